@@ -1,0 +1,1 @@
+"""What plugin authors import. Everything here is an interface."""

@@ -1,0 +1,148 @@
+"""The arbiter: what commands the behaviors of vehicles and payloads (paper, section 4.2).
+
+One object per registered name serves all its resources of a fleet. `m2pem.testing.ArbiterContract`
+checks every promise made here.
+"""
+
+from collections.abc import AsyncIterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.model.geometry import Geometry
+
+if TYPE_CHECKING:
+    import logging
+
+    from m2pem.api.bus import FleetBus
+    from m2pem.api.clock import Clock
+
+BehaviorId: TypeAlias = str
+"""Unique in a journal: "r1.b3" is the third behavior of run r1."""
+
+ResolvedValue: TypeAlias = float | int | bool | str | Geometry | None
+"""A parameter's value after units and names are resolved: SI numbers, texts, geometries."""
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """How a resource is reached: the fleet file's `connection`, and what it is.
+
+    `behaviors`: the names that the fleet allows; None means all that the arbiter offers.
+    `home`: where a simulated vehicle stands at first, in WGS-84 degrees and metres.
+    """
+
+    resource: ResourceId
+    domain: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    behaviors: tuple[str, ...] | None = None
+    detector: bool = False
+    lost_after_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ArbiterContext:
+    """What the executive lends to an arbiter. All time goes through `clock`.
+
+    `origin`: of the local ENU frame, (latitude in degrees, longitude in degrees, altitude in
+    metres). `teams`: members of each team, the lead first.
+    """
+
+    clock: "Clock"
+    bus: "FleetBus"
+    logger: "logging.Logger"
+    origin: tuple[float, float, float]
+    teams: Mapping[str, tuple[ResourceId, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """The bounds an arbiter promises for a resource, in seconds."""
+
+    lost_after_s: float = 3.0
+    hold_within_s: float = 1.0
+    cancel_timeout_s: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviorRequest:
+    """Start `behavior` on `resources`. `start` is idempotent on `id`.
+
+    `epoch` is the run's: an arbiter refuses one lower than it has seen for the run. `parameters`
+    are resolved: SI units, geometries instead of names. `preempts`: behaviors that are being
+    cancelled and still hold a resource; the new one takes over from them.
+    """
+
+    id: BehaviorId
+    epoch: int
+    behavior: str
+    parameters: Mapping[str, ResolvedValue]
+    resources: tuple[ResourceId, ...]
+    roles: Mapping[str, tuple[ResourceId, ...]] = field(default_factory=dict)
+    preempts: tuple[BehaviorId, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviorReport:
+    """What became of a behavior. `number` rises from 1 with each report of one behavior.
+
+    ACCEPTED comes before RUNNING, exactly one terminal state comes last. `code` is an error code
+    of FORMATS ("FAILED", "ROUTE_BLOCKED", ...), "" unless it failed; `reason` is for people.
+    `native_ref`: the arbiter's own name for it, handed back to `query` after a restart.
+    """
+
+    id: BehaviorId
+    number: int
+    state: BehaviorState
+    code: str = ""
+    reason: str = ""
+    native_ref: str | None = None
+
+
+class Arbiter(Protocol):
+    """Constructed as `Arbiter(connections: Mapping[ResourceId, Connection], context)`."""
+
+    def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+        """What the resource can do. Needs no connection and no transport library."""
+        ...
+
+    def limits(self, resource: ResourceId) -> Limits:
+        """The bounds that hold for the resource."""
+        ...
+
+    async def connect(self) -> None:
+        """Reach the resources. Returns when listening; a silent resource is not an error."""
+        ...
+
+    async def start(self, request: BehaviorRequest) -> None:
+        """Start a behavior. Everything that comes of it, a refusal too, is a report."""
+        ...
+
+    async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
+        """End a behavior; its report CANCELLED (or what it ended with) follows. Idempotent."""
+        ...
+
+    async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
+        """What has become of a behavior, by looking at the vehicle. UNKNOWN if it is not known."""
+        ...
+
+    async def hold(self, resource: ResourceId) -> None:
+        """Bring the resource to a safe stand-still, keeping its behavior for `resume`."""
+        ...
+
+    async def resume(self, resource: ResourceId) -> None:
+        """Go on with the behavior that `hold` interrupted."""
+        ...
+
+    def reports(self) -> AsyncIterator[BehaviorReport]:
+        """Reports as they come, for one reader, until `close`."""
+        ...
+
+    def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
+        """States as they come, for one reader, until `close`."""
+        ...
+
+    async def close(self) -> None:
+        """Let go of everything. Vehicles keep doing what they do."""
+        ...

@@ -1,0 +1,23 @@
+"""The fleet bus: telemetry of all resources, for arbiters, services and OCUs."""
+
+from collections.abc import AsyncIterator
+from typing import Protocol
+
+from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.model.catalogue import ResourceId
+
+
+class FleetBus(Protocol):
+    """Latest value of every resource, plus bounded subscriptions (the oldest is dropped)."""
+
+    def latest(self, resource: ResourceId) -> VehicleState | PayloadState | None:
+        """The newest state heard, or None before the first."""
+        ...
+
+    def publish(self, state: VehicleState | PayloadState) -> None:
+        """Make a state known; never blocks."""
+        ...
+
+    def subscribe(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
+        """States from now on, for one reader; `size` of them wait at most."""
+        ...

@@ -1,0 +1,204 @@
+"""MissionControl: the one face of the executive to operators, scripts and OCU plugins."""
+
+from collections.abc import AsyncIterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, Union
+
+from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.engine.records import Record
+from m2pem.findings import Finding
+from m2pem.model.behavior import Decision
+from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.model.values import Value
+
+if TYPE_CHECKING:
+    from m2pem.resources.fleet import Fleet
+
+RunId: TypeAlias = str
+"""r1, r2, ... in a journal."""
+
+
+class RunStatus(StrEnum):
+    """Where a run is. INTERRUPTED: it has not ended, and no executive drives it."""
+
+    RUNNING = "running"
+    PAUSED = "paused"
+    INTERRUPTED = "interrupted"
+    COMPLETED = "completed"
+    TERMINATED = "terminated"
+    FAILED = "failed"
+    STOPPED = "stopped"
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing more will happen in it."""
+        return self in (
+            RunStatus.COMPLETED,
+            RunStatus.TERMINATED,
+            RunStatus.FAILED,
+            RunStatus.STOPPED,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class RunSummary:
+    """One line of `m2pem runs`. Times are microseconds since the Unix epoch."""
+
+    run: RunId
+    mission: str
+    process: str
+    status: RunStatus
+    started_us: int
+    ended_us: int | None = None
+    records: int = 0
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class StampedRecord:
+    """A record with where it stands: `seq` counts from 1 in its run; `t_s` is mission time."""
+
+    run: RunId
+    seq: int
+    t_s: float
+    record: Record
+
+
+@dataclass(frozen=True, slots=True)
+class OpenPrompt:
+    """A question that stands. The first answer to it wins."""
+
+    run: RunId
+    prompt: str
+    element: str
+    text: str
+    decisions: tuple[Decision, ...]
+    role: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PromptClosed:
+    """A question no longer stands: `decision` and `by` are "" when it was withdrawn."""
+
+    run: RunId
+    prompt: str
+    decision: str = ""
+    by: str = ""
+
+
+Notice: TypeAlias = Union[StampedRecord, OpenPrompt, PromptClosed]
+"""What a subscriber gets, in order, after it was committed."""
+
+
+class MissionControl(Protocol):
+    """Every OCU, the command line and the web page use this, and nothing else of the executive.
+
+    `by` names who asked, and is journaled. Requests that cannot be met raise
+    `m2pem.errors.OperatorError` and change nothing.
+    """
+
+    async def start(
+        self,
+        mission: Path | str | bytes,
+        *,
+        process: str | None = None,
+        data: Mapping[str, Value] | None = None,
+        by: str = "",
+    ) -> RunId:
+        """Start a mission from a path, a `file:`/`http:` URL or BPMN bytes.
+
+        Raises:
+            MissionError: with every finding, when it is not well or does not fit the fleet.
+        """
+        ...
+
+    async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
+        """End every token, cancel every behavior."""
+        ...
+
+    async def pause(self, run: RunId, *, by: str = "") -> None:
+        """Hold every commanded resource and freeze timers."""
+        ...
+
+    async def resume(self, run: RunId, *, by: str = "") -> None:
+        """Go on after a pause."""
+        ...
+
+    async def signal(
+        self,
+        signal: str,
+        *,
+        run: RunId | None = None,
+        data: Mapping[str, Value] | None = None,
+        by: str = "",
+    ) -> None:
+        """Emit a signal, by its id, to one run or (None) to all."""
+        ...
+
+    async def message(
+        self, message: str, *, run: RunId, data: Mapping[str, Value] | None = None, by: str = ""
+    ) -> None:
+        """Send a message, by its id."""
+        ...
+
+    async def answer(self, run: RunId, prompt: str, decision: str, *, by: str = "") -> None:
+        """Answer a prompt. The first answer wins; a later one raises OperatorError."""
+        ...
+
+    async def set_geometry(
+        self, name: str, geometry: Mapping[str, Value], *, run: RunId | None = None, by: str = ""
+    ) -> None:
+        """Hand over a route, area or point (GeoJSON), to one run or to all, now and later."""
+        ...
+
+    def subscribe(self, run: RunId | None = None, size: int = 10_000) -> AsyncIterator[Notice]:
+        """What is committed from now on, and first the prompts that stand now."""
+        ...
+
+    def telemetry(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
+        """Telemetry from now on; the oldest waiting is dropped when a reader is slow."""
+        ...
+
+    async def records(
+        self, run: RunId, after_seq: int = 0, limit: int = 1000
+    ) -> Sequence[StampedRecord]:
+        """A page of a run's records."""
+        ...
+
+    async def runs(self) -> Sequence[RunSummary]:
+        """Every run of the journal."""
+        ...
+
+    def prompts(self) -> Sequence[OpenPrompt]:
+        """The prompts that stand now."""
+        ...
+
+    async def wait(self, run: RunId) -> RunSummary:
+        """Wait until the run has ended and its vehicles are released."""
+        ...
+
+    def fleet(self) -> "Fleet":
+        """The fleet in use."""
+        ...
+
+    def catalogue(self) -> Mapping[ResourceId, Sequence[BehaviorSpec]]:
+        """What every resource can do."""
+        ...
+
+    def check(self, mission: Path | str | bytes) -> Sequence[Finding]:
+        """All findings of `m2pem check` for a mission and the fleet in use."""
+        ...
+
+    async def simulate(self, mission: Path | str | bytes, **options: Any) -> "SimulationResult":
+        """Rehearse a mission on a virtual clock."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationResult:
+    """What a rehearsal did."""
+
+    summary: RunSummary
+    records: Sequence[StampedRecord] = field(default_factory=tuple)

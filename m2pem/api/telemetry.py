@@ -1,0 +1,73 @@
+"""What vehicles and payloads say about themselves, with frames and units in the names.
+
+Positions are WGS-84 (EPSG:4979): degrees, metres above mean sea level. Local vectors are ENU
+(REP-103). `yaw_rad` is from east, counter-clockwise (REP-103); headings for people are made of it.
+Telemetry is never journaled; `m2pem.gateway.watch` turns what matters into inputs.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from m2pem.model.catalogue import ResourceId
+
+
+@dataclass(frozen=True, slots=True)
+class GeoPosition:
+    """WGS-84 latitude and longitude in degrees, altitude in metres above mean sea level."""
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+
+
+class LinkState(StrEnum):
+    """Whether the vehicle is heard."""
+
+    CONNECTED = "connected"
+    DEGRADED = "degraded"
+    LOST = "lost"
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleState:
+    """A vehicle at one moment. None: not known. `time_us`: microseconds since the Unix epoch."""
+
+    resource: ResourceId
+    time_us: int
+    position: GeoPosition | None = None
+    altitude_above_home_m: float | None = None
+    velocity_enu_m_s: tuple[float, float, float] | None = None
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    yaw_rad: float | None = None
+    battery_fraction: float | None = None
+    mode: str = ""
+    armed: bool | None = None
+    ready: bool | None = None
+    not_ready_reasons: tuple[str, ...] = ()
+    link: LinkState = LinkState.CONNECTED
+    behavior: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """Something a detector payload found; the `Detector` service writes it to the data store."""
+
+    type: str
+    source: ResourceId
+    position: GeoPosition
+    time_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadState:
+    """A payload at one moment. `detections`: found since the last state."""
+
+    resource: ResourceId
+    time_us: int
+    pan_rad: float | None = None
+    tilt_rad: float | None = None
+    zoom: float | None = None
+    detections: tuple[Detection, ...] = ()
+    link: LinkState = LinkState.CONNECTED
+    behavior: str = ""

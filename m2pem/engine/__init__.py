@@ -1,0 +1,1 @@
+"""The token game: inputs -> records -> commands. Pure: no clock, no random, no I/O."""

@@ -1,0 +1,98 @@
+"""Commands: what the outside must do, derived from committed records and never stored.
+
+The executive carries them out after the commit; only `HoldResource`, `CancelBehavior` and what
+stops a run may go out before it.
+"""
+
+from dataclasses import dataclass
+from typing import TypeAlias, Union
+
+from m2pem.model.behavior import Decision
+from m2pem.model.values import Value
+
+
+@dataclass(frozen=True, slots=True)
+class StartBehavior:
+    """Start it on the arbiters of its resources; idempotent on `behavior`."""
+
+    behavior: str
+    epoch: int
+    type: str
+    name: str
+    resources: tuple[str, ...]
+    roles: dict[str, tuple[str, ...]]
+    parameters: dict[str, Value]
+    preempts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class CancelBehavior:
+    """End it; its terminal report releases the resources."""
+
+    behavior: str
+    epoch: int
+    resources: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HoldResource:
+    """Bring it to its safe state; needs no journal."""
+
+    resource: str
+
+
+@dataclass(frozen=True, slots=True)
+class ResumeResource:
+    """Let it go on with what it did before the hold."""
+
+    resource: str
+
+
+@dataclass(frozen=True, slots=True)
+class OpenPrompt:
+    """Ask the operators."""
+
+    prompt: str
+    element: str
+    text: str
+    decisions: tuple[Decision, ...]
+    role: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ClosePrompt:
+    """Take the question back, or tell who answered it (`by`) and how."""
+
+    prompt: str
+    decision: str = ""
+    by: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RunService:
+    """Run a registered service; answer with `ServiceCompleted` or `ServiceFailed`."""
+
+    service: str
+    name: str
+    element: str
+    roles: dict[str, tuple[str, ...]]
+    properties: dict[str, Value]
+
+
+@dataclass(frozen=True, slots=True)
+class CancelService:
+    """Nobody waits for it any more."""
+
+    service: str
+
+
+Command: TypeAlias = Union[
+    StartBehavior,
+    CancelBehavior,
+    HoldResource,
+    ResumeResource,
+    OpenPrompt,
+    ClosePrompt,
+    RunService,
+    CancelService,
+]

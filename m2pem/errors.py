@@ -1,0 +1,82 @@
+"""Every error that m2pem raises on purpose, in one tree.
+
+The class says whose fault it is, the message says where it is and what would be right:
+
+* `MissionError`, `FleetError`, `ExpressionSyntaxError`: what a person wrote is wrong;
+  the first two carry *every* finding at once.
+* `OperatorError`: a request that cannot be met now (unknown run, prompt already answered).
+* `PluginError`: a plugin broke its contract.
+* `JournalError`: the journal cannot be read or written.
+* `InternalError`: m2pem is wrong; please report it.
+
+Anything a running mission may handle (a behavior failed, a vehicle was lost, an expression
+divided by zero) is a record in the journal and never one of these.
+"""
+
+from collections.abc import Sequence
+
+from m2pem.findings import Finding
+
+
+class M2pemError(Exception):
+    """Root of the tree. `exit_status` is what the command line ends with."""
+
+    exit_status = 1
+
+
+class FindingsError(M2pemError):
+    """Something a person wrote cannot be used; `findings` lists all that is wrong with it."""
+
+    exit_status = 2
+
+    def __init__(self, what: str, findings: Sequence[Finding]) -> None:
+        self.what = what
+        self.findings = tuple(findings)
+        super().__init__("\n".join([what, *(str(finding) for finding in self.findings)]))
+
+
+class MissionError(FindingsError):
+    """The mission file cannot be loaded, or does not fit the fleet."""
+
+
+class FleetError(FindingsError):
+    """The fleet file, or a file that it names, cannot be used."""
+
+
+class ExpressionSyntaxError(M2pemError):
+    """An expression, duration or script line cannot be parsed.
+
+    `position` is the 0-based offset in `text` at which reading stopped.
+    """
+
+    exit_status = 2
+
+    def __init__(self, message: str, text: str, position: int) -> None:
+        self.message = message
+        self.text = text
+        self.position = position
+        super().__init__(f"{message} at column {position + 1} of {text!r}")
+
+
+class ExpressionError(M2pemError):
+    """Evaluating an expression failed. The engine turns it into BPMN error EXPRESSION."""
+
+
+class OperatorError(M2pemError):
+    """A request of an operator or script that cannot be met now; nothing was changed."""
+
+
+class PluginError(M2pemError):
+    """A plugin could not be loaded or broke its contract."""
+
+
+class JournalError(M2pemError):
+    """The journal cannot be opened, read or written."""
+
+
+class StaleEpochError(JournalError):
+    """Another executive has claimed the run since; this one must stop driving it."""
+
+
+class InternalError(M2pemError):
+    """A bug in m2pem: the run is held, nothing else is touched."""

@@ -1,0 +1,1 @@
+"""The asyncio shell: runs missions, dispatches to arbiters, answers operators."""

@@ -1,0 +1,41 @@
+"""A finding: one thing that is wrong, or doubtful, in a file that a person wrote."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Severity(StrEnum):
+    """An error stops the mission from starting; a warning does not (unless `--strict`)."""
+
+    ERROR = "error"
+    WARNING = "warning"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What is wrong, where, and what would be right.
+
+    `rule` is a short stable kebab-case name ("dangling-reference"), which docs and tests use.
+    `line` counts from 1; 0 means that no line applies. `element` is an id of the mission, or a
+    path into a fleet file ("vehicles.evsg1.arbiter"), or "".
+    """
+
+    severity: Severity
+    file: str
+    line: int
+    element: str
+    rule: str
+    message: str
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        where = f"{self.file}:{self.line}" if self.line else self.file
+        element = f" {self.element}:" if self.element else ""
+        remedy = f"; {self.remedy}" if self.remedy else ""
+        return f"{where}:{element} {self.severity.value}: {self.message}{remedy} [{self.rule}]"
+
+
+def has_errors(findings: Iterable[Finding]) -> bool:
+    """Whether any finding is an error."""
+    return any(finding.severity is Severity.ERROR for finding in findings)

@@ -1,0 +1,1 @@
+"""Telemetry of the fleet, and what of it becomes an input."""

@@ -1,0 +1,62 @@
+"""The hooks. A plugin is a distribution with an entry point in group `m2pem` to a module that
+marks functions of these names with `@m2pem.hookimpl`. Hooks are sync and hand in objects; traffic
+goes through the objects. Import your libraries inside the functions: starting up must stay fast.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+import pluggy
+
+if TYPE_CHECKING:
+    import click
+
+    from m2pem.api.arbiter import Arbiter
+    from m2pem.api.ocu import Ocu
+    from m2pem.api.service import Service
+    from m2pem.engine.records import Record
+    from m2pem.findings import Finding
+    from m2pem.model.elements import Mission
+    from m2pem.resources.fleet import Fleet
+
+hookspec = pluggy.HookspecMarker("m2pem")
+hookimpl = pluggy.HookimplMarker("m2pem")
+
+
+class Register(Protocol):
+    """Registers a factory under a name; a second one of the same name is an error."""
+
+    def __call__(self, name: str, factory: Callable[..., Any]) -> None:
+        """Register `factory` under `name`."""
+        ...
+
+
+@hookspec
+def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], None]") -> None:
+    """Register arbiters: `register("mavlink", MavlinkArbiter)`."""
+
+
+@hookspec
+def m2pem_register_ocus(register: "Callable[[str, Callable[..., Ocu]], None]") -> None:
+    """Register operator control units: `register("terminal", TerminalOcu)`."""
+
+
+@hookspec
+def m2pem_register_services(register: "Callable[[str, Callable[[], Service]], None]") -> None:
+    """Register service-task classes: `register("Detector", Detector)`."""
+
+
+@hookspec
+def m2pem_register_commands(cli: "click.Group") -> None:
+    """Add sub-commands to the command line."""
+
+
+@hookspec
+def m2pem_check_mission(mission: "Mission", fleet: "Fleet | None") -> "Sequence[Finding]":
+    """Return findings of your own for `m2pem check`."""
+    return ()
+
+
+@hookspec
+def m2pem_records_committed(run_id: str, records: "Sequence[Record]") -> None:
+    """Observe records after they were committed."""

@@ -1,0 +1,1 @@
+"""Where inputs and records are kept: memory, SQLite."""

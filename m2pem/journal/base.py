@@ -1,0 +1,107 @@
+"""The journal: every input and record of every run, durable before anything is dispatched.
+
+`JournalContract` checks every promise made here.
+"""
+
+from collections.abc import AsyncIterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from m2pem.engine.inputs import Input
+from m2pem.engine.records import Record, RunOutcome
+
+
+@dataclass(frozen=True, slots=True)
+class RunHeader:
+    """What a run needs to be rebuilt from nothing else: the mission and the fleet themselves.
+
+    `mission_name` is the file's name for people, `mission` its bytes; `fleet` is
+    `m2pem.resources.snapshot.dump(fleet)`, or b"" without one. `simulated`: every arbiter was
+    replaced by the simulated one; `speed`: of the clock against the wall clock.
+    """
+
+    mission_name: str
+    mission: bytes
+    process: str
+    fleet: bytes = b""
+    simulated: bool = False
+    speed: float = 1.0
+    created_us: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One input with the records that deciding it gave.
+
+    `seq` is the number of the first record (from 1 in each run; an entry always has at least one
+    record). `at_us`: when it was decided, microseconds since the Unix epoch. `t_us`: mission
+    time of its records, microseconds from the start.
+    """
+
+    run: str
+    epoch: int
+    seq: int
+    at_us: int
+    t_us: int
+    input: Input
+    records: tuple[Record, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RunLine:
+    """What the journal knows of a run without reading its records.
+
+    `driven`: an executive that is alive holds it. `outcome` None: not ended.
+    """
+
+    run: str
+    header: RunHeader
+    epoch: int
+    last_seq: int
+    started_us: int
+    driven: bool = False
+    paused: bool = False
+    outcome: RunOutcome | None = None
+    detail: str = ""
+    ended_us: int | None = None
+
+
+class Journal(Protocol):
+    """Opened by its constructor's `open` class method; one per executive."""
+
+    async def create(self, header: RunHeader) -> str:
+        """Make a run, durable on return, claimed with epoch 1; the id is r1, r2, ..."""
+        ...
+
+    async def claim(self, run: str) -> int:
+        """Take a run over: its epoch rises by one and is returned; older ones are shut out.
+
+        Raises:
+            JournalError: no such run, or an executive that is alive holds it (named).
+        """
+        ...
+
+    async def release(self, run: str) -> None:
+        """Let go of a run, so that another may claim it."""
+        ...
+
+    async def append(self, entries: Sequence[Entry]) -> None:
+        """Write entries; durable on return. Calls that wait together share one commit.
+
+        Raises:
+            StaleEpochError: the run was claimed by another since; nothing of the call is written.
+            JournalError: not written (disk full, ...); nothing of the call is written.
+        """
+        ...
+
+    def read(self, run: str, after_seq: int = 0) -> AsyncIterator[Entry]:
+        """Entries whose first record comes after `after_seq`, in order, in constant memory."""
+        ...
+
+    async def runs(self) -> Sequence[RunLine]:
+        """Every run, in order of its number."""
+        ...
+
+    async def close(self) -> None:
+        """Finish what is being written, let go of all runs."""
+        ...

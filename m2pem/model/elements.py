@@ -1,0 +1,322 @@
+"""The elements of a mission: a hierarchical graph, linked both ways, that never changes.
+
+A `Mission` holds processes; a process or subprocess (`Container`) holds flow nodes and sequence
+flows; a node knows its incoming and outgoing flows and its container. Elements are compared and
+hashed by identity. Links are set once, by `m2pem.model.bpmn`, before anybody sees the mission.
+
+Names are those of BPMN 2.0.2, chapter 10.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TypeAlias, Union
+
+from m2pem.findings import Finding
+from m2pem.model.behavior import Behavior, Mappings, Prompt, Script, ServiceCall
+from m2pem.model.events import (
+    Error,
+    Escalation,
+    EventDefinition,
+    Message,
+    Signal,
+)
+from m2pem.model.expression import Expression
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Element:
+    """Anything with an id in a mission. `line` is the line of its start tag, from 1."""
+
+    id: str
+    name: str
+    line: int
+
+    @property
+    def label(self) -> str:
+        """What to call the element in front of a person: its name, else its id."""
+        return self.name or self.id
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SequenceFlow(Element):
+    """A sequence flow (clause 8.4.13). `condition` None is true."""
+
+    condition: Expression | None = None
+    source: "FlowNode" = field(init=False, repr=False)
+    target: "FlowNode" = field(init=False, repr=False)
+    index: int = field(init=False, repr=False)
+    """Place in `Mission.flows`."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlowNode(Element):
+    """A node that tokens visit. Flows are in the order of the XML."""
+
+    incoming: "tuple[SequenceFlow, ...]" = field(init=False, repr=False, default=())
+    outgoing: "tuple[SequenceFlow, ...]" = field(init=False, repr=False, default=())
+    container: "Container" = field(init=False, repr=False)
+    index: int = field(init=False, repr=False)
+    """Place in `Mission.nodes`."""
+
+
+# --- containers ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DataObject(Element):
+    """A data object or property: declares the key `name or id` in its container's scope."""
+
+    @property
+    def key(self) -> str:
+        """The key in the data store (FORMATS: a property's or data object's name, else its id)."""
+        return self.name or self.id
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Process(Element):
+    """A process (clause 10.2). `executable` is the file's `isExecutable`."""
+
+    executable: bool = False
+    nodes: tuple[FlowNode, ...] = field(init=False, repr=False, default=())
+    flows: tuple[SequenceFlow, ...] = field(init=False, repr=False, default=())
+    data: tuple[DataObject, ...] = field(init=False, repr=False, default=())
+
+    @property
+    def process(self) -> "Process":
+        """The process itself; for a subprocess, the process that contains it."""
+        return self
+
+    @property
+    def starts(self) -> "tuple[StartEvent, ...]":
+        """Start events directly in this container, in the order of the XML."""
+        return tuple(node for node in self.nodes if isinstance(node, StartEvent))
+
+
+# --- activities ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Activity(FlowNode):
+    """Work (clause 10.3). `boundary`: events attached to it, in the order of the XML."""
+
+    default: SequenceFlow | None = field(init=False, repr=False, default=None)
+    boundary: "tuple[BoundaryEvent, ...]" = field(init=False, repr=False, default=())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task(Activity):
+    """A task without a type: done as soon as it is entered (clause 10.3.3)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ManualTask(Activity):
+    """Work outside any system's control: done as soon as it is entered."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UserTask(Activity):
+    """Asks an operator. `prompt` None: nothing to ask, but an operator must confirm it."""
+
+    prompt: Prompt | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScriptTask(Activity):
+    """Commands a behavior, or runs assignments; an empty script does neither."""
+
+    behavior: Behavior | None = None
+    script: Script | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ServiceTask(Activity):
+    """Runs a registered service, or commands a behavior (`m2pem:behavior`)."""
+
+    call: ServiceCall | None = None
+    behavior: Behavior | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SendTask(Activity):
+    """Sends a message, or commands a behavior (`m2pem:behavior`)."""
+
+    message: Message | None = None
+    behavior: Behavior | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReceiveTask(Activity):
+    """Waits for a message."""
+
+    message: Message | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CallActivity(Activity):
+    """Calls a process of the mission (clause 10.3.6). `called` is linked after all are read."""
+
+    called_id: str = ""
+    mappings: Mappings = field(default_factory=Mappings)
+    called: Process = field(init=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SubProcess(Activity):
+    """An embedded subprocess (clause 10.3.5); sees its parent's data."""
+
+    nodes: tuple[FlowNode, ...] = field(init=False, repr=False, default=())
+    flows: tuple[SequenceFlow, ...] = field(init=False, repr=False, default=())
+    data: tuple[DataObject, ...] = field(init=False, repr=False, default=())
+
+    @property
+    def process(self) -> Process:
+        """The process that contains it, at whatever depth."""
+        container: Container = self.container
+        while isinstance(container, SubProcess):
+            container = container.container
+        return container
+
+    @property
+    def starts(self) -> "tuple[StartEvent, ...]":
+        """Start events directly in this container, in the order of the XML."""
+        return tuple(node for node in self.nodes if isinstance(node, StartEvent))
+
+
+Container: TypeAlias = Union[Process, SubProcess]
+"""What holds flow nodes."""
+
+
+# --- gateways -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gateway(FlowNode):
+    """Controls flow (clause 10.6)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExclusiveGateway(Gateway):
+    """Takes the first true flow, else the default (clause 10.6.2)."""
+
+    default: SequenceFlow | None = field(init=False, repr=False, default=None)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InclusiveGateway(Gateway):
+    """Takes every true flow, else the default; joins what can still arrive (clause 10.6.3)."""
+
+    default: SequenceFlow | None = field(init=False, repr=False, default=None)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ParallelGateway(Gateway):
+    """Waits for every incoming flow, takes every outgoing one (clause 10.6.4)."""
+
+
+# --- events -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Event(FlowNode):
+    """An event (clause 10.5). No definition: a none event."""
+
+    definitions: tuple[EventDefinition, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StartEvent(Event):
+    """Where a container's tokens begin."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EndEvent(Event):
+    """Where a token ends, perhaps throwing something."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IntermediateCatchEvent(Event):
+    """Waits for its trigger."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IntermediateThrowEvent(Event):
+    """Throws, and goes on."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoundaryEvent(Event):
+    """Catches while its activity is active; `interrupting` is BPMN's cancelActivity."""
+
+    interrupting: bool = True
+    attached_to: Activity = field(init=False, repr=False)
+
+
+# --- the whole ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Participant(Element):
+    """A pool; no effect on execution."""
+
+    process_id: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MessageFlow(Element):
+    """A message flow between pools, by the ids at its ends; kept for display."""
+
+    source_id: str = ""
+    target_id: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lane(Element):
+    """A lane; no effect on execution. `node_ids`: what it shows."""
+
+    process_id: str = ""
+    node_ids: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mission:
+    """A whole BPMN file, ready to run.
+
+    `file` is its name for findings; `source` its bytes, kept for the journal. `nodes` and `flows`
+    list all of them, of all containers; `element.index` is the place there. `processes` are in
+    the order of the XML.
+    """
+
+    file: str
+    source: bytes = field(repr=False)
+    processes: tuple[Process, ...]
+    nodes: tuple[FlowNode, ...] = field(repr=False)
+    flows: tuple[SequenceFlow, ...] = field(repr=False)
+    signals: Mapping[str, Signal]
+    messages: Mapping[str, Message]
+    errors: Mapping[str, Error]
+    escalations: Mapping[str, Escalation]
+    participants: tuple[Participant, ...] = ()
+    message_flows: tuple[MessageFlow, ...] = ()
+    lanes: tuple[Lane, ...] = ()
+    warnings: tuple[Finding, ...] = ()
+    elements: Mapping[str, Element] = field(default_factory=dict, repr=False)
+    """Processes, flow nodes and sequence flows by id."""
+
+    def process(self, process_id: str | None = None) -> Process:
+        """The process a run begins with: the one named, else the file's main one.
+
+        The main one is the first that no call activity of the file calls, among those with
+        `isExecutable="true"`, or among all when none is so marked.
+
+        Raises:
+            KeyError: no process has that id.
+        """
+        if process_id is not None:
+            return {process.id: process for process in self.processes}[process_id]
+        called = {node.called_id for node in self.nodes if isinstance(node, CallActivity)}
+        candidates = [p for p in self.processes if p.executable] or list(self.processes)
+        return next((p for p in candidates if p.id not in called), candidates[0])
+
+    def activities(self) -> Iterator[Activity]:
+        """Every activity, in the order of the XML."""
+        return (node for node in self.nodes if isinstance(node, Activity))

@@ -1,0 +1,95 @@
+"""Event definitions and the root elements they refer to (BPMN 2.0.2, clauses 8.4 and 10.5.5)."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from m2pem.model.expression import Expression
+
+
+@dataclass(frozen=True, slots=True)
+class RootElement:
+    """An element of `definitions` that event definitions refer to by id."""
+
+    id: str
+    name: str
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Signal(RootElement):
+    """A broadcast (clause 10.5.5). `from_operator`: operators are expected to send it."""
+
+    from_operator: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Message(RootElement):
+    """Something sent to one receiver (clause 8.4.11). `from_operator` as for signals."""
+
+    from_operator: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Error(RootElement):
+    """What an activity can end with when it fails (clause 8.4.8). `code` defaults to the id."""
+
+    code: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Escalation(RootElement):
+    """A non-critical notice to an outer scope (clause 8.4.8). `code` defaults to the id."""
+
+    code: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class EventDefinition:
+    """What triggers, or results from, an event."""
+
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class SignalEventDefinition(EventDefinition):
+    signal: Signal
+
+
+@dataclass(frozen=True, slots=True)
+class MessageEventDefinition(EventDefinition):
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorEventDefinition(EventDefinition):
+    """`error` None catches every error; a throw always names one."""
+
+    error: Error | None
+
+
+@dataclass(frozen=True, slots=True)
+class EscalationEventDefinition(EventDefinition):
+    """`escalation` None catches every escalation; a throw always names one."""
+
+    escalation: Escalation | None
+
+
+class TimerKind(StrEnum):
+    """The three ways to say when (BPMN 2.0.2, table 10.101)."""
+
+    DATE = "timeDate"
+    DURATION = "timeDuration"
+    CYCLE = "timeCycle"
+
+
+@dataclass(frozen=True, slots=True)
+class TimerEventDefinition(EventDefinition):
+    """`expression` evaluates to ISO 8601 text; `m2pem.model.duration` reads it."""
+
+    kind: TimerKind
+    expression: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class TerminateEventDefinition(EventDefinition):
+    """Ends its own scope at once (clause 13.5.6)."""

@@ -1,0 +1,42 @@
+"""Routes, areas and points as missions and arbiters see them: named WGS-84 geometries."""
+
+from dataclasses import dataclass
+from typing import TypeAlias, Union
+
+Coordinate: TypeAlias = tuple[float, float, float | None]
+"""(latitude in degrees, longitude in degrees, altitude in metres or None when not given)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One position. `altitude_frame` is "relative" (to home), "amsl" or "terrain"."""
+
+    position: Coordinate
+    altitude_frame: str = "relative"
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """Waypoints in order (a GeoJSON LineString)."""
+
+    waypoints: tuple[Coordinate, ...]
+    altitude_frame: str = "relative"
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """A polygon: outer ring, then holes; each ring closed (first coordinate repeated last)."""
+
+    rings: tuple[tuple[Coordinate, ...], ...]
+    altitude_frame: str = "relative"
+
+
+@dataclass(frozen=True, slots=True)
+class VehiclePosition:
+    """Where a vehicle of the fleet is, whenever it is asked for: a moving target."""
+
+    vehicle: str
+
+
+Geometry: TypeAlias = Union[Point, Route, Area, VehiclePosition]
+"""What a geometry parameter resolves to."""

@@ -1,0 +1,10 @@
+"""The values a mission's data store holds: what JSON can say, with exact 64-bit integers."""
+
+from collections.abc import Callable
+from typing import TypeAlias, Union
+
+Value: TypeAlias = Union[bool, int, float, str, list["Value"], dict[str, "Value"], None]
+"""A value of the data store. Lists and maps are never changed in place once written."""
+
+ReadValue: TypeAlias = Callable[[str], Value]
+"""Reads the value under a dotted name; a name that is not in the store is None (null)."""

@@ -1,0 +1,1 @@
+"""The built-in simulated arbiter: vehicles and payloads on any clock."""
