@@ -1,0 +1,101 @@
+"""How entries, records and the names of runs are written, in the journal and for people.
+
+An entry's input and records are one JSON text, `[input, [record, ...]]`, and come back as exactly
+equal objects. JSON because a journal outlives the program that wrote it: `sqlite3` and `jq` read it.
+"""
+
+import re
+from typing import Any, TypeAlias, get_args, get_origin
+
+import msgspec
+
+from m2pem.engine.inputs import Input
+from m2pem.engine.records import Record
+from m2pem.errors import InternalError, JournalError
+from m2pem.journal.base import Entry
+from m2pem.model.values import Value
+
+# 18 digits: what the 64-bit keys of a database hold.
+_RUN_ID = re.compile(r"r[1-9][0-9]{0,17}")
+
+Body: TypeAlias = tuple[Input, tuple[Record, ...]]
+
+
+def _without_recursion(annotation: Any) -> Any:
+    """Replace `Value` by any JSON, which is what it is: msgspec can't follow a recursive alias."""
+    if annotation == Value:
+        return Any
+    arguments = get_args(annotation)
+    if Value in arguments:
+        return get_origin(annotation)[tuple(Any if a == Value else a for a in arguments)]
+    return annotation
+
+
+for _struct in (*get_args(Input), *get_args(Record)):
+    for _name, _annotation in _struct.__annotations__.items():
+        _struct.__annotations__[_name] = _without_recursion(_annotation)
+
+_decoder: msgspec.json.Decoder[Body] = msgspec.json.Decoder(tuple[Input, tuple[Record, ...]])
+_encoder = msgspec.json.Encoder()
+
+
+def encode_body(entry: Entry) -> bytes:
+    """The input and records of an entry as JSON.
+
+    Raises:
+        InternalError: a value is not one that JSON can say (NaN, infinity, half a surrogate pair).
+    """
+    content = (entry.input, entry.records)
+    try:
+        body = _encoder.encode(content)
+        # msgspec writes NaN and infinities as null; a journal that reads back differently is none.
+        exact = b"null" not in body or _decoder.decode(body) == content
+    except (TypeError, ValueError, OverflowError, RecursionError) as error:
+        raise InternalError(f"{entry.run}, record {entry.seq}: cannot be written: {error}") from error
+    if not exact:
+        raise InternalError(
+            f"{entry.run}, record {entry.seq}: cannot be written: a value is not a finite number"
+        )
+    return body
+
+
+def decode_body(body: bytes | str) -> Body:
+    """The input and records that `encode_body` wrote.
+
+    Raises:
+        JournalError: the text is damaged, or of a newer m2pem that has other records.
+    """
+    try:
+        return _decoder.decode(body)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise JournalError(f"damaged, or written by a newer m2pem: {error}") from error
+
+
+def record_line(run: str, seq: int, t_us: int, record: Record) -> bytes:
+    """A record as the one line of JSON that people and scripts read; no newline at the end.
+
+    `t_us` is its mission time in microseconds; the line has it in seconds, under "t".
+    """
+    head = _encoder.encode({"run": run, "seq": seq, "t": t_us / 1_000_000})
+    return head[:-1] + b"," + _encoder.encode(record)[1:]
+
+
+def run_id(number: int) -> str:
+    """The name of a journal's `number`th run: r1, r2, ..."""
+    return f"r{number}"
+
+
+def run_number(run: str) -> int:
+    """The number of a run's name.
+
+    Raises:
+        JournalError: it is not a run's name.
+    """
+    if not _RUN_ID.fullmatch(run):
+        raise unknown_run(run)
+    return int(run[1:])
+
+
+def unknown_run(run: str) -> JournalError:
+    """What to raise about a run that the journal does not have."""
+    return JournalError(f"the journal has no run {run!r}; `m2pem runs` lists what it has")

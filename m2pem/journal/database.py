@@ -1,0 +1,101 @@
+"""The SQLite file of a journal: making and opening it, and its errors in plain words."""
+
+import os
+import sqlite3
+from pathlib import Path
+from urllib.parse import quote
+
+from m2pem.errors import JournalError
+from m2pem.journal.migrations import check, migrate
+
+BUSY_TIMEOUT_S = 5.0
+
+
+def open_for_writing(path: Path) -> sqlite3.Connection:
+    """Open a journal's file, making it and its tables where they are missing.
+
+    The connection may be handed to one other thread. A new file is readable by its owner alone:
+    missions and fleets tell where vehicles are.
+
+    Raises:
+        JournalError: there is no such folder, no permission, it is not a journal, ...
+    """
+    try:
+        if path.is_dir():
+            raise JournalError(f"{path} is a folder; name a file in it")
+        os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
+    except FileNotFoundError as error:
+        raise JournalError(f"{path}: the folder {path.parent} does not exist; make it") from error
+    except OSError as error:
+        raise JournalError(f"{path} cannot be opened for writing: {error.strerror}") from error
+    try:
+        connection = _connect(path)
+        try:
+            # Before anything is changed: turning WAL on would already mark a foreign database.
+            check(connection, path)
+            (mode,) = connection.execute("PRAGMA journal_mode = WAL").fetchone()
+            if mode != "wal":
+                raise JournalError(f"{path}: this file system can't carry a write-ahead log")
+            connection.execute("PRAGMA synchronous = FULL")
+            migrate(connection, path)
+        except BaseException:
+            connection.close()
+            raise
+    except sqlite3.Error as error:
+        raise in_plain_words(error, path) from error
+    return connection
+
+
+def open_for_reading(path: Path) -> sqlite3.Connection:
+    """Open a second connection to a journal's file, which refuses to write."""
+    try:
+        connection = _connect(path)
+        connection.execute("PRAGMA query_only = ON")
+    except sqlite3.Error as error:
+        raise in_plain_words(error, path) from error
+    return connection
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    # mode=rw: never make a file, so that its permissions are those given above.
+    return sqlite3.connect(
+        f"file:{quote(str(path))}?mode=rw",
+        uri=True,
+        timeout=BUSY_TIMEOUT_S,
+        isolation_level=None,
+        check_same_thread=False,
+    )
+
+
+_WORDS = {
+    sqlite3.SQLITE_FULL: "the disk is full; make room",
+    sqlite3.SQLITE_READONLY: "it, its folder or its file system can only be read; allow writing",
+    sqlite3.SQLITE_NOTADB: "it is not a journal of m2pem, nor any SQLite database",
+    sqlite3.SQLITE_CORRUPT: "it is damaged; use a copy, or save what can be read with "
+    "`sqlite3 FILE .recover`",
+    sqlite3.SQLITE_BUSY: f"another program has kept it locked for {BUSY_TIMEOUT_S:g} s; end that",
+    sqlite3.SQLITE_CANTOPEN: "it cannot be opened; check the permissions of it and its folder",
+    sqlite3.SQLITE_IOERR: "the disk failed to read or write",
+}
+
+_PASSING = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_BUSY)
+
+
+def in_plain_words(error: sqlite3.Error, path: Path) -> JournalError:
+    """What went wrong with a journal's file, and what to do about it."""
+    words = _WORDS.get(_primary_code(error), "SQLite refused")
+    name = getattr(error, "sqlite_errorname", type(error).__name__)
+    return JournalError(f"{path}: {words} ({error}, {name})")
+
+
+def passes(error: sqlite3.Error) -> bool:
+    """Whether nothing of the transaction was written for certain, and a later one may succeed.
+
+    After a failed write or fsync neither is known: the kernel may have dropped what it could not
+    write, and a second fsync would say that all is well.
+    """
+    return _primary_code(error) in _PASSING
+
+
+def _primary_code(error: sqlite3.Error) -> int:
+    return int(getattr(error, "sqlite_errorcode", 0)) & 0xFF

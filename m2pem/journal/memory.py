@@ -1,0 +1,125 @@
+"""The journal in memory: for simulation, tests and missions that need no resume."""
+
+import os
+from bisect import bisect_right
+from collections.abc import AsyncIterator, Sequence
+from dataclasses import dataclass, field
+from operator import attrgetter
+
+from m2pem.errors import InternalError, JournalError
+from m2pem.journal.base import Entry, RunHeader, RunLine
+from m2pem.journal.codec import run_id, run_number, unknown_run
+from m2pem.journal.standing import Standing
+
+_BATCH_ENTRIES = 500
+
+
+@dataclass(slots=True)
+class _Run:
+    header: RunHeader
+    standing: Standing
+    driven: bool = True
+    entries: list[Entry] = field(default_factory=list)
+    dropped_seq: int = 0
+
+
+class MemoryJournal:
+    """Promises what the others promise, until the process ends.
+
+    `keep`: how many of a run's last entries are kept for certain (at most twice as many are held),
+    for long runs that nobody reads; None: all.
+    """
+
+    def __init__(self, keep: int | None = None) -> None:
+        self._keep = keep
+        self._runs: list[_Run] = []
+        self._closed = False
+
+    async def create(self, header: RunHeader) -> str:
+        """See `Journal.create`."""
+        self._check_open()
+        standing = Standing(epoch=1, pid=os.getpid(), started_us=header.created_us)
+        self._runs.append(_Run(header, standing))
+        return run_id(len(self._runs))
+
+    async def claim(self, run: str) -> int:
+        """See `Journal.claim`."""
+        found = self._find(run)
+        if found.driven:
+            raise JournalError(f"run {run} is already driven, by this process ({os.getpid()})")
+        found.driven = True
+        found.standing = found.standing.claimed(os.getpid())
+        return found.standing.epoch
+
+    async def release(self, run: str) -> None:
+        """See `Journal.release`."""
+        self._find(run).driven = False
+
+    async def append(self, entries: Sequence[Entry]) -> None:
+        """See `Journal.append`."""
+        self._check_open()
+        changed: dict[str, Standing] = {}
+        for entry in entries:
+            before = changed.get(entry.run) or self._find(entry.run).standing
+            changed[entry.run] = before.after(entry)
+        for run in changed:
+            if not self._find(run).driven:
+                raise InternalError(f"{run}: written to without having been claimed")
+        for run, standing in changed.items():
+            self._find(run).standing = standing
+        for entry in entries:
+            self._keep_entry(self._find(entry.run), entry)
+
+    def _keep_entry(self, run: _Run, entry: Entry) -> None:
+        run.entries.append(entry)
+        # At twice as many, so that dropping costs nothing per entry.
+        if self._keep is not None and len(run.entries) > 2 * self._keep:
+            surplus = len(run.entries) - self._keep
+            run.dropped_seq = run.entries[surplus - 1].seq
+            del run.entries[:surplus]
+
+    async def read(self, run: str, after_seq: int = 0) -> AsyncIterator[Entry]:
+        """See `Journal.read`.
+
+        Raises:
+            JournalError: there is no such run, or `keep` has dropped some of what is asked for.
+        """
+        found = self._find(run)
+        while batch := self._batch(found, run, after_seq):
+            for entry in batch:
+                yield entry
+            after_seq = batch[-1].seq
+
+    def _batch(self, found: _Run, run: str, after_seq: int) -> Sequence[Entry]:
+        if after_seq < found.dropped_seq:
+            raise JournalError(
+                f"run {run}: only what comes after record {found.dropped_seq} was kept "
+                f"(the journal in memory keeps {self._keep} entries)"
+            )
+        first = bisect_right(found.entries, after_seq, key=attrgetter("seq"))
+        return found.entries[first : first + _BATCH_ENTRIES]
+
+    async def runs(self) -> Sequence[RunLine]:
+        """See `Journal.runs`."""
+        self._check_open()
+        return [
+            found.standing.line(run_id(number), found.header, found.driven)
+            for number, found in enumerate(self._runs, 1)
+        ]
+
+    async def close(self) -> None:
+        """See `Journal.close`."""
+        self._closed = True
+        for found in self._runs:
+            found.driven = False
+
+    def _find(self, run: str) -> _Run:
+        self._check_open()
+        number = run_number(run)
+        if number > len(self._runs):
+            raise unknown_run(run)
+        return self._runs[number - 1]
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise JournalError("the journal has been closed")

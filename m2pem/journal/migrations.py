@@ -1,0 +1,92 @@
+"""The tables of the SQLite journal, as the steps that made them what they are.
+
+A step that was released is never changed; what has to change becomes a new step at the end of
+`MIGRATIONS`. `PRAGMA user_version` is how many of them a database has had.
+"""
+
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+
+from m2pem.errors import JournalError
+
+APPLICATION_ID = 0x6D327065
+"""What tells a journal from another program's database: "m2pe"."""
+
+
+def runs_standings_and_entries(connection: sqlite3.Connection) -> None:
+    """0.1: runs never change; where one stands is a row of its own, small and often rewritten."""
+    connection.execute(
+        """CREATE TABLE runs (
+            run INTEGER PRIMARY KEY,
+            mission_name TEXT NOT NULL,
+            mission BLOB NOT NULL,
+            process TEXT NOT NULL,
+            fleet BLOB NOT NULL,
+            simulated INTEGER NOT NULL,
+            speed REAL NOT NULL,
+            created_us INTEGER NOT NULL
+        )"""
+    )
+    connection.execute(
+        """CREATE TABLE standings (
+            run INTEGER PRIMARY KEY REFERENCES runs,
+            epoch INTEGER NOT NULL,
+            pid INTEGER NOT NULL,
+            started_us INTEGER NOT NULL,
+            last_seq INTEGER NOT NULL,
+            paused INTEGER NOT NULL,
+            outcome TEXT,
+            detail TEXT NOT NULL,
+            ended_us INTEGER
+        )"""
+    )
+    connection.execute(
+        """CREATE TABLE entries (
+            run INTEGER NOT NULL REFERENCES runs,
+            seq INTEGER NOT NULL,
+            epoch INTEGER NOT NULL,
+            at_us INTEGER NOT NULL,
+            t_us INTEGER NOT NULL,
+            body TEXT NOT NULL,
+            PRIMARY KEY (run, seq)
+        ) WITHOUT ROWID"""
+    )
+
+
+MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (runs_standings_and_entries,)
+
+
+def check(connection: sqlite3.Connection, path: Path) -> None:
+    """Refuse a database that is not a journal, or of a newer m2pem. Changes nothing."""
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    if application != APPLICATION_ID and (application or version or tables):
+        raise JournalError(f"{path} is a database of another program, not a journal of m2pem")
+    if version > len(MIGRATIONS):
+        raise JournalError(
+            f"{path} was written by a newer m2pem (format {version}; this one knows up to "
+            f"{len(MIGRATIONS)}): upgrade m2pem, or use another journal"
+        )
+
+
+def migrate(connection: sqlite3.Connection, path: Path) -> None:
+    """Bring the tables up to date, in one transaction. A new database gets all of them.
+
+    Raises:
+        JournalError: it is not a journal, or a newer one.
+    """
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        check(connection, path)
+        (version,) = connection.execute("PRAGMA user_version").fetchone()
+        for step in MIGRATIONS[version:]:
+            step(connection)
+        # PRAGMA takes no parameters.
+        connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+        connection.execute(f"PRAGMA user_version = {len(MIGRATIONS)}")
+        connection.execute("COMMIT")
+    except BaseException:
+        connection.execute("ROLLBACK")
+        raise
