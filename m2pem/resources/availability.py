@@ -32,7 +32,7 @@ class Availability:
         self._unavailable[resource] = reason
 
     def restore(self, resource: ResourceId) -> None:
-        """The resource may be given to behaviors again; also when a manned vehicle is handed over."""
+        """Behaviors may get the resource again; a manned vehicle, too, once it is handed over."""
         self._unavailable.pop(resource, None)
 
     def reason(self, resource: ResourceId) -> str:
