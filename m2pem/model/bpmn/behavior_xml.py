@@ -43,13 +43,13 @@ class BehaviorReader:
             elif what == "properties":
                 parameters += self._parameters(child)
             elif what == "resources":
-                roles += self._roles(child)
+                roles += self._resources(child)
             elif what == "role":
                 self._misplaced(child, "role", "resources")
             else:
                 self._unknown_child(child, "behavior", ("property", "properties", "resources"))
-        self._refuse_repeated(parameters, "parameter")
-        self._refuse_repeated(roles, "role")
+        self.refuse_repeated(parameters, "parameter")
+        self.refuse_repeated(roles, "role")
         return self._finish(element, head, parameters, roles)
 
     def _finish(
@@ -101,17 +101,17 @@ class BehaviorReader:
         for child in self._children(element):
             what = local(child.tag)
             if what == "property":
-                parameters += self._parameter(child)
+                parameters += self.one_parameter(child)
             elif what == "role":
                 roles += self._role(child)
             elif what == "properties":
                 parameters += self._parameters(child)
             elif what == "resources":
-                roles += self._roles(child)
+                roles += self._resources(child)
             else:
                 self._unknown_child(child, "service", ("property", "role"))
-        self._refuse_repeated(parameters, "property")
-        self._refuse_repeated(roles, "role")
+        self.refuse_repeated(parameters, "property")
+        self.refuse_repeated(roles, "role")
         name = (_attribute(element, "class") or "").strip()
         line = self._line(element)
         if not name:
@@ -128,16 +128,15 @@ class BehaviorReader:
         result: list[Parameter] = []
         for child in self._children(element):
             if local(child.tag) == "property":
-                result += self._parameter(child)
+                result += self.one_parameter(child)
             else:
                 self._unknown_child(child, "properties", ("property",))
         return result
 
-    def _parameter(self, element: etree._Element) -> list[Parameter]:
-        return self.parameter(element, _attribute(element, "name"), _value_text(element))
-
-    def parameter(self, element: etree._Element, name: str | None, text: str) -> list[Parameter]:
-        """One parameter, or none when a finding says why."""
+    def one_parameter(self, element: etree._Element) -> list[Parameter]:
+        """A `<property>`; nothing when a finding says why."""
+        name = _attribute(element, "name")
+        text = _value_text(element)
         self._check_attributes(element, frozenset({"name", "value", "id"}))
         line = self._line(element)
         if not name:
@@ -146,19 +145,21 @@ class BehaviorReader:
                 'write <property name="speed" value="2 m/s"/>',
             )
             return []
-        if "${" not in text and not text.lstrip().startswith("="):
+        if "{" not in text and not text.lstrip().startswith("="):
             return [Parameter(name, text, line)]
         value = self._reading.template(line, self._task, text)
         return [] if value is None else [Parameter(name, value, line)]
 
-    def _roles(self, element: etree._Element) -> list[Role]:
-        result: list[Role] = []
-        for child in self._children(element):
-            if local(child.tag) == "role":
-                result += self._role(child)
-            else:
+    def _resources(self, element: etree._Element) -> list[Role]:
+        children = list(self._children(element))
+        for child in children:
+            if local(child.tag) != "role":
                 self._unknown_child(child, "resources", ("role",))
-        return result
+        return self.roles([child for child in children if local(child.tag) == "role"])
+
+    def roles(self, elements: list[etree._Element]) -> list[Role]:
+        """The roles that some `<role>` elements say, without those that findings refuse."""
+        return [role for element in elements for role in self._role(element)]
 
     def _role(self, element: etree._Element) -> list[Role]:
         line = self._line(element)
@@ -220,7 +221,8 @@ class BehaviorReader:
                     did_you_mean(name, known, "delete it"),
                 )
 
-    def _refuse_repeated(self, items: list[Named], what: str) -> None:
+    def refuse_repeated(self, items: list[Named], what: str) -> None:
+        """Say which names stand there more than once."""
         seen: set[str] = set()
         for item in items:
             if item.name in seen:

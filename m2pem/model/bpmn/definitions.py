@@ -5,10 +5,12 @@ from typing import TypeVar
 
 from lxml import etree
 
+from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.model.bpmn.names import a, local
 from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.reading import MessageUse, Reading, reference, text_of
 from m2pem.model.bpmn.scan import Scan, scan
+from m2pem.model.duration import cycle, date_us, duration_us
 from m2pem.model.events import (
     Error,
     ErrorEventDefinition,
@@ -24,6 +26,7 @@ from m2pem.model.events import (
     TimerEventDefinition,
     TimerKind,
 )
+from m2pem.model.values import Value
 
 Root = TypeVar("Root", bound=RootElement)
 
@@ -130,6 +133,7 @@ def _nameless(reading: Reading, event: Scan, what: str, *, catches: bool) -> Non
 _TIMES = {kind.value: kind for kind in TimerKind}
 
 
+
 def _timer(
     reading: Reading, element: etree._Element, identifier: str
 ) -> TimerEventDefinition | None:
@@ -151,4 +155,20 @@ def _timer(
     expression = reading.template(times[0], identifier, text)
     if expression is None:
         return None
-    return TimerEventDefinition(reading.report.line(element), _TIMES[name], expression)
+    kind = _TIMES[name]
+    if expression.constant:
+        try:
+            _CHECKS[kind](expression.evaluate(lambda _: None))
+        except (ExpressionSyntaxError, ExpressionError) as error:
+            reading.report.error(
+                times[0], identifier, "timer-time", f"{name}: {error}", "write it as ISO 8601"
+            )
+            return None
+    return TimerEventDefinition(reading.report.line(element), kind, expression)
+
+
+_CHECKS: dict[TimerKind, Callable[[Value], object]] = {
+    TimerKind.DATE: date_us,
+    TimerKind.DURATION: lambda text: duration_us(text, 0),
+    TimerKind.CYCLE: cycle,
+}

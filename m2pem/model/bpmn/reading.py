@@ -128,6 +128,7 @@ class Reading:
     calls: list[PendingCall] = field(default_factory=list)
     written: list[Association] = field(default_factory=list)
     """Data output associations of all activities and events."""
+    written_keys: set[str] = field(default_factory=set)
     message_uses: list[MessageUse] = field(default_factory=list)
     self_starting: set[FlowNode] = field(default_factory=set)
     """Refused nodes that need no incoming flow (event subprocesses, link targets, ...)."""
@@ -186,6 +187,20 @@ class Reading:
                     did_you_mean(local(key), M2PEM_ATTRIBUTES, "delete it"),
                 )
 
+    def note_outputs(self, elements: list[etree._Element]) -> list[Association]:
+        """Keep data output associations: they say what the element writes."""
+        found = [association(each) for each in elements]
+        self.written += found
+        return found
+
+    def data_key(self, identifier: str) -> str:
+        """The key of a data object, property, data store or reference to one; "" for others."""
+        end = self.data.get(identifier)
+        if end is None:
+            return ""
+        target = self.data.get(end.refers_to, end)
+        return target.declared.key if target.declared is not None else target.key
+
     def boolean(self, element: etree._Element, name: str, default: bool, identifier: str) -> bool:
         """An attribute of XML Schema's type boolean."""
         text = element.get(name)
@@ -236,6 +251,22 @@ class Reading:
             f"not an expression: {error}",
             "write for example user.decision == 'continue' (docs/conditions.md)",
         )
+
+
+def association(element: etree._Element) -> Association:
+    """A data input or output association."""
+    sources: list[str] = []
+    target = ""
+    simple = True
+    for child in element:
+        name = local(child.tag)
+        if name == "sourceRef":
+            sources.append(reference(text_of(child)))
+        elif name == "targetRef":
+            target = reference(text_of(child))
+        elif name in ("assignment", "transformation"):
+            simple = False
+    return Association(element, sources, target, simple and len(sources) <= 1)
 
 
 def text_of(element: etree._Element) -> str:

@@ -2,12 +2,12 @@
 
 from lxml import etree
 
+from m2pem.model.bpmn.collaboration import read_collaboration
 from m2pem.model.bpmn.names import BPMN, M2PEM, a, kind, local
 from m2pem.model.bpmn.near import did_you_mean
-from m2pem.model.bpmn.reading import DataEnd, Reading, reference
+from m2pem.model.bpmn.reading import DataEnd, Reading
 from m2pem.model.bpmn.scan import Order, scan
 from m2pem.model.bpmn.schema import ROOT_NAMES, SHAPES
-from m2pem.model.elements import MessageFlow, Participant
 from m2pem.model.events import Error, Escalation, Message, Signal
 
 PROCESS = BPMN + "process"
@@ -35,7 +35,7 @@ def read_roots(reading: Reading, definitions: etree._Element) -> list[etree._Ele
         if tag == PROCESS:
             processes.append(element)
         elif name == "collaboration":
-            _read_collaboration(reading, element)
+            read_collaboration(reading, element)
         elif name.endswith("EventDefinition"):
             if element.get("id"):
                 reading.event_definitions[reading.claim(element)] = element
@@ -112,29 +112,3 @@ def _refuse_choreography(reading: Reading, element: etree._Element) -> None:
         f"m2pem does not execute {a(word)} yet",
         "draw the mission as processes and collaborations",
     )
-
-
-def _read_collaboration(reading: Reading, collaboration: etree._Element) -> None:
-    reading.optional_id(collaboration)
-    for element in collaboration:
-        name = local(element.tag) if element.tag.startswith(BPMN) else ""
-        if name == "participant":
-            identifier = reading.optional_id(element)
-            scan(reading, element, identifier)
-            process_id = reference(element.get("processRef", ""))
-            reading.participants.append(
-                Participant(
-                    identifier, element.get("name", ""), reading.report.line(element), process_id
-                )
-            )
-        elif name == "messageFlow":
-            identifier = reading.optional_id(element)
-            scan(reading, element, identifier)
-            flow = MessageFlow(
-                identifier,
-                element.get("name", ""),
-                reading.report.line(element),
-                reference(element.get("sourceRef", "")),
-                reference(element.get("targetRef", "")),
-            )
-            reading.message_flows.append((flow, reference(element.get("messageRef", ""))))

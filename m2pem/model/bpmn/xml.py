@@ -58,8 +58,10 @@ class Document:
     line: Callable[[etree._Element], int]
 
 
-def parse_xml(data: bytes) -> Document:
+def parse_xml(data: bytes, *, declared: bool = True) -> Document:
     """Parse a document; comments and processing instructions are dropped.
+
+    Unless `declared`, the data is UTF-8 whatever its XML declaration says.
 
     Raises:
         XmlError: too large, wrongly encoded, with a DOCTYPE, too deep or not well-formed.
@@ -71,7 +73,7 @@ def parse_xml(data: bytes) -> Document:
             f"the file has {len(data):,} bytes, more than the {MAX_BYTES:,} that m2pem reads",
             "split the mission into several files",
         )
-    text = _decode(data)
+    text = _decode(data) if declared else data.decode()
     _refuse_doctype(text)
     utf8 = text.encode()
     parser = etree.XMLParser(
