@@ -8,7 +8,7 @@ from typing import TypeAlias, Union
 
 import msgspec
 
-from m2pem.model.catalogue import BehaviorState
+from m2pem.model.catalogue import BehaviorState, ResumePolicy
 from m2pem.model.values import Value
 
 
@@ -69,6 +69,18 @@ class BehaviorReported(_Input, frozen=True):
     code: str = ""
     reason: str = ""
     native_ref: str | None = None
+
+
+class BehaviorMissing(_Input, frozen=True):
+    """After a restart a behavior is not as it was: what to do with it, by its resume policy.
+
+    `state`: what its arbiter says of it (UNKNOWN, or RUNNING when the outage was too long).
+    """
+
+    behavior: str
+    policy: ResumePolicy
+    state: BehaviorState = BehaviorState.UNKNOWN
+    reason: str = ""
 
 
 class PromptAnswer(_Input, frozen=True):
@@ -141,6 +153,7 @@ Input: TypeAlias = Union[
     Tick,
     Continue,
     BehaviorReported,
+    BehaviorMissing,
     PromptAnswer,
     ServiceCompleted,
     ServiceFailed,

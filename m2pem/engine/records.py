@@ -13,6 +13,7 @@ from typing import TypeAlias, Union
 
 import msgspec
 
+from m2pem.engine.inputs import Input
 from m2pem.model.catalogue import BehaviorState
 from m2pem.model.values import Value
 
@@ -104,7 +105,13 @@ class InputIgnored(_Record, frozen=True):
 class InputDeferred(_Record, frozen=True):
     """An input that came during a pause; it is decided at resume."""
 
-    input: dict[str, Value]
+    input: Input
+
+
+class InputSeen(_Record, frozen=True):
+    """An input that carried an id was taken; another with the same id will be ignored."""
+
+    id: str
 
 
 class GeometryReceived(_Record, frozen=True):
@@ -205,6 +212,21 @@ class BehaviorCancelRequested(_Record, frozen=True):
     behavior: str
     code: str = ""
     reason: str = ""
+
+
+class BehaviorUnsettled(_Record, frozen=True):
+    """After a restart nobody knows how it stands; its vehicle is held until an operator says."""
+
+    behavior: str
+    state: BehaviorState
+    reason: str = ""
+
+
+class BehaviorContinued(_Record, frozen=True):
+    """An operator lets it go on after a restart: its arbiter still has it."""
+
+    behavior: str
+    by: str = ""
 
 
 class BehaviorRestarted(_Record, frozen=True):
@@ -324,9 +346,10 @@ class EventAwaited(_Record, frozen=True):
 
 
 class EventTriggered(_Record, frozen=True):
-    """The awaited event came; the wait is over."""
+    """The awaited event came; the wait is over. `kept`: it took a message that was kept."""
 
     wait: int
+    kept: bool = False
 
 
 class SignalThrown(_Record, frozen=True):
@@ -341,7 +364,8 @@ class SignalThrown(_Record, frozen=True):
 
 
 class MessageThrown(_Record, frozen=True):
-    """By an element, or by an operator (`by`)."""
+    """By an element, or by an operator (`by`). `kept`: nobody waits for it yet, so its `data` is
+    kept for whoever waits next."""
 
     message: str
     token: int = 0
@@ -349,6 +373,8 @@ class MessageThrown(_Record, frozen=True):
     element: str = ""
     scope: int = 0
     by: str = ""
+    kept: bool = False
+    data: dict[str, Value] = {}
 
 
 class EscalationThrown(_Record, frozen=True):
@@ -384,6 +410,7 @@ Record: TypeAlias = Union[
     RunYielded,
     InputIgnored,
     InputDeferred,
+    InputSeen,
     GeometryReceived,
     ScopeOpened,
     ScopeClosed,
@@ -393,6 +420,8 @@ Record: TypeAlias = Union[
     BehaviorRequested,
     BehaviorProgressed,
     BehaviorCancelRequested,
+    BehaviorUnsettled,
+    BehaviorContinued,
     BehaviorRestarted,
     BehaviorEnded,
     PromptOpened,
