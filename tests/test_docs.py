@@ -82,12 +82,12 @@ def first_unprinted(expected: tuple[str, ...], printed: str) -> str | None:
     return None if skipping or next(lines, None) is None else "(the end of the output)"
 
 
-ALL = [
-    pytest.param(commands, id=f"{page.relative_to(REPOSITORY)}:{line}")
+BLOCKS = {
+    f"{page.relative_to(REPOSITORY)}:{line}": commands
     for page in PAGES
     for line, commands in blocks(page)
-]
-RUN = [block for block in ALL if any(c.program == "m2pem" for c in block.values[0])]
+}
+RUNNING_M2PEM = [name for name, block in BLOCKS.items() if any(c.program == "m2pem" for c in block)]
 
 
 @pytest.fixture
@@ -125,11 +125,11 @@ def run(text: str, folder: Path, environment: dict[str, str]) -> subprocess.Comp
     )
 
 
-@pytest.mark.parametrize("commands", RUN)
+@pytest.mark.parametrize("block", RUNNING_M2PEM)
 def test_m2pem_commands_do_what_the_page_says(
-    commands: tuple[Command, ...], workspace: Path, shell_environment: dict[str, str]
+    block: str, workspace: Path, shell_environment: dict[str, str]
 ) -> None:
-    for command in commands:
+    for command in BLOCKS[block]:
         if command.program != "m2pem":
             continue
         if command.interactive:
@@ -146,9 +146,9 @@ def test_m2pem_commands_do_what_the_page_says(
             assert missing is None, f"{command.text}\n{done.stdout}\nnot as shown: {missing}"
 
 
-@pytest.mark.parametrize("commands", ALL)
-def test_make_commands_name_targets(commands: tuple[Command, ...]) -> None:
-    named = [shlex.split(c.text, comments=True)[1:] for c in commands if c.program == "make"]
+@pytest.mark.parametrize("block", BLOCKS)
+def test_make_commands_name_targets(block: str) -> None:
+    named = [shlex.split(c.text, comments=True)[1:] for c in BLOCKS[block] if c.program == "make"]
     targets = {word for words in named for word in words if "=" not in word}
     assert targets <= MAKE_TARGETS
 

@@ -7,15 +7,16 @@ from functools import cache
 from pathlib import Path
 from statistics import median
 
+import pytest
+
 import m2pem
 
 REPOSITORY = Path(__file__).parents[1]
 MAXIMUM_LINES = 400
 MEDIAN_LINES = 150
 
-# Written in two parts, because this file too is searched for them.
-REGISTRIES = ("pypi" ".org", "pythonhosted" ".org", "npmjs" ".org", "npmjs" ".com", "debian" ".org")
-HOME_PATHS = re.compile(rb"(?<![\w.])/(?:home|Users)/\w+|(?<![\w./])/root/")
+REGISTRIES = re.compile(rb"\b(?:pypi|pythonhosted|npmjs|debian)\.(?:org|com|io)\b")
+HOME_PATHS = re.compile(rb"(?<![\w.])/(?:home|Users)/\w+|(?<![\w./])/root[/]")
 
 
 @cache
@@ -47,6 +48,14 @@ def module_lengths() -> dict[str, int]:
     }
 
 
+def found_in_files(pattern: re.Pattern[bytes]) -> list[str]:
+    return [
+        f"{path.relative_to(REPOSITORY)}: {found[0].decode()}"
+        for path in files()
+        if (found := pattern.search(path.read_bytes()))
+    ]
+
+
 def test_no_module_is_too_long() -> None:
     too_long = {name: lines for name, lines in module_lengths().items() if lines > MAXIMUM_LINES}
     assert too_long == {}
@@ -58,22 +67,24 @@ def test_most_modules_are_short() -> None:
 
 
 def test_no_file_names_a_package_registry() -> None:
-    naming = [
-        f"{path.relative_to(REPOSITORY)}: {host}"
-        for path in files()
-        for host in REGISTRIES
-        if host.encode() in path.read_bytes()
-    ]
-    assert naming == []
+    assert found_in_files(REGISTRIES) == []
 
 
 def test_no_file_names_somebodys_home() -> None:
-    naming = [
-        f"{path.relative_to(REPOSITORY)}: {found[0].decode()}"
-        for path in files()
-        if (found := HOME_PATHS.search(path.read_bytes()))
-    ]
-    assert naming == []
+    assert found_in_files(HOME_PATHS) == []
+
+
+@pytest.mark.parametrize(
+    ("pattern", "text"),
+    [
+        (REGISTRIES, b"https://files.%s.org/a.whl" % b"pythonhosted"),
+        (REGISTRIES, b"registry.%s.org" % b"npmjs"),
+        (HOME_PATHS, b"see /%s/ann/m2pem" % b"home"),
+        (HOME_PATHS, b"'/%s/.cache'" % b"root"),
+    ],
+)
+def test_what_no_file_may_name_is_recognised(pattern: re.Pattern[bytes], text: bytes) -> None:
+    assert pattern.search(text)
 
 
 def test_the_licence_is_apache_2() -> None:
