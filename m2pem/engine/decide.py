@@ -123,6 +123,16 @@ def _tick(x: Steps, item: i.Tick) -> None:
         ignore(x, "no timer is due")
 
 
+def _give_up(x: Steps, item: i.GiveUp) -> None:
+    state = x.state
+    awaited = [f"{behavior.element} (behavior {behavior.name})" for behavior in state.behaviors.values()]
+    awaited += [f"{prompt.token.node.id} (an answer)" for prompt in state.prompts.values()]
+    awaited += [f"{service.token.node.id} ({service.name})" for service in state.services.values()]
+    awaited += [f"{wait.node.id} ({wait.trigger.value})" for wait in state.waits.values()]
+    waiting = f"; awaited: {', '.join(dict.fromkeys(awaited))}" if awaited else ""
+    end_run(x, RunOutcome.FAILED, item.reason + waiting)
+
+
 def _geometry(x: Steps, item: i.GeometrySet) -> None:
     x.emit(r.GeometryReceived(item.name, item.geometry, item.by))
 
@@ -135,10 +145,10 @@ def _reported(x: Steps, item: i.BehaviorReported) -> None:
     if behavior is None:
         ignore(x, f"{item.state.value} for {item.behavior}, which is not active")
         return
-    if item.number <= behavior.number:
-        ignore(x, f"report {item.number} of {item.behavior} came before")
-        return
     if not item.state.terminal:
+        if item.number <= behavior.number:
+            ignore(x, f"report {item.number} of {item.behavior} came before")
+            return
         x.emit(r.BehaviorProgressed(item.behavior, item.number, item.state, item.native_ref))
         return
     _ended(x, behavior, item.state, item.code, item.reason)
@@ -330,6 +340,7 @@ _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
     i.ResumeRun: _resume,
     i.Tick: _tick,
     i.Continue: _continue,
+    i.GiveUp: _give_up,
     i.BehaviorReported: _reported,
     i.BehaviorMissing: _missing,
     i.PromptAnswer: _answer,

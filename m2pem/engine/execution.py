@@ -18,6 +18,9 @@ from m2pem.model.reach import upstream
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
 
+NO_FLEET = Fleet("", "no fleet", {})
+"""For a mission that commands no resource."""
+
 
 class Execution:
     """The records of the input being decided, and the steps it still causes."""
@@ -37,7 +40,7 @@ class Execution:
     def __init__(self, state: RunState, fleet: Fleet | None) -> None:
         self.state = state
         self.mission: Mission = state.mission
-        self.fleet = fleet
+        self.fleet = fleet if fleet is not None else NO_FLEET
         self.now_us = 0
         self.records: list[Record] = []
         self.queue: deque[Token | Scope] = deque()

@@ -60,6 +60,15 @@ class Continue(_Input, frozen=True):
     """Go on with steps left over when one input caused more than a batch of them."""
 
 
+class GiveUp(_Input, frozen=True):
+    """A rehearsal can go no further: nothing scheduled can happen any more, or a limit is reached.
+
+    The run fails, naming what it awaits.
+    """
+
+    reason: str
+
+
 class BehaviorReported(_Input, frozen=True):
     """An arbiter's report. `number` rises with each report of one behavior."""
 
@@ -152,6 +161,7 @@ Input: TypeAlias = Union[
     ResumeRun,
     Tick,
     Continue,
+    GiveUp,
     BehaviorReported,
     BehaviorMissing,
     PromptAnswer,

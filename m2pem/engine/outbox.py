@@ -97,6 +97,7 @@ def _commanded(state: RunState) -> list[str]:
 def _start(state: RunState, behavior: Behavior) -> StartBehavior:
     return StartBehavior(
         behavior.id,
+        behavior.element,
         state.epoch,
         behavior.type,
         behavior.name,

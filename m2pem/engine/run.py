@@ -72,6 +72,11 @@ class MissionRun:
         return bool(self.state.yielded) and self.state.status is RunStatus.RUNNING
 
     @property
+    def steps_done(self) -> int:
+        """Elements executed since this object was made: what bounds a rehearsal."""
+        return self._x.done
+
+    @property
     def next_due_us(self) -> int | None:
         """When the next timer is due (microseconds since the Unix epoch); None: no timer runs."""
         if self.state.status is not RunStatus.RUNNING:

@@ -14,12 +14,13 @@ from m2pem.resources.fleet import Fleet
 class Steps(Execution):
     """An execution that can work its queue off."""
 
-    __slots__ = ("batch", "left")
+    __slots__ = ("batch", "done", "left")
 
     def __init__(self, state: RunState, fleet: Fleet | None, batch: int) -> None:
         super().__init__(state, fleet)
         self.batch = batch
         self.left = batch
+        self.done = 0
 
     def begin(self, now_us: int) -> None:
         """Get ready for an input that came at `now_us`; steps left over go first."""
@@ -51,6 +52,7 @@ class Steps(Execution):
             self._yield()
         else:
             self._notice_a_stuck_run()
+        self.done += self.batch - self.left
         records, self.records = self.records, []
         return records
 

@@ -22,7 +22,7 @@ from m2pem.model.elements import (
 )
 from m2pem.model.expression import Expression
 from m2pem.model.values import Value
-from m2pem.resources.allocation import allocate
+from m2pem.resources.allocation import AllocationError, allocate
 
 
 def complete(x: Execution, token: Token) -> None:
@@ -134,7 +134,11 @@ def _request_service(x: Execution, token: Token, call: ServiceCall) -> None:
                 return
         else:
             properties[item.name] = item.value
-    allocation = allocate(call.roles, x.fleet)
+    try:
+        allocation = allocate(call, x.fleet)
+    except AllocationError as error:
+        throw_error(x, token, "RESOURCE_UNAVAILABLE", str(error))
+        return
     x.emit(
         r.ServiceRequested(
             token.id,

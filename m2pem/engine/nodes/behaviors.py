@@ -7,13 +7,13 @@ from m2pem.engine.interruption import throw_error
 from m2pem.engine.records import Trigger
 from m2pem.engine.state import BehaviorPhase, Token
 from m2pem.engine.waiting import await_event
-from m2pem.errors import ExpressionError
+from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.model.behavior import Behavior
 from m2pem.model.duration import duration_us
 from m2pem.model.expression import Expression
 from m2pem.model.values import Value
-from m2pem.resources.allocation import allocate
-from m2pem.resources.units import parse_duration_s
+from m2pem.resources.allocation import AllocationError, allocate
+from m2pem.resources.units import Dimension, UnitError, quantity
 
 
 def request_behavior(x: Execution, token: Token, behavior: Behavior) -> None:
@@ -28,7 +28,11 @@ def request_behavior(x: Execution, token: Token, behavior: Behavior) -> None:
     if not behavior.roles and behavior.name == "hold":
         _wait(x, token, parameters.get("duration"))
         return
-    allocation = allocate(behavior.roles, x.fleet)
+    try:
+        allocation = allocate(behavior, x.fleet)
+    except AllocationError as error:
+        throw_error(x, token, "RESOURCE_UNAVAILABLE", str(error))
+        return
     if not allocation.resources:
         reason = f"no resource is allocated to {behavior.name}"
         throw_error(x, token, "RESOURCE_UNAVAILABLE", reason)
@@ -81,7 +85,7 @@ def _wait(x: Execution, token: Token, duration: Value) -> None:
     if duration is not None:
         try:
             due_us += wait_us(duration, x.now_us)
-        except ValueError as error:
+        except (UnitError, ExpressionSyntaxError) as error:
             throw_error(x, token, "REJECTED", f"parameter duration: {error}")
             return
     await_event(x, token, token.node, Trigger.TIMER, due_us=due_us)
@@ -91,4 +95,4 @@ def wait_us(duration: Value, at_us: int) -> int:
     """A `hold`'s duration in microseconds: "30 s", a number of seconds, or ISO 8601."""
     if isinstance(duration, str) and duration.startswith("P"):
         return duration_us(duration, at_us)
-    return round(parse_duration_s(duration) * 1_000_000)
+    return round(quantity(duration, Dimension.DURATION) * 1_000_000)
