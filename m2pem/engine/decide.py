@@ -125,7 +125,9 @@ def _tick(x: Steps, item: i.Tick) -> None:
 
 def _give_up(x: Steps, item: i.GiveUp) -> None:
     state = x.state
-    awaited = [f"{behavior.element} (behavior {behavior.name})" for behavior in state.behaviors.values()]
+    awaited = [
+        f"{behavior.element} (behavior {behavior.name})" for behavior in state.behaviors.values()
+    ]
     awaited += [f"{prompt.token.node.id} (an answer)" for prompt in state.prompts.values()]
     awaited += [f"{service.token.node.id} ({service.name})" for service in state.services.values()]
     awaited += [f"{wait.node.id} ({wait.trigger.value})" for wait in state.waits.values()]
@@ -157,7 +159,10 @@ def _reported(x: Steps, item: i.BehaviorReported) -> None:
 def _ended(
     x: Steps, behavior: Behavior, state: BehaviorState, code: str = "", reason: str = ""
 ) -> None:
-    if state is not BehaviorState.SUCCEEDED:
+    wanted = state is BehaviorState.SUCCEEDED or (
+        state is BehaviorState.CANCELLED and behavior.phase is BehaviorPhase.CANCELLING
+    )
+    if not wanted:
         code = code or DEFAULT_CODES[state]
     token = x.state.tokens.get(behavior.token)
     if token is not None and token.behavior != behavior.id:

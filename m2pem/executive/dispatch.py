@@ -201,7 +201,7 @@ class Dispatcher:
     def _spec(
         self, resources: tuple[ResourceId, ...], name: str, kind: BehaviorType
     ) -> BehaviorSpec | None:
-        """How the behavior is taken: by every member of a team, else by the first that offers it."""
+        """How it is taken: by every member of a team, else by the first that offers it."""
         specs = [self._arbiters.graph.spec(resource, name, kind) for resource in resources]
         if kind is BehaviorType.TEAM and not all(specs):
             return None

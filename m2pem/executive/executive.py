@@ -17,7 +17,7 @@ from m2pem.api.arbiter import Arbiter, ArbiterContext
 from m2pem.api.clock import Clock
 from m2pem.api.control import RunId
 from m2pem.api.service import ServiceContext
-from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
+from m2pem.engine.inputs import BehaviorReported, GeometrySet, ResourceFault, StartRun, StopRun
 from m2pem.engine.records import Record
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
@@ -257,8 +257,6 @@ class Executive:
     # --- what happens outside -------------------------------------------------------------------
 
     def _post_report(self, report: Any) -> None:
-        from m2pem.engine.inputs import BehaviorReported
-
         run = report.id.partition(".")[0]
         runner = self.runners.get(run)
         if runner is None:

@@ -11,6 +11,7 @@ from m2pem.errors import MissionError
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.findings import Finding, Severity, has_errors
 from m2pem.model.elements import Mission
+from m2pem.model.lint import lint
 from m2pem.resources.check import check_mission
 
 if TYPE_CHECKING:
@@ -72,8 +73,6 @@ def findings_for(
 
     `data`: names given at start (`--data`). `arbiters` None: no fleet, so roles are not checked.
     """
-    from m2pem.model.lint import lint
-
     writes = {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
     findings = [*mission.warnings, *lint(mission, data, writes)]
     if process is not None and process not in {each.id for each in mission.processes}:

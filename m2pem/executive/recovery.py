@@ -59,9 +59,7 @@ async def take_over(
         item = _what_to_post(arbiters, behavior, report)
         if item is None and too_long and behavior.phase is BehaviorPhase.ACTIVE:
             reason = f"nobody drove the mission for {outage_s:.0f} s"
-            item = BehaviorMissing(
-                behavior.id, ResumePolicy.HOLD, BehaviorState.RUNNING, reason
-            )
+            item = BehaviorMissing(behavior.id, ResumePolicy.HOLD, BehaviorState.RUNNING, reason)
         if item is not None:
             runner.post(item)
     runner.take_up(
@@ -111,4 +109,3 @@ def _what_to_post(
 def _policy(arbiters: FleetArbiters, behavior: Behavior) -> ResumePolicy:
     spec = arbiters.graph.spec(behavior.resources[0], behavior.name, BehaviorType(behavior.type))
     return spec.resume if spec is not None else ResumePolicy.HOLD
-

@@ -51,7 +51,9 @@ def encode_body(entry: Entry) -> bytes:
         # msgspec writes NaN and infinities as null; a journal that reads back differently is none.
         exact = b"null" not in body or _decoder.decode(body) == content
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise InternalError(f"{entry.run}, record {entry.seq}: cannot be written: {error}") from error
+        raise InternalError(
+            f"{entry.run}, record {entry.seq}: cannot be written: {error}"
+        ) from error
     if not exact:
         raise InternalError(
             f"{entry.run}, record {entry.seq}: cannot be written: a value is not a finite number"

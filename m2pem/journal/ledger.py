@@ -97,14 +97,31 @@ class Ledger:
         self._connection.executemany(
             "INSERT INTO entries VALUES (?, ?, ?, ?, ?, ?)",
             (
-                (row.number, row.entry.seq, row.entry.epoch, row.entry.at_us, row.entry.t_us, row.body)
+                (
+                    row.number,
+                    row.entry.seq,
+                    row.entry.epoch,
+                    row.entry.at_us,
+                    row.entry.t_us,
+                    row.body,
+                )
                 for row in self._rows
             ),
         )
         self._connection.executemany(
             "REPLACE INTO standings VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
             (
-                (number, s.epoch, s.pid, s.started_us, s.last_seq, s.paused, s.outcome, s.detail, s.ended_us)
+                (
+                    number,
+                    s.epoch,
+                    s.pid,
+                    s.started_us,
+                    s.last_seq,
+                    s.paused,
+                    s.outcome,
+                    s.detail,
+                    s.ended_us,
+                )
                 for number, s in self._changed.items()
             ),
         )

@@ -124,7 +124,9 @@ class SqliteJournal:
             try:
                 content = decode_body(body)
             except JournalError as error:
-                raise JournalError(f"{self._path}: {run_id(number)}, record {seq}: {error}") from error
+                raise JournalError(
+                    f"{self._path}: {run_id(number)}, record {seq}: {error}"
+                ) from error
             entries.append(Entry(run_id(number), epoch, seq, at_us, t_us, *content))
             size += len(body)
             if size > _BATCH_BYTES:

@@ -43,6 +43,7 @@ def user_task(x: Execution, token: Token) -> None:
     """Open the prompt; an operator's answer completes the task (paper, section 4.1)."""
     node = token.node
     assert isinstance(node, UserTask)
+    assert node.prompt is not None
     if not arm_boundary(x, token, node):
         return
     prompt = node.prompt
@@ -76,6 +77,7 @@ def answered(x: Execution, token: Token, decision: str) -> None:
     """An operator has decided."""
     node = token.node
     assert isinstance(node, UserTask)
+    assert node.prompt is not None
     x.write(token, node.prompt.store, decision)
     complete(x, token)
 

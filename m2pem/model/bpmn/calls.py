@@ -184,9 +184,7 @@ def _associated(
         return _not_passed(reading, pending, found, str(error))
 
 
-def _not_passed(
-    reading: Reading, pending: PendingCall, found: Association, because: str
-) -> None:
+def _not_passed(reading: Reading, pending: PendingCall, found: Association, because: str) -> None:
     reading.report.warning(
         found.element,
         pending.call.id,

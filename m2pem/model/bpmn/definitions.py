@@ -63,7 +63,12 @@ def read_definition(
             error = reading.errors.setdefault(event.id, Error(event.id, label, line, event.id))
         return ErrorEventDefinition(line, error)
     escalation = look_up(
-        reading, element, "escalation", reading.escalations, event.id, lambda i: Escalation(i, label, line, i)
+        reading,
+        element,
+        "escalation",
+        reading.escalations,
+        event.id,
+        lambda i: Escalation(i, label, line, i),
     )
     if escalation is None and not catches:
         _nameless(reading, event, "escalation", catches=catches)
@@ -114,7 +119,9 @@ def _message(
     )
     definition = MessageEventDefinition(line, message or Message(event.id, label, line))
     reading.message_uses.append(
-        MessageUse(definition, event.id, label, reading.report.line(event.element), catches, message)
+        MessageUse(
+            definition, event.id, label, reading.report.line(event.element), catches, message
+        )
     )
     return definition
 
@@ -131,7 +138,6 @@ def _nameless(reading: Reading, event: Scan, what: str, *, catches: bool) -> Non
 
 
 _TIMES = {kind.value: kind for kind in TimerKind}
-
 
 
 def _timer(

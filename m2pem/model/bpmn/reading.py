@@ -213,7 +213,7 @@ class Reading:
                 identifier,
                 "bad-value",
                 f"{name}='{text}' is neither true nor false",
-                f"write {name}=\"true\" or {name}=\"false\"",
+                f'write {name}="true" or {name}="false"',
             )
             return default
         return value
@@ -241,9 +241,7 @@ class Reading:
             self._bad_expression(where, identifier, error)
             return None
 
-    def _bad_expression(
-        self, where: Where, identifier: str, error: ExpressionSyntaxError
-    ) -> None:
+    def _bad_expression(self, where: Where, identifier: str, error: ExpressionSyntaxError) -> None:
         self.report.error(
             where,
             identifier,
