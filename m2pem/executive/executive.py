@@ -77,6 +77,7 @@ class Executive:
         self.availability = Availability(fleet)
         self.runners: dict[RunId, Runner] = {}
         self.control = Control(self)
+        self._script = script
         self._speed = speed
         self._watch_links = watch_links
         self._max_steps = max_steps
@@ -223,7 +224,7 @@ class Executive:
         epoch = await self.journal.claim(number)
         mission = parse_mission(line.header.mission, line.header.mission_name)
         run = MissionRun(mission, self.fleet, number)
-        last_us = await replay(self.journal, run)
+        last_us = await replay(self.journal, run, self._script)
         runner = self._runner(run, epoch)
         if run.state.status is RunStatus.NEW:
             runner.post(StartRun(line.header.process))
@@ -252,6 +253,8 @@ class Executive:
         await self.journal.release(runner.id)
 
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
+        if self._script is not None:
+            self._script.seen(records)
         self.plugins.records_committed(run, records)
 
     # --- what happens outside -------------------------------------------------------------------
