@@ -6,7 +6,7 @@ from typing import TypeVar
 from lxml import etree
 
 from m2pem.model.behavior import Behavior, BehaviorType, Parameter, Role, RoleKind, ServiceCall
-from m2pem.model.bpmn.names import BPMN, M2PEM, local
+from m2pem.model.bpmn.names import BPMN, M2PEM, attribute_names, local
 from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.reading import Reading
 
@@ -18,9 +18,7 @@ Named = TypeVar("Named", Role, Parameter)
 class BehaviorReader:
     """Reads the XML inside one task; `line` finds the lines of that XML in the mission file."""
 
-    def __init__(
-        self, reading: Reading, task: str, line: Callable[[etree._Element], int]
-    ) -> None:
+    def __init__(self, reading: Reading, task: str, line: Callable[[etree._Element], int]) -> None:
         self._reading = reading
         self._report = reading.report
         self._task = task
@@ -65,13 +63,17 @@ class BehaviorReader:
         if kind not in list(BehaviorType):
             what = f"its type is '{kind}'" if kind else "it has no type"
             self._error(
-                line, "behavior-type", f"the behavior cannot be commanded: {what}",
+                line,
+                "behavior-type",
+                f"the behavior cannot be commanded: {what}",
                 f"write one of the types {', '.join(BehaviorType)}",
             )
         if not name or "${" in name:
             what = f"its name '{name}' is no literal text" if name else "it has no name"
             self._error(
-                line, "behavior-name", f"the behavior cannot be commanded: {what}",
+                line,
+                "behavior-name",
+                f"the behavior cannot be commanded: {what}",
                 'write for example <property name="name" value="goto"/>',
             )
         if kind not in list(BehaviorType) or not name:
@@ -87,7 +89,8 @@ class BehaviorReader:
         text = _value_text(element)
         if head.get(name, text) != text:
             self._error(
-                self._line(element), f"behavior-{name}",
+                self._line(element),
+                f"behavior-{name}",
                 f"the behavior's {name} is both '{head[name]}' and '{text}'",
                 "keep one of the two",
             )
@@ -116,7 +119,9 @@ class BehaviorReader:
         line = self._line(element)
         if not name:
             self._error(
-                line, "service-class", "the service has no class",
+                line,
+                "service-class",
+                "the service has no class",
                 'write for example <m2pem:service class="Detector"/>',
             )
             return None
@@ -141,7 +146,9 @@ class BehaviorReader:
         line = self._line(element)
         if not name:
             self._error(
-                line, "parameter-name", "a property has no name",
+                line,
+                "parameter-name",
+                "a property has no name",
                 'write <property name="speed" value="2 m/s"/>',
             )
             return []
@@ -171,14 +178,16 @@ class BehaviorReader:
         for key, text in texts.items():
             if text is not None and ("${" in text or "#{" in text):
                 self._error(
-                    line, "role-not-literal",
+                    line,
+                    "role-not-literal",
                     f"{key}='{text}' of role '{name}' is an expression, but roles are literal",
                     "write the vehicle, payload or team itself",
                 )
                 return []
         if texts["requires"] is not None:
             self._error(
-                line, "requires-reserved",
+                line,
+                "requires-reserved",
                 f"role '{name}' asks for a dynamic allocation (requires=), which m2pem reserves "
                 "but does not offer yet",
                 'name the resource: vehicle="...", payload="vehicle/payload" or team="..."',
@@ -188,7 +197,9 @@ class BehaviorReader:
         if len(named) != 1 or not named[0][1].strip():
             what = " and ".join(kind for kind, _ in named) if len(named) > 1 else "no resource"
             self._error(
-                line, "role-allocation", f"role '{name}' names {what}",
+                line,
+                "role-allocation",
+                f"role '{name}' names {what}",
                 "name exactly one vehicle, payload or team",
             )
             return []
@@ -199,7 +210,9 @@ class BehaviorReader:
     def _optional(self, line: int, role: str, text: str | None) -> bool:
         if text not in (None, "true", "false", "1", "0"):
             self._error(
-                line, "bad-value", f"optional='{text}' of role '{role}' is neither true nor false",
+                line,
+                "bad-value",
+                f"optional='{text}' of role '{role}' is neither true nor false",
                 'write optional="true", or delete it',
             )
         return text in ("true", "1")
@@ -212,11 +225,13 @@ class BehaviorReader:
                 yield child
 
     def _check_attributes(self, element: etree._Element, known: frozenset[str]) -> None:
-        for key in element.keys():
+        for key in attribute_names(element):
             name = key.removeprefix(M2PEM)
             if name not in known and not name.startswith("{"):
                 self._report.warning(
-                    self._line(element), self._task, "unknown-attribute",
+                    self._line(element),
+                    self._task,
+                    "unknown-attribute",
                     f"'{local(element.tag)}' has no attribute '{name}'; it is ignored",
                     did_you_mean(name, known, "delete it"),
                 )
@@ -227,21 +242,27 @@ class BehaviorReader:
         for item in items:
             if item.name in seen:
                 self._error(
-                    item.line, f"duplicate-{what}", f"the {what} '{item.name}' stands there twice",
+                    item.line,
+                    f"duplicate-{what}",
+                    f"the {what} '{item.name}' stands there twice",
                     "keep one of the two",
                 )
             seen.add(item.name)
 
     def _misplaced(self, element: etree._Element, what: str, wrapper: str) -> None:
         self._error(
-            self._line(element), "misplaced", f"{what} stands outside <{wrapper}>",
+            self._line(element),
+            "misplaced",
+            f"{what} stands outside <{wrapper}>",
             f"move it into <{wrapper}>",
         )
 
     def _unknown_child(self, child: etree._Element, parent: str, known: tuple[str, ...]) -> None:
         name = local(child.tag)
         self._report.warning(
-            self._line(child), self._task, "unknown-element",
+            self._line(child),
+            self._task,
+            "unknown-element",
             f"'{parent}' has no '{name}'; it is ignored",
             did_you_mean(name, known, "delete it"),
         )

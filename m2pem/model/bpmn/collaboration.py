@@ -70,5 +70,3 @@ def _warn(
         f"{attribute} names '{name}', which does not exist" if name else f"it has no {attribute}",
         did_you_mean(name, known, "correct it, or delete it; it has no effect on execution"),
     )
-
-

@@ -31,6 +31,7 @@ _EXECUTED = frozenset({"message", "timer", "signal", "escalation", "error", "ter
 _CATCHING = frozenset({"startEvent", "intermediateCatchEvent", "boundaryEvent"})
 _NEEDS_TRIGGER = frozenset({"intermediateCatchEvent", "boundaryEvent"})
 
+
 def read_event(reading: Reading, element: etree._Element, container: Container) -> Event:
     """A start, end, intermediate or boundary event."""
     identifier = reading.claim(element)

@@ -38,9 +38,7 @@ def read_flow(reading: Reading, element: etree._Element, container: Container) -
     )
 
 
-def _condition(
-    reading: Reading, element: etree._Element, identifier: str
-) -> Expression | None:
+def _condition(reading: Reading, element: etree._Element, identifier: str) -> Expression | None:
     reading.check_attributes(element, SHAPES[_CONDITION], identifier)
     text = text_of(element)
     if not text:

@@ -107,5 +107,3 @@ def _check_conditions(reading: Reading) -> None:
                 "BPMN allows no condition on a flow out of an event",
                 "put an exclusive gateway behind the event",
             )
-
-

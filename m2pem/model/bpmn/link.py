@@ -28,9 +28,7 @@ _set = object.__setattr__
 def link(reading: Reading) -> dict[str, Element]:
     """Link all elements; gives back processes, flow nodes and sequence flows by id."""
     nodes: dict[str, FlowNode] = {}
-    for index, (node, container) in enumerate(
-        zip(reading.nodes, reading.containers, strict=True)
-    ):
+    for index, (node, container) in enumerate(zip(reading.nodes, reading.containers, strict=True)):
         _set(node, "index", index)
         _set(node, "container", container)
         if node.id and node.id not in nodes:
@@ -98,9 +96,7 @@ def _dangling_end(
     )
 
 
-def _crossing(
-    reading: Reading, flow: SequenceFlow, source: FlowNode, target: FlowNode
-) -> None:
+def _crossing(reading: Reading, flow: SequenceFlow, source: FlowNode, target: FlowNode) -> None:
     reading.broken |= {source.container, target.container}
     reading.report.error(
         flow.line,
@@ -250,5 +246,3 @@ def _link_calls(reading: Reading, processes: dict[str, Process]) -> None:
         else:
             message = f"calledElement names '{call.called_id}', which is no process of this file"
         reading.report.error(call.line, call.id, rule, message, remedy)
-
-

@@ -66,8 +66,6 @@ def _assign(reading: Reading, use: MessageUse, message: Message | None) -> None:
             + f" one of its own, with the id '{use.node_id}'",
             "add messageRef, or draw a message flow",
         )
-        message = reading.messages.setdefault(
-            use.node_id, Message(use.node_id, use.name, use.line)
-        )
+        message = reading.messages.setdefault(use.node_id, Message(use.node_id, use.name, use.line))
     if isinstance(use.holder, MessageEventDefinition | ReceiveTask) or use.holder.behavior is None:
         object.__setattr__(use.holder, "message", message)

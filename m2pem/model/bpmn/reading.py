@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from lxml import etree
 
 from m2pem.errors import ExpressionSyntaxError
-from m2pem.model.bpmn.names import M2PEM, M2PEM_ATTRIBUTES, a, kind, local
+from m2pem.model.bpmn.names import M2PEM, M2PEM_ATTRIBUTES, a, attribute_names, kind, local
 from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.report import Report, Where
 from m2pem.model.bpmn.schema import Shape
@@ -167,7 +167,7 @@ class Reading:
 
     def check_attributes(self, element: etree._Element, shape: Shape, identifier: str) -> None:
         """Warn of attributes that neither BPMN nor m2pem defines for the element."""
-        for key in element.keys():
+        for key in attribute_names(element):
             if key in shape.attributes:
                 continue
             if key[0] != "{":
@@ -213,7 +213,7 @@ class Reading:
                 identifier,
                 "bad-value",
                 f"{name}='{text}' is neither true nor false",
-                f"write {name}=\"true\" or {name}=\"false\"",
+                f'write {name}="true" or {name}="false"',
             )
             return default
         return value
@@ -241,9 +241,7 @@ class Reading:
             self._bad_expression(where, identifier, error)
             return None
 
-    def _bad_expression(
-        self, where: Where, identifier: str, error: ExpressionSyntaxError
-    ) -> None:
+    def _bad_expression(self, where: Where, identifier: str, error: ExpressionSyntaxError) -> None:
         self.report.error(
             where,
             identifier,
@@ -271,7 +269,7 @@ def association(element: etree._Element) -> Association:
 
 def text_of(element: etree._Element) -> str:
     """All text inside an element, without the space around it."""
-    return "".join(element.itertext()).strip()
+    return "".join(map(str, element.itertext())).strip()
 
 
 def reference(text: str) -> str:

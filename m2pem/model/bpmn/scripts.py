@@ -49,9 +49,7 @@ def read_script_task(reading: Reading, found: Scan) -> ScriptTask:
     return ScriptTask(found.id, found.element.get("name", ""), line, behavior, statements)
 
 
-def read_carried(
-    reading: Reading, found: Scan, carried: list[etree._Element]
-) -> Behavior | None:
+def read_carried(reading: Reading, found: Scan, carried: list[etree._Element]) -> Behavior | None:
     """The behavior of a task's extension elements."""
     if len(carried) > 1:
         reading.report.error(

@@ -10,6 +10,7 @@ import codecs
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 from lxml import etree
 
@@ -24,9 +25,7 @@ _LAST_EXACT_LINE = 65_534  # libxml2 keeps an element's line in 16 bits
 _DECLARATION = re.compile(rb"""\s*<\?xml\s[^>]*?encoding\s*=\s*["']([A-Za-z][\w.:-]*)["']""")
 _PROLOG_PART = re.compile(r"\s+|<!--.*?-->|<\?.*?\?>", re.DOTALL)
 _WRAPPED_TAG = re.compile(rb"<[A-Za-z_][^<>]*\n")
-_MARKUP = re.compile(
-    rb"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|(<[^\s!?/<>])|\n", re.DOTALL
-)
+_MARKUP = re.compile(rb"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|(<[^\s!?/<>])|\n", re.DOTALL)
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8"),
     (codecs.BOM_UTF32_LE, "utf-32-le"),
@@ -89,7 +88,7 @@ def parse_xml(data: bytes, *, declared: bool = True) -> Document:
         root = etree.fromstring(utf8, parser)
     except etree.XMLSyntaxError as error:
         raise _not_well_formed(error) from None
-    if root.getroottree().docinfo.doctype:
+    if root.getroottree().docinfo.internalDTD is not None:
         raise _doctype_found(1)
     return Document(root, _line_finder(root, utf8))
 
@@ -189,4 +188,4 @@ def _line_finder(root: etree._Element, utf8: bytes) -> Callable[[etree._Element]
 
 
 def _sourceline(element: etree._Element) -> int:
-    return int(element.sourceline or 1)
+    return cast("int", element.sourceline)
