@@ -7,8 +7,8 @@ from lxml import etree
 
 from m2pem.model.behavior import Behavior, BehaviorType, Parameter, Role, RoleKind, ServiceCall
 from m2pem.model.bpmn.names import BPMN, M2PEM, attribute_names, local
-from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.reading import Reading
+from m2pem.model.near import did_you_mean
 
 _ROLE_ATTRIBUTES = frozenset({"name", "optional", "requires", *RoleKind})
 

@@ -7,7 +7,6 @@ from lxml import etree
 
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.model.bpmn.names import a, local
-from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.reading import MessageUse, Reading, reference, text_of
 from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.duration import cycle, date_us, duration_us
@@ -26,6 +25,7 @@ from m2pem.model.events import (
     TimerEventDefinition,
     TimerKind,
 )
+from m2pem.model.near import did_you_mean
 from m2pem.model.values import Value
 
 Root = TypeVar("Root", bound=RootElement)
