@@ -1,7 +1,7 @@
 """How entries, records and the names of runs are written, in the journal and for people.
 
 An entry's input and records are one JSON text, `[input, [record, ...]]`, and come back as exactly
-equal objects. JSON because a journal outlives the program that wrote it: `sqlite3` and `jq` read it.
+equal objects. It is JSON because a journal outlives the program that wrote it.
 """
 
 import re
@@ -51,7 +51,9 @@ def encode_body(entry: Entry) -> bytes:
         # msgspec writes NaN and infinities as null; a journal that reads back differently is none.
         exact = b"null" not in body or _decoder.decode(body) == content
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise InternalError(f"{entry.run}, record {entry.seq}: cannot be written: {error}") from error
+        raise InternalError(
+            f"{entry.run}, record {entry.seq}: cannot be written: {error}"
+        ) from error
     if not exact:
         raise InternalError(
             f"{entry.run}, record {entry.seq}: cannot be written: a value is not a finite number"
