@@ -16,6 +16,7 @@ class StartBehavior:
     """Start it on the arbiters of its resources; idempotent on `behavior`."""
 
     behavior: str
+    element: str
     epoch: int
     type: str
     name: str

@@ -8,7 +8,7 @@ from typing import TypeAlias, Union
 
 import msgspec
 
-from m2pem.model.catalogue import BehaviorState
+from m2pem.model.catalogue import BehaviorState, ResumePolicy
 from m2pem.model.values import Value
 
 
@@ -60,6 +60,15 @@ class Continue(_Input, frozen=True):
     """Go on with steps left over when one input caused more than a batch of them."""
 
 
+class GiveUp(_Input, frozen=True):
+    """A rehearsal can go no further: nothing scheduled can happen any more, or a limit is reached.
+
+    The run fails, naming what it awaits.
+    """
+
+    reason: str
+
+
 class BehaviorReported(_Input, frozen=True):
     """An arbiter's report. `number` rises with each report of one behavior."""
 
@@ -69,6 +78,18 @@ class BehaviorReported(_Input, frozen=True):
     code: str = ""
     reason: str = ""
     native_ref: str | None = None
+
+
+class BehaviorMissing(_Input, frozen=True):
+    """After a restart a behavior is not as it was: what to do with it, by its resume policy.
+
+    `state`: what its arbiter says of it (UNKNOWN, or RUNNING when the outage was too long).
+    """
+
+    behavior: str
+    policy: ResumePolicy
+    state: BehaviorState = BehaviorState.UNKNOWN
+    reason: str = ""
 
 
 class PromptAnswer(_Input, frozen=True):
@@ -140,7 +161,9 @@ Input: TypeAlias = Union[
     ResumeRun,
     Tick,
     Continue,
+    GiveUp,
     BehaviorReported,
+    BehaviorMissing,
     PromptAnswer,
     ServiceCompleted,
     ServiceFailed,

@@ -80,6 +80,9 @@ class Process(Element):
     nodes: tuple[FlowNode, ...] = field(init=False, repr=False, default=())
     flows: tuple[SequenceFlow, ...] = field(init=False, repr=False, default=())
     data: tuple[DataObject, ...] = field(init=False, repr=False, default=())
+    entries: tuple[FlowNode, ...] = field(init=False, repr=False, default=())
+    """What gets a token when the container begins (clause 13.2): the start events; without any,
+    every node without an incoming flow, boundary events excepted. Empty: nothing to do."""
 
     @property
     def process(self) -> "Process":
@@ -167,6 +170,9 @@ class SubProcess(Activity):
     nodes: tuple[FlowNode, ...] = field(init=False, repr=False, default=())
     flows: tuple[SequenceFlow, ...] = field(init=False, repr=False, default=())
     data: tuple[DataObject, ...] = field(init=False, repr=False, default=())
+    entries: tuple[FlowNode, ...] = field(init=False, repr=False, default=())
+    """What gets a token when the container begins (clause 13.2): the start events; without any,
+    every node without an incoming flow, boundary events excepted. Empty: nothing to do."""
 
     @property
     def process(self) -> Process:
@@ -301,6 +307,8 @@ class Mission:
     warnings: tuple[Finding, ...] = ()
     elements: Mapping[str, Element] = field(default_factory=dict, repr=False)
     """Processes, flow nodes and sequence flows by id."""
+    associated: frozenset[str] = frozenset()
+    """Keys that data output associations name as written; without an effect on execution."""
 
     def process(self, process_id: str | None = None) -> Process:
         """The process a run begins with: the one named, else the file's main one.

@@ -1,0 +1,85 @@
+# Everything a person or CI does with the project. `make` lists the targets.
+
+SHELL := bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/*/pyproject.toml))
+JS := tests/js
+DEBIAN_PACKAGES := nodejs npm
+
+# An environment holds absolute paths: one made elsewhere, or by another Python, is made anew.
+INSTALLED := $(VENV)/installed
+IDENTITY := $(strip $(CURDIR) $(shell $(PYTHON) -V 2>&1) $(PLUGINS))
+ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),$(IDENTITY))
+.PHONY: $(INSTALLED)
+endif
+
+.PHONY: help setup python-packages npm-packages demo test test-long lint format clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 12
+
+setup: python-packages npm-packages ## make .venv and install all that the demo and the tests need
+
+python-packages: $(INSTALLED)
+
+$(INSTALLED): pyproject.toml constraints.txt $(PLUGINS:%=%/pyproject.toml)
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "m2pem needs Python 3.11 or newer, and $(PYTHON) is not: try make PYTHON=python3.12" >&2; exit 1; }
+	@echo "Installing m2pem and its tools into $(VENV)"
+	@$(PYTHON) -m venv --clear $(VENV) || { \
+	  echo "$(PYTHON) cannot make virtual environments; on Debian: apt-get install python3-venv" >&2; exit 1; }
+	@PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt $(BIN)/python -m pip install \
+	  --quiet --disable-pip-version-check --editable '.[dev]' $(PLUGINS:%=--editable %)
+	@echo '$(IDENTITY)' > $@
+
+# The tests of what BPMN editors see need Node.js; nothing else does, so its absence stops nothing.
+npm-packages:
+	@command -v npm >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && { \
+	  echo "Installing Debian packages: $(DEBIAN_PACKAGES)"; \
+	  apt-get update -qq && apt-get install -y -qq $(DEBIAN_PACKAGES) >/dev/null; }; } || true
+	@if command -v npm >/dev/null; then $(MAKE) --silent $(JS)/node_modules/.package-lock.json; \
+	else echo "Some tests need Debian packages that are not installed: $(DEBIAN_PACKAGES)" >&2; fi
+
+$(JS)/node_modules/.package-lock.json: $(JS)/package-lock.json $(JS)/.npmrc
+	@echo "Installing the npm packages of $(JS)"
+	@cd $(JS) && npm ci --loglevel=error >/dev/null
+	@touch $@
+
+DEMO := $(BIN)/m2pem run missions/vignette1.bpmn --fleet fleet_configs/vignette1.yaml --simulate --speed 20
+ANSWERS := missions/answers/vignette1
+
+# On a terminal only the detector is scripted, and whoever sits there is the operator.
+demo: python-packages ## run the paper's mission on simulated vehicles, in two ways
+	@if [ -t 0 ] && [ -t 1 ]; then operator=_live; else operator=; fi; \
+	echo "The first way: a hazard is detected. Continue; at the second prompt, abort."; \
+	$(DEMO) --answers $(ANSWERS)_detection$$operator.yaml; \
+	echo; \
+	echo "The second way: nothing is detected. Continue, and the route is driven to its end."; \
+	$(DEMO) --answers $(ANSWERS)_route$$operator.yaml
+
+lint: setup ## check style, types and layers
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports
+
+format: setup ## put the code into shape
+	@$(BIN)/ruff check --fix .
+	@$(BIN)/ruff format .
+
+test: lint ## check all but the long tests
+	@$(BIN)/pytest -n 2 -m "not long"
+
+test-long: lint ## check everything: fuzzing, large random counts, foreign corpora too
+	@$(BIN)/pytest -n 2 --timeout 1800
+
+clean: ## remove all that can be made again
+	@rm -rf $(VENV) $(JS)/node_modules build dist
+	@rm -rf .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache .coverage
+	@find . -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,371 @@
+"""The fold: what each record does to the state. Nothing else changes a `RunState`.
+
+An applier never decides and never fails on a journal that the engine wrote. It may rely only on
+the state and the record, so that a replay by a later release gives the same state.
+"""
+
+from collections.abc import Callable
+from heapq import heapify, heappush
+from typing import Any
+
+from m2pem.engine import records as r
+from m2pem.engine.state import (
+    Behavior,
+    BehaviorPhase,
+    Join,
+    Prompt,
+    RunState,
+    RunStatus,
+    Scope,
+    Service,
+    Token,
+    Wait,
+)
+from m2pem.model.elements import (
+    CallActivity,
+    Container,
+    FlowNode,
+    InclusiveGateway,
+    ParallelGateway,
+    Process,
+    SequenceFlow,
+    SubProcess,
+)
+
+STALE_TIMERS = 64
+"""Timers that are over stay in their heap until there are this many more than live ones."""
+
+
+def apply(state: RunState, record: r.Record) -> None:
+    """Fold one record into the state."""
+    state.seq += 1
+    _APPLIERS[type(record)](state, record)
+
+
+def _node(state: RunState, element: str) -> FlowNode:
+    node = state.mission.elements[element]
+    assert isinstance(node, FlowNode)
+    return node
+
+
+def _is_join(node: FlowNode) -> bool:
+    return isinstance(node, (ParallelGateway, InclusiveGateway)) and len(node.incoming) > 1
+
+
+# --- the run ------------------------------------------------------------------------------------
+
+
+def _run_started(state: RunState, record: r.RunStarted) -> None:
+    state.status = RunStatus.RUNNING
+    state.started_us = record.started_us
+
+
+def _run_claimed(state: RunState, record: r.RunClaimed) -> None:
+    state.epoch = record.epoch
+
+
+def _run_paused(state: RunState, record: r.RunPaused) -> None:
+    state.status = RunStatus.PAUSED
+    state.paused_at_us = record.at_us
+
+
+def _run_resumed(state: RunState, record: r.RunResumed) -> None:
+    state.status = RunStatus.RUNNING
+    state.paused_total_us += record.at_us - state.paused_at_us
+    state.deferred.clear()
+
+
+def _run_ended(state: RunState, record: r.RunEnded) -> None:
+    state.status = RunStatus.ENDED
+    state.outcome = record.outcome
+    state.detail = record.detail
+    state.mailbox.clear()
+    state.deferred.clear()
+    state.yielded = ()
+
+
+def _run_yielded(state: RunState, record: r.RunYielded) -> None:
+    state.yielded = record.steps
+
+
+def _nothing(state: RunState, record: r.Record) -> None:
+    pass
+
+
+def _input_deferred(state: RunState, record: r.InputDeferred) -> None:
+    state.deferred.append(record.input)
+
+
+def _input_seen(state: RunState, record: r.InputSeen) -> None:
+    state.seen[record.id] = None
+
+
+def _geometry_received(state: RunState, record: r.GeometryReceived) -> None:
+    state.geometries[record.name] = record.geometry
+
+
+# --- scopes and tokens --------------------------------------------------------------------------
+
+
+def _scope_opened(state: RunState, record: r.ScopeOpened) -> None:
+    parent = state.scopes[record.parent] if record.parent is not None else None
+    owner = state.tokens[record.token] if record.token is not None else None
+    container: Container
+    element = state.mission.elements[record.element]
+    if isinstance(element, CallActivity):
+        container = element.called
+    else:
+        assert isinstance(element, (Process, SubProcess))
+        container = element
+    depth = parent.depth + 1 if parent is not None else 0
+    scope = Scope(record.scope, container, parent, owner, depth)
+    state.scopes[record.scope] = scope
+    state.last_scope = record.scope
+    if owner is not None:
+        owner.inner = scope
+    if state.root is None:
+        state.root = scope
+
+
+def _scope_closed(state: RunState, record: r.ScopeClosed) -> None:
+    scope = state.scopes.pop(record.scope)
+    if scope.owner is not None:
+        scope.owner.inner = None
+
+
+def _token_entered(state: RunState, record: r.TokenEntered) -> None:
+    node = _node(state, record.element)
+    scope = state.scopes[record.scope]
+    flow: SequenceFlow | None = None
+    if record.flow:
+        element = state.mission.elements[record.flow]
+        assert isinstance(element, SequenceFlow)
+        flow = element
+    token = Token(record.token, node, scope, flow)
+    state.tokens[record.token] = token
+    scope.tokens[record.token] = token
+    state.last_token = max(state.last_token, record.token)
+    if flow is not None and _is_join(node):
+        join = scope.joins.get(node)
+        if join is None:
+            join = scope.joins[node] = Join()
+            if isinstance(node, InclusiveGateway):
+                state.inclusive[scope.id, node.id] = (scope, node)
+        join.by_flow.setdefault(flow, []).append(token)
+
+
+def _token_left(state: RunState, record: r.TokenLeft) -> None:
+    token = state.tokens.pop(record.token)
+    scope = token.scope
+    del scope.tokens[record.token]
+    if token.waits is not None:
+        for wait in list(token.waits.values()):
+            _end_wait(state, wait)
+    if token.flow is not None and _is_join(token.node):
+        join = scope.joins[token.node]
+        arrived = join.by_flow[token.flow]
+        arrived.remove(token)
+        if not arrived:
+            del join.by_flow[token.flow]
+            if not join.by_flow:
+                del scope.joins[token.node]
+                state.inclusive.pop((scope.id, token.node.id), None)
+
+
+# --- behaviors, prompts, services ---------------------------------------------------------------
+
+
+def _behavior_requested(state: RunState, record: r.BehaviorRequested) -> None:
+    state.last_behavior += 1
+    state.behaviors[record.behavior] = Behavior(
+        record.behavior,
+        record.token,
+        record.element,
+        record.process,
+        record.scope,
+        record.type,
+        record.name,
+        record.resources,
+        record.roles,
+        record.parameters,
+        record.preempts,
+    )
+    for resource in record.resources:
+        state.held.setdefault(resource, []).append(record.behavior)
+    state.tokens[record.token].behavior = record.behavior
+
+
+def _behavior_progressed(state: RunState, record: r.BehaviorProgressed) -> None:
+    behavior = state.behaviors[record.behavior]
+    behavior.number = record.number
+    behavior.state = record.state
+    if record.native_ref is not None:
+        behavior.native_ref = record.native_ref
+
+
+def _behavior_cancel_requested(state: RunState, record: r.BehaviorCancelRequested) -> None:
+    behavior = state.behaviors[record.behavior]
+    behavior.phase = BehaviorPhase.CANCELLING
+    _forget_behavior(state, behavior)
+
+
+def _behavior_unsettled(state: RunState, record: r.BehaviorUnsettled) -> None:
+    behavior = state.behaviors[record.behavior]
+    behavior.phase = BehaviorPhase.UNSETTLED
+    behavior.state = record.state
+
+
+def _behavior_continued(state: RunState, record: r.BehaviorContinued) -> None:
+    state.behaviors[record.behavior].phase = BehaviorPhase.ACTIVE
+
+
+def _behavior_restarted(state: RunState, record: r.BehaviorRestarted) -> None:
+    behavior = state.behaviors[record.behavior]
+    behavior.phase = BehaviorPhase.ACTIVE
+    behavior.state = None
+    behavior.number = 0
+    behavior.native_ref = None
+
+
+def _behavior_ended(state: RunState, record: r.BehaviorEnded) -> None:
+    behavior = state.behaviors.pop(record.behavior)
+    for resource in behavior.resources:
+        holders = state.held[resource]
+        holders.remove(behavior.id)
+        if not holders:
+            del state.held[resource]
+    _forget_behavior(state, behavior)
+
+
+def _forget_behavior(state: RunState, behavior: Behavior) -> None:
+    token = state.tokens.get(behavior.token)
+    if token is not None and token.behavior == behavior.id:
+        token.behavior = ""
+
+
+def _prompt_opened(state: RunState, record: r.PromptOpened) -> None:
+    token = state.tokens[record.token]
+    state.last_prompt += 1
+    state.prompts[record.prompt] = Prompt(
+        record.prompt, token, record.text, record.decisions, record.role, record.behavior
+    )
+    token.prompt = record.prompt
+
+
+def _prompt_ended(state: RunState, record: r.PromptAnswered | r.PromptWithdrawn) -> None:
+    state.prompts.pop(record.prompt).token.prompt = ""
+
+
+def _service_requested(state: RunState, record: r.ServiceRequested) -> None:
+    token = state.tokens[record.token]
+    state.last_service += 1
+    state.services[record.service] = Service(
+        record.service, token, record.name, record.roles, record.properties
+    )
+    token.service = record.service
+
+
+def _service_ended(state: RunState, record: r.ServiceEnded | r.ServiceWithdrawn) -> None:
+    state.services.pop(record.service).token.service = ""
+
+
+# --- data and events ----------------------------------------------------------------------------
+
+
+def _data_written(state: RunState, record: r.DataWritten) -> None:
+    state.scopes[record.store].data[record.key] = record.value
+
+
+def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
+    token = state.tokens[record.token]
+    wait = Wait(
+        record.wait,
+        token,
+        _node(state, record.element),
+        record.trigger,
+        record.ref,
+        record.due_us,
+        record.calendar,
+        record.left,
+        record.cycle,
+    )
+    state.last_wait = record.wait
+    state.waits[wait.id] = wait
+    if token.waits is None:
+        token.waits = {}
+    token.waits[wait.id] = wait
+    if wait.trigger is r.Trigger.TIMER:
+        heappush(state.dates if wait.calendar else state.timers, (wait.due_us, wait.id))
+    else:
+        state.catchers.setdefault((wait.trigger, wait.ref), {})[wait.id] = wait
+
+
+def _end_wait(state: RunState, wait: Wait) -> None:
+    del state.waits[wait.id]
+    assert wait.token.waits is not None
+    del wait.token.waits[wait.id]
+    if wait.trigger is r.Trigger.TIMER:
+        heap = state.dates if wait.calendar else state.timers
+        if len(heap) > 2 * len(state.waits) + STALE_TIMERS:
+            heap[:] = [entry for entry in heap if entry[1] in state.waits]
+            heapify(heap)
+        return
+    key = (wait.trigger, wait.ref)
+    catchers = state.catchers[key]
+    del catchers[wait.id]
+    if not catchers:
+        del state.catchers[key]
+
+
+def _event_triggered(state: RunState, record: r.EventTriggered) -> None:
+    wait = state.waits[record.wait]
+    _end_wait(state, wait)
+    if record.kept:
+        letters = state.mailbox[wait.ref]
+        letters.pop(0)
+        if not letters:
+            del state.mailbox[wait.ref]
+
+
+def _message_thrown(state: RunState, record: r.MessageThrown) -> None:
+    if record.kept:
+        state.mailbox.setdefault(record.message, []).append(record.data)
+
+
+_APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
+    r.RunStarted: _run_started,
+    r.RunClaimed: _run_claimed,
+    r.RunPaused: _run_paused,
+    r.RunResumed: _run_resumed,
+    r.RunEnded: _run_ended,
+    r.RunYielded: _run_yielded,
+    r.InputIgnored: _nothing,
+    r.InputDeferred: _input_deferred,
+    r.InputSeen: _input_seen,
+    r.GeometryReceived: _geometry_received,
+    r.ScopeOpened: _scope_opened,
+    r.ScopeClosed: _scope_closed,
+    r.TokenEntered: _token_entered,
+    r.TokenLeft: _token_left,
+    r.FlowTaken: _nothing,
+    r.BehaviorRequested: _behavior_requested,
+    r.BehaviorProgressed: _behavior_progressed,
+    r.BehaviorCancelRequested: _behavior_cancel_requested,
+    r.BehaviorUnsettled: _behavior_unsettled,
+    r.BehaviorContinued: _behavior_continued,
+    r.BehaviorRestarted: _behavior_restarted,
+    r.BehaviorEnded: _behavior_ended,
+    r.PromptOpened: _prompt_opened,
+    r.PromptAnswered: _prompt_ended,
+    r.PromptWithdrawn: _prompt_ended,
+    r.ServiceRequested: _service_requested,
+    r.ServiceEnded: _service_ended,
+    r.ServiceWithdrawn: _service_ended,
+    r.DataWritten: _data_written,
+    r.EventAwaited: _event_awaited,
+    r.EventTriggered: _event_triggered,
+    r.SignalThrown: _nothing,
+    r.MessageThrown: _message_thrown,
+    r.EscalationThrown: _nothing,
+    r.ErrorThrown: _nothing,
+}

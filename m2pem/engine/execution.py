@@ -1,0 +1,163 @@
+"""The moves of the token game: what element handlers are made of.
+
+An `Execution` lives as long as its run and keeps nothing between inputs but tables of the mission.
+Work still to do is a queue of tokens to execute and scopes to look at; nothing here recurses.
+Every change is a record that is applied at once, so that what is decided next sees it.
+"""
+
+from collections import deque
+from collections.abc import Iterable
+
+from m2pem.engine import records as r
+from m2pem.engine.apply import apply
+from m2pem.engine.data import flatten, store_for
+from m2pem.engine.records import Record, TokenOutcome
+from m2pem.engine.state import RunState, Scope, Token
+from m2pem.model.elements import CallActivity, FlowNode, Mission, SequenceFlow, StartEvent
+from m2pem.model.reach import upstream
+from m2pem.model.values import Value
+from m2pem.resources.fleet import Fleet
+
+NO_FLEET = Fleet("", "no fleet", {})
+"""For a mission that commands no resource."""
+
+
+class Execution:
+    """The records of the input being decided, and the steps it still causes."""
+
+    __slots__ = (
+        "_reach",
+        "_triggered_starts",
+        "fleet",
+        "mission",
+        "now_us",
+        "process_ids",
+        "queue",
+        "records",
+        "state",
+    )
+
+    def __init__(self, state: RunState, fleet: Fleet | None) -> None:
+        self.state = state
+        self.mission: Mission = state.mission
+        self.fleet = fleet if fleet is not None else NO_FLEET
+        self.now_us = 0
+        self.records: list[Record] = []
+        self.queue: deque[Token | Scope] = deque()
+        self.process_ids = [node.container.process.id for node in self.mission.nodes]
+        self._reach: dict[FlowNode, dict[FlowNode, int]] = {}
+        self._triggered_starts: tuple[StartEvent, ...] | None = None
+
+    def emit(self, record: Record) -> None:
+        """State a fact, and let it take effect."""
+        self.records.append(record)
+        apply(self.state, record)
+
+    def process_of(self, node: FlowNode) -> str:
+        """Id of the process that contains a node."""
+        return self.process_ids[node.index]
+
+    def upstream(self, join: FlowNode) -> dict[FlowNode, int]:
+        """`m2pem.model.reach.upstream`, worked out once for each join."""
+        reach = self._reach.get(join)
+        if reach is None:
+            reach = self._reach[join] = upstream(join)
+        return reach
+
+    @property
+    def triggered_starts(self) -> tuple[StartEvent, ...]:
+        """Start events of processes that neither the run began with nor a call activity calls.
+
+        Each trigger of theirs makes an instance (FORMATS section 1).
+        """
+        if self._triggered_starts is None:
+            assert self.state.root is not None
+            elsewhere = {
+                node.called for node in self.mission.nodes if isinstance(node, CallActivity)
+            }
+            elsewhere.add(self.state.root.container.process)
+            self._triggered_starts = tuple(
+                start
+                for process in self.mission.processes
+                if process not in elsewhere
+                for start in process.starts
+                if start.definitions
+            )
+        return self._triggered_starts
+
+    # --- tokens ---------------------------------------------------------------------------------
+
+    def enter(
+        self, token: int, node: FlowNode, scope: Scope, flow: SequenceFlow | None = None
+    ) -> Token:
+        """Put a token on a node, and have it executed in its turn."""
+        self.emit(
+            r.TokenEntered(
+                token,
+                self.process_ids[node.index],
+                node.id,
+                scope.id,
+                flow.id if flow is not None else "",
+            )
+        )
+        entered = self.state.tokens[token]
+        self.queue.append(entered)
+        return entered
+
+    def spawn(self, node: FlowNode, scope: Scope) -> Token:
+        """A new token on a node."""
+        return self.enter(self.state.last_token + 1, node, scope)
+
+    def leave(self, token: Token, outcome: TokenOutcome) -> None:
+        """Take a token off its node. It is consumed unless it is entered elsewhere next."""
+        node = token.node
+        self.emit(
+            r.TokenLeft(token.id, self.process_ids[node.index], node.id, token.scope.id, outcome)
+        )
+
+    def consume(self, token: Token) -> None:
+        """The token has done its part and goes nowhere; its scope may be complete now."""
+        self.leave(token, TokenOutcome.COMPLETED)
+        if not token.scope.tokens:
+            self.queue.append(token.scope)
+
+    def proceed(self, token: Token, flows: Iterable[SequenceFlow]) -> None:
+        """Leave along `flows`: the token takes the first, a new one each of the others (4.1)."""
+        node, scope = token.node, token.scope
+        process = self.process_ids[node.index]
+        self.leave(token, TokenOutcome.COMPLETED)
+        number = token.id
+        for flow in flows:
+            self.emit(r.FlowTaken(number, process, node.id, scope.id, flow.id))
+            self.enter(number, flow.target, scope, flow)
+            number = self.state.last_token + 1
+        if not scope.tokens:
+            self.queue.append(scope)
+
+    # --- data -----------------------------------------------------------------------------------
+
+    def write(self, token: Token, key: str, value: Value) -> None:
+        """Write a value as the element that the token is on."""
+        for name, item in flatten(key, value):
+            store = store_for(token.scope, name)
+            self.write_into(store, token, name, item)
+
+    def write_into(self, store: Scope, token: Token, key: str, value: Value) -> None:
+        """Write one value into a given scope's store."""
+        node = token.node
+        self.emit(
+            r.DataWritten(
+                token.id,
+                self.process_ids[node.index],
+                node.id,
+                token.scope.id,
+                key,
+                value,
+                store.id,
+            )
+        )
+
+    def write_all(self, token: Token, data: dict[str, Value]) -> None:
+        """Write several values."""
+        for key, value in data.items():
+            self.write(token, key, value)

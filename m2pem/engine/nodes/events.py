@@ -1,0 +1,125 @@
+"""Events (BPMN 2.0.2, clauses 10.5 and 13.5)."""
+
+from m2pem.engine import records as r
+from m2pem.engine.execution import Execution
+from m2pem.engine.interruption import empty, end_run, throw_error, throw_escalation
+from m2pem.engine.messaging import send
+from m2pem.engine.nodes.containers import finish
+from m2pem.engine.nodes.flows import true_flows
+from m2pem.engine.records import RunOutcome, TokenOutcome
+from m2pem.engine.state import Token
+from m2pem.engine.waiting import arm, collect_letters, throw_signal
+from m2pem.model.elements import Event, StartEvent
+from m2pem.model.events import (
+    ErrorEventDefinition,
+    EscalationEventDefinition,
+    EventDefinition,
+    MessageEventDefinition,
+    SignalEventDefinition,
+    TerminateEventDefinition,
+)
+
+
+def complete(x: Execution, token: Token) -> None:
+    """The event has happened: leave by every flow."""
+    flows = true_flows(x, token, None)
+    if flows is not None:
+        x.proceed(token, flows)
+
+
+def start(x: Execution, token: Token) -> None:
+    """A plain start goes on at once; a typed one waits for its trigger (paper, section 4.1).
+
+    The start event of an instance that its trigger has made has happened already.
+    """
+    node = token.node
+    assert isinstance(node, StartEvent)
+    root = x.state.root
+    assert root is not None
+    triggered = token.scope.parent is None and token.scope is not root
+    if node.definitions and not triggered:
+        catch(x, token)
+    else:
+        complete(x, token)
+
+
+def catch(x: Execution, token: Token) -> None:
+    """Wait for the trigger."""
+    node = token.node
+    assert isinstance(node, Event)
+    if not node.definitions:
+        complete(x, token)
+        return
+    if all(arm(x, token, node, definition) for definition in node.definitions):
+        collect_letters(x, token)
+
+
+def throw(x: Execution, token: Token) -> None:
+    """Throw, and go on, unless what was thrown ended the scope."""
+    node = token.node
+    assert isinstance(node, Event)
+    for definition in node.definitions:
+        _throw(x, token, definition)
+        if x.state.tokens.get(token.id) is not token:
+            return
+    complete(x, token)
+
+
+def _throw(x: Execution, token: Token, definition: EventDefinition) -> None:
+    match definition:
+        case SignalEventDefinition():
+            signal(x, token, definition.signal.id)
+        case MessageEventDefinition():
+            send(x, token, definition.message.id)
+        case EscalationEventDefinition(escalation=escalation):
+            assert escalation is not None
+            throw_escalation(x, token, escalation)
+
+
+def signal(x: Execution, token: Token, signal_id: str) -> None:
+    """Broadcast a signal in the run."""
+    node = token.node
+    x.emit(r.SignalThrown(signal_id, token.id, x.process_of(node), node.id, token.scope.id))
+    throw_signal(x, signal_id, {})
+
+
+def boundary(x: Execution, token: Token) -> None:
+    """It has caught; its own flow begins."""
+    complete(x, token)
+
+
+def end(x: Execution, token: Token) -> None:
+    """The token ends here, perhaps throwing something."""
+    node = token.node
+    assert isinstance(node, Event)
+    for definition in node.definitions:
+        match definition:
+            case TerminateEventDefinition():
+                _terminate(x, token)
+                return
+            case ErrorEventDefinition(error=error):
+                assert error is not None
+                throw_error(x, token, error.code, f"thrown by {node.label}", leaving=True)
+                return
+            case EscalationEventDefinition(escalation=escalation):
+                assert escalation is not None
+                goes_on = throw_escalation(x, token, escalation, leaving=True)
+                if goes_on and not token.scope.tokens:
+                    x.queue.append(token.scope)
+                return
+            case _:
+                _throw(x, token, definition)
+                if x.state.tokens.get(token.id) is not token:
+                    return
+    x.consume(token)
+
+
+def _terminate(x: Execution, token: Token) -> None:
+    """End its scope at once (clause 13.5.6); in the process the run began with, end the run."""
+    scope = token.scope
+    x.leave(token, TokenOutcome.COMPLETED)
+    if scope is x.state.root:
+        end_run(x, RunOutcome.TERMINATED, f"terminated by {token.node.label}")
+        return
+    empty(x, scope, TokenOutcome.TERMINATED)
+    finish(x, scope)

@@ -1,0 +1,43 @@
+"""Which sequence flows a token leaves by (BPMN 2.0.2, clauses 8.4.13 and 10.6)."""
+
+from collections.abc import Sequence
+
+from m2pem.engine.data import reader
+from m2pem.engine.execution import Execution
+from m2pem.engine.interruption import throw_error
+from m2pem.engine.state import Token
+from m2pem.errors import ExpressionError
+from m2pem.model.elements import SequenceFlow
+
+
+def true_flows(
+    x: Execution, token: Token, default: SequenceFlow | None, *, first_only: bool = False
+) -> Sequence[SequenceFlow] | None:
+    """The flows whose condition is true, in the XML's order, else the default one.
+
+    None: an error was thrown instead, because a condition could not be evaluated (EXPRESSION) or
+    nothing was true and there is no default (NO_FLOW).
+    """
+    node = token.node
+    read = reader(token.scope)
+    chosen: list[SequenceFlow] = []
+    for flow in node.outgoing:
+        if flow is default:
+            continue
+        if flow.condition is not None:
+            try:
+                if not flow.condition.holds(read):
+                    continue
+            except ExpressionError as error:
+                reason = f"condition of {flow.id}: {error}"
+                throw_error(x, token, "EXPRESSION", reason)
+                return None
+        chosen.append(flow)
+        if first_only:
+            break
+    if chosen or not node.outgoing:
+        return chosen
+    if default is not None:
+        return (default,)
+    throw_error(x, token, "NO_FLOW", f"no flow out of {node.id} is true and it has no default")
+    return None

@@ -1,0 +1,131 @@
+"""The outbox is a fold over the state: which commands records lead to, and which still stand."""
+
+from collections.abc import Sequence
+
+from m2pem.engine import records as r
+from m2pem.engine.commands import (
+    CancelBehavior,
+    CancelService,
+    ClosePrompt,
+    Command,
+    HoldResource,
+    OpenPrompt,
+    ResumeResource,
+    RunService,
+    StartBehavior,
+)
+from m2pem.engine.records import Record
+from m2pem.engine.state import Behavior, BehaviorPhase, Prompt, RunState, RunStatus, Service
+from m2pem.model.behavior import Decision
+
+
+def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
+    """What newly decided records ask of the outside, in their order.
+
+    What was requested and ended within the same records is never asked for.
+    """
+    commands: list[Command] = []
+    for record in records:
+        match record:
+            case r.BehaviorRequested() | r.BehaviorRestarted():
+                behavior = state.behaviors.get(record.behavior)
+                if behavior is not None:
+                    commands.append(_start(state, behavior))
+            case r.BehaviorCancelRequested():
+                behavior = state.behaviors.get(record.behavior)
+                if behavior is not None:
+                    commands.append(_cancel(state, behavior))
+            case r.BehaviorUnsettled():
+                commands.extend(_hold(state, record.behavior))
+            case r.BehaviorContinued():
+                behavior = state.behaviors.get(record.behavior)
+                if behavior is not None:
+                    commands.extend(ResumeResource(name) for name in behavior.resources)
+            case r.PromptOpened():
+                prompt = state.prompts.get(record.prompt)
+                if prompt is not None:
+                    commands.append(_open(prompt))
+            case r.PromptAnswered():
+                commands.append(ClosePrompt(record.prompt, record.decision, record.by))
+            case r.PromptWithdrawn():
+                commands.append(ClosePrompt(record.prompt))
+            case r.ServiceRequested():
+                service = state.services.get(record.service)
+                if service is not None:
+                    commands.append(_run(service))
+            case r.ServiceWithdrawn():
+                commands.append(CancelService(record.service))
+            case r.RunPaused():
+                commands.extend(HoldResource(resource) for resource in _commanded(state))
+            case r.RunResumed():
+                commands.extend(ResumeResource(resource) for resource in _commanded(state))
+            case _:
+                pass
+    return commands
+
+
+def outstanding(state: RunState) -> list[Command]:
+    """What the outside should be busy with now.
+
+    For behaviors that nobody has cancelled, the executive asks their arbiter before it starts them
+    (`StartBehavior` here means: it should be running).
+    """
+    commands: list[Command] = []
+    for behavior in state.behaviors.values():
+        if behavior.phase is BehaviorPhase.CANCELLING:
+            commands.append(_cancel(state, behavior))
+        elif behavior.phase is BehaviorPhase.UNSETTLED:
+            commands.extend(_hold(state, behavior.id))
+        else:
+            commands.append(_start(state, behavior))
+    commands.extend(_open(prompt) for prompt in state.prompts.values())
+    commands.extend(_run(service) for service in state.services.values())
+    if state.status is RunStatus.PAUSED:
+        commands.extend(HoldResource(resource) for resource in _commanded(state))
+    return commands
+
+
+def _commanded(state: RunState) -> list[str]:
+    """Resources of behaviors that are neither being cancelled nor held already."""
+    return [
+        resource
+        for resource, holders in state.held.items()
+        if any(state.behaviors[holder].phase is BehaviorPhase.ACTIVE for holder in holders)
+    ]
+
+
+def _start(state: RunState, behavior: Behavior) -> StartBehavior:
+    return StartBehavior(
+        behavior.id,
+        behavior.element,
+        state.epoch,
+        behavior.type,
+        behavior.name,
+        behavior.resources,
+        behavior.roles,
+        behavior.parameters,
+        behavior.preempts,
+    )
+
+
+def _cancel(state: RunState, behavior: Behavior) -> CancelBehavior:
+    return CancelBehavior(behavior.id, state.epoch, behavior.resources)
+
+
+def _hold(state: RunState, behavior: str) -> list[Command]:
+    return [HoldResource(resource) for resource in state.behaviors[behavior].resources]
+
+
+def _open(prompt: Prompt) -> OpenPrompt:
+    decisions = tuple(Decision(d["value"], d["label"]) for d in prompt.decisions)
+    return OpenPrompt(prompt.id, prompt.token.node.id, prompt.text, decisions, prompt.role)
+
+
+def _run(service: Service) -> RunService:
+    return RunService(
+        service.id,
+        service.name,
+        service.token.node.id,
+        service.roles,
+        service.properties,
+    )

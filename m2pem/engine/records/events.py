@@ -1,0 +1,93 @@
+"""Records about data, and about what is awaited and thrown."""
+
+from m2pem.engine.records.base import BaseRecord, Trigger
+from m2pem.model.values import Value
+
+
+class DataWritten(BaseRecord, frozen=True):
+    """`store` is the scope that holds the key; `scope`, `element` say who wrote it."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    key: str
+    value: Value
+    store: int
+
+
+class EventAwaited(BaseRecord, frozen=True):
+    """A catch event is armed: `ref` is a signal's or message's id; `due_us` a timer's time.
+
+    A duration or cycle is due at a mission time (microseconds from the start, which stands during
+    a pause); a date (`calendar`) at a time since the Unix epoch. `left`: how often a cycle still
+    fires after this one (-1: for ever), every `period_us`.
+    """
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    wait: int
+    trigger: Trigger
+    ref: str = ""
+    due_us: int = 0
+    calendar: bool = False
+    left: int = 0
+    cycle: str = ""
+
+
+class EventTriggered(BaseRecord, frozen=True):
+    """The awaited event came; the wait is over. `kept`: it took a message that was kept."""
+
+    wait: int
+    kept: bool = False
+
+
+class SignalThrown(BaseRecord, frozen=True):
+    """By an element, or by an operator (`by`)."""
+
+    signal: str
+    token: int = 0
+    process: str = ""
+    element: str = ""
+    scope: int = 0
+    by: str = ""
+
+
+class MessageThrown(BaseRecord, frozen=True):
+    """By an element, or by an operator (`by`). `kept`: nobody waits for it yet, so its `data` is
+    kept for whoever waits next."""
+
+    message: str
+    token: int = 0
+    process: str = ""
+    element: str = ""
+    scope: int = 0
+    by: str = ""
+    kept: bool = False
+    data: dict[str, Value] = {}
+
+
+class EscalationThrown(BaseRecord, frozen=True):
+    """`caught_by`: the element that catches it, "" when none does (nothing else happens then)."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    escalation: str
+    code: str
+    caught_by: str = ""
+
+
+class ErrorThrown(BaseRecord, frozen=True):
+    """`caught_by`: the element that catches it, "" when none does (the run fails then)."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    code: str
+    reason: str = ""
+    caught_by: str = ""

@@ -1,0 +1,52 @@
+"""Records about scopes and tokens: the game itself."""
+
+from m2pem.engine.records.base import BaseRecord, TokenOutcome
+
+
+class ScopeOpened(BaseRecord, frozen=True):
+    """An instance of a container has begun. `token` sits on its activity in scope `parent`."""
+
+    scope: int
+    process: str
+    element: str
+    parent: int | None = None
+    token: int | None = None
+
+
+class ScopeClosed(BaseRecord, frozen=True):
+    """The instance has ended and its data is gone."""
+
+    scope: int
+    process: str
+    element: str
+    outcome: TokenOutcome
+
+
+class TokenEntered(BaseRecord, frozen=True):
+    """A token is on an element. `flow`: the sequence flow that it came by."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    flow: str = ""
+
+
+class TokenLeft(BaseRecord, frozen=True):
+    """It is there no more. Without a later `TokenEntered` it was consumed."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    outcome: TokenOutcome
+
+
+class FlowTaken(BaseRecord, frozen=True):
+    """`element` is where the flow begins."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    flow: str

@@ -1,0 +1,137 @@
+"""Records about what activities do: behaviors, prompts and services."""
+
+from m2pem.engine.records.base import BaseRecord
+from m2pem.model.catalogue import BehaviorState
+from m2pem.model.values import Value
+
+
+class BehaviorRequested(BaseRecord, frozen=True):
+    """The arbiters of `resources` must start a behavior.
+
+    `roles` maps each role of the mission to the resources allocated to it. `preempts` are
+    behaviors that are being cancelled and still hold one of the resources.
+    """
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    behavior: str
+    name: str
+    type: str
+    resources: tuple[str, ...]
+    roles: dict[str, tuple[str, ...]]
+    parameters: dict[str, Value]
+    preempts: tuple[str, ...] = ()
+
+
+class BehaviorProgressed(BaseRecord, frozen=True):
+    """ACCEPTED or RUNNING, with the arbiter's own reference for finding it again."""
+
+    behavior: str
+    number: int
+    state: BehaviorState
+    native_ref: str | None = None
+
+
+class BehaviorCancelRequested(BaseRecord, frozen=True):
+    """Nobody waits for it any more; its resources are released when it has ended."""
+
+    behavior: str
+    code: str = ""
+    reason: str = ""
+
+
+class BehaviorUnsettled(BaseRecord, frozen=True):
+    """After a restart nobody knows how it stands; its vehicle is held until an operator says."""
+
+    behavior: str
+    state: BehaviorState
+    reason: str = ""
+
+
+class BehaviorContinued(BaseRecord, frozen=True):
+    """An operator lets it go on after a restart: its arbiter still has it."""
+
+    behavior: str
+    by: str = ""
+
+
+class BehaviorRestarted(BaseRecord, frozen=True):
+    """It is requested again under the same id, by decision of an operator or its resume policy."""
+
+    behavior: str
+    epoch: int
+    by: str = ""
+
+
+class BehaviorEnded(BaseRecord, frozen=True):
+    """It has ended and released its resources. `code`: the error code, "" when it succeeded."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    behavior: str
+    state: BehaviorState
+    code: str
+    reason: str = ""
+
+
+class PromptOpened(BaseRecord, frozen=True):
+    """An operator is asked. `behavior`: the behavior that a recovery prompt is about."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    prompt: str
+    text: str
+    decisions: tuple[dict[str, str], ...]
+    role: str = ""
+    behavior: str = ""
+
+
+class PromptAnswered(BaseRecord, frozen=True):
+    token: int
+    process: str
+    element: str
+    scope: int
+    prompt: str
+    decision: str
+    by: str
+
+
+class PromptWithdrawn(BaseRecord, frozen=True):
+    """The question no longer stands: its task was interrupted, or it timed out."""
+
+    prompt: str
+
+
+class ServiceRequested(BaseRecord, frozen=True):
+    token: int
+    process: str
+    element: str
+    scope: int
+    service: str
+    name: str
+    roles: dict[str, tuple[str, ...]]
+    properties: dict[str, Value]
+
+
+class ServiceEnded(BaseRecord, frozen=True):
+    """`code`: "" when it completed, else the error that its task throws."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    service: str
+    code: str = ""
+    reason: str = ""
+
+
+class ServiceWithdrawn(BaseRecord, frozen=True):
+    """Nobody waits for the service any more."""
+
+    service: str

@@ -1,0 +1,87 @@
+"""A run of a mission: `MissionRun.receive` is the only door.
+
+    run = MissionRun(mission, fleet, "r1")
+    step = run.receive(StartRun("VIGNETTE1"), now_us)
+    # write step to the journal; when it is durable, carry out step.commands
+
+Pure: no clock, no random, no I/O. The same inputs at the same times give the same records.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from m2pem.engine.apply import apply
+from m2pem.engine.commands import Command
+from m2pem.engine.decide import decide
+from m2pem.engine.inputs import Input
+from m2pem.engine.outbox import commands_of, outstanding
+from m2pem.engine.records import Record
+from m2pem.engine.state import RunState, RunStatus
+from m2pem.engine.steps import Steps
+from m2pem.engine.waiting import next_timer
+from m2pem.model.elements import Mission
+from m2pem.resources.fleet import Fleet
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What an input led to. `seq` is the first record's number; `t_us` their mission time."""
+
+    input: Input
+    at_us: int
+    t_us: int
+    seq: int
+    records: Sequence[Record]
+    commands: Sequence[Command]
+
+
+class MissionRun:
+    """One run: its state, and the deciding of inputs."""
+
+    def __init__(self, mission: Mission, fleet: Fleet | None, run: str, batch: int = 10_000):
+        """`batch`: steps that one input may cause before the run yields (`Continue`)."""
+        self.state = RunState(run, mission)
+        self._x = Steps(self.state, fleet, batch)
+
+    def receive(self, item: Input, now_us: int) -> Step:
+        """Decide an input that came at `now_us` (microseconds since the Unix epoch).
+
+        Never raises for what a mission, an operator or a vehicle did. An exception is a bug in
+        m2pem; the state is not usable after it.
+        """
+        x = self._x
+        seq = self.state.seq + 1
+        t_us = 0 if self.state.status is RunStatus.NEW else self.state.mission_time_us(now_us)
+        x.begin(now_us)
+        decide(x, item)
+        records = x.finish()
+        return Step(item, now_us, t_us, seq, records, commands_of(self.state, records))
+
+    def replay(self, records: Iterable[Record]) -> None:
+        """Rebuild the state from journaled records, by applying them alone."""
+        for record in records:
+            apply(self.state, record)
+
+    def outstanding(self) -> Sequence[Command]:
+        """What the outside should be busy with now: for an executive that takes the run over."""
+        return outstanding(self.state)
+
+    @property
+    def wants_continue(self) -> bool:
+        """Whether steps are left over for a `Continue`."""
+        return bool(self.state.yielded) and self.state.status is RunStatus.RUNNING
+
+    @property
+    def steps_done(self) -> int:
+        """Elements executed since this object was made: what bounds a rehearsal."""
+        return self._x.done
+
+    @property
+    def next_due_us(self) -> int | None:
+        """When the next timer is due (microseconds since the Unix epoch); None: no timer runs."""
+        if self.state.status is not RunStatus.RUNNING:
+            return None
+        due = next_timer(self._x)
+        if due is None:
+            return None
+        return due[0] + self.state.started_us + self.state.paused_total_us

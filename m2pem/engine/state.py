@@ -1,0 +1,193 @@
+"""What a run is at one moment. Only `m2pem.engine.apply` changes it.
+
+Finished tokens, scopes, behaviors and prompts leave the state: what it holds is bounded by what is
+active, however long the run. All dicts are in order of creation, which makes every walk over them
+the same on every machine.
+"""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from m2pem.engine.inputs import Input
+from m2pem.engine.records import RunOutcome, Trigger
+from m2pem.model.catalogue import BehaviorState
+from m2pem.model.elements import Container, FlowNode, InclusiveGateway, Mission, SequenceFlow
+from m2pem.model.values import Value
+
+
+class RunStatus(StrEnum):
+    """The run's life: `m2pem.engine.lifecycle` says which input is welcome when."""
+
+    NEW = "new"
+    RUNNING = "running"
+    PAUSED = "paused"
+    ENDED = "ended"
+
+
+@dataclass(slots=True, eq=False)
+class Scope:
+    """An instance of a container: a process or a subprocess.
+
+    `owner` is the token on the activity in `parent`; both None for a process that nobody called.
+    `joins` are the tokens waiting at each join, by the flow that they came by.
+    """
+
+    id: int
+    container: Container
+    parent: "Scope | None"
+    owner: "Token | None"
+    depth: int
+    tokens: "dict[int, Token]" = field(default_factory=dict)
+    data: dict[str, Value] = field(default_factory=dict)
+    joins: "dict[FlowNode, Join]" = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
+class Join:
+    """Tokens waiting at a join by incoming flow, first come first; empty flows are absent."""
+
+    by_flow: "dict[SequenceFlow, list[Token]]" = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
+class Token:
+    """A token on a flow node. `flow`: how it came. A move makes a new object with the same id.
+
+    At most one of `behavior`, `prompt`, `service` and `inner` is set: what its activity does.
+    """
+
+    id: int
+    node: FlowNode
+    scope: Scope
+    flow: SequenceFlow | None
+    waits: "dict[int, Wait] | None" = None
+    behavior: str = ""
+    prompt: str = ""
+    service: str = ""
+    inner: Scope | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wait:
+    """A catch event armed for a token: at its own node, or at a boundary event of it.
+
+    Fields as in record `EventAwaited`.
+    """
+
+    id: int
+    token: Token
+    node: FlowNode
+    trigger: Trigger
+    ref: str
+    due_us: int
+    calendar: bool
+    left: int
+    cycle: str
+
+
+class BehaviorPhase(StrEnum):
+    """What the engine wants of a behavior: to run, to end, or an operator's word about it."""
+
+    ACTIVE = "active"
+    CANCELLING = "cancelling"
+    UNSETTLED = "unsettled"
+
+
+@dataclass(slots=True, eq=False)
+class Behavior:
+    """A behavior that was requested and has not ended. Fields as in record `BehaviorRequested`."""
+
+    id: str
+    token: int
+    element: str
+    process: str
+    scope: int
+    type: str
+    name: str
+    resources: tuple[str, ...]
+    roles: dict[str, tuple[str, ...]]
+    parameters: dict[str, Value]
+    preempts: tuple[str, ...]
+    phase: BehaviorPhase = BehaviorPhase.ACTIVE
+    state: BehaviorState | None = None
+    number: int = 0
+    native_ref: str | None = None
+
+
+@dataclass(slots=True, eq=False)
+class Prompt:
+    """A prompt that stands. `behavior`: set when it asks what to do with one after a restart."""
+
+    id: str
+    token: Token
+    text: str
+    decisions: tuple[dict[str, str], ...]
+    role: str
+    behavior: str
+
+
+@dataclass(slots=True, eq=False)
+class Service:
+    """A service that runs."""
+
+    id: str
+    token: Token
+    name: str
+    roles: dict[str, tuple[str, ...]]
+    properties: dict[str, Value]
+
+
+@dataclass(slots=True, eq=False)
+class RunState:
+    """A whole run. Times are microseconds: `_us` since the Unix epoch unless said otherwise."""
+
+    run: str
+    mission: Mission
+    status: RunStatus = RunStatus.NEW
+    outcome: RunOutcome | None = None
+    detail: str = ""
+    epoch: int = 1
+    seq: int = 0
+    started_us: int = 0
+    paused_at_us: int = 0
+    paused_total_us: int = 0
+
+    last_token: int = 0
+    last_scope: int = 0
+    last_wait: int = 0
+    last_behavior: int = 0
+    last_prompt: int = 0
+    last_service: int = 0
+
+    root: Scope | None = None
+    scopes: dict[int, Scope] = field(default_factory=dict)
+    tokens: dict[int, Token] = field(default_factory=dict)
+    behaviors: dict[str, Behavior] = field(default_factory=dict)
+    held: dict[str, list[str]] = field(default_factory=dict)
+    """Behaviors that hold a resource: at most one that is not being cancelled."""
+    inclusive: dict[tuple[int, str], tuple[Scope, InclusiveGateway]] = field(default_factory=dict)
+    """Inclusive joins at which a token waits, by scope and node."""
+    prompts: dict[str, Prompt] = field(default_factory=dict)
+    services: dict[str, Service] = field(default_factory=dict)
+
+    waits: dict[int, Wait] = field(default_factory=dict)
+    catchers: dict[tuple[Trigger, str], dict[int, Wait]] = field(default_factory=dict)
+    """Waits for a signal or message, by its id."""
+    timers: list[tuple[int, int]] = field(default_factory=list)
+    """Heap of (due mission time, wait); waits that are over may still be in it."""
+    dates: list[tuple[int, int]] = field(default_factory=list)
+    """Heap of (due time since the Unix epoch, wait); likewise."""
+    mailbox: dict[str, list[dict[str, Value]]] = field(default_factory=dict)
+    """Messages that nobody was waiting for yet, by message id; first come first."""
+
+    geometries: dict[str, dict[str, Value]] = field(default_factory=dict)
+    deferred: list[Input] = field(default_factory=list)
+    yielded: tuple[int, ...] = ()
+    seen: dict[str, None] = field(default_factory=dict)
+    """Ids of inputs that carried one."""
+
+    def mission_time_us(self, now_us: int) -> int:
+        """Microseconds from the start of the run, not counting pauses."""
+        if self.status is RunStatus.PAUSED:
+            now_us = self.paused_at_us
+        return now_us - self.started_us - self.paused_total_us

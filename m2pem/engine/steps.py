@@ -1,0 +1,95 @@
+"""Doing the steps that an input causes, one after the other: the engine's only loop."""
+
+from m2pem.engine import records as r
+from m2pem.engine.execution import Execution
+from m2pem.engine.interruption import end_run
+from m2pem.engine.nodes import EXECUTE
+from m2pem.engine.nodes.containers import look_at
+from m2pem.engine.nodes.gateways import fire_inclusive_joins
+from m2pem.engine.records import Record, RunOutcome
+from m2pem.engine.state import RunState, RunStatus, Scope, Token
+from m2pem.resources.fleet import Fleet
+
+
+class Steps(Execution):
+    """An execution that can work its queue off."""
+
+    __slots__ = ("batch", "done", "left")
+
+    def __init__(self, state: RunState, fleet: Fleet | None, batch: int) -> None:
+        super().__init__(state, fleet)
+        self.batch = batch
+        self.left = batch
+        self.done = 0
+
+    def begin(self, now_us: int) -> None:
+        """Get ready for an input that came at `now_us`; steps left over go first."""
+        self.now_us = now_us
+        self.left = self.batch
+        if self.state.yielded and self.state.status is RunStatus.RUNNING:
+            self.reload_queue()
+
+    def run_steps(self) -> None:
+        """Execute tokens until none can move, or the batch is used up."""
+        state, queue = self.state, self.queue
+        while state.status is RunStatus.RUNNING:
+            while queue and self.left:
+                self.left -= 1
+                item = queue.popleft()
+                if type(item) is Token:
+                    if state.tokens.get(item.id) is item:
+                        EXECUTE[type(item.node)](self, item)
+                else:
+                    assert isinstance(item, Scope)
+                    look_at(self, item)
+            if queue or not fire_inclusive_joins(self):
+                return
+
+    def finish(self) -> list[Record]:
+        """All records of the input: its steps are done, or left over in a `RunYielded`."""
+        self.run_steps()
+        if self.queue:
+            self._yield()
+        else:
+            self._notice_a_stuck_run()
+        self.done += self.batch - self.left
+        records, self.records = self.records, []
+        return records
+
+    def _yield(self) -> None:
+        steps = tuple(
+            item.id if isinstance(item, Token) else -item.id
+            for item in self.queue
+            if isinstance(item, Scope) or self.state.tokens.get(item.id) is item
+        )
+        self.queue.clear()
+        self.emit(r.RunYielded(steps))
+
+    def reload_queue(self) -> None:
+        """Take up the steps that a yield left over."""
+        steps = self.state.yielded
+        if steps:
+            self.emit(r.RunYielded(()))
+        for number in steps:
+            if number > 0:
+                token = self.state.tokens.get(number)
+                if token is not None:
+                    self.queue.append(token)
+            else:
+                scope = self.state.scopes.get(-number)
+                if scope is not None:
+                    self.queue.append(scope)
+
+    def _notice_a_stuck_run(self) -> None:
+        """No token can move and nothing is awaited: the run has failed (a deadlock)."""
+        state = self.state
+        if state.status is not RunStatus.RUNNING:
+            return
+        if state.waits or state.prompts or state.services:
+            return
+        if any(token.behavior for token in state.tokens.values()):
+            return
+        stuck = dict.fromkeys(
+            token.node.id for token in state.tokens.values() if token.inner is None
+        )
+        end_run(self, RunOutcome.FAILED, f"stuck: no token can move from {', '.join(stuck)}")

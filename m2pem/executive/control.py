@@ -1,0 +1,209 @@
+"""`MissionControl` over an executive: what OCUs, scripts and the command line call."""
+
+from collections.abc import AsyncIterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from m2pem.api.control import (
+    Notice,
+    OpenPrompt,
+    RunId,
+    RunStatus,
+    RunSummary,
+    SimulationResult,
+    StampedRecord,
+)
+from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.engine import inputs as i
+from m2pem.engine import records as r
+from m2pem.engine.state import RunStatus as EngineStatus
+from m2pem.errors import MissionError, OperatorError
+from m2pem.executive.loading import findings_for, read_source
+from m2pem.findings import Finding
+from m2pem.journal.base import RunLine
+from m2pem.model.bpmn import parse_mission
+from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.model.values import Value
+from m2pem.resources.fleet import Fleet
+
+if TYPE_CHECKING:
+    from m2pem.executive.executive import Executive
+
+
+class Control:
+    """Implements `m2pem.api.control.MissionControl`; see there for every promise."""
+
+    def __init__(self, executive: "Executive") -> None:
+        self._executive = executive
+
+    # --- runs -----------------------------------------------------------------------------------
+
+    async def start(
+        self,
+        mission: Path | str | bytes,
+        *,
+        process: str | None = None,
+        data: Mapping[str, Value] | None = None,
+        by: str = "",
+    ) -> RunId:
+        """Start a mission; returns when its beginning is in the journal."""
+        return await self._executive.start(mission, process, data, by)
+
+    async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
+        """End every token, cancel every behavior."""
+        await self._ask(run, i.StopRun(by, reason))
+
+    async def pause(self, run: RunId, *, by: str = "") -> None:
+        """Hold every commanded resource and freeze timers."""
+        await self._ask(run, i.PauseRun(by))
+
+    async def resume(self, run: RunId, *, by: str = "") -> None:
+        """Go on after a pause."""
+        await self._ask(run, i.ResumeRun(by))
+
+    async def signal(
+        self,
+        signal: str,
+        *,
+        run: RunId | None = None,
+        data: Mapping[str, Value] | None = None,
+        by: str = "",
+    ) -> None:
+        """Emit a signal to one run or to all that are active."""
+        item = i.SignalReceived(signal, dict(data or {}), by)
+        if run is not None:
+            known = self._executive.runner(run).run.state.mission.signals
+            if signal not in known:
+                raise OperatorError(
+                    f"{run} has no signal {signal!r}; its signals: {', '.join(known) or 'none'}"
+                )
+            await self._ask(run, item)
+            return
+        for runner in list(self._executive.runners.values()):
+            state = runner.run.state
+            if signal in state.mission.signals and state.status is not EngineStatus.ENDED:
+                await self._ask(runner.id, item)
+
+    async def message(
+        self, message: str, *, run: RunId, data: Mapping[str, Value] | None = None, by: str = ""
+    ) -> None:
+        """Send a message."""
+        await self._ask(run, i.MessageReceived(message, dict(data or {}), by))
+
+    async def answer(self, run: RunId, prompt: str, decision: str, *, by: str = "") -> None:
+        """Answer a prompt; the first answer wins."""
+        await self._ask(run, i.PromptAnswer(prompt, decision, by))
+
+    async def set_geometry(
+        self, name: str, geometry: Mapping[str, Value], *, run: RunId | None = None, by: str = ""
+    ) -> None:
+        """Hand over a route, area or point (GeoJSON)."""
+        self._executive.set_geometry(name, geometry, run, by)
+
+    async def _ask(self, run: RunId, item: i.Input) -> None:
+        """Have an input decided; one that the engine ignored is the operator's to know."""
+        step = await self._executive.runner(run).ask(item)
+        for record in step.records:
+            if isinstance(record, r.InputIgnored):
+                raise OperatorError(f"{run}: {record.reason}")
+
+    # --- watching -------------------------------------------------------------------------------
+
+    async def subscribe(
+        self, run: RunId | None = None, size: int = 10_000
+    ) -> AsyncIterator[Notice]:
+        """What is committed from now on, and first the prompts that stand now."""
+        subscription = self._executive.notices.subscribe(run, size)
+        try:
+            for prompt in self.prompts():
+                if run is None or prompt.run == run:
+                    subscription.put(prompt)
+            async for notice in subscription:
+                yield notice
+        finally:
+            subscription.close()
+
+    def telemetry(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
+        """Telemetry from now on."""
+        return self._executive.bus.subscribe(size)
+
+    async def records(
+        self, run: RunId, after_seq: int = 0, limit: int = 1000
+    ) -> Sequence[StampedRecord]:
+        """A page of a run's records."""
+        page: list[StampedRecord] = []
+        async for entry in self._executive.journal.read(run, after_seq):
+            for place, record in enumerate(entry.records):
+                seq = entry.seq + place
+                if seq > after_seq:
+                    page.append(StampedRecord(run, seq, entry.t_us / 1_000_000, record))
+                if len(page) == limit:
+                    return page
+        return page
+
+    async def runs(self) -> Sequence[RunSummary]:
+        """Every run of the journal."""
+        return [summary(line) for line in await self._executive.journal.runs()]
+
+    def prompts(self) -> Sequence[OpenPrompt]:
+        """The prompts that stand now."""
+        return [
+            prompt
+            for runner in self._executive.runners.values()
+            for prompt in runner.prompts.values()
+        ]
+
+    async def wait(self, run: RunId) -> RunSummary:
+        """Wait until the run has ended and its vehicles are released."""
+        runner = self._executive.runner(run)
+        await runner.done.wait()
+        if runner.failure is not None:
+            raise runner.failure
+        lines = {line.run: line for line in await self._executive.journal.runs()}
+        return summary(lines[run])
+
+    # --- what there is --------------------------------------------------------------------------
+
+    def fleet(self) -> Fleet:
+        """The fleet in use."""
+        return self._executive.fleet
+
+    def catalogue(self) -> Mapping[ResourceId, Sequence[BehaviorSpec]]:
+        """What every resource can do."""
+        return self._executive.arbiters.catalogue()
+
+    def check(self, mission: Path | str | bytes) -> Sequence[Finding]:
+        """All findings of `m2pem check` for a mission and the fleet in use."""
+        executive = self._executive
+        try:
+            name, source = read_source(mission)
+            loaded = parse_mission(source, name)
+        except MissionError as error:
+            return error.findings
+        return findings_for(
+            loaded, executive.arbiters, executive.plugins, simulated=executive.simulated
+        )
+
+    async def simulate(self, mission: Path | str | bytes, **options: Any) -> SimulationResult:
+        """Rehearse a mission on a virtual clock, in a thread of its own."""
+        raise OperatorError("this executive cannot rehearse missions")
+
+
+def summary(line: RunLine) -> RunSummary:
+    """A journal's line as operators see it."""
+    if line.outcome is not None:
+        status = RunStatus(line.outcome.value)
+    elif not line.driven:
+        status = RunStatus.INTERRUPTED
+    else:
+        status = RunStatus.PAUSED if line.paused else RunStatus.RUNNING
+    return RunSummary(
+        line.run,
+        line.header.mission_name,
+        line.header.process,
+        status,
+        line.started_us,
+        line.ended_us,
+        line.last_seq,
+        line.detail,
+    )

@@ -1,0 +1,251 @@
+"""Carries commands to arbiters: one FIFO a resource, every call bounded, every failure a report.
+
+A behavior on several resources takes its turn in the FIFO of each. Nothing here waits for a
+vehicle: what comes of a command arrives as a report.
+"""
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
+from m2pem.api.clock import Clock
+from m2pem.engine.commands import CancelBehavior, StartBehavior
+from m2pem.executive.arbiters import FleetArbiters
+from m2pem.executive.script import Script
+from m2pem.model.behavior import BehaviorType
+from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.model.geometry import Geometry
+from m2pem.resources.availability import Availability
+from m2pem.resources.parameters import ParameterError, resolve
+
+log = logging.getLogger("m2pem.dispatch")
+
+CALL_TIMEOUT_S = 10.0
+"""An arbiter's `start`, `cancel`, `hold` or `resume` only hands over; one that hangs is a fault."""
+
+Geometries = Callable[[str, str], Geometry | None]
+"""(run, name) -> the route, area or point that the run knows under the name."""
+
+
+@dataclass(slots=True)
+class _Active:
+    """A behavior handed to an arbiter and not ended."""
+
+    arbiter: Arbiter
+    last_number: int = 0
+    deadline: asyncio.Task[None] | None = None
+
+
+class Dispatcher:
+    """`post` takes every report, those of arbiters and those made here."""
+
+    def __init__(
+        self,
+        arbiters: FleetArbiters,
+        availability: Availability,
+        clock: Clock,
+        geometries: Geometries,
+        post: Callable[[BehaviorReport], None],
+        script: Script | None = None,
+    ) -> None:
+        self._arbiters = arbiters
+        self._availability = availability
+        self._clock = clock
+        self._geometries = geometries
+        self._post = post
+        self._script = script
+        self._active: dict[str, _Active] = {}
+        self._tails: dict[str, asyncio.Task[None]] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._unscriptable: set[str] = set()
+
+    # --- commands -------------------------------------------------------------------------------
+
+    def start(self, command: StartBehavior) -> None:
+        """Start a behavior, when its resources are free and its parameters make sense."""
+        self._enqueue(command.resources, lambda: self._start(command))
+
+    def cancel(self, command: CancelBehavior) -> None:
+        """End a behavior; if it has not within its arbiter's limit, it is given up as LOST."""
+        self._enqueue(command.resources, lambda: self._cancel(command))
+
+    def hold(self, resource: str) -> None:
+        """Bring a resource to its safe state."""
+        arbiter = self._arbiters.of(ResourceId(resource))
+        self._enqueue(
+            (resource,), lambda: self._call(f"hold {resource}", arbiter.hold(ResourceId(resource)))
+        )
+
+    def resume(self, resource: str) -> None:
+        """Let a resource go on after `hold`."""
+        arbiter = self._arbiters.of(ResourceId(resource))
+        self._enqueue(
+            (resource,),
+            lambda: self._call(f"resume {resource}", arbiter.resume(ResourceId(resource))),
+        )
+
+    # --- what is known of behaviors -------------------------------------------------------------
+
+    def reported(self, report: BehaviorReport) -> None:
+        """An arbiter's report passes through here, so that numbers go on rising."""
+        active = self._active.get(report.id)
+        if active is not None:
+            active.last_number = max(active.last_number, report.number)
+        self._post(report)
+
+    def ended(self, behavior: str) -> None:
+        """The journal has its end: its resources are free."""
+        active = self._active.pop(behavior, None)
+        if active is not None and active.deadline is not None:
+            active.deadline.cancel()
+        self._availability.release(behavior)
+
+    def adopt(self, behavior: str, resources: Iterable[str], number: int) -> None:
+        """After a restart: the arbiter has it already."""
+        ids = [ResourceId(resource) for resource in resources]
+        self._active[behavior] = _Active(self._arbiters.of(ids[0]), number)
+        self._availability.acquire(ids, behavior)
+
+    async def close(self) -> None:
+        """Let calls under way end, drop what waits for a limit."""
+        for active in self._active.values():
+            if active.deadline is not None:
+                active.deadline.cancel()
+        if self._tasks:
+            await asyncio.wait(self._tasks)
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _enqueue(self, resources: Iterable[str], job: Callable[[], Awaitable[object]]) -> None:
+        names = tuple(resources)
+        before = {self._tails[name] for name in names if name in self._tails}
+        task = asyncio.create_task(self._in_turn(before, job))
+        self._tasks.add(task)
+        for name in names:
+            self._tails[name] = task
+
+        def done(_: asyncio.Task[None]) -> None:
+            self._tasks.discard(task)
+            for name in names:
+                if self._tails.get(name) is task:
+                    del self._tails[name]
+
+        task.add_done_callback(done)
+
+    async def _in_turn(
+        self, before: set[asyncio.Task[None]], job: Callable[[], Awaitable[object]]
+    ) -> None:
+        if before:
+            await asyncio.wait(before)
+        await job()
+
+    async def _call(self, what: str, call: Awaitable[None]) -> str:
+        """Await an arbiter's call within its bound. Returns "", or what went wrong."""
+        try:
+            async with asyncio.timeout(CALL_TIMEOUT_S):
+                await call
+        except TimeoutError:
+            log.error("%s: the arbiter did not return within %s s", what, CALL_TIMEOUT_S)
+            return f"the arbiter did not return within {CALL_TIMEOUT_S:g} s"
+        except Exception as error:  # an arbiter's fault must not end the executive
+            log.exception("%s: the arbiter raised", what)
+            return f"the arbiter raised {type(error).__name__}: {error}"
+        return ""
+
+    async def _start(self, command: StartBehavior) -> None:
+        ids = tuple(ResourceId(resource) for resource in command.resources)
+        kind = BehaviorType(command.type)
+        arbiters = dict.fromkeys(self._arbiters.of(resource) for resource in ids)
+        arbiter = next(iter(arbiters))
+        self._active[command.behavior] = active = _Active(arbiter)
+        if len(arbiters) > 1:
+            reason = f"{', '.join(ids)} are served by different arbiters"
+            self._refuse(command.behavior, "REJECTED", reason)
+            return
+        spec = self._spec(ids, command.name, kind)
+        if spec is None:
+            reason = f"{', '.join(ids)}: no {kind.value} behavior {command.name} is offered"
+            self._refuse(command.behavior, "REJECTED", reason)
+            return
+        refusal = self._availability.acquire(ids, command.behavior, command.preempts)
+        if refusal is not None:
+            self._refuse(command.behavior, "RESOURCE_UNAVAILABLE", refusal)
+            return
+        run = command.behavior.partition(".")[0]
+        try:
+            parameters = resolve(
+                spec,
+                command.parameters,
+                lambda name: self._geometries(run, name),
+                self._arbiters.fleet.vehicles,
+            )
+        except ParameterError as error:
+            self._refuse(command.behavior, "REJECTED", str(error))
+            return
+        self._apply_script(command, arbiter)
+        request = BehaviorRequest(
+            command.behavior,
+            command.epoch,
+            command.name,
+            parameters,
+            ids,
+            _resource_ids(command.roles),
+            command.preempts,
+        )
+        wrong = await self._call(f"start {command.behavior}", arbiter.start(request))
+        if wrong and self._active.get(command.behavior) is active:
+            self._refuse(command.behavior, "REJECTED", wrong)
+
+    def _spec(
+        self, resources: tuple[ResourceId, ...], name: str, kind: BehaviorType
+    ) -> BehaviorSpec | None:
+        """How it is taken: by every member of a team, else by the first that offers it."""
+        specs = [self._arbiters.graph.spec(resource, name, kind) for resource in resources]
+        if kind is BehaviorType.TEAM and not all(specs):
+            return None
+        return next((spec for spec in specs if spec is not None), None)
+
+    def _apply_script(self, command: StartBehavior, arbiter: Arbiter) -> None:
+        scripted = self._script.behavior(command.element) if self._script is not None else None
+        if scripted is None:
+            return
+        script = getattr(arbiter, "script", None)
+        if script is not None:
+            script(command.behavior, scripted.after_s, scripted.end, scripted.error)
+        elif command.element not in self._unscriptable:
+            self._unscriptable.add(command.element)
+            log.warning("answers for %s act on simulated arbiters only", command.element)
+
+    async def _cancel(self, command: CancelBehavior) -> None:
+        active = self._active.get(command.behavior)
+        if active is None:
+            self._post(BehaviorReport(command.behavior, 1, BehaviorState.CANCELLED))
+            return
+        await self._call(
+            f"cancel {command.behavior}", active.arbiter.cancel(command.behavior, command.epoch)
+        )
+        if self._active.get(command.behavior) is active and active.deadline is None:
+            limits = [active.arbiter.limits(ResourceId(name)) for name in command.resources]
+            timeout_s = max(limit.cancel_timeout_s for limit in limits)
+            active.deadline = asyncio.create_task(self._give_up(command.behavior, timeout_s))
+
+    async def _give_up(self, behavior: str, timeout_s: float) -> None:
+        await self._clock.sleep(timeout_s)
+        active = self._active.get(behavior)
+        if active is not None:
+            reason = f"did not end within {timeout_s:g} s of its cancel"
+            self._post(
+                BehaviorReport(
+                    behavior, active.last_number + 1, BehaviorState.LOST, "TIMEOUT", reason
+                )
+            )
+
+    def _refuse(self, behavior: str, code: str, reason: str) -> None:
+        number = self._active[behavior].last_number + 1
+        self._post(BehaviorReport(behavior, number, BehaviorState.REJECTED, code, reason))
+
+
+def _resource_ids(roles: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[ResourceId, ...]]:
+    return {role: tuple(ResourceId(name) for name in names) for role, names in roles.items()}

@@ -1,0 +1,318 @@
+"""The executive: one fleet, its arbiters, and every run on them.
+
+    async with Executive(fleet, journal, plugins, clock) as executive:
+        run = await executive.control.start(Path("mission.bpmn"))
+        summary = await executive.control.wait(run)
+
+Leaving the block stops what still runs, waits until the vehicles are released, and closes all.
+"""
+
+import asyncio
+import logging
+from collections.abc import Mapping, Sequence
+from contextlib import AsyncExitStack
+from typing import Any, Self
+
+from m2pem.api.arbiter import Arbiter, ArbiterContext
+from m2pem.api.clock import Clock
+from m2pem.api.control import RunId
+from m2pem.api.service import ServiceContext
+from m2pem.engine.inputs import BehaviorReported, GeometrySet, ResourceFault, StartRun, StopRun
+from m2pem.engine.records import Record
+from m2pem.engine.run import MissionRun
+from m2pem.engine.state import RunStatus
+from m2pem.errors import JournalError, OperatorError
+from m2pem.executive.arbiters import FleetArbiters
+from m2pem.executive.control import Control
+from m2pem.executive.dispatch import Dispatcher
+from m2pem.executive.loading import findings_for, known_data, read_source, refuse_errors
+from m2pem.executive.notices import Notices
+from m2pem.executive.recovery import replay, take_over
+from m2pem.executive.runner import Outside, Runner
+from m2pem.executive.script import Script
+from m2pem.executive.services import Services
+from m2pem.gateway.bus import Bus
+from m2pem.gateway.watch import Watch, watch
+from m2pem.journal.base import Journal, RunHeader
+from m2pem.model.bpmn import parse_mission
+from m2pem.model.geometry import Geometry
+from m2pem.model.values import Value
+from m2pem.plugins import PluginManager
+from m2pem.resources.availability import Availability
+from m2pem.resources.fleet import Fleet
+from m2pem.resources.geojson import GeometryError, parse_geojson
+from m2pem.resources.snapshot import dump
+
+log = logging.getLogger("m2pem.executive")
+
+
+class Executive:
+    """`simulated`: every arbiter is the simulated one, with `settings` for its connections.
+
+    `speed`: of the clock against the wall clock, kept in the journal for a resume. `watch_links`:
+    whether silence of a vehicle ends its behaviors. `max_steps` as in `Runner`.
+    """
+
+    def __init__(
+        self,
+        fleet: Fleet,
+        journal: Journal,
+        plugins: PluginManager,
+        clock: Clock,
+        *,
+        simulated: bool = False,
+        settings: Mapping[str, Any] | None = None,
+        script: Script | None = None,
+        speed: float = 1.0,
+        watch_links: bool = True,
+        max_steps: int | None = None,
+    ) -> None:
+        self.fleet = fleet
+        self.journal = journal
+        self.plugins = plugins
+        self.clock = clock
+        self.simulated = simulated
+        self.bus = Bus()
+        self.notices = Notices()
+        self.availability = Availability(fleet)
+        self.runners: dict[RunId, Runner] = {}
+        self.control = Control(self)
+        self._speed = speed
+        self._watch_links = watch_links
+        self._max_steps = max_steps
+        self._handed_over: dict[str, dict[str, Value]] = {}
+        self._tasks: dict[RunId, asyncio.Task[None]] = {}
+        self._stack = AsyncExitStack()
+        context = ArbiterContext(
+            clock,
+            self.bus,
+            logging.getLogger("m2pem.arbiter"),
+            fleet.origin,
+            {team.name: team.members for team in fleet.teams.values()},
+        )
+        self.arbiters = FleetArbiters(
+            fleet, plugins, context, simulated=simulated, settings=settings
+        )
+        self.dispatcher = Dispatcher(
+            self.arbiters, self.availability, clock, self._geometry, self._post_report, script
+        )
+        self.services = Services(
+            plugins.service,
+            ServiceContext(clock, self.bus, logging.getLogger("m2pem.service"), fleet.detectors),
+            script,
+        )
+
+    # --- life -----------------------------------------------------------------------------------
+
+    async def __aenter__(self) -> Self:
+        """Connect the arbiters and listen to them."""
+        group = await self._stack.enter_async_context(asyncio.TaskGroup())
+        self._group = group
+        self._listeners: list[asyncio.Task[None]] = []
+        for name, arbiter in self.arbiters.by_name.items():
+            await arbiter.connect()
+            self._listen(self._read_reports(name, arbiter))
+            self._listen(self._read_telemetry(name, arbiter))
+        if self._watch_links:
+            bounds = {
+                resource: self.arbiters.of(resource).limits(resource).lost_after_s
+                for resource in self.arbiters.resources
+            }
+            rules = Watch(bounds, self.clock.now_us())
+            self._listen(watch(self.bus, self.clock, self._fault, rules))
+        return self
+
+    async def __aexit__(self, *reason: object) -> None:
+        """Stop every run, let its vehicles be released, close the arbiters."""
+        try:
+            await self.stop_all("the executive is shutting down")
+            await self.services.close()
+            await self.dispatcher.close()
+        finally:
+            for listener in self._listeners:
+                listener.cancel()
+            for arbiter in self.arbiters.by_name.values():
+                await arbiter.close()
+            self.bus.close()
+            self.notices.end()
+            await self._stack.aclose()
+
+    async def stop_all(self, reason: str) -> None:
+        """Stop what still runs and wait for it."""
+        for runner in self.runners.values():
+            if runner.run.state.status in (RunStatus.RUNNING, RunStatus.PAUSED):
+                runner.post(StopRun(reason=reason))
+        await asyncio.gather(*self._tasks.values())
+
+    def _listen(self, coroutine: Any) -> None:
+        self._listeners.append(self._group.create_task(coroutine))
+
+    async def _read_reports(self, name: str, arbiter: Arbiter) -> None:
+        try:
+            async for report in arbiter.reports():
+                self.dispatcher.reported(report)
+        except Exception:  # a broken arbiter must not end the executive; its links will age
+            log.exception("arbiter %s: its reports broke off", name)
+
+    async def _read_telemetry(self, name: str, arbiter: Arbiter) -> None:
+        try:
+            async for state in arbiter.telemetry():
+                self.bus.publish(state)
+        except Exception:  # as above
+            log.exception("arbiter %s: its telemetry broke off", name)
+
+    # --- runs -----------------------------------------------------------------------------------
+
+    def load(
+        self, mission: Any, process: str | None = None, data: Mapping[str, Value] | None = None
+    ) -> tuple[Any, str]:
+        """Read and check a mission; returns it with the id of the process to begin with.
+
+        Raises:
+            MissionError: with every finding.
+        """
+        name, source = read_source(mission)
+        loaded = parse_mission(source, name)
+        findings = findings_for(
+            loaded,
+            self.arbiters,
+            self.plugins,
+            known_data(data),
+            process,
+            simulated=self.simulated,
+        )
+        refuse_errors(f"{name} cannot run with fleet {self.fleet.file}", findings)
+        return loaded, loaded.process(process).id
+
+    async def start(
+        self, mission: Any, process: str | None, data: Mapping[str, Value] | None, by: str
+    ) -> RunId:
+        """Begin a run. Returns when its first records are durable."""
+        loaded, process_id = self.load(mission, process, data)
+        header = RunHeader(
+            loaded.file,
+            loaded.source,
+            process_id,
+            dump(self.fleet),
+            self.simulated,
+            self._speed,
+            self.clock.now_us(),
+        )
+        number = await self.journal.create(header)
+        runner = self._runner(MissionRun(loaded, self.fleet, number), 1)
+        for name, geometry in self._handed_over.items():
+            runner.post(GeometrySet(name, geometry))
+        runner._inbox.insert(0, StartRun(process_id, dict(data or {}), by))
+        self._drive(runner)
+        return number
+
+    async def resume(self, number: RunId) -> None:
+        """Take up a run that its executive left without ending it.
+
+        Raises:
+            JournalError: there is no such run, or an executive that is alive drives it.
+            OperatorError: it has ended.
+        """
+        lines = {line.run: line for line in await self.journal.runs()}
+        line = lines.get(number)
+        if line is None:
+            known = ", ".join(lines) or "none"
+            raise JournalError(f"there is no run {number}; the journal has: {known}")
+        if line.outcome is not None:
+            raise OperatorError(f"{number} has ended: {line.outcome.value}")
+        epoch = await self.journal.claim(number)
+        mission = parse_mission(line.header.mission, line.header.mission_name)
+        run = MissionRun(mission, self.fleet, number)
+        last_us = await replay(self.journal, run)
+        runner = self._runner(run, epoch)
+        if run.state.status is RunStatus.NEW:
+            runner.post(StartRun(line.header.process))
+        outage_s = max(0.0, (self.clock.now_us() - last_us) / 1_000_000)
+        await take_over(runner, self.arbiters, self.dispatcher, outage_s)
+        self._drive(runner)
+
+    def _runner(self, run: MissionRun, epoch: int) -> Runner:
+        outside = Outside(
+            self.journal,
+            self.clock,
+            self.dispatcher,
+            self.services,
+            self.notices,
+            self._observe,
+        )
+        runner = Runner(run, epoch, outside, self._max_steps)
+        self.runners[runner.id] = runner
+        return runner
+
+    def _drive(self, runner: Runner) -> None:
+        self._tasks[runner.id] = self._group.create_task(self._drive_and_release(runner))
+
+    async def _drive_and_release(self, runner: Runner) -> None:
+        await runner.drive()
+        await self.journal.release(runner.id)
+
+    def _observe(self, run: RunId, records: Sequence[Record]) -> None:
+        self.plugins.records_committed(run, records)
+
+    # --- what happens outside -------------------------------------------------------------------
+
+    def _post_report(self, report: Any) -> None:
+        run = report.id.partition(".")[0]
+        runner = self.runners.get(run)
+        if runner is None:
+            log.warning("a report for %s, which no run here asked for", report.id)
+            return
+        runner.post(
+            BehaviorReported(
+                report.id,
+                report.number,
+                report.state,
+                report.code,
+                report.reason,
+                report.native_ref,
+            )
+        )
+
+    def _fault(self, fault: ResourceFault) -> None:
+        log.warning("%s: %s: %s", fault.resource, fault.code, fault.reason)
+        for runner in self.runners.values():
+            if fault.resource in runner.run.state.held:
+                runner.post(fault)
+
+    def set_geometry(
+        self, name: str, geometry: Mapping[str, Value], run: RunId | None, by: str
+    ) -> None:
+        """Make a route, area or point known to one run, or to all now and later.
+
+        Raises:
+            OperatorError: it is no geometry that m2pem knows.
+        """
+        try:
+            parse_geojson(geometry)
+        except GeometryError as error:
+            raise OperatorError(f"geometry {name!r} {error}") from error
+        item = GeometrySet(name, dict(geometry), by)
+        if run is None:
+            self._handed_over[name] = dict(geometry)
+        for runner in self.runners.values() if run is None else [self.runner(run)]:
+            if not runner.done.is_set():
+                runner.post(item)
+
+    def runner(self, run: RunId) -> Runner:
+        """The runner of a run that is driven here.
+
+        Raises:
+            OperatorError: it is not.
+        """
+        runner = self.runners.get(run)
+        if runner is None:
+            known = ", ".join(self.runners) or "none"
+            raise OperatorError(f"{run} is not driven by this executive; it drives: {known}")
+        return runner
+
+    def _geometry(self, run: str, name: str) -> Geometry | None:
+        runner = self.runners.get(run)
+        given = runner.run.state.geometries.get(name) if runner is not None else None
+        if given is not None:
+            return parse_geojson(given)
+        return self.fleet.geometries.get(name)

@@ -1,0 +1,106 @@
+"""Getting a mission: from a path, a URL or bytes; and checking it against the fleet."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.error import URLError
+from urllib.parse import unquote, urlsplit
+from urllib.request import urlopen
+
+from m2pem.errors import MissionError
+from m2pem.executive.arbiters import FleetArbiters
+from m2pem.findings import Finding, Severity, has_errors
+from m2pem.model.elements import Mission
+from m2pem.model.lint import lint
+from m2pem.resources.check import check_mission
+
+if TYPE_CHECKING:
+    from m2pem.plugins import PluginManager
+
+FETCH_TIMEOUT_S = 10.0
+MAX_BYTES = 20_000_000
+
+
+def read_source(mission: Path | str | bytes) -> tuple[str, bytes]:
+    """The file's name for people, and its bytes. `str` is a path or a file:, http:, https: URL.
+
+    Raises:
+        MissionError: it cannot be read, or is too big.
+    """
+    if isinstance(mission, bytes):
+        return "mission.bpmn", mission
+    if isinstance(mission, str):
+        parts = urlsplit(mission)
+        if parts.scheme in ("http", "https"):
+            return Path(unquote(parts.path)).name or mission, _fetch(mission)
+        mission = Path(unquote(parts.path)) if parts.scheme == "file" else Path(mission)
+    try:
+        if mission.stat().st_size > MAX_BYTES:
+            raise _unreadable(str(mission), f"it is bigger than {MAX_BYTES // 1_000_000} MB")
+        return str(mission), mission.read_bytes()
+    except OSError as error:
+        raise _unreadable(str(mission), error.strerror or str(error)) from error
+
+
+def _fetch(url: str) -> bytes:
+    try:
+        with urlopen(url, timeout=FETCH_TIMEOUT_S) as response:
+            content: bytes = response.read(MAX_BYTES + 1)
+    except (URLError, OSError, ValueError) as error:
+        raise _unreadable(url, str(error)) from error
+    if len(content) > MAX_BYTES:
+        raise _unreadable(url, f"it is bigger than {MAX_BYTES // 1_000_000} MB")
+    return content
+
+
+def _unreadable(name: str, why: str) -> MissionError:
+    finding = Finding(
+        Severity.ERROR, name, 0, "", "unreadable-file", f"cannot be read: {why}", "check the path"
+    )
+    return MissionError(f"{name} cannot be read", [finding])
+
+
+def findings_for(
+    mission: Mission,
+    arbiters: FleetArbiters | None,
+    plugins: "PluginManager",
+    data: Iterable[str] = (),
+    process: str | None = None,
+    *,
+    simulated: bool = False,
+) -> list[Finding]:
+    """All findings of `m2pem check` for a mission that was read: its own, the fleet's, plugins'.
+
+    `data`: names given at start (`--data`). `arbiters` None: no fleet, so roles are not checked.
+    """
+    writes = {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
+    findings = [*mission.warnings, *lint(mission, data, writes)]
+    if process is not None and process not in {each.id for each in mission.processes}:
+        known = ", ".join(each.id for each in mission.processes)
+        findings.append(
+            Finding(
+                Severity.ERROR,
+                mission.file,
+                0,
+                process,
+                "unknown-process",
+                f"there is no process {process!r}",
+                f"name one of: {known}",
+            )
+        )
+    fleet = arbiters.fleet if arbiters is not None else None
+    if arbiters is not None:
+        findings += check_mission(mission, arbiters.fleet, arbiters.offered, simulated=simulated)
+    findings += plugins.check_mission(mission, fleet)
+    return sorted(findings, key=lambda finding: (finding.line, finding.element, finding.rule))
+
+
+def refuse_errors(what: str, findings: Sequence[Finding]) -> None:
+    """Raise MissionError with all findings when any of them is an error."""
+    if has_errors(findings):
+        raise MissionError(what, findings)
+
+
+def known_data(data: Mapping[str, object] | None) -> tuple[str, ...]:
+    """Names that are given at start."""
+    return tuple(data or ())

@@ -1,0 +1,111 @@
+"""Taking a run over after a restart (docs/architecture.md, "Journal and resume").
+
+Claim the run, fold its records, then look before doing anything: every behavior that should be
+running is asked for at its arbiter. Nothing is sent again that may have been done already.
+"""
+
+import asyncio
+import logging
+
+from m2pem.api.arbiter import BehaviorReport
+from m2pem.engine import commands as c
+from m2pem.engine.inputs import BehaviorMissing, BehaviorReported, ClaimRun, Input, ResourceFault
+from m2pem.engine.run import MissionRun
+from m2pem.engine.state import Behavior, BehaviorPhase
+from m2pem.executive.arbiters import FleetArbiters
+from m2pem.executive.dispatch import Dispatcher
+from m2pem.executive.runner import Runner
+from m2pem.journal.base import Journal
+from m2pem.model.behavior import BehaviorType
+from m2pem.model.catalogue import BehaviorState, ResourceId, ResumePolicy
+
+log = logging.getLogger("m2pem.resume")
+
+QUERY_TIMEOUT_S = 10.0
+"""How long an arbiter may take to look at a vehicle before it counts as unreachable."""
+
+
+async def replay(journal: Journal, run: MissionRun) -> int:
+    """Fold all of a run's records; returns when the last was decided (us since the Unix epoch)."""
+    last_us = 0
+    async for entry in journal.read(run.state.run):
+        run.replay(entry.records)
+        last_us = max(last_us, entry.at_us)
+    return last_us
+
+
+async def take_over(
+    runner: Runner, arbiters: FleetArbiters, dispatcher: Dispatcher, outage_s: float
+) -> None:
+    """Bring a replayed and claimed run back to life. Its task must not run yet.
+
+    `outage_s`: for how long nobody drove it. Longer than the fleet's `max_outage`, every behavior
+    is held and an operator is asked.
+    """
+    state = runner.run.state
+    runner.post(ClaimRun(runner.epoch))
+    max_outage_s = arbiters.fleet.max_outage_s
+    too_long = max_outage_s is not None and outage_s > max_outage_s
+    known = list(state.behaviors.values())
+    reports = await asyncio.gather(*(_query(arbiters, behavior) for behavior in known))
+    resend: set[str] = set()
+    for behavior, report in zip(known, reports, strict=True):
+        number = max(report.number if report is not None else 0, behavior.number)
+        unseen = behavior.state is None and behavior.phase is BehaviorPhase.ACTIVE
+        if report is not None and report.state is BehaviorState.UNKNOWN and unseen:
+            resend.add(behavior.id)
+            continue
+        dispatcher.adopt(behavior.id, behavior.resources, number)
+        item = _what_to_post(arbiters, behavior, report)
+        if item is None and too_long and behavior.phase is BehaviorPhase.ACTIVE:
+            reason = f"nobody drove the mission for {outage_s:.0f} s"
+            item = BehaviorMissing(behavior.id, ResumePolicy.HOLD, BehaviorState.RUNNING, reason)
+        if item is not None:
+            runner.post(item)
+    runner.take_up(
+        [
+            command
+            for command in runner.run.outstanding()
+            if not isinstance(command, c.StartBehavior) or command.behavior in resend
+        ]
+    )
+
+
+async def _query(arbiters: FleetArbiters, behavior: Behavior) -> BehaviorReport | None:
+    """What the arbiter sees; None: it cannot say."""
+    arbiter = arbiters.of(ResourceId(behavior.resources[0]))
+    try:
+        async with asyncio.timeout(QUERY_TIMEOUT_S):
+            return await arbiter.query(behavior.id, behavior.native_ref)
+    except TimeoutError:
+        log.error("%s: its arbiter did not answer within %s s", behavior.id, QUERY_TIMEOUT_S)
+    except Exception:  # an arbiter's fault is an unreachable vehicle
+        log.exception("%s: its arbiter raised on query", behavior.id)
+    return None
+
+
+def _what_to_post(
+    arbiters: FleetArbiters, behavior: Behavior, report: BehaviorReport | None
+) -> Input | None:
+    """The input that what was seen amounts to; None: it is as the journal says."""
+    if report is None:
+        reason = "its arbiter could not be asked after a restart"
+        return ResourceFault(behavior.resources[0], "LINK_LOST", reason, reachable=False)
+    if report.state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING):
+        return None
+    if report.state is BehaviorState.UNKNOWN:
+        reason = report.reason or "its arbiter no longer knows it"
+        return BehaviorMissing(behavior.id, _policy(arbiters, behavior), report.state, reason)
+    return BehaviorReported(
+        behavior.id,
+        max(report.number, behavior.number + 1),
+        report.state,
+        report.code,
+        report.reason,
+        report.native_ref,
+    )
+
+
+def _policy(arbiters: FleetArbiters, behavior: Behavior) -> ResumePolicy:
+    spec = arbiters.graph.spec(behavior.resources[0], behavior.name, BehaviorType(behavior.type))
+    return spec.resume if spec is not None else ResumePolicy.HOLD

@@ -1,0 +1,41 @@
+"""A scripted outside world, as an answers file tells it (FORMATS section 3).
+
+The executive asks it before it runs a service or starts a behavior; `m2pem.sim.answers` reads one
+from a file.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from m2pem.model.values import Value
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptedService:
+    """Instead of running the service: wait, then write, or fail with an error code."""
+
+    after_s: float = 0.0
+    write: Mapping[str, Value] | None = None
+    error: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptedBehavior:
+    """How the simulated arbiter ends a behavior: succeeded, failed, stalled or lost."""
+
+    after_s: float
+    end: str
+    error: str = ""
+
+
+class Script(Protocol):
+    """Each call is one visit; None: nothing is scripted for it (any more)."""
+
+    def service(self, element: str, name: str) -> ScriptedService | None:
+        """What a service task does on this visit."""
+        ...
+
+    def behavior(self, element: str) -> ScriptedBehavior | None:
+        """How the behavior of an element ends on this visit."""
+        ...

@@ -1,0 +1,186 @@
+"""Events: which definitions may stand where (BPMN 2.0.2, clause 10.5), and what they say."""
+
+from lxml import etree
+
+from m2pem.model.bpmn.definitions import read_definition
+from m2pem.model.bpmn.names import BPMN, a, kind, local
+from m2pem.model.bpmn.near import did_you_mean
+from m2pem.model.bpmn.reading import Reading, reference, text_of
+from m2pem.model.bpmn.scan import Scan, scan
+from m2pem.model.elements import (
+    BoundaryEvent,
+    Container,
+    EndEvent,
+    Event,
+    IntermediateCatchEvent,
+    IntermediateThrowEvent,
+    Process,
+    StartEvent,
+)
+from m2pem.model.events import ErrorEventDefinition, EventDefinition
+
+_ALLOWED = {
+    "startEvent": "message timer conditional signal",
+    "endEvent": "message error escalation cancel compensate signal terminate",
+    "intermediateCatchEvent": "message timer conditional link signal",
+    "intermediateThrowEvent": "message escalation link compensate signal",
+    "boundaryEvent": "message timer escalation error cancel compensate conditional signal",
+}
+_ALLOWED_IN_EVENT_SUBPROCESS = "message timer escalation error compensate conditional signal"
+_EXECUTED = frozenset({"message", "timer", "signal", "escalation", "error", "terminate"})
+_CATCHING = frozenset({"startEvent", "intermediateCatchEvent", "boundaryEvent"})
+_NEEDS_TRIGGER = frozenset({"intermediateCatchEvent", "boundaryEvent"})
+
+
+def read_event(reading: Reading, element: etree._Element, container: Container) -> Event:
+    """A start, end, intermediate or boundary event."""
+    identifier = reading.claim(element)
+    found = scan(reading, element, identifier)
+    place = local(element.tag)
+    definitions = _definitions(reading, found, place, container)
+    name = element.get("name", "")
+    line = reading.report.line(element)
+    reading.note_outputs(found.of("dataOutputAssociation"))
+    event: Event
+    if place == "startEvent":
+        event = StartEvent(identifier, name, line, definitions)
+    elif place == "endEvent":
+        event = EndEvent(identifier, name, line, definitions)
+    elif place == "intermediateThrowEvent":
+        event = IntermediateThrowEvent(identifier, name, line, definitions)
+    elif place == "intermediateCatchEvent":
+        event = IntermediateCatchEvent(identifier, name, line, definitions)
+        if any(local(tag) == "linkEventDefinition" for tag in found.children):
+            reading.self_starting.add(event)
+    else:
+        event = _boundary(reading, element, identifier, definitions)
+    return event
+
+
+def _boundary(
+    reading: Reading,
+    element: etree._Element,
+    identifier: str,
+    definitions: tuple[EventDefinition, ...],
+) -> BoundaryEvent:
+    interrupting = reading.boolean(element, "cancelActivity", True, identifier)
+    event = BoundaryEvent(
+        identifier, element.get("name", ""), reading.report.line(element), definitions, interrupting
+    )
+    reading.attachments.append((event, reference(element.get("attachedToRef", ""))))
+    if not interrupting and any(isinstance(d, ErrorEventDefinition) for d in definitions):
+        reading.report.error(
+            element,
+            identifier,
+            "error-not-interrupting",
+            'a boundary event that catches an error cannot have cancelActivity="false": the '
+            "activity has already failed",
+            "make it interrupting, or throw and catch an escalation",
+        )
+    return event
+
+
+def _definitions(
+    reading: Reading, found: Scan, place: str, container: Container
+) -> tuple[EventDefinition, ...]:
+    elements = [
+        each
+        for tag, group in found.children.items()
+        if tag.endswith("EventDefinition") and tag.startswith(BPMN)
+        for each in group
+    ]
+    for referring in found.of("eventDefinitionRef"):
+        target = _referred_definition(reading, referring, found.id)
+        if target is not None:
+            elements.append(target)
+    if len(elements) > 1:
+        reading.report.error(
+            found.element,
+            found.id,
+            "not-executed",
+            "m2pem does not execute an event with several triggers or results yet",
+            "use one event for each",
+        )
+        return ()
+    if not elements:
+        if place in _NEEDS_TRIGGER and not found.of("eventDefinitionRef"):
+            _no_trigger(reading, found, place)
+        return ()
+    definition = elements[0]
+    name = local(definition.tag).removesuffix("EventDefinition")
+    inside_event_subprocess = container in reading.self_starting
+    allowed = _ALLOWED[place].split()
+    if place == "startEvent" and inside_event_subprocess:
+        allowed = _ALLOWED_IN_EVENT_SUBPROCESS.split()
+    elif place == "startEvent" and not isinstance(container, Process):
+        reading.report.error(
+            found.element,
+            found.id,
+            "typed-start-in-subprocess",
+            f"a start event in an embedded subprocess cannot wait for {a(kind(definition.tag))}",
+            "use a plain start event, and a catching intermediate event after it",
+        )
+        return ()
+    if name not in allowed:
+        _not_allowed(reading, found, definition, allowed)
+        return ()
+    if name not in _EXECUTED:
+        reading.report.error(
+            found.element,
+            found.id,
+            "not-executed",
+            f"m2pem does not execute {a(kind(definition.tag))} yet",
+            _INSTEAD.get(name, "draw it with the elements that docs/missions.md lists"),
+        )
+        return ()
+    read = read_definition(reading, definition, found, catches=place in _CATCHING)
+    return () if read is None else (read,)
+
+
+_INSTEAD = {
+    "conditional": "check the condition at a gateway, or throw a signal where it becomes true",
+    "link": "join the two ends by a sequence flow",
+    "cancel": "throw and catch an error",
+    "compensate": "draw what undoes the activity after a boundary event",
+}
+
+
+def _referred_definition(
+    reading: Reading, referring: etree._Element, identifier: str
+) -> etree._Element | None:
+    name = reference(text_of(referring))
+    target = reading.event_definitions.get(name)
+    if target is None:
+        reading.report.error(
+            referring,
+            identifier,
+            "dangling-reference",
+            f"eventDefinitionRef names '{name}', which is no event definition of this file",
+            did_you_mean(name, reading.event_definitions, "name one that stands in definitions"),
+        )
+    return target
+
+
+def _no_trigger(reading: Reading, found: Scan, place: str) -> None:
+    word = kind(found.element.tag)
+    also = ", or make it an intermediateThrowEvent" if place == "intermediateCatchEvent" else ""
+    reading.report.error(
+        found.element,
+        found.id,
+        "no-trigger",
+        f"{a(word)} must say what it waits for",
+        f"give it a signal, message or timer event definition{also}",
+    )
+
+
+def _not_allowed(
+    reading: Reading, found: Scan, definition: etree._Element, allowed: list[str]
+) -> None:
+    names = [each for each in allowed if each in _EXECUTED]
+    reading.report.error(
+        found.element,
+        found.id,
+        "event-not-allowed",
+        f"BPMN does not allow {a(kind(definition.tag))} as {a(kind(found.element.tag))}",
+        f"use one of: {', '.join(names)}",
+    )

@@ -1,0 +1,71 @@
+"""Which message an event sends or receives when only message flows say so.
+
+Diagrams of several pools often draw the message flow and name no message. Places that message
+flows join then share one message: the one that any of them or of the flows names, else one that
+is made up, with the id of the first flow.
+"""
+
+from m2pem.model.bpmn.reading import MessageUse, Reading
+from m2pem.model.elements import ReceiveTask
+from m2pem.model.events import Message, MessageEventDefinition
+
+
+def resolve_messages(reading: Reading) -> None:
+    """Give a message to every event and task that names none."""
+    groups = _groups(reading)
+    uses = {use.node_id: use for use in reading.message_uses}
+    agreed: dict[int, Message] = {}
+    for flow, message_ref in reading.message_flows:
+        group = groups[flow.source_id]
+        named = reading.messages.get(message_ref)
+        for end in (flow.source_id, flow.target_id):
+            use = uses.get(end)
+            named = named or (use.message if use else None)
+        if named is not None:
+            agreed.setdefault(group, named)
+    for flow, _ in reading.message_flows:
+        group = groups[flow.source_id]
+        if group not in agreed and (flow.source_id in uses or flow.target_id in uses):
+            identifier = flow.id or f"{flow.source_id}-{flow.target_id}"
+            message = Message(identifier, flow.name, flow.line)
+            agreed[group] = reading.messages.setdefault(identifier, message)
+    for use in reading.message_uses:
+        if use.message is None:
+            _assign(reading, use, agreed.get(groups.get(use.node_id, -1)))
+
+
+def _groups(reading: Reading) -> dict[str, int]:
+    """The connected part of the message flows in which each of their ends is; pools join none."""
+    pools = {participant.id for participant in reading.participants}
+    neighbors: dict[str, list[str]] = {}
+    for flow, _ in reading.message_flows:
+        neighbors.setdefault(flow.source_id, [])
+        neighbors.setdefault(flow.target_id, [])
+        if flow.source_id not in pools and flow.target_id not in pools:
+            neighbors[flow.source_id].append(flow.target_id)
+            neighbors[flow.target_id].append(flow.source_id)
+    groups: dict[str, int] = {}
+    for number, start in enumerate(neighbors):
+        waiting = [start]
+        while waiting:
+            end = waiting.pop()
+            if end not in groups:
+                groups[end] = number
+                waiting += neighbors[end]
+    return groups
+
+
+def _assign(reading: Reading, use: MessageUse, message: Message | None) -> None:
+    if message is None:
+        reading.report.warning(
+            use.line,
+            use.node_id,
+            "missing-reference",
+            "it names no message; it "
+            + ("waits for" if use.catches else "sends")
+            + f" one of its own, with the id '{use.node_id}'",
+            "add messageRef, or draw a message flow",
+        )
+        message = reading.messages.setdefault(use.node_id, Message(use.node_id, use.name, use.line))
+    if isinstance(use.holder, MessageEventDefinition | ReceiveTask) or use.holder.behavior is None:
+        object.__setattr__(use.holder, "message", message)

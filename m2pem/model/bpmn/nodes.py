@@ -1,0 +1,173 @@
+"""One flow node: which reader its tag has, and what all activities and gateways share."""
+
+from collections.abc import Callable
+
+from lxml import etree
+
+from m2pem.model.bpmn.calls import read_call_activity
+from m2pem.model.bpmn.events import read_event
+from m2pem.model.bpmn.names import BPMN, a, kind, local
+from m2pem.model.bpmn.prompts import read_user_task
+from m2pem.model.bpmn.reading import Reading, reference
+from m2pem.model.bpmn.scan import Scan, own_extensions, scan
+from m2pem.model.bpmn.scripts import read_script_task
+from m2pem.model.bpmn.tasks import (
+    read_manual_task,
+    read_plain_task,
+    read_receive_task,
+    read_send_task,
+    read_service_task,
+)
+from m2pem.model.elements import (
+    Activity,
+    Container,
+    ExclusiveGateway,
+    FlowNode,
+    Gateway,
+    InclusiveGateway,
+    ParallelGateway,
+    SubProcess,
+)
+
+_NONE: frozenset[str] = frozenset()
+_LOOPS = ("loopCharacteristics", "standardLoopCharacteristics", "multiInstanceLoopCharacteristics")
+LOOPS = frozenset(BPMN + name for name in _LOOPS)
+SUBPROCESSES = frozenset(BPMN + name for name in ("subProcess", "transaction", "adHocSubProcess"))
+
+_TASKS: dict[str, Callable[[Reading, Scan], Activity]] = {
+    BPMN + "task": read_plain_task,
+    BPMN + "manualTask": read_manual_task,
+    BPMN + "userTask": read_user_task,
+    BPMN + "scriptTask": read_script_task,
+    BPMN + "serviceTask": read_service_task,
+    BPMN + "sendTask": read_send_task,
+    BPMN + "receiveTask": read_receive_task,
+    BPMN + "callActivity": read_call_activity,
+    BPMN + "businessRuleTask": read_plain_task,
+}
+_GATEWAYS: dict[str, type[Gateway]] = {
+    BPMN + "exclusiveGateway": ExclusiveGateway,
+    BPMN + "inclusiveGateway": InclusiveGateway,
+    BPMN + "parallelGateway": ParallelGateway,
+    BPMN + "complexGateway": Gateway,
+    BPMN + "eventBasedGateway": Gateway,
+}
+_EVENTS = frozenset(
+    BPMN + name
+    for name in (
+        "startEvent",
+        "endEvent",
+        "intermediateCatchEvent",
+        "intermediateThrowEvent",
+        "boundaryEvent",
+    )
+)
+_REFUSED = {
+    "businessRuleTask": "use a service task",
+    "complexGateway": "use an exclusive, inclusive or parallel gateway",
+    "eventBasedGateway": "wait with boundary events on one task, or with parallel branches",
+    "transaction": "use a subprocess with boundary events",
+    "adHocSubProcess": "join its activities by sequence flows, in a plain subprocess",
+    "choreographyTask": "draw the mission as processes",
+    "callChoreography": "draw the mission as processes",
+    "subChoreography": "draw the mission as processes",
+    "event": "use a start, end or intermediate event",
+    "implicitThrowEvent": "use an intermediate throw event",
+}
+
+
+def read_node(reading: Reading, element: etree._Element, container: Container) -> FlowNode | None:
+    """A flow node with all but its flows; None when the tag is that of none."""
+    tag = element.tag
+    if tag in _EVENTS:
+        return read_event(reading, element, container)
+    task = _TASKS.get(tag)
+    gateway = _GATEWAYS.get(tag)
+    name = local(tag)
+    if task is None and gateway is None and tag not in SUBPROCESSES and name not in _REFUSED:
+        return None
+    if name in _REFUSED:
+        not_executed(reading, element, element.get("id", ""), kind(tag), _REFUSED[name])
+    identifier = reading.claim(element)
+    node: FlowNode
+    if gateway is not None:
+        own_extensions(reading, scan(reading, element, identifier), _NONE)
+        node = gateway(identifier, element.get("name", ""), reading.report.line(element))
+        _note_default(reading, element, node)
+        if reading.boolean(element, "instantiate", False, identifier):
+            reading.self_starting.add(node)
+        return node
+    if tag in SUBPROCESSES:
+        # Its children are read with its content, by containers.py.
+        node = SubProcess(identifier, element.get("name", ""), reading.report.line(element))
+        _event_subprocess(reading, element, node)
+        _check_activity(reading, element, node)
+    elif task is not None:
+        found = scan(reading, element, identifier)
+        node = task(reading, found)
+        if tag != BPMN + "callActivity":
+            reading.note_outputs(found.of("dataOutputAssociation"))
+        for loop in _LOOPS:
+            for each in found.of(loop):
+                refuse_loop(reading, each, identifier)
+        _check_activity(reading, element, node)
+    else:
+        node = FlowNode(identifier, element.get("name", ""), reading.report.line(element))
+    return node
+
+
+def not_executed(
+    reading: Reading, element: etree._Element, identifier: str, what: str, instead: str
+) -> None:
+    """Refuse what is BPMN but nothing that m2pem runs."""
+    reading.report.error(
+        element, identifier, "not-executed", f"m2pem does not execute {a(what)} yet", instead
+    )
+
+
+def refuse_loop(reading: Reading, element: etree._Element, identifier: str) -> None:
+    """Refuse the loop marker of an activity."""
+    not_executed(
+        reading, element, identifier, kind(element.tag), "draw the loop with an exclusive gateway"
+    )
+
+
+def _event_subprocess(reading: Reading, element: etree._Element, node: SubProcess) -> None:
+    if reading.boolean(element, "triggeredByEvent", False, node.id):
+        reading.self_starting.add(node)
+        not_executed(
+            reading,
+            element,
+            node.id,
+            "event subprocess",
+            "use a boundary event on a subprocess around the rest",
+        )
+
+
+def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -> None:
+    _note_default(reading, element, node)
+    if reading.boolean(element, "isForCompensation", False, node.id):
+        reading.self_starting.add(node)
+        not_executed(
+            reading,
+            element,
+            node.id,
+            "compensation activity",
+            "draw what undoes the activity after a boundary event",
+        )
+    for name in ("startQuantity", "completionQuantity"):
+        quantity = element.get(name, "1").strip()
+        if quantity != "1":
+            reading.report.error(
+                element,
+                node.id,
+                "not-executed",
+                f"m2pem does not execute {name}='{quantity}' yet",
+                "use a parallel gateway for several tokens",
+            )
+
+
+def _note_default(reading: Reading, element: etree._Element, node: FlowNode) -> None:
+    default = element.get("default")
+    if default:
+        reading.defaults.append((node, reference(default), reading.report.line(element)))

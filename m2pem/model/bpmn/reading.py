@@ -1,0 +1,277 @@
+"""What is known while a file is being read: elements so far, and references to resolve."""
+
+import re
+from dataclasses import dataclass, field
+
+from lxml import etree
+
+from m2pem.errors import ExpressionSyntaxError
+from m2pem.model.bpmn.names import M2PEM, M2PEM_ATTRIBUTES, a, kind, local
+from m2pem.model.bpmn.near import did_you_mean
+from m2pem.model.bpmn.report import Report, Where
+from m2pem.model.bpmn.schema import Shape
+from m2pem.model.elements import (
+    BoundaryEvent,
+    CallActivity,
+    Container,
+    DataObject,
+    FlowNode,
+    Lane,
+    MessageFlow,
+    Participant,
+    Process,
+    ReceiveTask,
+    SendTask,
+    SequenceFlow,
+    UserTask,
+)
+from m2pem.model.events import Error, Escalation, Message, MessageEventDefinition, Signal
+from m2pem.model.expression import Expression, parse, template
+
+KEY = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
+"""A dotted name of the data store."""
+
+_TRUTH = {"true": True, "1": True, "false": False, "0": False}
+
+
+@dataclass(slots=True)
+class FlowEnds:
+    """A sequence flow and the ids that it joins, not yet looked up."""
+
+    flow: SequenceFlow
+    source_ref: str
+    target_ref: str
+    container: Container
+
+
+@dataclass(slots=True)
+class DataEnd:
+    """What a data association can refer to. `carriers` may have extension elements."""
+
+    key: str
+    carriers: list[etree._Element]
+    declared: DataObject | None = None
+    refers_to: str = ""
+
+
+@dataclass(slots=True)
+class Association:
+    """A data association of an activity, by ids."""
+
+    element: etree._Element
+    source_refs: list[str]
+    target_ref: str
+    simple: bool
+
+
+@dataclass(slots=True)
+class PendingPrompt:
+    """A user task whose prompt waits until all data objects are known."""
+
+    task: UserTask
+    element: etree._Element
+    extensions: dict[str, list[etree._Element]]
+    documentation: str
+    inputs: list[Association]
+
+
+@dataclass(slots=True)
+class PendingCall:
+    """A call activity whose data associations wait until all data objects are known."""
+
+    call: CallActivity
+    element: etree._Element
+    parameters: dict[str, str]
+    """Keys of its own data inputs and outputs, by id."""
+    inputs: list[Association]
+    outputs: list[Association]
+
+
+@dataclass(slots=True)
+class MessageUse:
+    """A place that sends or receives a message, which message flows may have to name."""
+
+    holder: MessageEventDefinition | SendTask | ReceiveTask
+    node_id: str
+    name: str
+    line: int
+    catches: bool
+    message: Message | None
+
+
+@dataclass(slots=True)
+class Reading:
+    """The state of reading one file."""
+
+    report: Report
+    expression_language: str | None = None
+    ids: dict[str, int] = field(default_factory=dict)
+    event_definitions: dict[str, etree._Element] = field(default_factory=dict)
+    global_tasks: dict[str, str] = field(default_factory=dict)
+    signals: dict[str, Signal] = field(default_factory=dict)
+    messages: dict[str, Message] = field(default_factory=dict)
+    errors: dict[str, Error] = field(default_factory=dict)
+    escalations: dict[str, Escalation] = field(default_factory=dict)
+    participants: list[Participant] = field(default_factory=list)
+    message_flows: list[tuple[MessageFlow, str]] = field(default_factory=list)
+    lanes: list[Lane] = field(default_factory=list)
+    processes: list[Process] = field(default_factory=list)
+    nodes: list[FlowNode] = field(default_factory=list)
+    containers: list[Container] = field(default_factory=list)
+    """The container of each of `nodes`, in the same order."""
+    flows: list[FlowEnds] = field(default_factory=list)
+    defaults: list[tuple[FlowNode, str, int]] = field(default_factory=list)
+    attachments: list[tuple[BoundaryEvent, str]] = field(default_factory=list)
+    data: dict[str, DataEnd] = field(default_factory=dict)
+    declared: list[tuple[Container, DataObject]] = field(default_factory=list)
+    prompts: list[PendingPrompt] = field(default_factory=list)
+    calls: list[PendingCall] = field(default_factory=list)
+    written: list[Association] = field(default_factory=list)
+    """Data output associations of all activities and events."""
+    written_keys: set[str] = field(default_factory=set)
+    message_uses: list[MessageUse] = field(default_factory=list)
+    self_starting: set[FlowNode] = field(default_factory=set)
+    """Refused nodes that need no incoming flow (event subprocesses, link targets, ...)."""
+    broken: set[Container] = field(default_factory=set)
+    """Containers whose graph is not what was drawn, because a finding says so."""
+
+    def claim(self, element: etree._Element) -> str:
+        """The element's id; says when it has none, or one that is taken."""
+        identifier = element.get("id")
+        if not identifier:
+            self.report.error(
+                element,
+                "",
+                "missing-id",
+                f"{a(kind(element.tag))} has no id"
+                + (f" (its name is '{element.get('name')}')" if element.get("name") else ""),
+                "give it an id that nothing else in the file has",
+            )
+            return ""
+        first = self.ids.get(identifier)
+        if first is None:
+            self.ids[identifier] = self.report.line(element)
+        else:
+            self.report.error(
+                element,
+                identifier,
+                "duplicate-id",
+                f"the id '{identifier}' is already that of the element on line {first}",
+                "give one of the two another id, and its references too",
+            )
+        return identifier
+
+    def optional_id(self, element: etree._Element) -> str:
+        """The id of an element that can do without one."""
+        return self.claim(element) if element.get("id") else ""
+
+    def check_attributes(self, element: etree._Element, shape: Shape, identifier: str) -> None:
+        """Warn of attributes that neither BPMN nor m2pem defines for the element."""
+        for key in element.keys():
+            if key in shape.attributes:
+                continue
+            if key[0] != "{":
+                self.report.warning(
+                    element,
+                    identifier,
+                    "unknown-attribute",
+                    f"BPMN has no attribute '{key}' for {a(kind(element.tag))}; it is ignored",
+                    did_you_mean(key, shape.attributes, "delete it, or give it its namespace"),
+                )
+            elif key.startswith(M2PEM) and key[len(M2PEM) :] not in M2PEM_ATTRIBUTES:
+                self.report.warning(
+                    element,
+                    identifier,
+                    "unknown-extension",
+                    f"m2pem has no attribute 'm2pem:{local(key)}'; it is ignored",
+                    did_you_mean(local(key), M2PEM_ATTRIBUTES, "delete it"),
+                )
+
+    def note_outputs(self, elements: list[etree._Element]) -> list[Association]:
+        """Keep data output associations: they say what the element writes."""
+        found = [association(each) for each in elements]
+        self.written += found
+        return found
+
+    def data_key(self, identifier: str) -> str:
+        """The key of a data object, property, data store or reference to one; "" for others."""
+        end = self.data.get(identifier)
+        if end is None:
+            return ""
+        target = self.data.get(end.refers_to, end)
+        return target.declared.key if target.declared is not None else target.key
+
+    def boolean(self, element: etree._Element, name: str, default: bool, identifier: str) -> bool:
+        """An attribute of XML Schema's type boolean."""
+        text = element.get(name)
+        if text is None:
+            return default
+        value = _TRUTH.get(text.strip())
+        if value is None:
+            self.report.error(
+                element,
+                identifier,
+                "bad-value",
+                f"{name}='{text}' is neither true nor false",
+                f'write {name}="true" or {name}="false"',
+            )
+            return default
+        return value
+
+    def expression(
+        self, where: Where, identifier: str, text: str, language: str | None = None
+    ) -> Expression | None:
+        """An expression of any dialect; says why when it is none."""
+        try:
+            if language is None and self.expression_language is not None:
+                try:
+                    return parse(text, self.expression_language)
+                except ExpressionSyntaxError:
+                    return parse(text)
+            return parse(text, language)
+        except ExpressionSyntaxError as error:
+            self._bad_expression(where, identifier, error)
+            return None
+
+    def template(self, where: Where, identifier: str, text: str) -> Expression | None:
+        """A text that may be an expression; says why when it is a wrong one."""
+        try:
+            return template(text)
+        except ExpressionSyntaxError as error:
+            self._bad_expression(where, identifier, error)
+            return None
+
+    def _bad_expression(self, where: Where, identifier: str, error: ExpressionSyntaxError) -> None:
+        self.report.error(
+            where,
+            identifier,
+            "bad-expression",
+            f"not an expression: {error}",
+            "write for example user.decision == 'continue' (docs/conditions.md)",
+        )
+
+
+def association(element: etree._Element) -> Association:
+    """A data input or output association."""
+    sources: list[str] = []
+    target = ""
+    simple = True
+    for child in element:
+        name = local(child.tag)
+        if name == "sourceRef":
+            sources.append(reference(text_of(child)))
+        elif name == "targetRef":
+            target = reference(text_of(child))
+        elif name in ("assignment", "transformation"):
+            simple = False
+    return Association(element, sources, target, simple and len(sources) <= 1)
+
+
+def text_of(element: etree._Element) -> str:
+    """All text inside an element, without the space around it."""
+    return "".join(element.itertext()).strip()
+
+
+def reference(text: str) -> str:
+    """The id that a reference (a QName in BPMN's schema) names, without its prefix."""
+    return text.strip().rpartition(":")[2]

@@ -1,0 +1,149 @@
+"""Script tasks: a behavior as XML, or statements (docs/missions.md)."""
+
+from lxml import etree
+
+from m2pem.model.behavior import Behavior, Script
+from m2pem.model.bpmn.behavior_xml import BehaviorReader, is_behavior
+from m2pem.model.bpmn.names import local
+from m2pem.model.bpmn.reading import Reading
+from m2pem.model.bpmn.scan import Scan, own_extensions
+from m2pem.model.bpmn.xml import XmlError, parse_xml
+from m2pem.model.elements import ScriptTask
+from m2pem.model.script import parse_script
+
+_XML_FORMATS = frozenset({"application/xml", "text/xml", "xml"})
+_OWN_FORMATS = frozenset({"", "m2pem"})
+BEHAVIOR = frozenset({"behavior"})
+
+
+def read_script_task(reading: Reading, found: Scan) -> ScriptTask:
+    """A script task: a behavior of its extension elements or script, or statements."""
+    extensions = own_extensions(reading, found, BEHAVIOR)
+    carried = extensions.get("behavior", [])
+    scripts = found.of("script")
+    script = scripts[0] if scripts else None
+    has_script = script is not None and (len(script) > 0 or bool((script.text or "").strip()))
+    behavior: Behavior | None = None
+    statements: Script | None = None
+    if carried:
+        if has_script:
+            reading.report.error(
+                found.element,
+                found.id,
+                "two-behaviors",
+                "the task has both m2pem:behavior and a script",
+                "delete one of the two",
+            )
+        behavior = read_carried(reading, found, carried)
+    elif script is not None and has_script:
+        behavior, statements = _script(reading, found, script)
+    else:
+        reading.report.warning(
+            found.element,
+            found.id,
+            "empty-script",
+            "the script task has no script; it does nothing",
+            "give it a behavior, or make it a plain task",
+        )
+    line = reading.report.line(found.element)
+    return ScriptTask(found.id, found.element.get("name", ""), line, behavior, statements)
+
+
+def read_carried(reading: Reading, found: Scan, carried: list[etree._Element]) -> Behavior | None:
+    """The behavior of a task's extension elements."""
+    if len(carried) > 1:
+        reading.report.error(
+            carried[1],
+            found.id,
+            "two-behaviors",
+            "the task has more than one m2pem:behavior",
+            "keep one; draw a task for each behavior",
+        )
+    return BehaviorReader(reading, found.id, reading.report.line).behavior(carried[0])
+
+
+def _script(
+    reading: Reading, found: Scan, script: etree._Element
+) -> tuple[Behavior | None, Script | None]:
+    form = found.element.get("scriptFormat", "").strip().lower()
+    text = script.text or ""
+    if form not in _XML_FORMATS and form not in _OWN_FORMATS:
+        reading.report.error(
+            found.element,
+            found.id,
+            "script-language",
+            f"m2pem does not run scripts in '{found.element.get('scriptFormat')}'",
+            'write statements (scriptFormat="m2pem") or a behavior '
+            '(scriptFormat="application/xml")',
+        )
+        return None, None
+    if len(script):
+        if form == "m2pem":
+            _form_differs(reading, found, "XML")
+        return _child_behavior(reading, found, script), None
+    if form in _XML_FORMATS or (not form and text.lstrip().startswith("<")):
+        return _text_behavior(reading, found, script, text), None
+    statements, problems = parse_script(text, reading.report.line(script))
+    for line, message in problems:
+        reading.report.error(
+            line,
+            found.id,
+            "bad-script",
+            f"the script cannot be run: {message}",
+            "one statement a line: dotted.name = expression, or throw error CODE",
+        )
+    return None, statements
+
+
+def _form_differs(reading: Reading, found: Scan, actual: str) -> None:
+    reading.report.error(
+        found.element,
+        found.id,
+        "script-language",
+        f"the script says scriptFormat='{found.element.get('scriptFormat')}', but is {actual}",
+        "correct its scriptFormat",
+    )
+
+
+def _child_behavior(reading: Reading, found: Scan, script: etree._Element) -> Behavior | None:
+    child = script[0]
+    if len(script) > 1 or not is_behavior(child):
+        _no_behavior(reading, found, reading.report.line(child), local(child.tag))
+        return None
+    return BehaviorReader(reading, found.id, reading.report.line).behavior(child)
+
+
+def _text_behavior(
+    reading: Reading, found: Scan, script: etree._Element, text: str
+) -> Behavior | None:
+    body = text.lstrip()
+    first = reading.report.line(script) + text[: len(text) - len(body)].count("\n")
+    try:
+        document = parse_xml(body.encode(), declared=False)
+    except XmlError as error:
+        reading.report.error(
+            first + error.line - 1,
+            found.id,
+            "bad-script",
+            error.message.replace("the file", "the script"),
+            error.remedy,
+        )
+        return None
+    if not is_behavior(document.root):
+        _no_behavior(reading, found, first, local(document.root.tag))
+        return None
+
+    def line(element: etree._Element) -> int:
+        return first + document.line(element) - 1
+
+    return BehaviorReader(reading, found.id, line).behavior(document.root)
+
+
+def _no_behavior(reading: Reading, found: Scan, line: int, name: str) -> None:
+    reading.report.error(
+        line,
+        found.id,
+        "bad-script",
+        f"the script is XML, but <{name}> is no <behavior>",
+        "write one <behavior> (docs/missions.md), or statements",
+    )

@@ -1,0 +1,145 @@
+"""Tasks other than script tasks and user tasks."""
+
+from lxml import etree
+
+from m2pem.model.behavior import Behavior, Parameter, ServiceCall
+from m2pem.model.bpmn.behavior_xml import BehaviorReader
+from m2pem.model.bpmn.definitions import look_up
+from m2pem.model.bpmn.names import CAMUNDA, M2PEM, local
+from m2pem.model.bpmn.reading import MessageUse, Reading
+from m2pem.model.bpmn.scan import Scan, own_extensions
+from m2pem.model.bpmn.scripts import BEHAVIOR, read_carried
+from m2pem.model.elements import ManualTask, ReceiveTask, SendTask, ServiceTask, Task
+from m2pem.model.events import Message
+
+_NONE: frozenset[str] = frozenset()
+_SERVICE = frozenset({"behavior", "service", "property", "role"})
+
+
+def read_plain_task(reading: Reading, found: Scan) -> Task:
+    """A task without a type."""
+    own_extensions(reading, found, _NONE)
+    return Task(found.id, found.element.get("name", ""), reading.report.line(found.element))
+
+
+def read_manual_task(reading: Reading, found: Scan) -> ManualTask:
+    """A manual task."""
+    own_extensions(reading, found, _NONE)
+    return ManualTask(found.id, found.element.get("name", ""), reading.report.line(found.element))
+
+
+def read_service_task(reading: Reading, found: Scan) -> ServiceTask:
+    """A service task: a registered service, or a behavior."""
+    extensions = own_extensions(reading, found, _SERVICE)
+    carried = extensions.get("behavior", [])
+    behavior: Behavior | None = read_carried(reading, found, carried) if carried else None
+    call = _service_call(reading, found, extensions)
+    if carried and call is not None:
+        reading.report.error(
+            found.element,
+            found.id,
+            "two-behaviors",
+            f"the task has both m2pem:behavior and the service class '{call.service}'",
+            "delete one of the two",
+        )
+    elif not carried and call is None and not extensions.get("service"):
+        reading.report.warning(
+            found.element,
+            found.id,
+            "no-service",
+            "the service task names no service; it does nothing",
+            'add <m2pem:service class="Detector"/> to its extension elements, or make it a plain '
+            "task",
+        )
+    line = reading.report.line(found.element)
+    return ServiceTask(found.id, found.element.get("name", ""), line, call, behavior)
+
+
+def _service_call(
+    reading: Reading, found: Scan, extensions: dict[str, list[etree._Element]]
+) -> ServiceCall | None:
+    element = found.element
+    reader = BehaviorReader(reading, found.id, reading.report.line)
+    calls = [reader.service(each) for each in extensions.get("service", [])]
+    named = [call for call in calls if call is not None]
+    line = reading.report.line(element)
+    for key in ("class", M2PEM + "class", M2PEM + "service", CAMUNDA + "class"):
+        name = (element.get(key) or "").strip()
+        if name:
+            named.append(ServiceCall(name, line))
+    classes = {call.service for call in named}
+    if len(classes) > 1:
+        reading.report.error(
+            element,
+            found.id,
+            "two-services",
+            f"the task names several service classes: {', '.join(sorted(classes))}",
+            "keep one",
+        )
+    if not named:
+        return None
+    first = named[0]
+    properties = [*first.properties, *_loose_properties(reader, found, extensions)]
+    roles = [*first.roles, *reader.roles(extensions.get("role", []))]
+    reader.refuse_repeated(properties, "property")
+    return ServiceCall(first.service, first.line, tuple(roles), tuple(properties))
+
+
+def _loose_properties(
+    reader: BehaviorReader, found: Scan, extensions: dict[str, list[etree._Element]]
+) -> list[Parameter]:
+    """Properties beside the service: `m2pem:property`, and Camunda's `camunda:properties`."""
+    loose = list(extensions.get("property", []))
+    for each in found.extensions():
+        if each.tag == CAMUNDA + "properties":
+            loose += [child for child in each if local(child.tag) == "property"]
+    return [parameter for each in loose for parameter in reader.one_parameter(each)]
+
+
+def read_send_task(reading: Reading, found: Scan) -> SendTask:
+    """A send task: a message, or a behavior."""
+    carried = own_extensions(reading, found, BEHAVIOR).get("behavior", [])
+    behavior = read_carried(reading, found, carried) if carried else None
+    message = _message(reading, found)
+    if carried and message is not None:
+        reading.report.error(
+            found.element,
+            found.id,
+            "two-behaviors",
+            "the task has both m2pem:behavior and a message to send",
+            "draw a task for each",
+        )
+    name = found.element.get("name", "")
+    line = reading.report.line(found.element)
+    task = SendTask(found.id, name, line, message, behavior)
+    if not carried:
+        reading.message_uses.append(MessageUse(task, found.id, name, line, False, message))
+    return task
+
+
+def read_receive_task(reading: Reading, found: Scan) -> ReceiveTask:
+    """A receive task."""
+    own_extensions(reading, found, _NONE)
+    message = _message(reading, found)
+    name = found.element.get("name", "")
+    line = reading.report.line(found.element)
+    task = ReceiveTask(found.id, name, line, message)
+    reading.message_uses.append(MessageUse(task, found.id, name, line, True, message))
+    if reading.boolean(found.element, "instantiate", False, found.id):
+        reading.self_starting.add(task)
+        reading.report.error(
+            found.element,
+            found.id,
+            "not-executed",
+            "m2pem does not execute a receive task that starts its process yet",
+            "put a message start event before it, and delete instantiate",
+        )
+    return task
+
+
+def _message(reading: Reading, found: Scan) -> Message | None:
+    element = found.element
+    line = reading.report.line(element)
+    return look_up(
+        reading, element, "message", reading.messages, found.id, lambda i: Message(i, "", line)
+    )

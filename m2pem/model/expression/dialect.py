@@ -1,0 +1,141 @@
+"""Which dialect a text is written in, and where in it the expressions stand."""
+
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+
+from m2pem.errors import ExpressionSyntaxError
+from m2pem.model.expression.literals import shorten
+
+
+class Dialect(StrEnum):
+    """The ways to write an expression. TEMPLATE: text with `${...}` parts. TEXT: only itself."""
+
+    BARE = "m2pem"
+    JUEL = "juel"
+    FEEL = "feel"
+    TEMPLATE = "template"
+    TEXT = "text"
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Where an expression stands: `text[start:end]`, without its marks."""
+
+    start: int
+    end: int
+
+
+MAX_LENGTH = 10_000
+"""Characters of a text that holds an expression."""
+
+_ACCEPTED = "supported are m2pem (bare), juel ('${...}') and FEEL (a leading '=')"
+_MARK = re.compile(r"\\[$#]\{|[$#]\{")
+
+
+def locate(text: str, language: str | None) -> tuple[Dialect, Span]:
+    """The dialect of a text that is one expression, by its marks, else by its `language`.
+
+    Raises:
+        ExpressionSyntaxError: the language is none of ours; the text is too long, or goes on
+            outside its `${...}`.
+    """
+    _limit(text)
+    spoken = _spoken(language)
+    stripped = text.strip()
+    start = len(text) - len(text.lstrip())
+    whole = Span(start, start + len(stripped))
+    if language and spoken is None and not (_is_xpath(language) and _is_marked(stripped)):
+        raise ExpressionSyntaxError(
+            f"the expression language {shorten(language)!r} is not supported; {_ACCEPTED}",
+            text,
+            0,
+        )
+    if spoken is Dialect.BARE:
+        return Dialect.BARE, whole
+    if stripped.startswith(("${", "#{")):
+        span = _close(text, start)
+        if span.end + 1 != whole.end:
+            raise ExpressionSyntaxError(
+                "an expression is one '${...}': put all of it between the braces",
+                text,
+                span.end + 1,
+            )
+        return Dialect.JUEL, span
+    if stripped.startswith("="):
+        return Dialect.FEEL, Span(start + 1, whole.end)
+    return spoken or Dialect.BARE, whole
+
+
+def split(text: str) -> list[str | Span]:
+    """The literal parts of a text (`\\${` stands for `${`) and its `${...}` parts, in order.
+
+    Raises:
+        ExpressionSyntaxError: a `${` without its `}`, or a text with a `${` that is too long.
+    """
+    parts: list[str | Span] = []
+    literal = ""
+    position = 0
+    while mark := _MARK.search(text, position):
+        literal += text[position : mark.start()]
+        if mark[0].startswith("\\"):
+            literal += mark[0][1:]
+            position = mark.end()
+            continue
+        _limit(text)
+        if literal:
+            parts.append(literal)
+            literal = ""
+        span = _close(text, mark.start())
+        parts.append(span)
+        position = span.end + 1
+    literal += text[position:]
+    return [*parts, literal] if literal else parts
+
+
+def _limit(text: str) -> None:
+    if len(text) > MAX_LENGTH:
+        message = f"the expression is longer than {MAX_LENGTH} characters"
+        raise ExpressionSyntaxError(message, shorten(text), 0)
+
+
+def _close(text: str, mark: int) -> Span:
+    """The inside of the `${` at `mark`; a brace inside quotes does not close it."""
+    position = mark + 2
+    quote = ""
+    while position < len(text):
+        character = text[position]
+        if quote:
+            if character == "\\":
+                position += 1
+            elif character == quote:
+                quote = ""
+        elif character in "'\"":
+            quote = character
+        elif character == "}":
+            return Span(mark + 2, position)
+        position += 1
+    raise ExpressionSyntaxError(f"'{text[mark : mark + 2]}' is not closed by '}}'", text, mark)
+
+
+def _spoken(language: str | None) -> Dialect | None:
+    if not language:
+        return None
+    parts = [part for part in re.split(r"[/:#]", language.strip().lower()) if part]
+    if "feel" in parts:
+        return Dialect.FEEL
+    if parts == ["m2pem"]:
+        return Dialect.BARE
+    if parts and parts[-1] == "juel":
+        return Dialect.JUEL
+    return None
+
+
+def _is_xpath(language: str) -> bool:
+    return "xpath" in language.lower()
+
+
+def _is_marked(stripped: str) -> bool:
+    # Editors declare XPath, BPMN's default, over files whose expressions are `${...}`, which
+    # no XPath can be.
+    return stripped.startswith(("${", "#{", "="))

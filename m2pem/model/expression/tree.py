@@ -1,0 +1,155 @@
+"""The syntax tree: what all dialects parse to, and what a verifier translates.
+
+Nodes are immutable. A tree is never deeper than `MAX_DEPTH`, so walking it by recursion is safe.
+Dataclass equality takes `Literal(1)`, `Literal(1.0)` and `Literal(True)` for the same, as Python
+does; compare `repr` where the type matters.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TypeAlias, Union
+
+MAX_DEPTH = 100
+
+
+class Comparison(StrEnum):
+    """`==` and `!=` compare any two values; the others order two numbers or two texts."""
+
+    EQUAL = "=="
+    NOT_EQUAL = "!="
+    LESS = "<"
+    LESS_EQUAL = "<="
+    GREATER = ">"
+    GREATER_EQUAL = ">="
+
+
+class Operation(StrEnum):
+    """Arithmetic. `+` also joins two texts."""
+
+    ADD = "+"
+    SUBTRACT = "-"
+    MULTIPLY = "*"
+    DIVIDE = "/"
+
+
+@dataclass(frozen=True, slots=True)
+class Literal:
+    """A value as written."""
+
+    value: bool | int | float | str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """The value under a dotted name of the data store; null when it is not there."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class ListOf:
+    """`[a, b]`."""
+
+    items: "tuple[Node, ...]"
+
+
+@dataclass(frozen=True, slots=True)
+class Not:
+    """`not a`; null counts as false."""
+
+    operand: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class And:
+    """`a and b and ...`, from left to right until one is false."""
+
+    operands: "tuple[Node, ...]"
+
+
+@dataclass(frozen=True, slots=True)
+class Or:
+    """`a or b or ...`, from left to right until one is true."""
+
+    operands: "tuple[Node, ...]"
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """`left operator right`, always true or false."""
+
+    operator: Comparison
+    left: "Node"
+    right: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class In:
+    """`item in container`: whether a list has an item that is equal."""
+
+    item: "Node"
+    container: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class Negate:
+    """`-a`."""
+
+    operand: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class Arithmetic:
+    """`left operator right`; null when either is null."""
+
+    operator: Operation
+    left: "Node"
+    right: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A listed function; `function` is its name in `functions.FUNCTIONS`, whatever the dialect."""
+
+    function: str
+    arguments: "tuple[Node, ...]"
+
+
+@dataclass(frozen=True, slots=True)
+class Join:
+    """A text with `${...}` parts; each part's value is written into it."""
+
+    parts: "tuple[Node, ...]"
+
+
+Node: TypeAlias = Union[
+    Literal, Name, ListOf, Not, And, Or, Compare, In, Negate, Arithmetic, Call, Join
+]
+
+
+def children(node: Node) -> tuple[Node, ...]:
+    """The nodes directly below, in the order they are evaluated."""
+    match node:
+        case Literal() | Name():
+            return ()
+        case ListOf(nodes) | And(nodes) | Or(nodes) | Join(nodes) | Call(_, nodes):
+            return nodes
+        case Not(operand) | Negate(operand):
+            return (operand,)
+        case Compare(_, left, right) | In(left, right) | Arithmetic(_, left, right):
+            return (left, right)
+
+
+def walk(node: Node) -> Iterator[tuple[Node, int]]:
+    """Every node of the tree with its depth, the root's being 1; parents come first."""
+    waiting = [(node, 1)]
+    while waiting:
+        current, depth = waiting.pop()
+        yield current, depth
+        waiting.extend((child, depth + 1) for child in reversed(children(current)))
+
+
+def names(node: Node) -> frozenset[str]:
+    """The dotted names that the tree reads."""
+    return frozenset(each.name for each, _ in walk(node) if isinstance(each, Name))

@@ -1,0 +1,111 @@
+"""What holds for the repository as a whole."""
+
+import re
+import subprocess
+import tomllib
+from functools import cache
+from pathlib import Path
+from statistics import median
+
+import pytest
+
+import m2pem
+
+REPOSITORY = Path(__file__).parents[1]
+MAXIMUM_LINES = 400
+MEDIAN_LINES = 150
+
+REGISTRIES = re.compile(rb"\b(?:pypi|pythonhosted|npmjs|debian)\.(?:org|com|io)\b")
+HOME_PATHS = re.compile(rb"(?<![\w.])/(?:home|Users)/\w+|(?<![\w./])/root[/]")
+
+
+@cache
+def files() -> tuple[Path, ...]:
+    """Every file of the repository that is not ignored."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=REPOSITORY,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    ).stdout
+    paths = (REPOSITORY / name for name in listed.split("\0") if name)
+    return tuple(path for path in paths if path.is_file())
+
+
+def module_lengths() -> dict[str, int]:
+    """Lines of each module of the core and of the plugins."""
+    modules = [
+        path
+        for path in files()
+        if path.suffix == ".py"
+        and path.relative_to(REPOSITORY).parts[0] in ("m2pem", "plugins")
+        and "tests" not in path.parts
+    ]
+    return {
+        str(path.relative_to(REPOSITORY)): len(path.read_text(encoding="utf-8").splitlines())
+        for path in modules
+    }
+
+
+def found_in_files(pattern: re.Pattern[bytes]) -> list[str]:
+    return [
+        f"{path.relative_to(REPOSITORY)}: {found[0].decode()}"
+        for path in files()
+        if (found := pattern.search(path.read_bytes()))
+    ]
+
+
+def test_no_module_is_too_long() -> None:
+    too_long = {name: lines for name, lines in module_lengths().items() if lines > MAXIMUM_LINES}
+    assert too_long == {}
+
+
+def test_most_modules_are_short() -> None:
+    lengths = [n for name, n in module_lengths().items() if not name.endswith("__init__.py")]
+    assert median(lengths) <= MEDIAN_LINES
+
+
+def test_no_file_names_a_package_registry() -> None:
+    assert found_in_files(REGISTRIES) == []
+
+
+def test_no_file_names_somebodys_home() -> None:
+    assert found_in_files(HOME_PATHS) == []
+
+
+@pytest.mark.parametrize(
+    ("pattern", "text"),
+    [
+        (REGISTRIES, b"https://files.%s.org/a.whl" % b"pythonhosted"),
+        (REGISTRIES, b"registry.%s.org" % b"npmjs"),
+        (HOME_PATHS, b"see /%s/ann/m2pem" % b"home"),
+        (HOME_PATHS, b"'/%s/.cache'" % b"root"),
+    ],
+)
+def test_what_no_file_may_name_is_recognised(pattern: re.Pattern[bytes], text: bytes) -> None:
+    assert pattern.search(text)
+
+
+def test_the_licence_is_apache_2() -> None:
+    first_lines = (REPOSITORY / "LICENSE").read_text(encoding="utf-8")[:200]
+    assert "Apache License" in first_lines
+    assert "Version 2.0" in first_lines
+
+
+def test_the_package_and_its_metadata_say_the_same_version() -> None:
+    pyproject = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))
+    assert pyproject["project"]["version"] == m2pem.__version__
+
+
+def test_the_changelog_leads_to_this_version() -> None:
+    changelog = (REPOSITORY / "CHANGELOG.md").read_text(encoding="utf-8")
+    headings = re.findall(r"^## \[(.+?)\]", changelog, re.M)
+    assert headings[:1] == ["Unreleased"] or headings[0] == m2pem.__version__
+
+
+def test_every_version_is_pinned() -> None:
+    lines = (REPOSITORY / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pins = [line for line in lines if line and not line.startswith("#")]
+    assert [pin for pin in pins if not re.fullmatch(r"[\w.-]+==[\w.]+", pin)] == []
+    assert pins
