@@ -140,7 +140,7 @@ class Executive:
     async def stop_all(self, reason: str) -> None:
         """Stop what still runs and wait for it."""
         for runner in self.runners.values():
-            if runner.run.state.status in (RunStatus.RUNNING, RunStatus.PAUSED):
+            if runner.run.state.status is not RunStatus.ENDED:
                 runner.post(StopRun(reason=reason))
         await asyncio.gather(*self._tasks.values())
 
@@ -200,10 +200,11 @@ class Executive:
         )
         number = await self.journal.create(header)
         runner = self._runner(MissionRun(loaded, self.fleet, number), 1)
+        begun = runner.tell(StartRun(process_id, dict(data or {}), by))
         for name, geometry in self._handed_over.items():
             runner.post(GeometrySet(name, geometry))
-        runner._inbox.insert(0, StartRun(process_id, dict(data or {}), by))
         self._drive(runner)
+        await begun
         return number
 
     async def resume(self, number: RunId) -> None:
@@ -313,6 +314,7 @@ class Executive:
     def _geometry(self, run: str, name: str) -> Geometry | None:
         runner = self.runners.get(run)
         given = runner.run.state.geometries.get(name) if runner is not None else None
+        given = given or self._handed_over.get(name)
         if given is not None:
             return parse_geojson(given)
         return self.fleet.geometries.get(name)

@@ -61,10 +61,7 @@ def fleet(*names: str) -> Fleet:
     return Fleet(
         "test",
         "test.yaml",
-        {
-            ResourceId(name): Vehicle(ResourceId(name), Domain.GROUND, "fake", {})
-            for name in names
-        },
+        {ResourceId(name): Vehicle(ResourceId(name), Domain.GROUND, "fake", {}) for name in names},
     )
 
 

@@ -32,6 +32,7 @@ from m2pem.engine.records import (
 from m2pem.errors import InternalError, JournalError, StaleEpochError
 from m2pem.journal.base import Entry, Journal, RunHeader, RunLine
 from m2pem.model.catalogue import BehaviorState
+from m2pem.model.values import Value
 
 HEADER = RunHeader(
     mission_name="vignette1.bpmn",
@@ -153,7 +154,9 @@ class JournalContract:
 
     async def test_entries_come_back_as_they_were(self, open_journal: OpenJournal) -> None:
         """Equal objects, whatever JSON can say."""
-        data = {'naïve ✓ \x00"\\\n🛰': [1, 1.0, -0.0, True, None, {"": [-(2**63), 2**63 - 1]}]}
+        data: dict[str, Value] = {
+            'naïve ✓ \x00"\\\n🛰': [1, 1.0, -0.0, True, None, {"": [-(2**63), 2**63 - 1]}]
+        }
         some = [
             entry("r1", 1, RunStarted("PATROL", 1), given=StartRun("PATROL", data, by="op")),
             entry("r1", 2, DataWritten(1, "P", "E", 2, "k", 5e-324, 1), InputIgnored("")),
