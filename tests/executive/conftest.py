@@ -1,5 +1,6 @@
 """An executive on a virtual clock, with a fake arbiter that does what the test says."""
 
+import itertools
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,6 +18,7 @@ from m2pem.resources.fleet import Domain, Fleet, Vehicle
 from m2pem.testing.fakes import FakeArbiter
 
 START_US = 1_767_225_600_000_000
+MAX_OUTAGE_S: float | None = None
 
 HEAD = """<?xml version="1.0" encoding="UTF-8"?>
 <definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
@@ -48,7 +50,7 @@ def flow(source: str, target: str) -> str:
 def sequence(*elements: tuple[str, str]) -> str:
     """Elements (id, xml) between a start and an end, in one process P."""
     ids = ["S", *(name for name, _ in elements), "E"]
-    flows = "".join(flow(a, b) for a, b in zip(ids, ids[1:], strict=False))
+    flows = "".join(flow(a, b) for a, b in itertools.pairwise(ids))
     inside = "".join(xml for _, xml in elements)
     return (
         f'<process id="P" isExecutable="true"><startEvent id="S"/>{inside}<endEvent id="E"/>'
@@ -62,6 +64,16 @@ def fleet(*names: str) -> Fleet:
         "test",
         "test.yaml",
         {ResourceId(name): Vehicle(ResourceId(name), Domain.GROUND, "fake", {}) for name in names},
+        max_outage_s=MAX_OUTAGE_S,
+    )
+
+
+def question(element: str) -> str:
+    """A user task that asks yes or no."""
+    return (
+        f'<userTask id="{element}"><extensionElements><m2pem:prompt>Go?</m2pem:prompt>'
+        '<m2pem:decision value="yes" label="Yes"/><m2pem:decision value="no" label="No"/>'
+        "</extensionElements></userTask>"
     )
 
 

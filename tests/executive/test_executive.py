@@ -7,19 +7,9 @@ from m2pem.engine.records import BehaviorEnded, ErrorThrown, RunEnded
 from m2pem.errors import MissionError, OperatorError
 from m2pem.model.catalogue import BehaviorState
 
-from .conftest import World, behavior, flow, mission, sequence
+from .conftest import World, behavior, flow, mission, question, sequence
 
 DRIVE = mission(sequence(("Drive", behavior("Drive", "drive_stop", "ugv1"))))
-
-
-def question(element: str) -> str:
-    """A user task that asks yes or no."""
-    return (
-        f'<userTask id="{element}"><extensionElements><m2pem:prompt>Go?</m2pem:prompt>'
-        '<m2pem:decision value="yes" label="Yes"/><m2pem:decision value="no" label="No"/>'
-        "</extensionElements></userTask>"
-    )
-
 
 ASK = mission(sequence(("Ask", question("Ask"))))
 
