@@ -263,8 +263,7 @@ class Runner:
 
     def _hold_everything(self, failure: M2pemError) -> None:
         self.failure = failure
-        for resource in list(self.run.state.held):
-            self._outside.dispatcher.hold(resource)
+        self._outside.dispatcher.hold_all(self.id)
 
     # --- taking over after a restart --------------------------------------------------------------
 

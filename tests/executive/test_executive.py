@@ -3,9 +3,11 @@
 import pytest
 
 from m2pem.api.control import OpenPrompt, RunStatus, StampedRecord
+from m2pem.api.telemetry import VehicleState
 from m2pem.engine.records import BehaviorEnded, ErrorThrown, RunEnded
-from m2pem.errors import MissionError, OperatorError
-from m2pem.model.catalogue import BehaviorState
+from m2pem.errors import InternalError, JournalError, MissionError, OperatorError, PluginError
+from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.testing.fakes import FakeArbiter
 
 from .conftest import World, behavior, flow, mission, question, sequence
 
@@ -254,3 +256,84 @@ def test_a_pause_stops_durations(play):
         return world.clock.now_us() - before
 
     assert play(story) == 110_000_000
+
+
+def test_a_silent_vehicle_loses_its_behavior_and_is_given_to_nobody_until_heard(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await control.start(DRIVE)
+        await world.fake.until_called("start", "r1.b1")
+        lost = await control.wait(run)
+        refused = await control.wait(await control.start(DRIVE))
+        world.fake.say(VehicleState(ResourceId("ugv1"), world.clock.now_us()))
+        await world.clock.sleep(0.1)
+        again = await control.start(DRIVE)
+        await world.fake.until_called("start", f"{again}.b1")
+        return lost, refused
+
+    lost, refused = play(story, "ugv1", watch_links=True)
+    assert "LINK_LOST" in lost.detail
+    assert "RESOURCE_UNAVAILABLE" in refused.detail
+
+
+def test_a_low_battery_cancels_the_behavior_with_its_own_error(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await control.start(DRIVE)
+        await world.fake.until_called("start", "r1.b1")
+        world.fake.say(VehicleState(ResourceId("ugv1"), world.clock.now_us(), battery_fraction=0.1))
+        await world.fake.until_called("cancel", "r1.b1")
+        world.fake.report("r1.b1", BehaviorState.CANCELLED)
+        return await control.wait(run)
+
+    assert "BATTERY_LOW" in play(story, "ugv1", watch_links=True).detail
+
+
+def test_an_arbiter_that_cannot_connect_is_named(play, monkeypatch):
+    async def refuse(self):
+        raise OSError("port in use")
+
+    monkeypatch.setattr(FakeArbiter, "connect", refuse)
+
+    async def story(world: World):
+        raise AssertionError
+
+    with pytest.raises(PluginError, match=r"fake.*port in use"):
+        play(story, "ugv1")
+
+
+def test_a_bug_in_m2pem_holds_the_runs_vehicles_and_touches_no_other_run(play, monkeypatch):
+    async def story(world: World):
+        control = world.executive.control
+        broken = await control.start(DRIVE)
+        await world.fake.until_called("start", "r1.b1")
+        other = await control.start(ASK)
+        monkeypatch.setattr(
+            world.executive.runner(broken).run, "receive", lambda *_: 1 / 0, raising=False
+        )
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        await world.fake.until_called("hold", "ugv1")
+        with pytest.raises(InternalError):
+            await control.wait(broken)
+        await control.answer(other, "p1", "yes")
+        return await control.wait(other)
+
+    assert play(story, "ugv1").status is RunStatus.COMPLETED
+
+
+def test_a_journal_that_fails_holds_the_vehicles_and_starts_nothing(play, monkeypatch):
+    async def story(world: World):
+        control = world.executive.control
+        run = await control.start(DRIVE)
+        await world.fake.until_called("start", "r1.b1")
+
+        async def full(entries):
+            raise JournalError("the disk is full")
+
+        monkeypatch.setattr(world.journal, "append", full)
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        await world.fake.until_called("hold", "ugv1")
+        with pytest.raises(JournalError, match="disk is full"):
+            await control.wait(run)
+
+    play(story, "ugv1")
