@@ -11,7 +11,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 
 from m2pem.engine.inputs import BehaviorReported, Continue, Input
@@ -25,7 +25,8 @@ from m2pem.engine.records import (
     TokenLeft,
     TokenOutcome,
 )
-from m2pem.journal import Entry, Journal, MemoryJournal, RunHeader, SqliteJournal
+from m2pem.journal import Entry, Journal, MemoryJournal, RunHeader
+from m2pem.journal.sqlite import SqliteJournal
 from m2pem.model.catalogue import BehaviorState
 
 HEADER = RunHeader("bench.bpmn", b"<definitions/>" * 1000, "PATROL")
@@ -140,13 +141,14 @@ async def single(journal: SqliteJournal, scratch: Path, inputs: int) -> dict[str
 
 async def measure(folder: Path) -> dict[str, dict[str, float]]:
     """All cases, each with a journal of its own."""
+    cases: dict[str, Callable[[SqliteJournal], Awaitable[dict[str, float]]]] = {
+        "sqlite, bulk": lambda journal: bulk(journal, 200, 1000),
+        "sqlite, 100 runs": lambda journal: concurrent(journal, 100, 200),
+        "sqlite, 1 run": lambda journal: single(journal, folder, 1000),
+    }
     results = {"memory, bulk": await bulk(MemoryJournal(), 200, 1000)}
-    for name, case in {
-        "sqlite, bulk": lambda j: bulk(j, 200, 1000),
-        "sqlite, 100 runs": lambda j: concurrent(j, 100, 200),
-        "sqlite, 1 run": lambda j: single(j, folder, 1000),
-    }.items():
-        journal = SqliteJournal.open(folder / f"{len(results)}.db")
+    for number, (name, case) in enumerate(cases.items()):
+        journal = SqliteJournal.open(folder / f"{number}.db")
         results[name] = await case(journal)
         await journal.close()
     return results

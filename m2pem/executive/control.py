@@ -102,7 +102,7 @@ class Control:
 
     async def _ask(self, run: RunId, item: i.Input) -> None:
         """Have an input decided; one that the engine ignored is the operator's to know."""
-        step = await self._executive.runner(run).ask(item)
+        step = await self._executive.runner(run).tell(item)
         for record in step.records:
             if isinstance(record, r.InputIgnored):
                 raise OperatorError(f"{run}: {record.reason}")

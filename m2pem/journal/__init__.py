@@ -7,7 +7,6 @@ from urllib.parse import quote, unquote, urlsplit
 from m2pem.errors import JournalError
 from m2pem.journal.base import Entry, Journal, RunHeader, RunLine
 from m2pem.journal.memory import MemoryJournal
-from m2pem.journal.sqlite import SqliteJournal
 
 __all__ = [
     "Entry",
@@ -15,7 +14,6 @@ __all__ = [
     "MemoryJournal",
     "RunHeader",
     "RunLine",
-    "SqliteJournal",
     "default_url",
     "open_journal",
 ]
@@ -35,7 +33,7 @@ def open_journal(url: str) -> Journal:
             raise JournalError(
                 f"{url} is not a journal's URL: write sqlite:///absolute/path, or the path alone"
             )
-        return SqliteJournal.open(Path(unquote(parts.path)))
+        return _open_file(Path(unquote(parts.path)))
     if parts.scheme in ("postgresql", "postgres"):
         raise JournalError(
             f"{_without_password(url)}: journals in PostgreSQL are reserved for a later version; "
@@ -43,9 +41,10 @@ def open_journal(url: str) -> Journal:
         )
     if "://" in url or not url:
         raise JournalError(
-            f"{_without_password(url)!r} is not a journal's URL: write a path, sqlite:///absolute/path or memory:"
+            f"{_without_password(url)!r} is not a journal's URL: "
+            "write a path, sqlite:///absolute/path or memory:"
         )
-    return SqliteJournal.open(Path(url).expanduser())
+    return _open_file(Path(url).expanduser())
 
 
 def default_url() -> str:
@@ -65,6 +64,13 @@ def default_url() -> str:
     except OSError as error:
         raise JournalError(f"{folder} cannot be made: {error.strerror}") from error
     return f"sqlite://{quote(str(folder / 'journal.db'))}"
+
+
+def _open_file(path: Path) -> Journal:
+    # Half of the import time of this package, which most commands don't need.
+    from m2pem.journal.sqlite import SqliteJournal  # noqa: PLC0415
+
+    return SqliteJournal.open(path)
 
 
 def _without_password(url: str) -> str:

@@ -1,7 +1,7 @@
 """How entries, records and the names of runs are written, in the journal and for people.
 
 An entry's input and records are one JSON text, `[input, [record, ...]]`, and come back as exactly
-equal objects. JSON because a journal outlives the program that wrote it: `sqlite3` and `jq` read it.
+equal objects. It is JSON because a journal outlives the program that wrote it.
 """
 
 import re

@@ -20,9 +20,9 @@ def open_for_writing(path: Path) -> sqlite3.Connection:
     Raises:
         JournalError: there is no such folder, no permission, it is not a journal, ...
     """
+    if path.is_dir():
+        raise JournalError(f"{path} is a folder; name a file in it")
     try:
-        if path.is_dir():
-            raise JournalError(f"{path} is a folder; name a file in it")
         os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
     except FileNotFoundError as error:
         raise JournalError(f"{path}: the folder {path.parent} does not exist; make it") from error
@@ -31,19 +31,23 @@ def open_for_writing(path: Path) -> sqlite3.Connection:
     try:
         connection = _connect(path)
         try:
-            # Before anything is changed: turning WAL on would already mark a foreign database.
-            check(connection, path)
-            (mode,) = connection.execute("PRAGMA journal_mode = WAL").fetchone()
-            if mode != "wal":
-                raise JournalError(f"{path}: this file system can't carry a write-ahead log")
-            connection.execute("PRAGMA synchronous = FULL")
-            migrate(connection, path)
+            _prepare(connection, path)
         except BaseException:
             connection.close()
             raise
     except sqlite3.Error as error:
         raise in_plain_words(error, path) from error
     return connection
+
+
+def _prepare(connection: sqlite3.Connection, path: Path) -> None:
+    # Checked before anything is changed: turning WAL on would already mark a foreign database.
+    check(connection, path)
+    (mode,) = connection.execute("PRAGMA journal_mode = WAL").fetchone()
+    if mode != "wal":
+        raise JournalError(f"{path}: its file system can't carry a write-ahead log; use another")
+    connection.execute("PRAGMA synchronous = FULL")
+    migrate(connection, path)
 
 
 def open_for_reading(path: Path) -> sqlite3.Connection:

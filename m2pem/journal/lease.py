@@ -16,6 +16,7 @@ import sys
 import threading
 import weakref
 from pathlib import Path
+from typing import ClassVar
 
 _HELD_ELSEWHERE = (errno.EAGAIN, errno.EACCES)
 
@@ -94,8 +95,8 @@ class PosixRunLocks(RunLocks):
     ends, and what the process itself holds is kept in `_taken`.
     """
 
-    _files: dict[tuple[int, int], int] = {}
-    _taken: set[tuple[int, int]] = set()
+    _files: ClassVar[dict[tuple[int, int], int]] = {}
+    _taken: ClassVar[set[tuple[int, int]]] = set()
     _guard = threading.Lock()
 
     def __init__(self, path: Path) -> None:
@@ -112,6 +113,7 @@ class PosixRunLocks(RunLocks):
                 _open_locks.add(self)
 
     def forget(self) -> None:
+        """In a forked child: it has inherited nothing of what the parent holds."""
         super().forget()
         self._files.clear()
         self._taken.clear()

@@ -8,6 +8,8 @@ import os
 import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import chain
 from typing import Any
 
 from m2pem.engine.records import RunOutcome
@@ -25,6 +27,16 @@ class Row:
     number: int
     entry: Entry
     body: str
+
+    @property
+    def columns(self) -> tuple[Any, ...]:
+        """As the table has them."""
+        entry = self.entry
+        return self.number, entry.seq, entry.epoch, entry.at_us, entry.t_us, self.body
+
+
+_ROWS = 100
+"""To a statement: SQLite before 3.32 takes 999 parameters."""
 
 
 class Ledger:
@@ -94,42 +106,23 @@ class Ledger:
 
     def commit(self) -> bool:
         """Make it durable; False when there was nothing to write."""
-        self._connection.executemany(
-            "INSERT INTO entries VALUES (?, ?, ?, ?, ?, ?)",
-            (
-                (
-                    row.number,
-                    row.entry.seq,
-                    row.entry.epoch,
-                    row.entry.at_us,
-                    row.entry.t_us,
-                    row.body,
-                )
-                for row in self._rows
-            ),
-        )
-        self._connection.executemany(
-            "REPLACE INTO standings VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-            (
-                (
-                    number,
-                    s.epoch,
-                    s.pid,
-                    s.started_us,
-                    s.last_seq,
-                    s.paused,
-                    s.outcome,
-                    s.detail,
-                    s.ended_us,
-                )
-                for number, s in self._changed.items()
-            ),
+        self._write("INSERT INTO entries", [row.columns for row in self._rows])
+        self._write(
+            "REPLACE INTO standings", [_columns(*changed) for changed in self._changed.items()]
         )
         self._connection.execute("COMMIT")
         wrote = bool(self._changed)
         self._known.update(self._changed)
         self._reset()
         return wrote
+
+    def _write(self, into: str, rows: Sequence[tuple[Any, ...]]) -> None:
+        # Many rows to a statement: each execution gives the interpreter's lock away, and with a
+        # busy event loop it takes 5 ms to get it back.
+        for first in range(0, len(rows), _ROWS):
+            some = rows[first : first + _ROWS]
+            statement = f"{into} VALUES {_placeholders(len(some), len(some[0]))}"
+            self._connection.execute(statement, tuple(chain.from_iterable(some)))
 
     def rollback(self) -> None:
         """Write nothing of it."""
@@ -169,6 +162,25 @@ class Ledger:
         self._changed.clear()
         self._rows.clear()
         self._locked.clear()
+
+
+@cache
+def _placeholders(rows: int, columns: int) -> str:
+    return ", ".join([f"({', '.join('?' * columns)})"] * rows)
+
+
+def _columns(number: int, s: Standing) -> tuple[Any, ...]:
+    return (
+        number,
+        s.epoch,
+        s.pid,
+        s.started_us,
+        s.last_seq,
+        s.paused,
+        s.outcome,
+        s.detail,
+        s.ended_us,
+    )
 
 
 def standing_of(columns: Sequence[Any]) -> Standing:

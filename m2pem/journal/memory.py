@@ -53,7 +53,9 @@ class MemoryJournal:
 
     async def release(self, run: str) -> None:
         """See `Journal.release`."""
-        self._find(run).driven = False
+        self._check_open()
+        if (number := run_number(run)) <= len(self._runs):
+            self._runs[number - 1].driven = False
 
     async def append(self, entries: Sequence[Entry]) -> None:
         """See `Journal.append`."""

@@ -4,6 +4,7 @@ import asyncio
 import sqlite3
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -29,12 +30,18 @@ class SqliteJournal:
     the file says which runs are driven.
     """
 
-    def __init__(self, path: Path, writing: sqlite3.Connection, locks: RunLocks) -> None:
+    def __init__(
+        self,
+        path: Path,
+        writing: sqlite3.Connection,
+        reading: sqlite3.Connection,
+        locks: RunLocks,
+    ) -> None:
         self._path = path
         self._locks = locks
         self._writing = writing
+        self._reading = reading
         self._writer = GroupWriter(Ledger(writing, locks), path, finish=self._finish)
-        self._reading = open_for_reading(path)
         self._reader = ThreadPoolExecutor(1, thread_name_prefix=f"reading {path}")
         self._closed = False
         self._writer.start()
@@ -47,13 +54,15 @@ class SqliteJournal:
             JournalError: there is no such folder, it is not a journal, a newer one, ...
         """
         path = path.resolve()
-        writing = open_for_writing(path)
-        try:
-            locks = run_locks(path.with_name(f"{path.name}-lock"))
-        except OSError as error:
-            writing.close()
-            raise JournalError(f"{error.filename} cannot be opened: {error.strerror}") from error
-        return cls(path, writing, locks)
+        with ExitStack() as undo:
+            writing = undo.enter_context(closing(open_for_writing(path)))
+            reading = undo.enter_context(closing(open_for_reading(path)))
+            try:
+                locks = run_locks(path.with_name(f"{path.name}-lock"))
+            except OSError as error:
+                raise JournalError(f"{error.filename} can't be opened: {error.strerror}") from error
+            undo.pop_all()
+        return cls(path, writing, reading, locks)
 
     @property
     def commits(self) -> int:
@@ -87,11 +96,17 @@ class SqliteJournal:
     async def release(self, run: str) -> None:
         """See `Journal.release`; what was handed over before is written first."""
         self._check_open()
-        await self._let_go(run_number(run))
+        await asyncio.wait([self._let_go(run_number(run))])
 
     def _let_go(self, number: int) -> asyncio.Future[None]:
         forgotten = self._writer.submit(lambda ledger: ledger.forget(number))
-        forgotten.add_done_callback(lambda _: self._locks.release(number))
+
+        def unlock(forgotten: asyncio.Future[None]) -> None:
+            # Looked at so that asyncio doesn't report it: a failed journal lets go all the same.
+            forgotten.exception()
+            self._locks.release(number)
+
+        forgotten.add_done_callback(unlock)
         return forgotten
 
     async def append(self, entries: Sequence[Entry]) -> None:

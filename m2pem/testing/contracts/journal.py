@@ -1,0 +1,410 @@
+"""What every journal promises (`m2pem.journal.base.Journal`), as tests.
+
+    class TestMyJournal(JournalContract):
+        @pytest.fixture
+        def open_journal(self, tmp_path):
+            return lambda: MyJournal(tmp_path / "journal")
+
+Needs pytest-asyncio.
+"""
+
+import asyncio
+import os
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from contextlib import asynccontextmanager
+from typing import TypeAlias
+
+import pytest
+
+from m2pem.engine.inputs import BehaviorReported, Continue, Input, PauseRun, StartRun, Tick
+from m2pem.engine.records import (
+    BehaviorProgressed,
+    DataWritten,
+    InputIgnored,
+    Record,
+    RunClaimed,
+    RunEnded,
+    RunOutcome,
+    RunPaused,
+    RunResumed,
+    RunStarted,
+)
+from m2pem.errors import InternalError, JournalError, StaleEpochError
+from m2pem.journal.base import Entry, Journal, RunHeader, RunLine
+from m2pem.model.catalogue import BehaviorState
+from m2pem.model.values import Value
+
+HEADER = RunHeader(
+    mission_name="vignette1.bpmn",
+    mission="<définitions/>".encode(),
+    process="PATROL",
+    fleet=b"\x00\xff fleet",
+    simulated=True,
+    speed=2.5,
+    created_us=1_767_225_600_000_001,
+)
+
+OpenJournal: TypeAlias = Callable[[], Journal]
+
+
+@asynccontextmanager
+async def opened(open_journal: OpenJournal) -> AsyncIterator[Journal]:
+    """A journal, closed in the end."""
+    journal = open_journal()
+    try:
+        yield journal
+    finally:
+        await journal.close()
+
+
+def entry(
+    run: str, seq: int, *records: Record, given: Input | None = None, epoch: int = 1
+) -> Entry:
+    """An entry with these records, else with one `InputIgnored` that says its number."""
+    some = records or (InputIgnored(f"nr {seq}"),)
+    at_us = HEADER.created_us + seq
+    return Entry(run, epoch, seq, at_us, seq * 10, Tick() if given is None else given, some)
+
+
+async def written(journal: Journal, run: str, after_seq: int = 0) -> list[Entry]:
+    """All that the journal has of a run."""
+    return [found async for found in journal.read(run, after_seq)]
+
+
+async def line(journal: Journal, run: str) -> RunLine:
+    """What `runs` says of one run."""
+    (found,) = [some for some in await journal.runs() if some.run == run]
+    return found
+
+
+async def outcomes(*calls: Awaitable[None]) -> Sequence[BaseException | None]:
+    """What each of several calls that wait together raised."""
+    return await asyncio.gather(*calls, return_exceptions=True)
+
+
+@pytest.mark.asyncio
+class JournalContract:
+    """Override `open_journal`, and `durable` for a journal that ends with its process."""
+
+    @pytest.fixture
+    def open_journal(self) -> OpenJournal:
+        """Opens a journal; each call on the same storage, which is empty at first."""
+        raise NotImplementedError("override this fixture")
+
+    @pytest.fixture
+    def durable(self) -> bool:
+        """Whether a journal that is opened again, or twice, has what was written."""
+        return True
+
+    # --- runs -----------------------------------------------------------------------------------
+
+    async def test_runs_are_named_in_order(self, open_journal: OpenJournal) -> None:
+        """r1, r2, ..."""
+        async with opened(open_journal) as journal:
+            assert [await journal.create(HEADER) for _ in range(3)] == ["r1", "r2", "r3"]
+            assert [found.run for found in await journal.runs()] == ["r1", "r2", "r3"]
+
+    async def test_a_new_run_is_driven_and_has_its_header(self, open_journal: OpenJournal) -> None:
+        """Byte for byte: it is what the run is rebuilt from."""
+        async with opened(open_journal) as journal:
+            run = await journal.create(HEADER)
+            assert await journal.runs() == [
+                RunLine(run, HEADER, 1, 0, started_us=HEADER.created_us, driven=True)
+            ]
+            assert await written(journal, run) == []
+
+    async def test_an_unknown_run_is_refused_by_name(self, open_journal: OpenJournal) -> None:
+        """Whoever asks, and whether or not the name looks like one."""
+        async with opened(open_journal) as journal:
+            await journal.create(HEADER)
+            for run in ("r2", "r0", "r01", "1", "", "r", "r-1", "R1", "r1 ", "r" + "9" * 30):
+                for asked in (
+                    journal.claim(run),
+                    written(journal, run),
+                    journal.append([entry(run, 1)]),
+                ):
+                    with pytest.raises(JournalError) as refused:
+                        await asked
+                    assert repr(run) in str(refused.value)
+
+    async def test_a_line_follows_the_run(self, open_journal: OpenJournal) -> None:
+        """Started, paused, going on and ended, without reading records."""
+        async with opened(open_journal) as journal:
+            run = await journal.create(HEADER)
+            await journal.append([entry(run, 1, RunStarted("PATROL", 77), InputIgnored("x"))])
+            assert (await line(journal, run)).started_us == 77
+            assert (await line(journal, run)).last_seq == 2
+            await journal.append([entry(run, 3, RunPaused(5), given=PauseRun())])
+            assert (await line(journal, run)).paused
+            await journal.append([entry(run, 4, RunResumed(6))])
+            assert not (await line(journal, run)).paused
+            assert (await line(journal, run)).outcome is None
+            await journal.append([entry(run, 5, RunPaused(7))])
+            await journal.append([entry(run, 6, RunEnded(RunOutcome.STOPPED, "by the operator"))])
+            ended = await line(journal, run)
+            assert (ended.outcome, ended.detail) == (RunOutcome.STOPPED, "by the operator")
+            assert (ended.ended_us, ended.last_seq) == (HEADER.created_us + 6, 6)
+            assert not ended.paused
+            await journal.append(
+                [entry(run, 7, BehaviorProgressed("b1", 1, BehaviorState.RUNNING))]
+            )
+            assert (await line(journal, run)).ended_us == HEADER.created_us + 6
+
+    # --- entries --------------------------------------------------------------------------------
+
+    async def test_entries_come_back_as_they_were(self, open_journal: OpenJournal) -> None:
+        """Equal objects, whatever JSON can say."""
+        data: dict[str, Value] = {
+            'naïve ✓ \x00"\\\n🛰': [1, 1.0, -0.0, True, None, {"": [-(2**63), 2**63 - 1]}]
+        }
+        some = [
+            entry("r1", 1, RunStarted("PATROL", 1), given=StartRun("PATROL", data, by="op")),
+            entry("r1", 2, DataWritten(1, "P", "E", 2, "k", 5e-324, 1), InputIgnored("")),
+            entry(
+                "r1",
+                4,
+                given=BehaviorReported("b1", 1, BehaviorState.RUNNING, native_ref="null"),
+            ),
+        ]
+        async with opened(open_journal) as journal:
+            await journal.create(HEADER)
+            for one in some:
+                await journal.append([one])
+            assert repr(await written(journal, "r1")) == repr(some)
+
+    async def test_reading_starts_after_a_record(self, open_journal: OpenJournal) -> None:
+        """With the entry whose first record comes next."""
+        async with opened(open_journal) as journal:
+            run = await journal.create(HEADER)
+            await journal.append([entry(run, 1, InputIgnored("1"), InputIgnored("2"))])
+            await journal.append([entry(run, 3), entry(run, 4)])
+            for after_seq, expected in {0: [1, 3, 4], 1: [3, 4], 2: [3, 4], 3: [4], 9: []}.items():
+                assert [e.seq for e in await written(journal, run, after_seq)] == expected
+
+    async def test_a_long_run_is_read_in_order(self, open_journal: OpenJournal) -> None:
+        """Beyond any batch that a journal may read in."""
+        async with opened(open_journal) as journal:
+            run, other = await journal.create(HEADER), await journal.create(HEADER)
+            some = [entry(run, seq) for seq in range(1, 2501)]
+            await journal.append(some)
+            await journal.append([entry(other, 1)])
+            assert await written(journal, run) == some
+
+    async def test_one_call_may_write_to_several_runs(self, open_journal: OpenJournal) -> None:
+        """And runs stay apart."""
+        async with opened(open_journal) as journal:
+            runs = [await journal.create(HEADER) for _ in range(3)]
+            some = [entry(run, seq) for seq in (1, 2) for run in runs]
+            await journal.append(some)
+            for run in runs:
+                assert await written(journal, run) == [e for e in some if e.run == run]
+
+    async def test_calls_that_wait_together_are_all_written(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """Each in its own run, in order."""
+        async with opened(open_journal) as journal:
+            runs = [await journal.create(HEADER) for _ in range(20)]
+
+            async def drive(run: str) -> None:
+                for seq in range(1, 6):
+                    await journal.append([entry(run, seq)])
+
+            await asyncio.gather(*map(drive, runs))
+            for run in runs:
+                assert [found.seq for found in await written(journal, run)] == [1, 2, 3, 4, 5]
+
+    async def test_nothing_to_append_is_no_error(self, open_journal: OpenJournal) -> None:
+        """And writes nothing."""
+        async with opened(open_journal) as journal:
+            run = await journal.create(HEADER)
+            await journal.append([])
+            assert await written(journal, run) == []
+
+    # --- what is refused ------------------------------------------------------------------------
+
+    async def test_an_entry_that_does_not_follow_is_refused_whole(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """A gap, a number that is there already, no record: a bug of the caller."""
+        async with opened(open_journal) as journal:
+            run = await journal.create(HEADER)
+            await journal.append([entry(run, 1)])
+            empty = Entry(run, 1, 3, 0, 0, Continue(), ())
+            unclaimed = entry(run, 3, epoch=2)
+            for bad in (entry(run, 1), entry(run, 2), entry(run, 4), empty, unclaimed):
+                with pytest.raises(InternalError, match="r1"):
+                    await journal.append([entry(run, 2), bad])
+            assert [found.seq for found in await written(journal, run)] == [1]
+            await journal.append([entry(run, 2)])
+            assert (await line(journal, run)).last_seq == 2
+
+    async def test_a_value_that_json_cannot_say_is_refused(self, open_journal: OpenJournal) -> None:
+        """Rather than read back as another."""
+        async with opened(open_journal) as journal:
+            run = await journal.create(HEADER)
+            await journal.append([entry(run, 1, given=StartRun("P", {"k": None}))])
+            for value in (float("nan"), float("inf"), "\ud800"):
+                with pytest.raises(InternalError, match="r1, record 2"):
+                    await journal.append([entry(run, 2, given=StartRun("P", {"k": value}))])
+            await journal.append([entry(run, 2)])
+
+    async def test_an_older_epoch_is_shut_out(self, open_journal: OpenJournal) -> None:
+        """Nothing of its call is written, not even to runs that it may write to."""
+        async with opened(open_journal) as journal:
+            run, other = await journal.create(HEADER), await journal.create(HEADER)
+            await journal.append([entry(run, 1)])
+            await journal.release(run)
+            assert await journal.claim(run) == 2
+            with pytest.raises(StaleEpochError, match="r1"):
+                await journal.append([entry(other, 1), entry(run, 2)])
+            assert await written(journal, other) == []
+            await journal.append([entry(run, 2, RunClaimed(2), epoch=2)])
+            assert [found.epoch for found in await written(journal, run)] == [1, 2]
+
+    async def test_a_refused_call_does_not_touch_those_it_waits_with(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """The others of its group are written."""
+        async with opened(open_journal) as journal:
+            runs = [await journal.create(HEADER) for _ in range(4)]
+            await journal.release(runs[1])
+            await journal.claim(runs[1])
+            seqs = (1, 1, 7, 1)
+            calls = (journal.append([entry(run, seq)]) for run, seq in zip(runs, seqs, strict=True))
+            raised = await outcomes(*calls)
+            assert [type(error) for error in raised] == [
+                type(None),
+                StaleEpochError,
+                InternalError,
+                type(None),
+            ]
+            assert [len(await written(journal, run)) for run in runs] == [1, 0, 0, 1]
+
+    # --- who drives -----------------------------------------------------------------------------
+
+    async def test_a_driven_run_cannot_be_claimed(self, open_journal: OpenJournal) -> None:
+        """The process that drives it is named, and nothing changes."""
+        async with opened(open_journal) as journal:
+            run = await journal.create(HEADER)
+            with pytest.raises(JournalError, match=str(os.getpid())):
+                await journal.claim(run)
+            assert (await line(journal, run)).epoch == 1
+            await journal.append([entry(run, 1)])
+
+    async def test_a_released_run_can_be_claimed(self, open_journal: OpenJournal) -> None:
+        """Its epoch rises by one, and it is driven again."""
+        async with opened(open_journal) as journal:
+            run = await journal.create(HEADER)
+            await journal.release(run)
+            await journal.release(run)
+            assert not (await line(journal, run)).driven
+            assert await journal.claim(run) == 2
+            assert (await line(journal, run)).driven
+            assert (await line(journal, run)).epoch == 2
+
+    async def test_a_released_run_is_not_written_to(self, open_journal: OpenJournal) -> None:
+        """Another may claim it at any moment."""
+        async with opened(open_journal) as journal:
+            run = await journal.create(HEADER)
+            await journal.release(run)
+            with pytest.raises(InternalError, match="r1"):
+                await journal.append([entry(run, 1)])
+            assert await written(journal, run) == []
+
+    # --- cancelling and closing -----------------------------------------------------------------
+
+    async def test_a_cancelled_append_is_whole_or_not_there(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """And the journal goes on."""
+        async with opened(open_journal) as journal:
+            run, other = await journal.create(HEADER), await journal.create(HEADER)
+            call = asyncio.ensure_future(journal.append([entry(run, 1), entry(run, 2)]))
+            await asyncio.sleep(0)
+            call.cancel()
+            await asyncio.wait([call])
+            await journal.append([entry(other, 1)])
+            assert [found.seq for found in await written(journal, run)] in ([], [1, 2])
+            assert (await line(journal, run)).last_seq == len(await written(journal, run))
+
+    async def test_a_closed_journal_says_so(self, open_journal: OpenJournal) -> None:
+        """Whatever is asked of it; closing it again does nothing."""
+        journal = open_journal()
+        run = await journal.create(HEADER)
+        await journal.close()
+        await journal.close()
+        for asked in (
+            journal.create(HEADER),
+            journal.claim(run),
+            journal.release(run),
+            journal.append([entry(run, 1)]),
+            written(journal, run),
+            journal.runs(),
+        ):
+            with pytest.raises(JournalError, match="closed"):
+                await asked
+
+    async def test_closing_finishes_what_is_being_written(
+        self, open_journal: OpenJournal, durable: bool
+    ) -> None:
+        """Calls made before are answered, and durable."""
+        journal = open_journal()
+        run = await journal.create(HEADER)
+        calls = [asyncio.ensure_future(journal.append([entry(run, seq)])) for seq in range(1, 51)]
+        await asyncio.sleep(0)
+        await journal.close()
+        assert await outcomes(*calls) == [None] * 50
+        if durable:
+            async with opened(open_journal) as again:
+                assert len(await written(again, run)) == 50
+
+    # --- opening again --------------------------------------------------------------------------
+
+    async def test_what_was_written_is_there_when_opened_again(
+        self, open_journal: OpenJournal, durable: bool
+    ) -> None:
+        """Not driven; claimed with the next epoch; names go on."""
+        if not durable:
+            pytest.skip("this journal ends with its process")
+        async with opened(open_journal) as journal:
+            run = await journal.create(HEADER)
+            await journal.append([entry(run, 1, RunStarted("PATROL", 5), RunPaused(6))])
+            before = await line(journal, run)
+            entries = await written(journal, run)
+        async with opened(open_journal) as journal:
+            assert await journal.runs() == [
+                RunLine(run, HEADER, 1, 2, started_us=5, driven=False, paused=True)
+            ]
+            assert before.driven
+            assert await written(journal, run) == entries
+            assert await journal.claim(run) == 2
+            await journal.append([entry(run, 3, epoch=2)])
+            assert await journal.create(HEADER) == "r2"
+
+    async def test_two_journals_on_one_storage_share_it(
+        self, open_journal: OpenJournal, durable: bool
+    ) -> None:
+        """One sees what the other wrote; only one drives a run; a stale one is shut out."""
+        if not durable:
+            pytest.skip("this journal ends with its process")
+        async with opened(open_journal) as one, opened(open_journal) as two:
+            run = await one.create(HEADER)
+            assert await two.create(HEADER) == "r2"
+            await one.append([entry(run, 1)])
+            assert await written(two, run) == [entry(run, 1)]
+            assert (await line(two, run)).driven
+            with pytest.raises(JournalError, match=str(os.getpid())):
+                await two.claim(run)
+            await one.release(run)
+            assert not (await line(two, run)).driven
+            assert await two.claim(run) == 2
+            await two.append([entry(run, 2, epoch=2)])
+            with pytest.raises(StaleEpochError):
+                await one.append([entry(run, 2)])
+            with pytest.raises(JournalError, match=str(os.getpid())):
+                await one.claim(run)
+            await two.release(run)
+            assert await one.claim(run) == 3
+            await one.append([entry(run, 3, epoch=3)])
+            assert [found.epoch for found in await written(two, run)] == [1, 2, 3]
