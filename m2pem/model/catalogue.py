@@ -19,6 +19,7 @@ class ParameterKind(StrEnum):
     ALTITUDE = "altitude"  # m, in the frame that `altitude_frame` says
     SPEED = "speed"  # m/s
     ANGLE = "angle"  # rad; people write deg or rad
+    ANGULAR_SPEED = "angular_speed"  # rad/s; people write deg/s or rad/s
     NUMBER = "number"
     COUNT = "count"  # a whole number, 0 or more
     BOOLEAN = "boolean"
