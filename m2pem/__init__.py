@@ -4,8 +4,23 @@ A mission is a BPMN 2.0 diagram; m2pem checks it against a fleet, rehearses it o
 and executes it with tokens. Start with `load_mission` and `load_fleet`, or with the command line.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from m2pem.hookspecs import hookimpl
+
+if TYPE_CHECKING:
+    from m2pem.resources.fleet_file import load_fleet
 
 __version__ = "0.1.0"
 
-__all__ = ["__version__", "hookimpl"]
+__all__ = ["__version__", "hookimpl", "load_fleet"]
+
+# Loaded when asked for: the parsers of files are most of what importing m2pem would cost.
+_LAZY = {"load_fleet": "m2pem.resources.fleet_file"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_LAZY[name]), name)

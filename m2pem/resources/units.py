@@ -106,3 +106,18 @@ def quantity(value: object, dimension: Dimension) -> float:
     if not math.isfinite(result):
         raise UnitError(f"{value!r} is too large")
     return result
+
+
+def plain_number(value: object) -> float:
+    """Read a number that has no unit, from a text or a number.
+
+    Raises:
+        UnitError: no number, a unit behind it, not finite.
+    """
+    if isinstance(value, str | int | float) and not isinstance(value, bool):
+        match = _QUANTITY.fullmatch(value if isinstance(value, str) else repr(value))
+        if match and match[2]:
+            raise UnitError(f"{value!r} has the unit '{match[2]}'; a plain number is expected")
+        if match and math.isfinite(float(match[1])):
+            return float(match[1])
+    raise UnitError(f"{value!r} is not a number")

@@ -1,0 +1,183 @@
+"""The static check: whether a mission fits a fleet, before anything moves (paper, section 4.2)."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from m2pem.findings import Finding, Severity
+from m2pem.model.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
+from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.model.elements import Activity, Mission, ScriptTask, SendTask, ServiceTask
+from m2pem.resources.allocation import resources_of
+from m2pem.resources.behaviors import SHARED
+from m2pem.resources.check_roles import TaskFindings, check_roles, place
+from m2pem.resources.fleet import Fleet
+from m2pem.resources.graph import Catalogue, ResourceGraph
+from m2pem.resources.nearmiss import did_you_mean
+from m2pem.resources.parameters import ParameterProblem, examine
+from m2pem.resources.units import article
+
+DETECTOR_SERVICE = "Detector"
+
+
+def check_mission(
+    mission: Mission, fleet: Fleet, catalogue: Catalogue, simulated: bool = False
+) -> list[Finding]:
+    """Everything about a mission's roles, behaviors and parameters that does not fit the fleet.
+
+    `catalogue` is what the arbiter of a resource offers; with `simulated` it is that of the
+    simulated arbiter, which then stands in for all. Findings come in the order of the mission.
+    A geometry that the fleet lacks is a warning: an operator may hand it over in time.
+    """
+    check = _Check(mission.file, fleet, ResourceGraph(fleet, catalogue), catalogue, simulated)
+    return [finding for task in mission.activities() for finding in check.task(task)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Check:
+    file: str
+    fleet: Fleet
+    graph: ResourceGraph
+    catalogue: Catalogue
+    simulated: bool
+
+    def task(self, task: Activity) -> list[Finding]:
+        findings = TaskFindings(self.file, task)
+        if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior:
+            self._behavior(task.behavior, findings)
+        elif isinstance(task, ServiceTask) and task.call:
+            self._service(task.call, findings)
+        return findings.found
+
+    def _behavior(self, behavior: Behavior, findings: TaskFindings) -> None:
+        filled = check_roles(behavior.roles, self.fleet, findings)
+        matching = [role for role in filled if role.kind.value == behavior.type.value]
+        self._check_role_kinds(behavior, filled, findings)
+        specs: list[BehaviorSpec] = []
+        for role in matching:
+            for resource in resources_of(role, self.fleet):
+                self._check_manned(behavior, role, resource, findings)
+                spec = self.graph.spec(resource, behavior.name, behavior.type)
+                if spec is None:
+                    message, remedy, rule = self._not_offered(behavior, resource)
+                    findings.add(rule, message, remedy, line=behavior.line, role=role.name)
+                elif spec not in specs:
+                    specs.append(spec)
+        shared = SHARED.get((behavior.name, behavior.type))
+        if not specs and shared:
+            specs = [shared]
+        if not specs and not behavior.roles:
+            findings.add(
+                "unknown-behavior",
+                f"there is no {behavior.type} behavior '{behavior.name}'",
+                self._near_behavior(behavior, SHARED.values()),
+                line=behavior.line,
+            )
+        for spec in specs:
+            self._check_parameters(behavior, spec, findings)
+
+    def _check_role_kinds(
+        self, behavior: Behavior, filled: Sequence[Role], findings: TaskFindings
+    ) -> None:
+        wanted = behavior.type.value
+        what = f"the {wanted} behavior {behavior.name}"
+        if not behavior.roles:
+            if behavior.name != "hold" or behavior.type is not BehaviorType.VEHICLE:
+                message = f"{what} has no role"
+                findings.add("no-role", message, f"name a {wanted} for it", line=behavior.line)
+            return
+        if not any(role.kind.value == wanted for role in behavior.roles):
+            message = f"{what} has no role with a {wanted}"
+            findings.add("no-role", message, f"name a {wanted} for it", line=behavior.line)
+            return
+        if not any(role.kind.value == wanted for role in filled) and all(
+            role.optional for role in behavior.roles if role.kind.value == wanted
+        ):
+            message = f"{self.fleet.file} fills none of the optional roles of {what}"
+            findings.add("no-role", message, "at least one is needed", line=behavior.line)
+        for role in filled:
+            if role.kind.value != wanted and role.kind is not RoleKind.PAYLOAD:
+                findings.add(
+                    "idle-role",
+                    f"{role.resource} is held while {what} runs, but takes no part in it",
+                    line=role.line,
+                    role=role.name,
+                    severity=Severity.WARNING,
+                )
+
+    def _check_manned(
+        self, behavior: Behavior, role: Role, resource: ResourceId, findings: TaskFindings
+    ) -> None:
+        vehicle = self.fleet.vehicles.get(resource)
+        if vehicle and vehicle.manned:
+            message = f"{place(self.fleet, resource)} is manned and cannot be commanded"
+            remedy = "a target may be manned, a role may not"
+            findings.add("manned", message, remedy, line=role.line, role=role.name)
+
+    def _not_offered(self, behavior: Behavior, resource: ResourceId) -> tuple[str, str, str]:
+        """Message, remedy and rule for a behavior that a resource does not take."""
+        offered = self.catalogue(resource)
+        holder = self.fleet.vehicles.get(resource) or self.fleet.payloads[resource]
+        name, wanted = behavior.name, behavior.type
+        if any(spec.name == name and spec.type is wanted for spec in offered):
+            allowed = ", ".join(holder.behaviors or ()) or "none"
+            message = f"the fleet does not let {place(self.fleet, resource)} do '{name}'"
+            return message, f"it allows: {allowed}", "behavior-not-allowed"
+        types = {s.type for s in (*offered, *SHARED.values()) if s.name == name} - {wanted}
+        if types:
+            other = sorted(types)[0]
+            message = f"'{name}' is {article(f'{other} behavior')}, not {article(wanted)} behavior"
+            return message, f'set type="{other}" and name a {other}', "wrong-type"
+        arbiter = "the simulated arbiter" if self.simulated else f"arbiter '{holder.arbiter}'"
+        message = f"{arbiter} of {place(self.fleet, resource)} offers no {wanted} behavior '{name}'"
+        return message, self._near_behavior(behavior, offered), "unknown-behavior"
+
+    def _near_behavior(self, behavior: Behavior, offered: Iterable[BehaviorSpec]) -> str:
+        names = [spec.name for spec in offered if spec.type is behavior.type]
+        hint = did_you_mean(behavior.name, names)
+        others = self.graph.offering(behavior.name, behavior.type)
+        if others and not hint:
+            return f"it is offered on {', '.join(others[:3])}"
+        return hint or f"it offers: {', '.join(sorted(names)) or 'nothing'}"
+
+    def _check_parameters(
+        self, behavior: Behavior, spec: BehaviorSpec, findings: TaskFindings
+    ) -> None:
+        lines = {parameter.name: parameter.line for parameter in behavior.parameters}
+        literal = {p.name: p.value for p in behavior.parameters if isinstance(p.value, str)}
+        deferred = [p.name for p in behavior.parameters if not isinstance(p.value, str)]
+        geometry = self.fleet.geometries.get
+        _, problems = examine(spec, literal, geometry, self.fleet.vehicles, deferred)
+        for problem in problems:
+            warning = problem.rule == "unknown-geometry"
+            findings.add(
+                problem.rule,
+                problem.message + (f" in {self.fleet.file}" if warning else ""),
+                self._geometry_remedy(problem, literal) if warning else problem.remedy,
+                line=lines.get(problem.name, behavior.line),
+                severity=Severity.WARNING if warning else Severity.ERROR,
+            )
+
+    def _geometry_remedy(self, problem: ParameterProblem, literal: dict[str, str]) -> str:
+        name = literal[problem.name]
+        hint = problem.remedy or did_you_mean(name, self.fleet.geometries)
+        handed_over = "an operator must hand it over before the task starts"
+        return f"{hint} else {handed_over}" if hint else handed_over
+
+    def _service(self, call: ServiceCall, findings: TaskFindings) -> None:
+        filled = check_roles(call.roles, self.fleet, findings)
+        if call.service != DETECTOR_SERVICE:
+            return
+        detectors = ", ".join(self.fleet.detectors) or "none"
+        remedy = f"detectors of the fleet: {detectors}"
+        for role in filled:
+            if role.resource not in self.fleet.detectors:
+                message = f"{place(self.fleet, role.resource)} is no detector payload"
+                findings.add("no-detector", message, remedy, line=role.line, role=role.name)
+        if not call.roles and not self.fleet.detectors:
+            findings.add(
+                "no-detector",
+                f"{self.fleet.file} has no detector payload for service {call.service}",
+                "mark one with 'detector: true'",
+                line=call.line,
+                severity=Severity.WARNING,
+            )
