@@ -32,8 +32,7 @@ _ON_ROADS = frozenset({"road_following_formation", "road_sweep", "bridge_crossin
 _PICTURES = frozenset({"zoom", "take_picture", "record_video"})
 _BY_KIND: Mapping[str, frozenset[str]] = {
     "camera": _PICTURES,
-    "ptz": _PICTURES
-    | {"ptz_point_at", "ptz_scan_polygon", "ptz_scan_sector", "ptz_track"},
+    "ptz": _PICTURES | {"ptz_point_at", "ptz_scan_polygon", "ptz_scan_sector", "ptz_track"},
     "gpr": frozenset(),
 }
 

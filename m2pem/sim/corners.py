@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TypeAlias, Union
 
 from m2pem.sim.phases import Vector
@@ -86,11 +87,7 @@ def rounded(points: list[Vector], radius_m: float) -> list[list[Piece]]:
     A corner gets a bend of `radius_m`, smaller where the legs are short. Between two runs the
     vehicle stops and turns: at sharp corners, and where a leg goes straight up or down.
     """
-    legs = [
-        Line(a, b)
-        for a, b in zip(points, points[1:], strict=False)
-        if math.dist(a, b) > _NOTHING_M
-    ]
+    legs = [Line(a, b) for a, b in pairwise(points) if math.dist(a, b) > _NOTHING_M]
     runs: list[list[Piece]] = [[]]
     for index, leg in enumerate(legs):
         start = leg.start

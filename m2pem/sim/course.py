@@ -99,9 +99,7 @@ class Course:
             if isinstance(first, Line) and first.level_m > 1e-6:
                 self.turn_to(first.yaw_rad)
             pieces = [(piece.length_m, self._limit(piece, limit)) for piece in run]
-            profiles = chain(
-                pieces, kinematics.acceleration_m_s2, kinematics.deceleration_m_s2
-            )
+            profiles = chain(pieces, kinematics.acceleration_m_s2, kinematics.deceleration_m_s2)
             for piece, profile in zip(run, profiles, strict=True):
                 self._add(piece, profile)
         return self
@@ -181,8 +179,8 @@ class Course:
                 piece.radius_m,
                 piece.angle_rad,
                 profile,
-                piece.sweep_rad,
-                piece.climb_m,
+                sweep=piece.sweep_rad,
+                climb=piece.climb_m,
             )
 
     def _travel(self, start: Vector, direction: Vector, profile: Profile) -> None:
@@ -196,6 +194,7 @@ class Course:
         radius: float,
         angle: float,
         profile: Profile,
+        *,
         sweep: float | None = None,
         climb: float = 0.0,
     ) -> None:

@@ -12,10 +12,11 @@ from m2pem.sim.track import Plan
 from m2pem.sim.wishes import RefusedError, Wishes
 
 DEFAULT_OVERLAP = 0.2
+MAST_M = 2.0
+"""How high on its vehicle a payload looks from."""
+
 AIM_STEP_S = 1.0
 """How often a tracking payload looks where its target is."""
-
-_PARKED = Pose((0.0, 0.0, 0.0), 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +27,7 @@ class Mount:
     gimbal: Gimbal
     look: Look
     carrier: Pose | None
+    ground_up_m: float = 0.0
 
     def pose(self) -> Pose:
         """How its vehicle stands.
@@ -82,7 +84,8 @@ class _Looks:
 
 def direction(carrier: Pose, place: Vector) -> tuple[float, float]:
     """Bearing from the bow (clockwise) and elevation of a place, in rad."""
-    east, north, up = (place[i] - carrier.place[i] for i in range(3))
+    east, north = place[0] - carrier.place[0], place[1] - carrier.place[1]
+    up = place[2] - carrier.place[2] - MAST_M
     level = math.hypot(east, north)
     bearing = turned(math.atan2(north, east), carrier.yaw) if level > 1e-6 else 0.0
     return bearing, math.atan2(up, level) if level > 1e-6 or abs(up) > 1e-6 else 0.0
@@ -103,10 +106,11 @@ def aimed(gimbal: Gimbal, look: Look, carrier: Pose, place: Vector) -> Slew:
     pan = max(-gimbal.pan_limit_rad, min(gimbal.pan_limit_rad, pan))
     tilt = max(gimbal.tilt_low_rad, min(gimbal.tilt_high_rad, tilt))
     reach = gimbal.slew_rate_rad_s * AIM_STEP_S
+    turn = pan - look.pan if gimbal.pan_limit_rad < math.pi else turned(look.pan, pan)
     return Slew(
         look,
         Look(
-            look.pan + max(-reach, min(reach, pan - look.pan)),
+            look.pan + max(-reach, min(reach, turn)),
             look.tilt + max(-reach, min(reach, tilt - look.tilt)),
             look.zoom,
         ),
@@ -118,7 +122,7 @@ def _target(mount: Mount, wishes: Wishes) -> tuple[str | Vector, Vector]:
     vehicle = wishes.target_vehicle()
     if vehicle is not None:
         return vehicle, wishes.pose_of(vehicle).place
-    place = wishes.ground_target(mount.pose().place[2])
+    place = wishes.point(mount.ground_up_m)
     return place, place
 
 
@@ -152,7 +156,6 @@ def _scan_sector(mount: Mount, wishes: Wishes) -> Gaze:
     _looking(mount, middle, tilt)
     looks = _Looks(mount).to(Look(middle - half, tilt, mount.look.zoom))
     looks.to(Look(middle + half, tilt, mount.look.zoom), wishes.number("speed"))
-    looks.look = Look(math.remainder(looks.look.pan, math.tau), tilt, mount.look.zoom)
     return Gaze(looks.plan())
 
 
@@ -162,8 +165,7 @@ def _scan_polygon(mount: Mount, wishes: Wishes) -> Gaze:
     if area is None:
         raise RefusedError("parameter 'area': there is none")
     carrier = mount.pose()
-    ground = wishes.ground_up(carrier.place[2])
-    seen = [direction(carrier, (e, n, ground)) for e, n in wishes.rings(area)[0]]
+    seen = [direction(carrier, (e, n, mount.ground_up_m)) for e, n in wishes.rings(area)[0]]
     middle = seen[0][0]
     pans = [middle + turned(middle, pan) for pan, _ in seen]
     tilts = [tilt for _, tilt in seen]

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 from m2pem.model.geometry import Area
 from m2pem.sim.course import Course, Craft
@@ -23,12 +24,12 @@ ACTUATOR_S = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Manoeuvre:
-    """What a vehicle does. After `plan` it keeps up `pursuit`, if there is one, for ever.
+    """What a vehicle does. After `plan`, if any, it keeps up `pursuit`, if any, for ever.
 
     `cruise_m_s`: the vehicle's own speed from now on.
     """
 
-    plan: Plan[Pose]
+    plan: Plan[Pose] | None
     pursuit: Pursuit | None = None
     cruise_m_s: float | None = None
 
@@ -42,7 +43,9 @@ def under_way(craft: Craft, up_m: float | None) -> Course:
     """A course that begins by stopping, and by taking off if need be, to `up_m` or as usual."""
     course = Course(craft)
     if craft.flies and not craft.aloft:
-        course.climb_to(craft.home[2] + craft.kinematics.default_altitude_m if up_m is None else up_m)
+        course.climb_to(
+            craft.home[2] + craft.kinematics.default_altitude_m if up_m is None else up_m
+        )
     return course
 
 
@@ -212,7 +215,7 @@ def _middle(wishes: Wishes, area: Area) -> tuple[float, float]:
 
 def _nearest_edge(ring: list[tuple[float, float]], place: Vector) -> tuple[float, float]:
     candidates = []
-    for (ae, an), (be, bn) in zip(ring, ring[1:], strict=False):
+    for (ae, an), (be, bn) in pairwise(ring):
         de, dn = be - ae, bn - an
         length2 = de * de + dn * dn
         part = ((place[0] - ae) * de + (place[1] - an) * dn) / length2 if length2 else 0.0
@@ -248,16 +251,8 @@ def pursue(
     speed = min(craft.kinematics.max_speed_m_s, wished or math.inf)
     pursuit = Pursuit(vehicle or "", place, offset_m, bearing_rad, up, speed)
     # What moves already is steered on from its speed; only a landed one must rise first.
-    course = under_way(craft, up) if craft.flies and not craft.aloft else None
-    now = Course(_stopped(craft)).plan()
-    return Manoeuvre(course.plan() if course else now, pursuit)
-
-
-def _stopped(craft: Craft) -> Craft:
-    pose = Pose(craft.pose.place, craft.pose.yaw)
-    return Craft(
-        craft.name, craft.domain, craft.kinematics, pose, craft.cruise_m_s, craft.home
-    )
+    landed = craft.flies and not craft.aloft
+    return Manoeuvre(under_way(craft, up).plan() if landed else None, pursuit)
 
 
 def _teleop(craft: Craft, wishes: Wishes) -> Manoeuvre:
@@ -293,4 +288,3 @@ MANOEUVRES: Mapping[str, Callable[[Craft, Wishes], Manoeuvre]] = {
     "deploy": _deploy,
 }
 """By behavior's name, for one vehicle."""
-

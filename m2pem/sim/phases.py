@@ -67,13 +67,16 @@ class Travel(msgspec.Struct, frozen=True, tag=True):
 
     @property
     def duration_s(self) -> float:
+        """How long it lasts, in s."""
         return self.profile.duration_s
 
     @property
     def load(self) -> float:
+        """Battery load; 1.0 is that of moving."""
         return 1.0
 
     def at(self, t: float) -> Pose:
+        """Where the vehicle is, so many seconds after the start."""
         gone, speed = self.profile.at(t)
         velocity = along((0.0, 0.0, 0.0), self.direction, speed)
         return Pose(along(self.start, self.direction, gone), self.yaw, velocity)
@@ -92,13 +95,16 @@ class Curve(msgspec.Struct, frozen=True, tag=True):
 
     @property
     def duration_s(self) -> float:
+        """How long it lasts, in s."""
         return self.profile.duration_s
 
     @property
     def load(self) -> float:
+        """Battery load; 1.0 is that of moving."""
         return 1.0
 
     def at(self, t: float) -> Pose:
+        """Where the vehicle is, so many seconds after the start."""
         gone, speed = self.profile.at(t)
         length = self.profile.length
         part = gone / length
@@ -126,9 +132,11 @@ class Pivot(msgspec.Struct, frozen=True, tag=True):
 
     @property
     def load(self) -> float:
+        """Battery load; 1.0 is that of moving."""
         return 1.0
 
     def at(self, t: float) -> Pose:
+        """Where the vehicle is, so many seconds after the start."""
         part = min(1.0, max(0.0, t / self.duration_s)) if self.duration_s > 0 else 1.0
         return Pose(self.place, self.yaw + self.sweep * part)
 
@@ -142,6 +150,7 @@ class Stand(msgspec.Struct, frozen=True, tag=True):
     load: float
 
     def at(self, _: float) -> Pose:
+        """Where the vehicle is, so many seconds after the start."""
         return Pose(self.place, self.yaw)
 
 
@@ -157,9 +166,11 @@ class Steer(msgspec.Struct, frozen=True, tag=True):
 
     @property
     def load(self) -> float:
+        """Battery load; 1.0 is that of moving."""
         return 1.0
 
     def at(self, t: float) -> Pose:
+        """Where the vehicle is, so many seconds after the start."""
         t = min(t, self.duration_s)
         halfway = along(self.velocity, self.acceleration, t / 2)
         return Pose(
@@ -178,9 +189,11 @@ class Slew(msgspec.Struct, frozen=True, tag=True):
 
     @property
     def load(self) -> float:
+        """Battery load; 1.0 is that of moving."""
         return 0.0
 
     def at(self, t: float) -> Look:
+        """Where the payload looks, so many seconds after the start."""
         if math.isinf(self.duration_s):
             return self.start
         part = min(1.0, max(0.0, t / self.duration_s)) if self.duration_s > 0 else 1.0

@@ -56,7 +56,8 @@ def steer(
         sweep = turned(pose.yaw, math.atan2(north, east))
         bound = kinematics.turn_rate_rad_s
         yaw_rate = max(-bound, min(bound, sweep / STEP_S))
-    return Steer(pose.place, pose.velocity, acceleration, pose.yaw, yaw_rate, STEP_S)
+    # Longer than a step, so that the vehicle still moves at the moment of the next one.
+    return Steer(pose.place, pose.velocity, acceleration, pose.yaw, yaw_rate, 1.5 * STEP_S)
 
 
 def _approach(east: float, north: float, decel: float) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from typing import Any
 from m2pem.api.arbiter import Connection
 from m2pem.errors import FleetError
 from m2pem.findings import Finding, Severity
-from m2pem.resources.units import Dimension, UnitError, quantity
+from m2pem.resources.units import Dimension, quantity
 from m2pem.sim.domains import DEFAULTS, Kinematics
 from m2pem.sim.faults import FAULT_KINDS, Fault
 
@@ -115,11 +115,9 @@ def read_settings(connection: Connection) -> Settings:
         detections=reader.items("detections", _detection),
         targets=reader.items("targets", _target),
         faults=reader.items("faults", _fault),
-        telemetry_hz=reader.number("telemetry_hz", None, -1.0),
+        telemetry_hz=reader.rate("telemetry_hz"),
         state=reader.text("state"),
     )
-    if settings.telemetry_hz is not None and settings.telemetry_hz < 0:
-        settings = dataclasses.replace(settings, telemetry_hz=None)
     reader.finish()
     return settings
 
@@ -161,9 +159,17 @@ class _Reader:
             return math.inf
         try:
             return _plain(value) if dimension is None else quantity(value, dimension)
-        except (UnitError, ValueError) as error:
+        except ValueError as error:
             self.wrong(key, error)
             return default
+
+    def rate(self, key: str) -> float | None:
+        if self._settings.get(key) is None:
+            return None
+        rate = self.number(key, None, 0.0)
+        if rate < 0:
+            self.wrong(key, f"{rate:g} is below 0")
+        return rate
 
     def fraction(self, key: str, default: float) -> float:
         value = self._settings.get(key)
@@ -213,25 +219,25 @@ class _Reader:
             return ()
         found = []
         for index, item in enumerate(value):
+            if not isinstance(item, Mapping):
+                self.wrong(f"{key}[{index}]", f"{item!r} is not a map")
+                continue
             try:
-                if not isinstance(item, Mapping):
-                    raise ValueError(f"{item!r} is not a map")  # noqa: TRY004
                 found.append(read(item))
-            except (UnitError, ValueError, KeyError) as error:
-                problem = f"{error} is missing" if isinstance(error, KeyError) else error
-                self.wrong(f"{key}[{index}]", problem)
+            except KeyError as error:
+                self.wrong(f"{key}[{index}]", f"{error} is missing")
+            except ValueError as error:
+                self.wrong(f"{key}[{index}]", error)
         return tuple(found)
 
 
 def _plain(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError(f"{value!r} is not a number")
     try:
-        number = float(value)
-    except ValueError:
-        raise ValueError(f"{value!r} is not a number") from None
+        number = math.nan if isinstance(value, bool) else float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        number = math.nan
     if not math.isfinite(number):
-        raise ValueError(f"{value!r} is not finite")
+        raise ValueError(f"{value!r} is not a number")
     return number
 
 

@@ -5,6 +5,7 @@ All in metres, seconds and m/s along the path.
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import msgspec
 
@@ -63,7 +64,7 @@ class Profile(msgspec.Struct, frozen=True):
 
 
 def fit(
-    length: float, v_in: float, limit: float, v_out: float, accel: float, decel: float
+    length: float, limit: float, *, v_in: float, v_out: float, accel: float, decel: float
 ) -> Profile:
     """The fastest profile over `length` that keeps to `limit`."""
     peak = math.sqrt(
@@ -72,13 +73,11 @@ def fit(
     return Profile(length, v_in, max(v_in, v_out, min(limit, peak)), v_out, accel, decel)
 
 
-def chain(
-    pieces: Sequence[tuple[float, float]], accel: float, decel: float
-) -> tuple[Profile, ...]:
+def chain(pieces: Sequence[tuple[float, float]], accel: float, decel: float) -> tuple[Profile, ...]:
     """Profiles over pieces of (length, speed limit) in a row, from rest to rest."""
     joints = [
         0.0,
-        *(min(a, b) for (_, a), (_, b) in zip(pieces, pieces[1:], strict=False)),
+        *(min(a, b) for (_, a), (_, b) in pairwise(pieces)),
         0.0,
     ]
     for index, (length, _) in enumerate(pieces):
@@ -89,7 +88,14 @@ def chain(
         length = pieces[index][0]
         joints[index] = min(joints[index], math.sqrt(joints[index + 1] ** 2 + 2 * decel * length))
     return tuple(
-        fit(length, joints[index], limit, joints[index + 1], accel, decel)
+        fit(
+            length,
+            limit,
+            v_in=joints[index],
+            v_out=joints[index + 1],
+            accel=accel,
+            decel=decel,
+        )
         for index, (length, limit) in enumerate(pieces)
     )
 

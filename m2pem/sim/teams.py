@@ -7,6 +7,7 @@ them has arrived. They don't watch each other.
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 
 from m2pem.sim.course import Course, Craft
 from m2pem.sim.manoeuvres import (
@@ -104,9 +105,7 @@ def _shifted(places: list[Vector], left_m: float) -> list[Vector]:
     """The route moved sideways; at corners by as much as keeps the legs apart."""
     if not left_m or len(places) < 2:
         return places
-    yaws = [
-        math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in zip(places, places[1:], strict=False)
-    ]
+    yaws = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(places)]
     shifted = []
     for index, (east, north, up) in enumerate(places):
         before, after = yaws[max(0, index - 1)], yaws[min(index, len(yaws) - 1)]
@@ -168,8 +167,7 @@ def _survey(crafts: Sequence[Craft], wishes: Wishes) -> list[Manoeuvre]:
 
 def _observe(crafts: Sequence[Craft], wishes: Wishes) -> list[Manoeuvre]:
     return [
-        observe(craft, wishes, math.tau * index / len(crafts))
-        for index, craft in enumerate(crafts)
+        observe(craft, wishes, math.tau * index / len(crafts)) for index, craft in enumerate(crafts)
     ]
 
 

@@ -143,12 +143,20 @@ class Warp(msgspec.Struct, frozen=True):
 
 
 class Track(Generic[S]):
-    """A plan in the time of the clock."""
+    """A plan in the time of the clock. `counted_us`: battery load is counted from then on."""
 
-    def __init__(self, plan: Plan[S], started_us: int, warp: Warp | None = None) -> None:
+    def __init__(
+        self,
+        plan: Plan[S],
+        started_us: int,
+        warp: Warp | None = None,
+        counted_us: int | None = None,
+    ) -> None:
         self.plan = plan
         self.started_us = started_us
         self.warp = warp or Warp(started_us)
+        self.counted_us = started_us if counted_us is None else counted_us
+        self._counted_tau = 0.0 if counted_us is None else self._tau(counted_us)
 
     def at(self, now_us: int) -> S:
         """Where the body is."""
@@ -162,10 +170,17 @@ class Track(Generic[S]):
         return self.warp.when(self.plan.duration_s)
 
     def load_s(self, now_us: int, standing_load: float) -> float:
-        """Seconds of full battery load since the start; `standing_load` while its time stands."""
-        tau = min(self.warp.at(now_us)[0], self.plan.duration_s)
-        elapsed_s = (now_us - self.started_us) / US_PER_S
-        return self.plan.work(tau) + max(0.0, elapsed_s - tau) * standing_load
+        """Seconds of full battery load since `counted_us`; of `standing_load` while it stands."""
+        tau = self._tau(now_us)
+        moving_s = tau - self._counted_tau
+        standing_s = max(0.0, (now_us - self.counted_us) / US_PER_S - moving_s)
+        work = self.plan.work(tau) - self.plan.work(self._counted_tau)
+        return work + standing_s * standing_load
+
+    def count_from(self, now_us: int) -> None:
+        """Count battery load from now on."""
+        self.counted_us = now_us
+        self._counted_tau = self._tau(now_us)
 
     def hold(self, now_us: int, braking_s: float) -> None:
         """Slow to a stop within `braking_s`."""
@@ -175,3 +190,6 @@ class Track(Generic[S]):
         """Undo `hold`: speed up as long as braking took."""
         braked_s = min(self.warp.ramp_s, (now_us - self.warp.since_us) / US_PER_S)
         self.warp = self.warp.turned(now_us, 1.0, braked_s)
+
+    def _tau(self, now_us: int) -> float:
+        return min(self.warp.at(now_us)[0], self.plan.duration_s)

@@ -11,7 +11,12 @@ from m2pem.sim.phases import Pose, Vector
 
 
 class RefusedError(Exception):
-    """The manoeuvre cannot be done; the text says why."""
+    """The behavior cannot be done; the text says why, `code` is that of the report."""
+
+    def __init__(self, reason: str, code: str = "REJECTED") -> None:
+        self.reason = reason
+        self.code = code
+        super().__init__(reason)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +80,18 @@ class Wishes:
             east, north, up = self.pose_of(value.vehicle).place
             return (east, north, self.height(craft) or max(up, up_m) if craft.flies else up_m)
         raise RefusedError("it has no target")
+
+    def point(self, ground_up_m: float) -> Vector:
+        """The point that `target` says, seen from a payload over ground of that height."""
+        value = self.values.get("target")
+        if not isinstance(value, Point):
+            raise RefusedError("it has no target")
+        altitude = value.position[2] or 0.0
+        if value.altitude_frame == "amsl" and value.position[2] is not None:
+            up = altitude - self.frame.origin[2]
+        else:
+            up = ground_up_m + altitude
+        return (*self._level("target", value.position), up)
 
     def pose_of(self, vehicle: str) -> Pose:
         """How a vehicle stands now.
