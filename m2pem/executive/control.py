@@ -109,19 +109,12 @@ class Control:
 
     # --- watching -------------------------------------------------------------------------------
 
-    async def subscribe(
-        self, run: RunId | None = None, size: int = 10_000
-    ) -> AsyncIterator[Notice]:
+    def subscribe(self, run: RunId | None = None, size: int = 10_000) -> AsyncIterator[Notice]:
         """What is committed from now on, and first the prompts that stand now."""
         subscription = self._executive.notices.subscribe(run, size)
-        try:
-            for prompt in self.prompts():
-                if run is None or prompt.run == run:
-                    subscription.put(prompt)
-            async for notice in subscription:
-                yield notice
-        finally:
-            subscription.close()
+        for prompt in self.prompts():
+            subscription.put(prompt)
+        return subscription
 
     def telemetry(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
         """Telemetry from now on."""
