@@ -214,9 +214,7 @@ class Executive:
         loaded = parse_mission(source, name)
         return loaded, self.admit(loaded, process, data)
 
-    def admit(
-        self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None
-    ) -> str:
+    def admit(self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None) -> str:
         """Check a mission; returns the id of the process to begin with.
 
         Raises:

@@ -55,9 +55,7 @@ class Agenda:
         self._awake = False
         self.expected = 0
 
-    def at(
-        self, time_us: int, call: Callable[[int], None], *, background: bool = False
-    ) -> Entry:
+    def at(self, time_us: int, call: Callable[[int], None], *, background: bool = False) -> Entry:
         """Schedule `call(time_us)`. Calls for the same time come in the order of scheduling."""
         over = self._background_over if background else self._expected_over
         self.expected += not background

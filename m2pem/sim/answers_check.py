@@ -82,9 +82,7 @@ class _Check:
                 remedy = suggest(event.id, known, kind)
                 self.source.error((kind, place, "id"), f"unknown-{kind[:-1]}", message, remedy)
 
-    def _unknown(
-        self, path: tuple[str, str], name: str, what: str, known: Collection[str]
-    ) -> None:
+    def _unknown(self, path: tuple[str, str], name: str, what: str, known: Collection[str]) -> None:
         there = self._mission.elements.get(name)
         if isinstance(there, FlowNode):
             message = f"'{name}' (line {there.line} of {self._mission.file}) is no {what}"

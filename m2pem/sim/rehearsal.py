@@ -13,7 +13,8 @@ from pathlib import Path
 from m2pem.api.control import RunStatus, RunSummary, SimulationResult, StampedRecord
 from m2pem.engine.inputs import GiveUp
 from m2pem.engine.records import Record, ServiceEnded, ServiceWithdrawn
-from m2pem.engine.state import BehaviorPhase, RunStatus as EngineStatus
+from m2pem.engine.state import BehaviorPhase
+from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import AnswersError
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
