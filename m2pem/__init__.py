@@ -10,17 +10,22 @@ from typing import TYPE_CHECKING, Any
 from m2pem.hookspecs import hookimpl
 
 if TYPE_CHECKING:
+    from m2pem.model.bpmn import read_mission as load_mission
     from m2pem.resources.fleet_file import load_fleet
 
 __version__ = "0.1.0"
 
-__all__ = ["__version__", "hookimpl", "load_fleet"]
+__all__ = ["__version__", "hookimpl", "load_fleet", "load_mission"]
 
 # Loaded when asked for: the parsers of files are most of what importing m2pem would cost.
-_LAZY = {"load_fleet": "m2pem.resources.fleet_file"}
+_LAZY = {
+    "load_fleet": ("m2pem.resources.fleet_file", "load_fleet"),
+    "load_mission": ("m2pem.model.bpmn", "read_mission"),
+}
 
 
 def __getattr__(name: str) -> Any:
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_LAZY[name]), name)
+    module, attribute = _LAZY[name]
+    return getattr(import_module(module), attribute)

@@ -14,7 +14,7 @@ from m2pem.engine.data import flatten, store_for
 from m2pem.engine.records import Record, TokenOutcome
 from m2pem.engine.state import RunState, Scope, Token
 from m2pem.model.elements import CallActivity, FlowNode, Mission, SequenceFlow, StartEvent
-from m2pem.model.reach import upstream
+from m2pem.model.upstream import upstream
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
 
@@ -58,7 +58,7 @@ class Execution:
         return self.process_ids[node.index]
 
     def upstream(self, join: FlowNode) -> dict[FlowNode, int]:
-        """`m2pem.model.reach.upstream`, worked out once for each join."""
+        """`m2pem.model.upstream.upstream`, worked out once for each join."""
         reach = self._reach.get(join)
         if reach is None:
             reach = self._reach[join] = upstream(join)

@@ -22,7 +22,7 @@ class StartRun(_Input, frozen=True):
     """Begin: one token for each start event of the process, and the data given at start."""
 
     process: str
-    data: dict[str, Value] = {}
+    data: dict[str, Value] = msgspec.field(default_factory=dict)
     by: str = ""
 
 
@@ -104,7 +104,7 @@ class ServiceCompleted(_Input, frozen=True):
     """A service has ended well and writes `data`."""
 
     service: str
-    data: dict[str, Value] = {}
+    data: dict[str, Value] = msgspec.field(default_factory=dict)
 
 
 class ServiceFailed(_Input, frozen=True):
@@ -119,7 +119,7 @@ class SignalReceived(_Input, frozen=True):
     """A signal from outside, by the id (UUID) of the `signal` root element."""
 
     signal: str
-    data: dict[str, Value] = {}
+    data: dict[str, Value] = msgspec.field(default_factory=dict)
     by: str = ""
     id: str = ""
 
@@ -128,7 +128,7 @@ class MessageReceived(_Input, frozen=True):
     """A message from outside, by the id of its root element; `data` goes to its catcher."""
 
     message: str
-    data: dict[str, Value] = {}
+    data: dict[str, Value] = msgspec.field(default_factory=dict)
     by: str = ""
     id: str = ""
 

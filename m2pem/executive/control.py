@@ -102,26 +102,19 @@ class Control:
 
     async def _ask(self, run: RunId, item: i.Input) -> None:
         """Have an input decided; one that the engine ignored is the operator's to know."""
-        step = await self._executive.runner(run).ask(item)
+        step = await self._executive.runner(run).tell(item)
         for record in step.records:
             if isinstance(record, r.InputIgnored):
                 raise OperatorError(f"{run}: {record.reason}")
 
     # --- watching -------------------------------------------------------------------------------
 
-    async def subscribe(
-        self, run: RunId | None = None, size: int = 10_000
-    ) -> AsyncIterator[Notice]:
+    def subscribe(self, run: RunId | None = None, size: int = 10_000) -> AsyncIterator[Notice]:
         """What is committed from now on, and first the prompts that stand now."""
         subscription = self._executive.notices.subscribe(run, size)
-        try:
-            for prompt in self.prompts():
-                if run is None or prompt.run == run:
-                    subscription.put(prompt)
-            async for notice in subscription:
-                yield notice
-        finally:
-            subscription.close()
+        for prompt in self.prompts():
+            subscription.put(prompt)
+        return subscription
 
     def telemetry(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
         """Telemetry from now on."""

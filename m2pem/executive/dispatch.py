@@ -34,6 +34,7 @@ class _Active:
     """A behavior handed to an arbiter and not ended."""
 
     arbiter: Arbiter
+    resources: tuple[ResourceId, ...]
     last_number: int = 0
     deadline: asyncio.Task[None] | None = None
 
@@ -86,6 +87,13 @@ class Dispatcher:
             lambda: self._call(f"resume {resource}", arbiter.resume(ResourceId(resource))),
         )
 
+    def hold_all(self, run: str) -> None:
+        """Bring everything that a run commands to its safe state, whatever its state says."""
+        for behavior, active in self._active.items():
+            if behavior.partition(".")[0] == run:
+                for resource in active.resources:
+                    self.hold(resource)
+
     # --- what is known of behaviors -------------------------------------------------------------
 
     def reported(self, report: BehaviorReport) -> None:
@@ -105,7 +113,7 @@ class Dispatcher:
     def adopt(self, behavior: str, resources: Iterable[str], number: int) -> None:
         """After a restart: the arbiter has it already."""
         ids = [ResourceId(resource) for resource in resources]
-        self._active[behavior] = _Active(self._arbiters.of(ids[0]), number)
+        self._active[behavior] = _Active(self._arbiters.of(ids[0]), tuple(ids), number)
         self._availability.acquire(ids, behavior)
 
     async def close(self) -> None:
@@ -159,7 +167,7 @@ class Dispatcher:
         kind = BehaviorType(command.type)
         arbiters = dict.fromkeys(self._arbiters.of(resource) for resource in ids)
         arbiter = next(iter(arbiters))
-        self._active[command.behavior] = active = _Active(arbiter)
+        self._active[command.behavior] = active = _Active(arbiter, ids)
         if len(arbiters) > 1:
             reason = f"{', '.join(ids)} are served by different arbiters"
             self._refuse(command.behavior, "REJECTED", reason)

@@ -9,19 +9,22 @@ Leaving the block stops what still runs, waits until the vehicles are released, 
 
 import asyncio
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import AsyncExitStack
+from functools import partial
+from pathlib import Path
 from typing import Any, Self
 
-from m2pem.api.arbiter import Arbiter, ArbiterContext
+from m2pem.api.arbiter import Arbiter, ArbiterContext, BehaviorReport
 from m2pem.api.clock import Clock
 from m2pem.api.control import RunId
 from m2pem.api.service import ServiceContext
+from m2pem.api.telemetry import LinkState
 from m2pem.engine.inputs import BehaviorReported, GeometrySet, ResourceFault, StartRun, StopRun
 from m2pem.engine.records import Record
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
-from m2pem.errors import JournalError, OperatorError
+from m2pem.errors import JournalError, OperatorError, PluginError
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.control import Control
 from m2pem.executive.dispatch import Dispatcher
@@ -35,6 +38,8 @@ from m2pem.gateway.bus import Bus
 from m2pem.gateway.watch import Watch, watch
 from m2pem.journal.base import Journal, RunHeader
 from m2pem.model.bpmn import parse_mission
+from m2pem.model.catalogue import ResourceId
+from m2pem.model.elements import Mission
 from m2pem.model.geometry import Geometry
 from m2pem.model.values import Value
 from m2pem.plugins import PluginManager
@@ -44,6 +49,9 @@ from m2pem.resources.geojson import GeometryError, parse_geojson
 from m2pem.resources.snapshot import dump
 
 log = logging.getLogger("m2pem.executive")
+
+REMEMBERED_RUNS = 100
+"""Runs that are over whose last state is kept in memory; the journal has them all."""
 
 
 class Executive:
@@ -82,6 +90,8 @@ class Executive:
         self._max_steps = max_steps
         self._handed_over: dict[str, dict[str, Value]] = {}
         self._tasks: dict[RunId, asyncio.Task[None]] = {}
+        self._listeners: list[asyncio.Task[None]] = []
+        self._lost: set[ResourceId] = set()
         self._stack = AsyncExitStack()
         context = ArbiterContext(
             clock,
@@ -105,22 +115,36 @@ class Executive:
     # --- life -----------------------------------------------------------------------------------
 
     async def __aenter__(self) -> Self:
-        """Connect the arbiters and listen to them."""
-        group = await self._stack.enter_async_context(asyncio.TaskGroup())
-        self._group = group
-        self._listeners: list[asyncio.Task[None]] = []
+        """Connect the arbiters and listen to them.
+
+        Raises:
+            PluginError: an arbiter cannot connect.
+        """
+        await self._connect()
+        self._group = await self._stack.enter_async_context(asyncio.TaskGroup())
         for name, arbiter in self.arbiters.by_name.items():
-            await arbiter.connect()
-            self._listen(self._read_reports(name, arbiter))
-            self._listen(self._read_telemetry(name, arbiter))
+            self._listen(f"reports of {name}", partial(self._read_reports, arbiter))
+            self._listen(f"telemetry of {name}", partial(self._read_telemetry, arbiter))
         if self._watch_links:
             bounds = {
-                resource: self.arbiters.of(resource).limits(resource).lost_after_s
-                for resource in self.arbiters.resources
+                vehicle.id: vehicle.lost_after_s
+                or self.arbiters.of(vehicle.id).limits(vehicle.id).lost_after_s
+                for vehicle in self.fleet.vehicles.values()
             }
             rules = Watch(bounds, self.clock.now_us())
-            self._listen(watch(self.bus, self.clock, self._fault, rules))
+            self._listen("link watch", partial(watch, self.bus, self.clock, self._fault, rules))
         return self
+
+    async def _connect(self) -> None:
+        connected: list[Arbiter] = []
+        for name, arbiter in self.arbiters.by_name.items():
+            try:
+                await arbiter.connect()
+            except Exception as error:
+                for other in connected:
+                    await other.close()
+                raise PluginError(f"arbiter {name} cannot connect: {error}") from error
+            connected.append(arbiter)
 
     async def __aexit__(self, *reason: object) -> None:
         """Stop every run, let its vehicles be released, close the arbiters."""
@@ -140,32 +164,38 @@ class Executive:
     async def stop_all(self, reason: str) -> None:
         """Stop what still runs and wait for it."""
         for runner in self.runners.values():
-            if runner.run.state.status in (RunStatus.RUNNING, RunStatus.PAUSED):
+            if runner.run.state.status is not RunStatus.ENDED:
                 runner.post(StopRun(reason=reason))
         await asyncio.gather(*self._tasks.values())
 
-    def _listen(self, coroutine: Any) -> None:
-        self._listeners.append(self._group.create_task(coroutine))
+    def _listen(self, what: str, listening: Callable[[], Awaitable[None]]) -> None:
+        async def listen() -> None:
+            try:
+                await listening()
+            except Exception:  # a broken arbiter must not end the executive; its links will age
+                log.exception("%s broke off", what)
 
-    async def _read_reports(self, name: str, arbiter: Arbiter) -> None:
-        try:
-            async for report in arbiter.reports():
-                self.dispatcher.reported(report)
-        except Exception:  # a broken arbiter must not end the executive; its links will age
-            log.exception("arbiter %s: its reports broke off", name)
+        self._listeners.append(self._group.create_task(listen(), name=what))
 
-    async def _read_telemetry(self, name: str, arbiter: Arbiter) -> None:
-        try:
-            async for state in arbiter.telemetry():
-                self.bus.publish(state)
-        except Exception:  # as above
-            log.exception("arbiter %s: its telemetry broke off", name)
+    async def _read_reports(self, arbiter: Arbiter) -> None:
+        async for report in arbiter.reports():
+            self.dispatcher.reported(report)
+
+    async def _read_telemetry(self, arbiter: Arbiter) -> None:
+        async for state in arbiter.telemetry():
+            self.bus.publish(state)
+            if state.resource in self._lost and state.link is not LinkState.LOST:
+                self._lost.discard(state.resource)
+                self.availability.restore(state.resource)
 
     # --- runs -----------------------------------------------------------------------------------
 
     def load(
-        self, mission: Any, process: str | None = None, data: Mapping[str, Value] | None = None
-    ) -> tuple[Any, str]:
+        self,
+        mission: Path | str | bytes,
+        process: str | None = None,
+        data: Mapping[str, Value] | None = None,
+    ) -> tuple[Mission, str]:
         """Read and check a mission; returns it with the id of the process to begin with.
 
         Raises:
@@ -185,10 +215,15 @@ class Executive:
         return loaded, loaded.process(process).id
 
     async def start(
-        self, mission: Any, process: str | None, data: Mapping[str, Value] | None, by: str
+        self,
+        mission: Path | str | bytes,
+        process: str | None,
+        data: Mapping[str, Value] | None,
+        by: str,
     ) -> RunId:
         """Begin a run. Returns when its first records are durable."""
-        loaded, process_id = self.load(mission, process, data)
+        # Reading and checking take a while, and a URL may take longer: not in the event loop.
+        loaded, process_id = await asyncio.to_thread(self.load, mission, process, data)
         header = RunHeader(
             loaded.file,
             loaded.source,
@@ -200,10 +235,11 @@ class Executive:
         )
         number = await self.journal.create(header)
         runner = self._runner(MissionRun(loaded, self.fleet, number), 1)
+        begun = runner.tell(StartRun(process_id, dict(data or {}), by))
         for name, geometry in self._handed_over.items():
             runner.post(GeometrySet(name, geometry))
-        runner._inbox.insert(0, StartRun(process_id, dict(data or {}), by))
         self._drive(runner)
+        await begun
         return number
 
     async def resume(self, number: RunId) -> None:
@@ -250,13 +286,17 @@ class Executive:
     async def _drive_and_release(self, runner: Runner) -> None:
         await runner.drive()
         await self.journal.release(runner.id)
+        del self._tasks[runner.id]
+        over = [each for each in self.runners.values() if each.done.is_set()]
+        for oldest in over[:-REMEMBERED_RUNS]:
+            del self.runners[oldest.id]
 
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
         self.plugins.records_committed(run, records)
 
     # --- what happens outside -------------------------------------------------------------------
 
-    def _post_report(self, report: Any) -> None:
+    def _post_report(self, report: BehaviorReport) -> None:
         run = report.id.partition(".")[0]
         runner = self.runners.get(run)
         if runner is None:
@@ -275,6 +315,10 @@ class Executive:
 
     def _fault(self, fault: ResourceFault) -> None:
         log.warning("%s: %s: %s", fault.resource, fault.code, fault.reason)
+        resource = ResourceId(fault.resource)
+        if not fault.reachable and not self.availability.reason(resource):
+            self._lost.add(resource)
+            self.availability.withdraw(resource, f"lost: {fault.reason}")
         for runner in self.runners.values():
             if fault.resource in runner.run.state.held:
                 runner.post(fault)
@@ -313,6 +357,7 @@ class Executive:
     def _geometry(self, run: str, name: str) -> Geometry | None:
         runner = self.runners.get(run)
         given = runner.run.state.geometries.get(name) if runner is not None else None
+        given = given or self._handed_over.get(name)
         if given is not None:
             return parse_geojson(given)
         return self.fleet.geometries.get(name)

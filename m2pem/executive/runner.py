@@ -23,7 +23,7 @@ from m2pem.engine.inputs import (
 )
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import BehaviorPhase, RunStatus
-from m2pem.errors import InternalError, M2pemError, StaleEpochError
+from m2pem.errors import InternalError, M2pemError, OperatorError, StaleEpochError
 from m2pem.executive.dispatch import Dispatcher
 from m2pem.executive.notices import Notices
 from m2pem.executive.services import Services
@@ -76,18 +76,19 @@ class Runner:
         self._inbox.append(item)
         self._wake.set()
 
-    async def ask(self, item: Input) -> Step:
-        """Hand in what an operator wants, and wait until it is decided and committed.
+    def tell(self, item: Input) -> "asyncio.Future[Step]":
+        """Hand in what an operator wants; the future is done when it is decided and committed.
 
         Raises:
+            OperatorError: the run has ended.
             M2pemError: the run can decide nothing any more.
         """
         if self.done.is_set():
-            raise self.failure or InternalError(f"{self.id} is not being driven")
+            raise self._why_not()
         told: asyncio.Future[Step] = asyncio.get_running_loop().create_future()
         self._told.append((item, told))
         self.post(item)
-        return await told
+        return told
 
     # --- the loop -------------------------------------------------------------------------------
 
@@ -113,9 +114,10 @@ class Runner:
             self.done.set()
             for _, told in self._told:
                 if not told.done():
-                    told.set_exception(
-                        self.failure or InternalError(f"{self.id} is not being driven")
-                    )
+                    told.set_exception(self._why_not())
+
+    def _why_not(self) -> M2pemError:
+        return self.failure or OperatorError(f"{self.id} has ended")
 
     def _is_over(self) -> bool:
         state = self.run.state
@@ -261,8 +263,7 @@ class Runner:
 
     def _hold_everything(self, failure: M2pemError) -> None:
         self.failure = failure
-        for resource in list(self.run.state.held):
-            self._outside.dispatcher.hold(resource)
+        self._outside.dispatcher.hold_all(self.id)
 
     # --- taking over after a restart --------------------------------------------------------------
 

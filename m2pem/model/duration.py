@@ -50,7 +50,11 @@ class Cycle:
         return max(self.start_us, at_us)
 
     def next_us(self, due_us: int) -> int:
-        """When it fires after it was due at `due_us`; lateness does not add up."""
+        """When it fires after it was due at `due_us`; lateness does not add up.
+
+        Raises:
+            ExpressionSyntaxError: that is after the year 9999.
+        """
         return due_us + duration_us(self.period, due_us)
 
 

@@ -1,24 +1,36 @@
-"""Which incoming flows of a gateway a token can still reach: what an inclusive join must know."""
+"""What no token can ever visit, by the drawing alone (conditions are not looked at)."""
 
-from m2pem.model.elements import BoundaryEvent, FlowNode
+from collections.abc import Iterable
+
+from m2pem.findings import Finding, Severity
+from m2pem.model.elements import Activity, Container, FlowNode
 
 
-def upstream(join: FlowNode) -> dict[FlowNode, int]:
-    """For every node that can reach `join`: a bit mask of the incoming flows it can reach.
+def unreached(container: Container, also: Iterable[FlowNode] = ()) -> list[FlowNode]:
+    """The nodes directly in a container that no path leads to from its entries, or from `also`."""
+    waiting: list[FlowNode] = [*container.entries, *also]
+    reached = set(waiting)
+    while waiting:
+        node = waiting.pop()
+        following: list[FlowNode] = [flow.target for flow in node.outgoing]
+        if isinstance(node, Activity):
+            following += node.boundary
+        for each in following:
+            if each not in reached:
+                reached.add(each)
+                waiting.append(each)
+    return [node for node in container.nodes if node not in reached]
 
-    Bit n stands for `join.incoming[n]`. Paths do not pass `join` itself. A token on an activity
-    can also go by the boundary events attached to it.
-    """
-    reach: dict[FlowNode, int] = {}
-    for place, flow in enumerate(join.incoming):
-        bit = 1 << place
-        pending = [flow.source]
-        while pending:
-            node = pending.pop()
-            if node is join or reach.get(node, 0) & bit:
-                continue
-            reach[node] = reach.get(node, 0) | bit
-            pending.extend(before.source for before in node.incoming)
-            if isinstance(node, BoundaryEvent):
-                pending.append(node.attached_to)
-    return reach
+
+def unreachable(file: str, node: FlowNode) -> Finding:
+    """The finding about one of them."""
+    what = "no start event can reach it" if node.container.starts else "nothing can reach it"
+    return Finding(
+        Severity.ERROR,
+        file,
+        node.line,
+        node.id,
+        "unreachable",
+        f"{what}, so it would never run",
+        "draw a sequence flow to it, or delete it",
+    )

@@ -33,6 +33,15 @@ def check_mission(
 
 
 @dataclass(frozen=True, slots=True)
+class _Taker:
+    """How a behavior takes its parameters, and on whose account: the first that takes them so."""
+
+    spec: BehaviorSpec
+    role: str
+    place: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class _Check:
     file: str
     fleet: Fleet
@@ -52,7 +61,7 @@ class _Check:
         filled = check_roles(behavior.roles, self.fleet, findings)
         matching = [role for role in filled if role.kind.value == behavior.type.value]
         self._check_role_kinds(behavior, filled, findings)
-        specs: list[BehaviorSpec] = []
+        takers: list[_Taker] = []
         for role in matching:
             for resource in resources_of(role, self.fleet):
                 self._check_manned(behavior, role, resource, findings)
@@ -60,20 +69,20 @@ class _Check:
                 if spec is None:
                     message, remedy, rule = self._not_offered(behavior, resource)
                     findings.add(rule, message, remedy, line=behavior.line, role=role.name)
-                elif spec not in specs:
-                    specs.append(spec)
+                elif all(spec != taker.spec for taker in takers):
+                    takers.append(_Taker(spec, role.name, f"{place(self.fleet, resource)}: "))
         shared = SHARED.get((behavior.name, behavior.type))
-        if not specs and shared:
-            specs = [shared]
-        if not specs and not behavior.roles:
+        if not takers and shared:
+            takers = [_Taker(shared, behavior.roles[0].name if behavior.roles else "")]
+        if not takers and not behavior.roles:
             findings.add(
                 "unknown-behavior",
                 f"there is no {behavior.type} behavior '{behavior.name}'",
                 self._near_behavior(behavior, SHARED.values()),
                 line=behavior.line,
             )
-        for spec in specs:
-            self._check_parameters(behavior, spec, findings)
+        for taker in takers:
+            self._check_parameters(behavior, taker, findings)
 
     def _check_role_kinds(
         self, behavior: Behavior, filled: Sequence[Role], findings: TaskFindings
@@ -139,21 +148,20 @@ class _Check:
             return f"it is offered on {', '.join(others[:3])}"
         return hint or f"it offers: {', '.join(sorted(names)) or 'nothing'}"
 
-    def _check_parameters(
-        self, behavior: Behavior, spec: BehaviorSpec, findings: TaskFindings
-    ) -> None:
+    def _check_parameters(self, behavior: Behavior, taker: _Taker, findings: TaskFindings) -> None:
         lines = {parameter.name: parameter.line for parameter in behavior.parameters}
         literal = {p.name: p.value for p in behavior.parameters if isinstance(p.value, str)}
         deferred = [p.name for p in behavior.parameters if not isinstance(p.value, str)]
         geometry = self.fleet.geometries.get
-        _, problems = examine(spec, literal, geometry, self.fleet.vehicles, deferred)
+        _, problems = examine(taker.spec, literal, geometry, self.fleet.vehicles, deferred)
         for problem in problems:
             warning = problem.rule == "unknown-geometry"
             findings.add(
                 problem.rule,
-                problem.message + (f" in {self.fleet.file}" if warning else ""),
+                taker.place + problem.message + (f" in {self.fleet.file}" if warning else ""),
                 self._geometry_remedy(problem, literal) if warning else problem.remedy,
                 line=lines.get(problem.name, behavior.line),
+                role=taker.role,
                 severity=Severity.WARNING if warning else Severity.ERROR,
             )
 

@@ -152,6 +152,10 @@ class FleetModel(_Model):
 def fleet_schema() -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of fleet files, for editors: `m2pem fleet --schema`."""
     schema = FleetModel.model_json_schema()
+    models = (schema, *schema["$defs"].values())
+    for properties in [p for model in models for p in model["properties"].values()]:
+        if "patternProperties" in properties:  # keys that are no names: pydantic lets them pass
+            properties["additionalProperties"] = False
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "https://m2pem.org/schema/1/fleet.schema.json",

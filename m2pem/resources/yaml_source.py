@@ -170,7 +170,7 @@ class _Reader:
             return text
         try:
             value: Value = self.yaml.constructor.construct_object(node)
-        except (ValueError, KeyError):  # a tag that its text does not fit: "!!int abc"
+        except (ValueError, LookupError):  # a tag that its text does not fit: "!!int abc"
             self.source._note(line, path, "yaml-tag", f"{text!r} is not of type {kind}")
             return None
         too_large = isinstance(value, int) and not -_INT_LIMIT <= value < _INT_LIMIT

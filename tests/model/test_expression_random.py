@@ -287,21 +287,21 @@ def test_parsing_raises_nothing_but_syntax_errors(text, language, store):
 
 
 @pytest.mark.long
-@settings(max_examples=20_000, deadline=None)
+@settings(max_examples=10_000, deadline=None)
 @given(trees, stores)
 def test_many_random_expressions_have_the_value_of_the_reference(tree, store):
     check_against_reference(tree, store)
 
 
 @pytest.mark.long
-@settings(max_examples=20_000, deadline=None)
+@settings(max_examples=10_000, deadline=None)
 @given(trees_with_calls, stores)
 def test_evaluation_of_many_raises_nothing_but_expression_errors(tree, store):
     check_errors(tree, store)
 
 
 @pytest.mark.long
-@settings(max_examples=50_000, deadline=None)
+@settings(max_examples=15_000, deadline=None)
 @given(any_text, languages, stores)
 def test_parsing_many_texts_raises_nothing_but_syntax_errors(text, language, store):
     check_any_text(text, language, store)

@@ -1,5 +1,7 @@
 """Records about data, and about what is awaited and thrown."""
 
+import msgspec
+
 from m2pem.engine.records.base import BaseRecord, Trigger
 from m2pem.model.values import Value
 
@@ -66,7 +68,7 @@ class MessageThrown(BaseRecord, frozen=True):
     scope: int = 0
     by: str = ""
     kept: bool = False
-    data: dict[str, Value] = {}
+    data: dict[str, Value] = msgspec.field(default_factory=dict)
 
 
 class EscalationThrown(BaseRecord, frozen=True):

@@ -11,7 +11,7 @@ from m2pem.model.bpmn.calls import resolve_calls
 from m2pem.model.bpmn.collaboration import check_collaborations
 from m2pem.model.bpmn.containers import MAX_DEPTH, read_process
 from m2pem.model.bpmn.data import resolve_data
-from m2pem.model.bpmn.graph import check_graph
+from m2pem.model.bpmn.graph import add_unreachable, check_graph
 from m2pem.model.bpmn.link import link
 from m2pem.model.bpmn.messages import resolve_messages
 from m2pem.model.bpmn.names import BPMN, local
@@ -114,6 +114,7 @@ def _read(report: Report, document: Document, data: bytes) -> Mission | None:
     check_collaborations(reading, elements)
     check_graph(reading)
     if has_errors(report.findings):
+        add_unreachable(reading)
         return None
     return Mission(
         file=report.file,

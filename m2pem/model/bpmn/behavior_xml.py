@@ -6,9 +6,9 @@ from typing import TypeVar
 from lxml import etree
 
 from m2pem.model.behavior import Behavior, BehaviorType, Parameter, Role, RoleKind, ServiceCall
-from m2pem.model.bpmn.names import BPMN, M2PEM, local
-from m2pem.model.bpmn.near import did_you_mean
+from m2pem.model.bpmn.names import BPMN, M2PEM, attribute_names, local
 from m2pem.model.bpmn.reading import Reading
+from m2pem.model.near import did_you_mean
 
 _ROLE_ATTRIBUTES = frozenset({"name", "optional", "requires", *RoleKind})
 
@@ -225,7 +225,7 @@ class BehaviorReader:
                 yield child
 
     def _check_attributes(self, element: etree._Element, known: frozenset[str]) -> None:
-        for key in element.keys():
+        for key in attribute_names(element):
             name = key.removeprefix(M2PEM)
             if name not in known and not name.startswith("{"):
                 self._report.warning(

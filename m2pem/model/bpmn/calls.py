@@ -134,11 +134,13 @@ def _own_parameters(found: Scan) -> dict[str, str]:
     result: dict[str, str] = {}
     for specification in found.of("ioSpecification"):
         for child in specification:
-            if local(child.tag) in ("dataInput", "dataOutput") and child.get("id"):
-                result[child.get("id", "")] = child.get("name") or child.get("id", "")
+            identifier = child.get("id")
+            if identifier and local(child.tag) in ("dataInput", "dataOutput"):
+                result[identifier] = child.get("name") or identifier
     for own in found.of("property"):
-        if own.get("id"):
-            result[own.get("id", "")] = ""  # editors' placeholder for "whatever it is called"
+        identifier = own.get("id")
+        if identifier:
+            result[identifier] = ""  # editors' placeholder for "whatever it is called"
     return result
 
 
@@ -184,7 +186,9 @@ def _associated(
         return _not_passed(reading, pending, found, str(error))
 
 
-def _not_passed(reading: Reading, pending: PendingCall, found: Association, because: str) -> None:
+def _not_passed(
+    reading: Reading, pending: PendingCall, found: Association, because: str
+) -> Mapping | None:
     reading.report.warning(
         found.element,
         pending.call.id,
@@ -192,3 +196,4 @@ def _not_passed(reading: Reading, pending: PendingCall, found: Association, beca
         f"the data association passes nothing: {because}",
         'use <m2pem:in source="a.b" target="x"/> or <m2pem:out .../>',
     )
+    return None

@@ -5,10 +5,10 @@ from collections.abc import Collection, Mapping
 from lxml import etree
 
 from m2pem.model.bpmn.names import BPMN, local
-from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.reading import Reading, reference
 from m2pem.model.bpmn.scan import scan
 from m2pem.model.elements import Element, MessageFlow, Participant
+from m2pem.model.near import did_you_mean
 
 
 def read_collaboration(reading: Reading, collaboration: etree._Element) -> None:

@@ -9,12 +9,12 @@ from m2pem.model.bpmn.data import read_data
 from m2pem.model.bpmn.flows import SEQUENCE_FLOW, read_flow
 from m2pem.model.bpmn.lanes import read_lanes
 from m2pem.model.bpmn.names import BPMN, a, kind, local
-from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.nodes import LOOPS, read_node, refuse_loop
 from m2pem.model.bpmn.reading import Reading
 from m2pem.model.bpmn.scan import Order
 from m2pem.model.bpmn.schema import FLOW_ELEMENT_NAMES, SHAPES, Shape
 from m2pem.model.elements import Container, Process, SubProcess
+from m2pem.model.near import did_you_mean
 
 MAX_DEPTH = 1000
 """How deep subprocesses may nest in a process."""

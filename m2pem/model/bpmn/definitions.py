@@ -7,7 +7,6 @@ from lxml import etree
 
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.model.bpmn.names import a, local
-from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.reading import MessageUse, Reading, reference, text_of
 from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.duration import cycle, date_us, duration_us
@@ -26,6 +25,7 @@ from m2pem.model.events import (
     TimerEventDefinition,
     TimerKind,
 )
+from m2pem.model.near import did_you_mean
 from m2pem.model.values import Value
 
 Root = TypeVar("Root", bound=RootElement)
@@ -47,49 +47,31 @@ def read_definition(
     if name == "message":
         return _message(reading, element, event, catches=catches)
     if name == "signal":
-        signal = look_up(
-            reading, element, "signal", reading.signals, event.id, lambda i: Signal(i, label, line)
-        )
-        if signal is None:
-            _nameless(reading, event, "signal", catches=catches)
-            signal = reading.signals.setdefault(event.id, Signal(event.id, label, line))
-        return SignalEventDefinition(line, signal)
+        sign = Signal(event.id, label, line)
+        signal = look_up(reading, element, reading.signals, sign)
+        return SignalEventDefinition(line, signal or _own(reading, event, reading.signals, sign))
     if name == "error":
-        error = look_up(
-            reading, element, "error", reading.errors, event.id, lambda i: Error(i, label, line, i)
-        )
+        own = Error(event.id, label, line, event.id)
+        error = look_up(reading, element, reading.errors, own)
         if error is None and not catches:
-            _nameless(reading, event, "error", catches=catches)
-            error = reading.errors.setdefault(event.id, Error(event.id, label, line, event.id))
+            error = _own(reading, event, reading.errors, own)
         return ErrorEventDefinition(line, error)
-    escalation = look_up(
-        reading,
-        element,
-        "escalation",
-        reading.escalations,
-        event.id,
-        lambda i: Escalation(i, label, line, i),
-    )
+    notice = Escalation(event.id, label, line, event.id)
+    escalation = look_up(reading, element, reading.escalations, notice)
     if escalation is None and not catches:
-        _nameless(reading, event, "escalation", catches=catches)
-        escalation = reading.escalations.setdefault(
-            event.id, Escalation(event.id, label, line, event.id)
-        )
+        escalation = _own(reading, event, reading.escalations, notice)
     return EscalationEventDefinition(line, escalation)
 
 
 def look_up(
-    reading: Reading,
-    element: etree._Element,
-    what: str,
-    table: Mapping[str, Root],
-    identifier: str,
-    stand_in: Callable[[str], Root],
+    reading: Reading, element: etree._Element, table: Mapping[str, Root], stand_in: Root
 ) -> Root | None:
     """What an attribute such as `signalRef` names; None when it is absent.
 
-    A reference to nothing gives a stand-in beside the finding, so that reading can go on.
+    A reference to nothing gives the stand-in beside a finding, so that reading can go on. The
+    stand-in has the id of the event or task that refers.
     """
+    what = type(stand_in).__name__.lower()
     text = element.get(f"{what}Ref")
     if not text:
         return None
@@ -101,12 +83,25 @@ def look_up(
     because = f"the element on line {taken} is none" if taken else f"no {what} has that id"
     reading.report.error(
         element,
-        identifier,
+        stand_in.id,
         "dangling-reference",
         f"{what}Ref names '{name}', but {because}",
         did_you_mean(name, table, f"name {a(what)} element that stands in definitions"),
     )
-    return stand_in(name)
+    return stand_in
+
+
+def _own(reading: Reading, event: Scan, table: dict[str, Root], root: Root) -> Root:
+    """The root element of an event that names none."""
+    what = type(root).__name__.lower()
+    reading.report.warning(
+        event.element,
+        event.id,
+        "missing-reference",
+        f"the event names no {what}; it has one of its own, with the id '{event.id}'",
+        f"add {what}Ref to its event definition",
+    )
+    return table.setdefault(event.id, root)
 
 
 def _message(
@@ -114,27 +109,12 @@ def _message(
 ) -> MessageEventDefinition:
     line = reading.report.line(element)
     label = event.element.get("name", "")
-    message = look_up(
-        reading, element, "message", reading.messages, event.id, lambda i: Message(i, label, line)
-    )
-    definition = MessageEventDefinition(line, message or Message(event.id, label, line))
-    reading.message_uses.append(
-        MessageUse(
-            definition, event.id, label, reading.report.line(event.element), catches, message
-        )
-    )
+    own = Message(event.id, label, line)
+    message = look_up(reading, element, reading.messages, own)
+    definition = MessageEventDefinition(line, message or own)
+    where = reading.report.line(event.element)
+    reading.message_uses.append(MessageUse(definition, event.id, label, where, catches, message))
     return definition
-
-
-def _nameless(reading: Reading, event: Scan, what: str, *, catches: bool) -> None:
-    reading.report.warning(
-        event.element,
-        event.id,
-        "missing-reference",
-        f"the event names no {what}; it {'catches' if catches else 'throws'} one of its own, "
-        f"with the id '{event.id}'",
-        f"add {what}Ref to its event definition",
-    )
 
 
 _TIMES = {kind.value: kind for kind in TimerKind}

@@ -4,7 +4,6 @@ from lxml import etree
 
 from m2pem.model.bpmn.definitions import read_definition
 from m2pem.model.bpmn.names import BPMN, a, kind, local
-from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.reading import Reading, reference, text_of
 from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.elements import (
@@ -18,6 +17,7 @@ from m2pem.model.elements import (
     StartEvent,
 )
 from m2pem.model.events import ErrorEventDefinition, EventDefinition
+from m2pem.model.near import did_you_mean
 
 _ALLOWED = {
     "startEvent": "message timer conditional signal",

@@ -1,26 +1,18 @@
-"""What BPMN asks of the linked graph: a beginning, reachable elements, conditions in place."""
+"""What BPMN asks of the linked graph: a beginning, and conditions in place."""
 
 from m2pem.model.bpmn.reading import Reading
-from m2pem.model.elements import (
-    Activity,
-    Container,
-    Event,
-    FlowNode,
-    ParallelGateway,
-    SubProcess,
-)
+from m2pem.model.elements import Container, Event, ParallelGateway, SubProcess
+from m2pem.model.reach import unreachable, unreached
 
 _set = object.__setattr__
 
 
 def check_graph(reading: Reading) -> None:
-    """Find what no token can begin, reach or decide."""
+    """Find what can never begin, and conditions that nothing decides."""
     _check_processes(reading)
-    containers: list[Container] = list(reading.processes)
-    containers += [node for node in reading.nodes if isinstance(node, SubProcess)]
-    for container in containers:
+    for container in _containers(reading):
         if container.nodes and container not in reading.broken:
-            _check_reached(reading, container)
+            _check_start(reading, container)
         elif not container.nodes and isinstance(container, SubProcess):
             reading.report.warning(
                 container.line,
@@ -50,10 +42,8 @@ def _check_processes(reading: Reading) -> None:
         )
 
 
-def _check_reached(reading: Reading, container: Container) -> None:
-    loose = [node for node in container.nodes if node in reading.self_starting]
-    waiting: list[FlowNode] = [*container.entries, *loose]
-    if not waiting:
+def _check_start(reading: Reading, container: Container) -> None:
+    if not container.entries and reading.self_starting.isdisjoint(container.nodes):
         reading.report.error(
             container.line,
             container.id,
@@ -62,27 +52,22 @@ def _check_reached(reading: Reading, container: Container) -> None:
             "flow",
             "add a start event",
         )
-        return
-    reached = set(waiting)
-    while waiting:
-        node = waiting.pop()
-        following = [flow.target for flow in node.outgoing]
-        if isinstance(node, Activity):
-            following += node.boundary
-        for each in following:
-            if each not in reached:
-                reached.add(each)
-                waiting.append(each)
-    for node in container.nodes:
-        if node not in reached:
-            what = "no start event can reach it" if container.starts else "nothing can reach it"
-            reading.report.error(
-                node.line,
-                node.id,
-                "unreachable",
-                f"{what}, so it would never run",
-                "draw a sequence flow to it, or delete it",
-            )
+
+
+def add_unreachable(reading: Reading) -> None:
+    """Say, of a mission that is refused anyway, what `lint` says of others."""
+    for container in _containers(reading):
+        if container in reading.broken or not container.entries:
+            continue
+        loose = [node for node in container.nodes if node in reading.self_starting]
+        for node in unreached(container, loose):
+            finding = unreachable(reading.report.file, node)
+            reading.report.findings.append(finding)
+
+
+def _containers(reading: Reading) -> list[Container]:
+    inner = [node for node in reading.nodes if isinstance(node, SubProcess)]
+    return [*reading.processes, *inner]
 
 
 def _check_conditions(reading: Reading) -> None:

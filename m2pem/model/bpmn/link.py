@@ -4,7 +4,6 @@ The only place that sets the fields of elements after they were made.
 """
 
 from m2pem.model.bpmn.names import a
-from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.reading import FlowEnds, Reading
 from m2pem.model.elements import (
     Activity,
@@ -21,6 +20,7 @@ from m2pem.model.elements import (
     SequenceFlow,
     StartEvent,
 )
+from m2pem.model.near import did_you_mean
 
 _set = object.__setattr__
 

@@ -61,9 +61,8 @@ def _assign(reading: Reading, use: MessageUse, message: Message | None) -> None:
             use.line,
             use.node_id,
             "missing-reference",
-            "it names no message; it "
-            + ("waits for" if use.catches else "sends")
-            + f" one of its own, with the id '{use.node_id}'",
+            f"no message is named and no message flow leads {'to' if use.catches else 'from'} it; "
+            f"it has a message of its own, with the id '{use.node_id}'",
             "add messageRef, or draw a message flow",
         )
         message = reading.messages.setdefault(use.node_id, Message(use.node_id, use.name, use.line))

@@ -1,5 +1,9 @@
 """XML namespaces and tags that mission files use."""
 
+from typing import cast
+
+from lxml import etree
+
 BPMN = "{http://www.omg.org/spec/BPMN/20100524/MODEL}"
 M2PEM = "{https://m2pem.org/schema/1}"
 CAMUNDA = "{http://camunda.org/schema/1.0/bpmn}"
@@ -28,6 +32,11 @@ M2PEM_ATTRIBUTES = frozenset(
     {"class", "collection", "elementVariable", "from", "role", "service", "store", "timeout"}
 )
 """Local names of the attributes of `M2PEM` that may stand on BPMN elements."""
+
+
+def attribute_names(element: etree._Element) -> list[str]:
+    """The names of an element's attributes, with their namespaces."""
+    return cast("list[str]", element.keys())
 
 
 def local(tag: str) -> str:

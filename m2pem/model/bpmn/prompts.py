@@ -7,12 +7,12 @@ from lxml import etree
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.model.behavior import Decision, Prompt
 from m2pem.model.bpmn.names import BPMN, M2PEM, local
-from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.reading import KEY, PendingPrompt, Reading, association, text_of
 from m2pem.model.bpmn.scan import Scan, own_extensions
 from m2pem.model.duration import duration_us
 from m2pem.model.elements import UserTask
 from m2pem.model.expression import Expression
+from m2pem.model.near import did_you_mean
 
 _USED = frozenset({"userTask", "prompt", "decision"})
 _SETTINGS = ("store", "role", "timeout")

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from lxml import etree
 
 from m2pem.errors import ExpressionSyntaxError
-from m2pem.model.bpmn.names import M2PEM, M2PEM_ATTRIBUTES, a, kind, local
-from m2pem.model.bpmn.near import did_you_mean
+from m2pem.model.bpmn.names import M2PEM, M2PEM_ATTRIBUTES, a, attribute_names, kind, local
 from m2pem.model.bpmn.report import Report, Where
 from m2pem.model.bpmn.schema import Shape
 from m2pem.model.elements import (
@@ -27,6 +26,7 @@ from m2pem.model.elements import (
 )
 from m2pem.model.events import Error, Escalation, Message, MessageEventDefinition, Signal
 from m2pem.model.expression import Expression, parse, template
+from m2pem.model.near import did_you_mean
 
 KEY = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
 """A dotted name of the data store."""
@@ -167,7 +167,7 @@ class Reading:
 
     def check_attributes(self, element: etree._Element, shape: Shape, identifier: str) -> None:
         """Warn of attributes that neither BPMN nor m2pem defines for the element."""
-        for key in element.keys():
+        for key in attribute_names(element):
             if key in shape.attributes:
                 continue
             if key[0] != "{":
@@ -223,15 +223,25 @@ class Reading:
     ) -> Expression | None:
         """An expression of any dialect; says why when it is none."""
         try:
-            if language is None and self.expression_language is not None:
-                try:
-                    return parse(text, self.expression_language)
-                except ExpressionSyntaxError:
-                    return parse(text)
-            return parse(text, language)
+            return self._parse(text, language)
         except ExpressionSyntaxError as error:
             self._bad_expression(where, identifier, error)
             return None
+
+    def _parse(self, text: str, language: str | None) -> Expression:
+        """Parse by the language given; by the bare dialect what only a file's default misnames.
+
+        Editors write a default (XPath, which is BPMN's, or FEEL) over conditions in no language.
+        """
+        try:
+            return parse(text, language or self.expression_language)
+        except ExpressionSyntaxError as error:
+            if language is not None and "xpath" not in language.lower():
+                raise
+            try:
+                return parse(text)
+            except ExpressionSyntaxError:
+                raise error from None
 
     def template(self, where: Where, identifier: str, text: str) -> Expression | None:
         """A text that may be an expression; says why when it is a wrong one."""
@@ -269,7 +279,7 @@ def association(element: etree._Element) -> Association:
 
 def text_of(element: etree._Element) -> str:
     """All text inside an element, without the space around it."""
-    return "".join(element.itertext()).strip()
+    return "".join(map(str, element.itertext())).strip()
 
 
 def reference(text: str) -> str:

@@ -23,17 +23,17 @@ class Report:
 
     def error(self, where: Where, element: str, rule: str, message: str, remedy: str) -> None:
         """Note something that stops the mission from being loaded."""
-        self._add(Severity.ERROR, where, element, rule, message, remedy)
+        self._add(Severity.ERROR, where, element, rule, (message, remedy))
 
     def warning(self, where: Where, element: str, rule: str, message: str, remedy: str) -> None:
         """Note something doubtful."""
-        self._add(Severity.WARNING, where, element, rule, message, remedy)
+        self._add(Severity.WARNING, where, element, rule, (message, remedy))
 
     def _add(
-        self, severity: Severity, where: Where, element: str, rule: str, message: str, remedy: str
+        self, severity: Severity, where: Where, element: str, rule: str, said: tuple[str, str]
     ) -> None:
         line = where if isinstance(where, int) else self.line(where)
-        self.findings.append(Finding(severity, self.file, line, element, rule, message, remedy))
+        self.findings.append(Finding(severity, self.file, line, element, rule, *said))
 
     def sorted(self) -> tuple[Finding, ...]:
         """All findings by line; those of one line in the order they were made."""

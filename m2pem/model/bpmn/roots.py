@@ -4,11 +4,11 @@ from lxml import etree
 
 from m2pem.model.bpmn.collaboration import read_collaboration
 from m2pem.model.bpmn.names import BPMN, M2PEM, a, kind, local
-from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.reading import DataEnd, Reading
 from m2pem.model.bpmn.scan import Order, scan
 from m2pem.model.bpmn.schema import ROOT_NAMES, SHAPES
 from m2pem.model.events import Error, Escalation, Message, Signal
+from m2pem.model.near import did_you_mean
 
 PROCESS = BPMN + "process"
 _DI = frozenset({"BPMNDiagram", "import", "extension", "relationship"})

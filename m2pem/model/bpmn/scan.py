@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from lxml import etree
 
 from m2pem.model.bpmn.names import BPMN, M2PEM, M2PEM_ELEMENTS, a, kind, local
-from m2pem.model.bpmn.near import did_you_mean
 from m2pem.model.bpmn.reading import Reading, text_of
 from m2pem.model.bpmn.schema import SHAPES, Shape
+from m2pem.model.near import did_you_mean
 
 DOCUMENTATION = BPMN + "documentation"
 EXTENSIONS = BPMN + "extensionElements"

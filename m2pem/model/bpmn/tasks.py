@@ -138,8 +138,5 @@ def read_receive_task(reading: Reading, found: Scan) -> ReceiveTask:
 
 
 def _message(reading: Reading, found: Scan) -> Message | None:
-    element = found.element
-    line = reading.report.line(element)
-    return look_up(
-        reading, element, "message", reading.messages, found.id, lambda i: Message(i, "", line)
-    )
+    own = Message(found.id, "", reading.report.line(found.element))
+    return look_up(reading, found.element, reading.messages, own)

@@ -10,6 +10,7 @@ import codecs
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 from lxml import etree
 
@@ -87,7 +88,7 @@ def parse_xml(data: bytes, *, declared: bool = True) -> Document:
         root = etree.fromstring(utf8, parser)
     except etree.XMLSyntaxError as error:
         raise _not_well_formed(error) from None
-    if root.getroottree().docinfo.doctype:
+    if root.getroottree().docinfo.internalDTD is not None:
         raise _doctype_found(1)
     return Document(root, _line_finder(root, utf8))
 
@@ -187,4 +188,4 @@ def _line_finder(root: etree._Element, utf8: bytes) -> Callable[[etree._Element]
 
 
 def _sourceline(element: etree._Element) -> int:
-    return int(element.sourceline or 1)
+    return cast("int", element.sourceline)

@@ -1,0 +1,196 @@
+"""What is doubtful about a mission as a whole; what is wrong with one element, reading finds.
+
+The findings are warnings, but for elements that no start event can reach: those load, so that
+they can be verified and simulated, and are errors of `check`.
+"""
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from m2pem.findings import Finding, Severity
+from m2pem.model.elements import (
+    CallActivity,
+    Container,
+    EndEvent,
+    Event,
+    ExclusiveGateway,
+    FlowNode,
+    InclusiveGateway,
+    IntermediateThrowEvent,
+    Mission,
+    Process,
+    ReceiveTask,
+    SendTask,
+    SubProcess,
+)
+from m2pem.model.events import (
+    Message,
+    MessageEventDefinition,
+    Signal,
+    SignalEventDefinition,
+)
+from m2pem.model.names import unwritten
+from m2pem.model.reach import unreachable, unreached
+
+
+def lint(
+    mission: Mission,
+    known_names: Iterable[str] = (),
+    service_writes: Mapping[str, Sequence[str]] | None = None,
+) -> list[Finding]:
+    """Look over a whole mission; findings are sorted by line.
+
+    `known_names`: names that are written from outside (`--data`). `service_writes`: what each
+    registered service class writes; a class that is not there may write anything.
+    """
+    findings = [
+        *_unreachable(mission),
+        *_undecided_gateways(mission),
+        *_outside_only(mission),
+        *_recursion(mission),
+        *unwritten(mission, known_names, service_writes or {}),
+    ]
+    return sorted(findings, key=lambda finding: finding.line)
+
+
+def _warning(
+    mission: Mission, line: int, element: str, rule: str, said: tuple[str, str]
+) -> Finding:
+    return Finding(Severity.WARNING, mission.file, line, element, rule, *said)
+
+
+def _unreachable(mission: Mission) -> Iterator[Finding]:
+    inner = [node for node in mission.nodes if isinstance(node, SubProcess)]
+    containers: list[Container] = [*mission.processes, *inner]
+    for container in containers:
+        for node in unreached(container):
+            yield unreachable(mission.file, node)
+
+
+def _undecided_gateways(mission: Mission) -> Iterator[Finding]:
+    for node in mission.nodes:
+        if (
+            isinstance(node, ExclusiveGateway | InclusiveGateway)
+            and len(node.outgoing) > 1
+            and all(flow.condition is None for flow in node.outgoing)
+        ):
+            what = (
+                f"it always takes the first, '{node.outgoing[0].id}'"
+                if isinstance(node, ExclusiveGateway) and node.default is None
+                else "it always takes the same ones"
+            )
+            yield _warning(
+                mission,
+                node.line,
+                node.id,
+                "no-conditions",
+                (
+                    f"none of the gateway's {len(node.outgoing)} outgoing flows has a condition; "
+                    f"{what}",
+                    "give the flows conditions",
+                ),
+            )
+
+
+# --- signals and messages -----------------------------------------------------------------------
+
+
+def _outside_only(mission: Mission) -> Iterator[Finding]:
+    thrown: set[tuple[str, str]] = set()
+    caught: dict[tuple[str, str], tuple[Signal | Message, list[FlowNode]]] = {}
+    for node in mission.nodes:
+        for root in _roots(node):
+            key = (type(root).__name__, root.id)
+            if isinstance(node, EndEvent | IntermediateThrowEvent | SendTask):
+                thrown.add(key)
+            else:
+                caught.setdefault(key, (root, []))[1].append(node)
+    for key, (root, catchers) in caught.items():
+        if key in thrown or root.from_operator:
+            continue
+        what = key[0].lower()
+        waiting = ", ".join(f"'{node.id}'" for node in catchers)
+        yield _warning(
+            mission,
+            root.line,
+            root.id,
+            "outside-only",
+            (
+                f"{waiting} {'wait' if len(catchers) > 1 else 'waits'} for the {what} "
+                f"'{root.name or root.id}', which nothing in the file "
+                f"{'throws' if what == 'signal' else 'sends'}",
+                f'add m2pem:from="operator" to the {what} if operators send it',
+            ),
+        )
+
+
+def _roots(node: FlowNode) -> Iterator[Signal | Message]:
+    if isinstance(node, SendTask | ReceiveTask):
+        if node.message is not None:
+            yield node.message
+    elif isinstance(node, Event):
+        for definition in node.definitions:
+            if isinstance(definition, SignalEventDefinition):
+                yield definition.signal
+            elif isinstance(definition, MessageEventDefinition):
+                yield definition.message
+
+
+# --- calls --------------------------------------------------------------------------------------
+
+
+def _recursion(mission: Mission) -> Iterator[Finding]:
+    """One warning for each call through which a process can call itself."""
+    calls: dict[Process, list[CallActivity]] = {process: [] for process in mission.processes}
+    for node in mission.nodes:
+        if isinstance(node, CallActivity):
+            calls[node.container.process].append(node)
+    group = _groups(calls)
+    for process, inside in calls.items():
+        for call in inside:
+            if group[call.called] == group[process]:
+                yield _warning(
+                    mission,
+                    call.line,
+                    call.id,
+                    "call-recursion",
+                    (
+                        f"process '{process.id}' calls itself through '{call.called.id}'"
+                        if call.called is not process
+                        else f"process '{process.id}' calls itself",
+                        "make sure that a decision before the call can end it",
+                    ),
+                )
+
+
+def _groups(calls: Mapping[Process, Sequence[CallActivity]]) -> dict[Process, int]:
+    """Processes that can call each other have the same number (Kosaraju's algorithm).
+
+    A process that cannot call itself has a number of its own, and is in no call's group but its
+    own: a call to itself is a cycle of one.
+    """
+    callers: dict[Process, list[Process]] = {process: [] for process in calls}
+    for process, inside in calls.items():
+        for call in inside:
+            callers[call.called].append(process)
+    finished: list[Process] = []
+    seen: set[Process] = set()
+    for start in calls:
+        waiting = [(start, False)]
+        while waiting:
+            process, done = waiting.pop()
+            if done:
+                finished.append(process)
+            elif process not in seen:
+                seen.add(process)
+                waiting.append((process, True))
+                waiting += [(call.called, False) for call in calls[process]]
+    group: dict[Process, int] = {}
+    for number, last in enumerate(reversed(finished)):
+        members = deque([last])
+        while members:
+            process = members.popleft()
+            if process not in group:
+                group[process] = number
+                members += callers[process]
+    return group

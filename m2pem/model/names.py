@@ -1,0 +1,136 @@
+"""Which names of the data store each process reads and writes, as far as the file says."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from m2pem.findings import Finding, Severity
+from m2pem.model.behavior import Assignment, Parameter
+from m2pem.model.elements import (
+    CallActivity,
+    Event,
+    FlowNode,
+    Mission,
+    Process,
+    ScriptTask,
+    SendTask,
+    ServiceTask,
+    UserTask,
+)
+from m2pem.model.events import TimerEventDefinition
+from m2pem.model.expression import Expression
+from m2pem.model.near import did_you_mean
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """An expression that is evaluated over a process's data, and where it stands."""
+
+    expression: Expression
+    element: str
+    line: int
+
+
+@dataclass(slots=True)
+class _Store:
+    """What happens to the data of one process; embedded subprocesses share it."""
+
+    reads: list[Read] = field(default_factory=list)
+    written: set[str] = field(default_factory=set)
+    anything: bool = False
+    """Whether something may write any name: a service that nobody described."""
+
+    def has(self, name: str) -> bool:
+        """Whether the name, or a map that holds it, is written."""
+        if self.anything:
+            return True
+        parts = name.split(".")
+        return any(".".join(parts[:count]) in self.written for count in range(len(parts), 0, -1))
+
+
+def unwritten(
+    mission: Mission, known_names: Iterable[str], service_writes: Mapping[str, Sequence[str]]
+) -> Iterator[Finding]:
+    """A warning for each name that a process reads and nothing writes; it would be null."""
+    stores = {process: _Store() for process in mission.processes}
+    everywhere = {*known_names, *mission.associated}
+    for store in stores.values():
+        store.written |= everywhere
+    for node in mission.nodes:
+        store = stores[node.container.process]
+        store.reads += _reads(node)
+        _note_writes(node, store, service_writes)
+        if isinstance(node, CallActivity):
+            _note_mappings(node, store, stores[node.called])
+    for process, store in stores.items():
+        yield from _findings(mission, process, store)
+
+
+def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Finding]:
+    said: set[tuple[str, str]] = set()
+    for read in store.reads:
+        for name in sorted(read.expression.names):
+            if store.has(name) or (read.element, name) in said:
+                continue
+            said.add((read.element, name))
+            yield Finding(
+                Severity.WARNING,
+                mission.file,
+                read.line,
+                read.element,
+                "unwritten-name",
+                f"'{name}' is read, but nothing in process '{process.id}' writes it; unless "
+                "--data or an operator does, it is null",
+                did_you_mean(name, store.written, "write it in a task before, or pass it in"),
+            )
+
+
+def _reads(node: FlowNode) -> Iterator[Read]:
+    for flow in node.outgoing:
+        if flow.condition is not None:
+            yield Read(flow.condition, flow.id, flow.line)
+    if isinstance(node, ScriptTask | ServiceTask | SendTask) and node.behavior is not None:
+        yield from _parameters(node, node.behavior.parameters)
+    if isinstance(node, ScriptTask) and node.script is not None:
+        for statement in node.script.statements:
+            if isinstance(statement, Assignment):
+                yield Read(statement.expression, node.id, statement.line)
+    elif isinstance(node, ServiceTask) and node.call is not None:
+        yield from _parameters(node, node.call.properties)
+    elif isinstance(node, UserTask) and node.prompt is not None and node.prompt.timeout is not None:
+        yield Read(node.prompt.timeout, node.id, node.line)
+    elif isinstance(node, Event):
+        for definition in node.definitions:
+            if isinstance(definition, TimerEventDefinition):
+                yield Read(definition.expression, node.id, definition.line)
+
+
+def _parameters(node: FlowNode, parameters: Iterable[Parameter]) -> Iterator[Read]:
+    for parameter in parameters:
+        if isinstance(parameter.value, Expression):
+            yield Read(parameter.value, node.id, parameter.line)
+
+
+def _note_writes(
+    node: FlowNode, store: _Store, service_writes: Mapping[str, Sequence[str]]
+) -> None:
+    if isinstance(node, ScriptTask) and node.script is not None:
+        for statement in node.script.statements:
+            if isinstance(statement, Assignment):
+                store.written.add(statement.key)
+    elif isinstance(node, UserTask) and node.prompt is not None:
+        store.written.add(node.prompt.store)
+    elif isinstance(node, ServiceTask) and node.call is not None:
+        writes = service_writes.get(node.call.service)
+        if writes is None:
+            store.anything = True
+        else:
+            store.written.update(writes)
+
+
+def _note_mappings(call: CallActivity, caller: _Store, called: _Store) -> None:
+    for mapping in call.mappings.inputs:
+        caller.reads.append(Read(mapping.source, call.id, mapping.line))
+        called.written.add(mapping.target)
+    for mapping in call.mappings.outputs:
+        called.reads.append(Read(mapping.source, call.id, mapping.line))
+        caller.written.add(mapping.target)

@@ -1,0 +1,221 @@
+"""Taking a run over after a crash: the journal is what a dead executive left behind."""
+
+import asyncio
+
+import pytest
+
+from m2pem.api.arbiter import BehaviorReport
+from m2pem.api.control import RunStatus
+from m2pem.engine.inputs import BehaviorReported, Input, PromptAnswer, StartRun
+from m2pem.engine.records import BehaviorRestarted, PromptOpened
+from m2pem.engine.run import MissionRun
+from m2pem.errors import JournalError, OperatorError
+from m2pem.journal import MemoryJournal
+from m2pem.journal.base import Entry, RunHeader
+from m2pem.model.bpmn import parse_mission
+from m2pem.model.catalogue import BehaviorState
+from m2pem.resources.snapshot import dump
+
+from .conftest import START_US, World, behavior, fleet, mission, question, sequence
+
+GOTO = mission(
+    sequence(
+        (
+            "Drive",
+            behavior(
+                "Drive",
+                "goto",
+                "ugv1",
+                parameters='<m2pem:property name="target" value="[38.1, -77.3, 0]"/>',
+            ),
+        )
+    )
+)
+OUTAGE_US = 60_000_000
+ACCEPTED = BehaviorReported("r1.b1", 1, BehaviorState.ACCEPTED)
+RUNNING = BehaviorReported("r1.b1", 2, BehaviorState.RUNNING, native_ref="native")
+
+
+def left_behind(source: bytes, *inputs: Input) -> MemoryJournal:
+    """A journal in which run r1 got `inputs`, a second apart, and then its executive died."""
+
+    async def write() -> MemoryJournal:
+        journal = MemoryJournal()
+        vehicles = fleet("ugv1")
+        number = await journal.create(RunHeader("m.bpmn", source, "P", dump(vehicles)))
+        run = MissionRun(parse_mission(source, "m.bpmn"), vehicles, number)
+        for second, item in enumerate((StartRun("P"), *inputs)):
+            at_us = START_US + second * 1_000_000
+            step = run.receive(item, at_us)
+            await journal.append(
+                [Entry(number, 1, step.seq, at_us, step.t_us, item, tuple(step.records))]
+            )
+        await journal.release(number)
+        return journal
+
+    return asyncio.run(write())
+
+
+def resumed(play, journal, story, **options):
+    """Resumes r1 a minute later and goes on with `story(world)`."""
+
+    async def all_of_it(world: World):
+        for behavior_id, report in options.get("known", {}).items():
+            world.fake.known[behavior_id] = report
+        await world.executive.resume("r1")
+        return await story(world)
+
+    return play(all_of_it, "ugv1", journal=journal, start_us=START_US + OUTAGE_US)
+
+
+def test_a_behavior_that_still_runs_is_reattached_and_not_started_again(play):
+    async def story(world: World):
+        await world.fake.until_called("query", "r1.b1")
+        world.fake._numbers["r1.b1"] = 2
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        summary = await world.executive.control.wait("r1")
+        return summary, world.fake.count("start")
+
+    known = {"r1.b1": BehaviorReport("r1.b1", 2, BehaviorState.RUNNING)}
+    summary, starts = resumed(play, left_behind(GOTO, ACCEPTED, RUNNING), story, known=known)
+    assert summary.status is RunStatus.COMPLETED
+    assert starts == 0
+
+
+def test_a_behavior_that_ended_meanwhile_completes_its_task(play):
+    async def story(world: World):
+        summary = await world.executive.control.wait("r1")
+        return summary, world.fake.count("start")
+
+    known = {"r1.b1": BehaviorReport("r1.b1", 3, BehaviorState.SUCCEEDED)}
+    summary, starts = resumed(play, left_behind(GOTO, ACCEPTED, RUNNING), story, known=known)
+    assert summary.status is RunStatus.COMPLETED
+    assert starts == 0
+
+
+def test_a_request_that_never_reached_its_arbiter_is_sent(play):
+    async def story(world: World):
+        await world.fake.until_called("start", "r1.b1")
+        world.fake.report("r1.b1", BehaviorState.ACCEPTED)
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        summary = await world.executive.control.wait("r1")
+        return summary, [call.what for call in world.fake.calls]
+
+    summary, calls = resumed(play, left_behind(GOTO), story)
+    assert summary.status is RunStatus.COMPLETED
+    assert calls == ["query", "start"]
+
+
+@pytest.mark.parametrize(
+    ("decision", "status", "starts"),
+    [
+        ("resume", RunStatus.COMPLETED, 1),
+        ("skip", RunStatus.COMPLETED, 0),
+        ("abort", RunStatus.STOPPED, 0),
+    ],
+)
+def test_a_moving_behavior_nobody_knows_is_held_and_the_operator_decides(
+    play, decision, status, starts
+):
+    async def story(world: World):
+        control = world.executive.control
+        await world.fake.until_called("hold", "ugv1")
+        (prompt,) = control.prompts()
+        assert [choice.value for choice in prompt.decisions] == ["resume", "skip", "abort"]
+        assert world.fake.count("start") == 0
+        await control.answer("r1", prompt.prompt, decision, by="anna")
+        if decision == "resume":
+            await world.fake.until_called("start", "r1.b1")
+            world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        else:
+            await world.fake.until_called("cancel", "r1.b1")
+            world.fake.report("r1.b1", BehaviorState.CANCELLED)
+        summary = await control.wait("r1")
+        return summary.status, world.fake.count("start")
+
+    assert resumed(play, left_behind(GOTO, ACCEPTED, RUNNING), story) == (status, starts)
+
+
+def test_a_scan_that_nobody_knows_is_started_again(play):
+    scan = mission(
+        sequence(
+            (
+                "Drive",
+                behavior("Drive", "zoom", "ugv1").replace('type="vehicle"', 'type="payload"'),
+            )
+        )
+    )
+
+    async def story(world: World):
+        await world.fake.until_called("start", "r1.b1")
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        await world.executive.control.wait("r1")
+        return world.seen
+
+    seen = resumed(play, left_behind(scan, ACCEPTED), story)
+    assert any(isinstance(record, BehaviorRestarted) for record in seen)
+
+
+def test_an_outage_beyond_the_fleets_bound_holds_what_still_runs_and_asks(play, monkeypatch):
+    monkeypatch.setattr("tests.executive.conftest.MAX_OUTAGE_S", 10.0)
+
+    async def story(world: World):
+        control = world.executive.control
+        await world.fake.until_called("hold", "ugv1")
+        (prompt,) = control.prompts()
+        assert "59 s" in prompt.text
+        await control.answer("r1", prompt.prompt, "resume", by="anna")
+        await world.fake.until_called("resume", "ugv1")
+        world.fake._numbers["r1.b1"] = 2
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        summary = await control.wait("r1")
+        return summary.status, world.fake.count("start")
+
+    known = {"r1.b1": BehaviorReport("r1.b1", 2, BehaviorState.RUNNING)}
+    journal = left_behind(GOTO, ACCEPTED)
+    assert resumed(play, journal, story, known=known) == (RunStatus.COMPLETED, 0)
+
+
+def test_open_prompts_are_asked_again(play):
+    async def story(world: World):
+        control = world.executive.control
+        await world.clock.sleep(1)
+        (prompt,) = control.prompts()
+        await control.answer("r1", prompt.prompt, "yes")
+        summary = await control.wait("r1")
+        return summary, [record for record in world.seen if isinstance(record, PromptOpened)]
+
+    summary, opened = resumed(play, left_behind(mission(sequence(("Ask", question("Ask"))))), story)
+    assert summary.status is RunStatus.COMPLETED
+    assert opened == []
+
+
+def test_a_run_that_has_ended_is_not_resumed(play):
+    journal = left_behind(
+        mission(sequence(("Ask", question("Ask")))), PromptAnswer("p1", "yes", "anna")
+    )
+
+    async def story(world: World):
+        with pytest.raises(OperatorError, match="completed"):
+            await world.executive.resume("r1")
+
+    play(story, "ugv1", journal=journal)
+
+
+def test_an_unknown_run_is_refused_with_those_that_are_there(play):
+    async def story(world: World):
+        with pytest.raises(JournalError, match=r"r7.*r1"):
+            await world.executive.resume("r7")
+
+    play(story, "ugv1", journal=left_behind(GOTO))
+
+
+def test_an_arbiter_that_cannot_be_asked_is_a_lost_vehicle(play):
+    async def story(world: World):
+        world.fake.raises["query"] = OSError("no route to host")
+        await world.executive.resume("r1")
+        return await world.executive.control.wait("r1")
+
+    summary = play(story, "ugv1", journal=left_behind(GOTO, ACCEPTED), start_us=START_US + 1)
+    assert summary.status is RunStatus.FAILED
+    assert "LINK_LOST" in summary.detail
