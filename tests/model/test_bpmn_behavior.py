@@ -128,7 +128,8 @@ WRONG = {
         [("misplaced", 5)],
     ),
     "parameter without a name": (
-        '<behavior type="vehicle" name="goto"><properties>\n<property value="1"/></properties></behavior>',
+        '<behavior type="vehicle" name="goto"><properties>\n<property value="1"/>'
+        "</properties></behavior>",
         [("parameter-name", 5)],
     ),
     "parameter twice": (
@@ -217,5 +218,9 @@ def test_statements(form: str) -> None:
     assert found.script is not None
     assign, throw = found.script.statements
     assert isinstance(assign, Assignment)
-    assert (assign.key, assign.expression.names, assign.line) == ("mission.speed", {"base"}, 4)
+    assert (assign.key, assign.expression.names, assign.line) == (
+        "mission.speed",
+        frozenset({"base"}),
+        4,
+    )
     assert throw == ThrowError("NO_FUEL", 5)

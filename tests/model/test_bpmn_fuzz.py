@@ -43,7 +43,9 @@ def mutate(data: bytes, random_: random.Random, times: int) -> bytes:
                 key, source = (random_.choice(sorted(each.attrib)) for each in (element, other))
                 element.set(key, other.get(source) or "")
             case 6:
-                key = random_.choice(["id", "name", "default", "x", "sourceRef", "class", "timeout"])
+                key = random_.choice(
+                    ["id", "name", "default", "x", "sourceRef", "class", "timeout"]
+                )
                 element.set(key, random_.choice(["", "${", "x:y", "Sub", "=", "a b", "${a}"]))
             case _:
                 element.text = random_.choice(["", "${", "<behavior", "a = ", "PT", None, "x"])
@@ -95,7 +97,9 @@ def test_damaged_bytes_never_break_the_reader(data: st.DataObject) -> None:
     seed = bytearray(data.draw(st.sampled_from(SEEDS)))
     for _ in range(data.draw(st.integers(1, 5))):
         seed[data.draw(st.integers(0, len(seed) - 1))] = data.draw(st.integers(0, 255))
-    survives(bytes(seed[: data.draw(st.integers(0, len(seed)))] if data.draw(st.booleans()) else seed))
+    survives(
+        bytes(seed[: data.draw(st.integers(0, len(seed)))] if data.draw(st.booleans()) else seed)
+    )
 
 
 @given(st.binary(max_size=200))

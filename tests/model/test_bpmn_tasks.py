@@ -119,7 +119,9 @@ def test_what_the_task_itself_says_goes_before_the_data_object() -> None:
         "</extensionElements><dataInput",
         1,
     )
-    data = f'<dataObjectReference id="R" dataObjectRef="O"/><dataObject id="O">{CARRIED}</dataObject>'
+    data = (
+        f'<dataObjectReference id="R" dataObjectRef="O"/><dataObject id="O">{CARRIED}</dataObject>'
+    )
     prompt = task(load(around(own + data))).prompt
     assert prompt is not None
     assert (prompt.text, prompt.decisions) == ("Mine", (Decision("w", "w"),))
@@ -171,7 +173,8 @@ def test_roles_and_properties_of_a_service() -> None:
                 '<m2pem:property name="type" value="gpr"/>'
                 '<m2pem:property name="limit" value="${limit}"/></m2pem:service>'
                 '<m2pem:property name="loose" value="1"/>'
-                '<camunda:properties><camunda:property name="more" value="2"/></camunda:properties>',
+                '<camunda:properties><camunda:property name="more" value="2"/>'
+                "</camunda:properties>",
             )
         )
     )
@@ -206,9 +209,7 @@ def test_roles_and_properties_of_a_service() -> None:
             ("two-behaviors", 3),
         ),
         (
-            extended(
-                "sendTask", '<m2pem:behavior type="vehicle" name="hold"/>', ' messageRef="m"'
-            ),
+            extended("sendTask", '<m2pem:behavior type="vehicle" name="hold"/>', ' messageRef="m"'),
             ("two-behaviors", 3),
         ),
     ],

@@ -37,7 +37,9 @@ def test_entities_are_not_expanded() -> None:
 
 
 def test_external_dtds_are_not_fetched() -> None:
-    data = b'<?xml version="1.0"?>\n<!-- <x> -->\n<!DOCTYPE d SYSTEM "http://127.0.0.1:1/d.dtd">\n<d/>'
+    data = (
+        b'<?xml version="1.0"?>\n<!-- <x> -->\n<!DOCTYPE d SYSTEM "http://127.0.0.1:1/d.dtd">\n<d/>'
+    )
     assert refused(data) == ("doctype", 3)
 
 
@@ -159,4 +161,3 @@ def test_errors_name_what_is_wrong() -> None:
         parse_xml(b"<a><b></a>")
     assert "mismatch" in caught.value.message
     assert "line" not in caught.value.message.split("mismatch")[1][-10:]
-

@@ -14,9 +14,7 @@ def found(
     known: Sequence[str] = (),
     writes: Mapping[str, Sequence[str]] | None = None,
 ) -> list[tuple[str, int, str]]:
-    return [
-        (each.rule, each.line, each.element) for each in lint(load(data), known, writes or {})
-    ]
+    return [(each.rule, each.line, each.element) for each in lint(load(data), known, writes or {})]
 
 
 # --- the graph ----------------------------------------------------------------------------------
@@ -37,9 +35,7 @@ def test_what_follows_a_boundary_event_can_be_reached() -> None:
 
 
 def test_contents_of_an_unreachable_subprocess_are_not_named_again() -> None:
-    data = process(
-        f'<task id="T"/>{line_of("T")}\n<subProcess id="X"><task id="x"/></subProcess>'
-    )
+    data = process(f'<task id="T"/>{line_of("T")}\n<subProcess id="X"><task id="x"/></subProcess>')
     assert found(data) == [("unreachable", 4, "X")]
 
 
@@ -143,7 +139,7 @@ def test_names_that_nothing_writes() -> None:
     data = process(
         f'<userTask id="T"/>{line_of("T")}{script("A", "a = missing.name + b")}\n'
         f'<sequenceFlow id="f" sourceRef="T" targetRef="A">{condition}</sequenceFlow>\n'
-        f'{script("B", "b = a")}{flow("A", "B")}'
+        f"{script('B', 'b = a')}{flow('A', 'B')}"
     )
     assert found(data) == [("unwritten-name", 3, "A"), ("unwritten-name", 4, "f")]
     typo = lint(load(data))[1]
@@ -180,9 +176,9 @@ def test_a_called_process_sees_only_what_is_passed_in() -> None:
     assert found(data("")) == [("unwritten-name", 3, "U")]
     assert found(data('<m2pem:in source="speed" target="speed"/>')) == []
     assert found(data('<m2pem:in source="sped" target="speed"/>')) == [("unwritten-name", 2, "C")]
-    assert found(data('<m2pem:out source="y" target="z"/><m2pem:in source="1" target="speed"/>')) == [
-        ("unwritten-name", 2, "C")
-    ]
+    assert found(
+        data('<m2pem:out source="y" target="z"/><m2pem:in source="1" target="speed"/>')
+    ) == [("unwritten-name", 2, "C")]
 
 
 def test_parameters_timers_and_prompts_read_too() -> None:
