@@ -84,6 +84,10 @@ WARNINGS = {
         ),
         [("missing-reference", 3, "S"), ("missing-reference", 4, "E")],
     ),
+    "reference to no data object": (
+        around(f'{TASK}\n<dataObjectReference id="R" dataObjectRef="nope"/>'),
+        [("dangling-reference", 4, "R")],
+    ),
     "dangling display references": (
         around(
             TASK,
