@@ -1,6 +1,7 @@
 """What expressions mean: values, errors, and the Expression object."""
 
 import copy
+import itertools
 import math
 import pickle
 
@@ -236,6 +237,16 @@ def test_failure_names_the_operator_and_the_values(text, message):
         value(text)
     assert message in str(caught.value)
     assert repr(text[:30])[:-1] in str(caught.value)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5])
+def test_and_and_or_heed_every_operand(count):
+    names = [f"n{index}" for index in range(count)]
+    both, either = parse(" and ".join(names)), parse(" or ".join(names))
+    for operands in itertools.product([True, False, None], repeat=count):
+        read = dict(zip(names, operands, strict=True)).get
+        assert both.evaluate(read) is all(operands)
+        assert either.evaluate(read) is any(operands)
 
 
 def test_distance_is_that_of_the_great_circle():
