@@ -182,6 +182,29 @@ def test_conditions_and_defaults(mission: Mission) -> None:
     assert not condition.holds(lambda _: None)
 
 
+@pytest.mark.parametrize(
+    ("default", "language", "text"),
+    [
+        ("https://www.omg.org/spec/DMN/20191111/FEEL/", "", "a = 1"),
+        ("https://www.omg.org/spec/DMN/20191111/FEEL/", "", "a == 1"),
+        ("http://www.w3.org/1999/XPath", "", "a == 1"),
+        ("", ' language="http://www.w3.org/1999/XPath"', "a == 1"),
+        ("", ' language="FEEL"', "a = 1"),
+    ],
+)
+def test_the_language_that_an_editor_declares(default: str, language: str, text: str) -> None:
+    data = process(
+        f'<task id="T"/>{line_of("T")}<endEvent id="E2"/>'
+        '<sequenceFlow id="f" sourceRef="T" targetRef="E2">'
+        f"<conditionExpression{language}>{text}</conditionExpression></sequenceFlow>"
+    ).replace(b"<definitions ", f'<definitions expressionLanguage="{default}" '.encode(), 1)
+    flow = load(data).elements["f"]
+    assert isinstance(flow, SequenceFlow)
+    assert flow.condition is not None
+    assert flow.condition.holds(lambda _: 1)
+    assert not flow.condition.holds(lambda _: 2)
+
+
 def test_a_prefixed_called_element_is_found(mission: Mission) -> None:
     call = node(mission, "Call")
     assert isinstance(call, CallActivity)
