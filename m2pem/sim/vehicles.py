@@ -19,7 +19,8 @@ _PARKING_GAP_M = 10.0
 class SimVehicle:
     """Stands at its `home`, or (without one) in a row south of the fleet's origin.
 
-    `behavior`: the id of what it is busy with, `doing` the name; "" when free. `held`: whether `hold` was called on it.
+    `behavior`: the id of what it is busy with, `doing` the name; "" when free. `held`: whether
+    `hold` was called on it.
     """
 
     def __init__(
