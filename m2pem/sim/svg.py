@@ -18,7 +18,7 @@ class Canvas:
 
     def __init__(self, parent: "Canvas | None" = None, title: str = "") -> None:
         if parent is not None:
-            self._element = ET.SubElement(parent._element, "g")
+            self._element: ET.Element = ET.SubElement(parent._element, "g")
         else:
             attributes = {"xmlns": "http://www.w3.org/2000/svg", "font-family": FONT}
             self._element = ET.Element("svg", {**attributes, "font-size": str(SIZE)})
