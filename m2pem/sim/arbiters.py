@@ -97,6 +97,8 @@ class SimArbiter:
         self._epochs = Epochs()
         self._faults = {resource: self._own_faults(resource) for resource in self._bodies}
         self._scripts: dict[BehaviorId, Strike] = {}
+        self._connected = False
+        self._late: list[tuple[SimPayload, Detection]] = []
         self._listener: asyncio.Task[None] | None = None
 
     # --- the protocol ---------------------------------------------------------------------------
@@ -125,9 +127,15 @@ class SimArbiter:
         """
         now_us = self._clock.now_us()
         began_us, known = self._open_files(now_us)
-        self._detectors.begin(began_us, lambda payload: known.get(payload, ()), now_us)
+        self._detectors.begin(began_us, lambda payload: known.get(payload, ()))
+        self._links.muted = True
         self._agenda.run_due(now_us)
+        self._links.muted = False
         self._broadcast.begin(now_us)
+        for payload, detection in self._late:
+            self._broadcast.tell(payload, now_us, (detection,))
+        self._late.clear()
+        self._connected = True
         self._agenda.wake()
         if self._detectors.strangers:
             self._listener = asyncio.get_running_loop().create_task(self._listen())
@@ -340,7 +348,10 @@ class SimArbiter:
             self._detectors.moved(body.id, now_us)
 
     def _detected(self, payload: SimPayload, detection: Detection, now_us: int) -> None:
-        if self._links.up(payload.carrier):
+        if not self._connected:
+            # What was found while nobody was there is told when somebody is.
+            self._late.append((payload, detection))
+        elif self._links.up(payload.carrier):
             self._broadcast.tell(payload, now_us, (detection,))
         else:
             self._links.defer(
@@ -374,11 +385,10 @@ class SimArbiter:
         for resource, file in by_resource.items():
             found[resource] = json.loads(file.meta(f"found {resource}", "[]"))
         self._memory.files = by_resource
-        self._links.muted = True
         for execution in executions:
             self._epochs.admit(execution.id, execution.epoch)
+        self._links.muted = True
         self._conductor.restore(executions, now_us)
-        self._links.muted = False
         return began_us, found
 
     def _keep_found(self, payload: ResourceId, found: Iterable[int]) -> None:

@@ -2,7 +2,7 @@ import asyncio
 import math
 
 import pytest
-from conftest import START_US, Simulate, area, local, make, place, route
+from conftest import START_US, Fleet, Simulate, area, local, make, place, route
 
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.api.clock import Clock
@@ -18,8 +18,8 @@ from m2pem.sim.faults import Fault
 from m2pem.testing.contracts.bench import ArbiterBench
 
 S = 1_000_000
-UGV = {"ugv": ("ground", {"heading": "90 deg"})}
-UAV = {"uav": ("air", {})}
+UGV: Fleet = {"ugv": ("ground", {"heading": "90 deg"})}
+UAV: Fleet = {"uav": ("air", {})}
 EAST_100 = route((50, 0), (100, 0))
 GROUND = DEFAULTS["ground"]
 DRIVE_S = 100 / 5 + 5 / 1.5 / 2 + 5 / 3 / 2
@@ -429,7 +429,7 @@ def test_the_same_commands_have_the_same_reports_at_the_same_times() -> None:
         heard: list[tuple[int, BehaviorReport]] = []
 
         async def main(clock: Clock) -> None:
-            fleet = {f"v{i}": ("air" if i % 2 else "ground", {}) for i in range(6)}
+            fleet: Fleet = {f"v{i}": ("air" if i % 2 else "ground", {}) for i in range(6)}
             arbiter = make(clock, fleet)
             async with ArbiterBench(arbiter, clock) as bench:
                 for i in range(6):

@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from conftest import START_US, Simulate, area, local, place, route
+from conftest import START_US, Fleet, Simulate, area, local, place, route
 
 from m2pem.api.telemetry import VehicleState
 from m2pem.model.behavior import BehaviorType
@@ -13,8 +13,8 @@ from m2pem.sim.manoeuvres import MANOEUVRES
 from m2pem.testing.contracts.bench import ArbiterBench
 
 S = 1_000_000
-UGV = {"ugv": ("ground", {}), "lead": ("ground", {})}
-UAV = {"uav": ("air", {"endurance": "10 h"}), "lead": ("ground", {})}
+UGV: Fleet = {"ugv": ("ground", {}), "lead": ("ground", {})}
+UAV: Fleet = {"uav": ("air", {"endurance": "10 h"}), "lead": ("ground", {})}
 SQUARE = area((0, 0), (200, 0), (200, 100), (0, 100))
 
 
@@ -213,7 +213,7 @@ def test_the_duration_of_an_orbit_counts_from_arriving_on_it(simulate: Simulate)
 
 @pytest.mark.parametrize("fleet", [UGV, UAV])
 def test_observing_lasts_until_cancelled_or_for_its_duration(
-    simulate: Simulate, fleet: dict[str, tuple[str, dict[str, object]]]
+    simulate: Simulate, fleet: Fleet
 ) -> None:
     vehicle = next(iter(fleet))
 
@@ -277,7 +277,7 @@ def test_teleop_lasts_for_its_timeout(simulate: Simulate) -> None:
 
 @pytest.mark.parametrize("fleet", [UGV, UAV])
 def test_following_keeps_its_station_while_the_target_moves_and_stands(
-    simulate: Simulate, fleet: dict[str, tuple[str, dict[str, object]]]
+    simulate: Simulate, fleet: Fleet
 ) -> None:
     follower = next(iter(fleet))
 
