@@ -291,9 +291,7 @@ class FakeControl:
     async def answer(self, run: str, prompt: str, decision: str, *, by: str = "") -> None:
         self._say("answer", prompt, decision, by)
 
-    async def signal(
-        self, signal: str, *, run: str, data: Mapping[str, Any], by: str = ""
-    ) -> None:
+    async def signal(self, signal: str, *, run: str, data: Mapping[str, Any], by: str = "") -> None:
         self._say("signal", signal, data, by)
 
     async def message(
@@ -327,10 +325,11 @@ def act(
     """What answers do until the executive ends and everything is sent."""
 
     async def main(clock: VirtualClock) -> list[tuple[float, Any]]:
-        control: Any = FakeControl(clock, *notices)
+        control = FakeControl(clock, *notices)
         for name, value in control_is.items():
             setattr(control, name, value)
-        await script.act(control, "r1", clock, default_first_decision=default_first_decision)
+        face: Any = control
+        await script.act(face, "r1", clock, default_first_decision=default_first_decision)
         assert script.to_send == 0
         return control.said
 
@@ -419,8 +418,8 @@ ROUNDS = b"""<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
   <process id="P">
     <startEvent id="S"/>
     <userTask id="Ask"><extensionElements><m2pem:prompt>Which?</m2pem:prompt>
-      <m2pem:decision value="again"/><m2pem:decision value="once more"/><m2pem:decision value="end"/>
-    </extensionElements></userTask>
+      <m2pem:decision value="again"/><m2pem:decision value="once more"/>
+      <m2pem:decision value="end"/></extensionElements></userTask>
     <serviceTask id="Look">
       <extensionElements><m2pem:service class="Detector"/></extensionElements>
     </serviceTask>
