@@ -108,11 +108,10 @@ def _arm_timer(
         await_event(x, token, node, Trigger.TIMER, due_us=date_us(text), calendar=True)
         return
     rounds = cycle(text)
-    if rounds.repetitions == 0:
-        return
     left = -1 if rounds.repetitions is None else rounds.repetitions - 1
     if rounds.start_us is not None:
-        await_event(x, token, node, Trigger.TIMER, "", rounds.start_us, True, left, rounds.period)
+        due_us = rounds.first_us(x.now_us)
+        await_event(x, token, node, Trigger.TIMER, "", due_us, True, left, rounds.period)
     else:
         due_us = x.state.mission_time_us(x.now_us) + duration_us(rounds.period, x.now_us)
         await_event(x, token, node, Trigger.TIMER, "", due_us, False, left, rounds.period)
