@@ -169,7 +169,10 @@ def _arm_again(x: Execution, wait: Wait) -> None:
     elif wait.left != 0:
         left = wait.left - 1 if wait.left > 0 else -1
         at_us = wait.due_us + (0 if wait.calendar else x.state.started_us)
-        due_us = wait.due_us + duration_us(wait.cycle, at_us)
+        try:
+            due_us = wait.due_us + duration_us(wait.cycle, at_us)
+        except ExpressionSyntaxError:  # the next round is beyond the calendar: it never comes
+            return
         await_event(
             x, wait.token, wait.node, Trigger.TIMER, "", due_us, wait.calendar, left, wait.cycle
         )
