@@ -132,14 +132,16 @@ def arm_boundary(x: Execution, token: Token, activity: Activity) -> bool:
 
 def collect_letters(x: Execution, token: Token) -> bool:
     """Let a token that waits for messages have those kept for it. False: it has left with one."""
-    if not x.state.mailbox or token.waits is None:
-        return True
-    for wait in list(token.waits.values()):
-        if wait.trigger is Trigger.MESSAGE and wait.ref in x.state.mailbox:
-            data = x.state.mailbox[wait.ref][0]
-            trigger(x, wait, data, kept=True)
-            if x.state.tokens.get(token.id) is not token:
-                return False
+    found = bool(x.state.mailbox)
+    while found and token.waits is not None:
+        found = False
+        for wait in list(token.waits.values()):
+            letters = x.state.mailbox.get(wait.ref) if wait.trigger is Trigger.MESSAGE else None
+            if letters:
+                found = True
+                trigger(x, wait, letters[0], kept=True)
+                if x.state.tokens.get(token.id) is not token:
+                    return False
     return True
 
 
