@@ -48,11 +48,9 @@ def decide(x: Steps, item: i.Input) -> None:
             _defer(x, item)
         case Welcome.DECIDE:
             number = getattr(item, "id", "")
-            if number:
-                if number in x.state.seen:
-                    ignore(x, f"{type(item).__name__} {number} was taken before")
-                    return
-                x.emit(r.InputSeen(number))
+            if number in x.state.seen:
+                ignore(x, f"{type(item).__name__} {number} was taken before")
+                return
             _DECIDERS[type(item)](x, item)
 
 
@@ -328,13 +326,22 @@ def _service_failed(x: Steps, item: i.ServiceFailed) -> None:
 
 
 def _signal(x: Steps, item: i.SignalReceived) -> None:
+    _note_id(x, item.id)
     x.emit(r.SignalThrown(item.signal, by=item.by or "outside"))
     throw_signal(x, item.signal, item.data)
 
 
 def _message(x: Steps, item: i.MessageReceived) -> None:
-    if not receive(x, item.message, item.data, item.by or "outside"):
+    if item.message not in x.receivable:
         ignore(x, f"nothing in the mission receives message {item.message}")
+        return
+    _note_id(x, item.id)
+    receive(x, item.message, item.data, item.by or "outside")
+
+
+def _note_id(x: Steps, number: str) -> None:
+    if number:
+        x.emit(r.InputSeen(number))
 
 
 _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
