@@ -60,12 +60,11 @@ def ignore(x: Steps, reason: str) -> None:
 
 
 def _defer(x: Steps, item: i.Input) -> None:
-    if isinstance(item, i.PromptAnswer):
-        for earlier in x.state.deferred:
-            if isinstance(earlier, i.PromptAnswer) and earlier.prompt == item.prompt:
-                ignore(x, f"prompt {item.prompt} was answered by {earlier.by or 'another'}")
-                return
-    x.emit(r.InputDeferred(item))
+    refusal = _why_no_answer(x, item) if isinstance(item, i.PromptAnswer) else ""
+    if refusal:
+        ignore(x, refusal)
+    else:
+        x.emit(r.InputDeferred(item))
 
 
 # --- the run ------------------------------------------------------------------------------------
@@ -264,14 +263,11 @@ def _fault(x: Steps, item: i.ResourceFault) -> None:
 
 
 def _answer(x: Steps, item: i.PromptAnswer) -> None:
-    prompt = x.state.prompts.get(item.prompt)
-    if prompt is None:
-        ignore(x, f"prompt {item.prompt} is not open: it was answered or withdrawn")
+    refusal = _why_no_answer(x, item)
+    if refusal:
+        ignore(x, refusal)
         return
-    values = [decision["value"] for decision in prompt.decisions]
-    if item.decision not in values:
-        ignore(x, f"{item.decision!r} is no decision of prompt {item.prompt}: {', '.join(values)}")
-        return
+    prompt = x.state.prompts[item.prompt]
     token = prompt.token
     node = token.node
     x.emit(
@@ -289,6 +285,19 @@ def _answer(x: Steps, item: i.PromptAnswer) -> None:
         _settle(x, x.state.behaviors[prompt.behavior], item)
     else:
         answered(x, token, item.decision)
+
+
+def _why_no_answer(x: Steps, item: i.PromptAnswer) -> str:
+    prompt = x.state.prompts.get(item.prompt)
+    if prompt is None:
+        return f"prompt {item.prompt} is not open: it was answered or withdrawn"
+    values = [decision["value"] for decision in prompt.decisions]
+    if item.decision not in values:
+        return f"{item.decision!r} is no decision of prompt {item.prompt}: {', '.join(values)}"
+    for earlier in x.state.deferred:
+        if isinstance(earlier, i.PromptAnswer) and earlier.prompt == item.prompt:
+            return f"prompt {item.prompt} was answered by {earlier.by or 'another'}"
+    return ""
 
 
 def _service_completed(x: Steps, item: i.ServiceCompleted) -> None:
