@@ -156,10 +156,9 @@ def _reported(x: Steps, item: i.BehaviorReported) -> None:
 def _ended(
     x: Steps, behavior: Behavior, state: BehaviorState, code: str = "", reason: str = ""
 ) -> None:
-    wanted = state is BehaviorState.SUCCEEDED or (
-        state is BehaviorState.CANCELLED and behavior.phase is BehaviorPhase.CANCELLING
-    )
-    if not wanted:
+    if state is BehaviorState.SUCCEEDED:
+        code = ""
+    elif state is not BehaviorState.CANCELLED or behavior.phase is not BehaviorPhase.CANCELLING:
         code = code or DEFAULT_CODES[state]
     token = x.state.tokens.get(behavior.token)
     if token is not None and token.behavior != behavior.id:
