@@ -239,23 +239,27 @@ def _settle(x: Steps, behavior: Behavior, answer: i.PromptAnswer) -> None:
 
 
 def _fault(x: Steps, item: i.ResourceFault) -> None:
-    holders = [
-        behavior
-        for holder in x.state.held.get(item.resource, ())
-        if (behavior := x.state.behaviors[holder]).phase is not BehaviorPhase.CANCELLING
-        or not item.reachable
-    ]
-    if not holders:
-        ignore(x, f"{item.code} of {item.resource}, which does nothing for this run")
-    for behavior in holders:
-        if not item.reachable:
+    told = False
+    for holder in list(x.state.held.get(item.resource, ())):
+        behavior = x.state.behaviors[holder]
+        if not item.reachable and len(behavior.resources) == 1:
             _ended(x, behavior, BehaviorState.LOST, item.code, item.reason)
-            continue
-        token = x.state.tokens[behavior.token]
-        if token.prompt:
-            x.emit(r.PromptWithdrawn(token.prompt))
-        x.emit(r.BehaviorCancelRequested(behavior.id, item.code, item.reason))
-        throw_error(x, token, item.code, item.reason)
+        elif behavior.phase is not BehaviorPhase.CANCELLING:
+            _give_behavior_up(x, behavior, item)
+        else:
+            continue  # it ends by its report, or when it has not answered its cancel in time
+        told = True
+    if not told:
+        ignore(x, f"{item.code} of {item.resource}, which does nothing for this run")
+
+
+def _give_behavior_up(x: Steps, behavior: Behavior, item: i.ResourceFault) -> None:
+    """Cancel it, for what can still be reached of its resources must stop."""
+    token = x.state.tokens[behavior.token]
+    if token.prompt:
+        x.emit(r.PromptWithdrawn(token.prompt))
+    x.emit(r.BehaviorCancelRequested(behavior.id, item.code, item.reason))
+    throw_error(x, token, item.code, item.reason)
 
 
 # --- operators, services, the outside -----------------------------------------------------------
