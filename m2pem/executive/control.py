@@ -19,6 +19,7 @@ from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import MissionError, OperatorError
 from m2pem.executive.loading import findings_for, read_source
+from m2pem.executive.notices import Subscription
 from m2pem.findings import Finding
 from m2pem.journal.base import RunLine
 from m2pem.model.bpmn import parse_mission
@@ -109,19 +110,12 @@ class Control:
 
     # --- watching -------------------------------------------------------------------------------
 
-    async def subscribe(
-        self, run: RunId | None = None, size: int = 10_000
-    ) -> AsyncIterator[Notice]:
+    def subscribe(self, run: RunId | None = None, size: int = 10_000) -> AsyncIterator[Notice]:
         """What is committed from now on, and first the prompts that stand now."""
         subscription = self._executive.notices.subscribe(run, size)
-        try:
-            for prompt in self.prompts():
-                if run is None or prompt.run == run:
-                    subscription.put(prompt)
-            async for notice in subscription:
-                yield notice
-        finally:
-            subscription.close()
+        for prompt in self.prompts():
+            subscription.put(prompt)
+        return _until_closed(subscription)
 
     def telemetry(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
         """Telemetry from now on."""
@@ -130,15 +124,15 @@ class Control:
     async def records(
         self, run: RunId, after_seq: int = 0, limit: int = 1000
     ) -> Sequence[StampedRecord]:
-        """A page of a run's records."""
+        """A page of a run's records; it ends with those of an input, so it may be longer."""
         page: list[StampedRecord] = []
         async for entry in self._executive.journal.read(run, after_seq):
-            for place, record in enumerate(entry.records):
-                seq = entry.seq + place
-                if seq > after_seq:
-                    page.append(StampedRecord(run, seq, entry.t_us / 1_000_000, record))
-                if len(page) == limit:
-                    return page
+            page += (
+                StampedRecord(run, entry.seq + place, entry.t_us / 1_000_000, record)
+                for place, record in enumerate(entry.records)
+            )
+            if len(page) >= limit:
+                break
         return page
 
     async def runs(self) -> Sequence[RunSummary]:
@@ -187,6 +181,14 @@ class Control:
     async def simulate(self, mission: Path | str | bytes, **options: Any) -> SimulationResult:
         """Rehearse a mission on a virtual clock, in a thread of its own."""
         raise OperatorError("this executive cannot rehearse missions")
+
+
+async def _until_closed(subscription: Subscription) -> AsyncIterator[Notice]:
+    try:
+        async for notice in subscription:
+            yield notice
+    finally:
+        subscription.close()
 
 
 def summary(line: RunLine) -> RunSummary:
