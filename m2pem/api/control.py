@@ -134,7 +134,7 @@ class MissionControl(Protocol):
         data: Mapping[str, Value] | None = None,
         by: str = "",
     ) -> None:
-        """Emit a signal, by its id, to one run or (None) to all."""
+        """Emit a signal, by its id or its name, to one run or (None) to all that have it."""
         ...
 
     async def message(
