@@ -19,7 +19,6 @@ from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import MissionError, OperatorError
 from m2pem.executive.loading import findings_for, read_source
-from m2pem.executive.notices import Subscription
 from m2pem.findings import Finding
 from m2pem.journal.base import RunLine
 from m2pem.model.bpmn import parse_mission
@@ -131,7 +130,7 @@ class Control:
         subscription = self._executive.notices.subscribe(run, size)
         for prompt in self.prompts():
             subscription.put(prompt)
-        return _until_closed(subscription)
+        return subscription
 
     def telemetry(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
         """Telemetry from now on."""
@@ -204,14 +203,6 @@ def _named(name: str, signals: Mapping[str, Signal]) -> list[str]:
     if name in signals:
         return [name]
     return [key for key, signal in signals.items() if name and signal.name == name]
-
-
-async def _until_closed(subscription: Subscription) -> AsyncIterator[Notice]:
-    try:
-        async for notice in subscription:
-            yield notice
-    finally:
-        subscription.close()
 
 
 def summary(line: RunLine) -> RunSummary:

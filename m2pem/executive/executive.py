@@ -50,6 +50,9 @@ from m2pem.resources.snapshot import dump
 
 log = logging.getLogger("m2pem.executive")
 
+REMEMBERED_RUNS = 100
+"""Runs that are over whose last state is kept in memory; the journal has them all."""
+
 
 class Executive:
     """`simulated`: every arbiter is the simulated one, with `settings` for its connections.
@@ -219,7 +222,8 @@ class Executive:
         by: str,
     ) -> RunId:
         """Begin a run. Returns when its first records are durable."""
-        loaded, process_id = self.load(mission, process, data)
+        # Reading and checking take a while, and a URL may take longer: not in the event loop.
+        loaded, process_id = await asyncio.to_thread(self.load, mission, process, data)
         header = RunHeader(
             loaded.file,
             loaded.source,
@@ -282,6 +286,10 @@ class Executive:
     async def _drive_and_release(self, runner: Runner) -> None:
         await runner.drive()
         await self.journal.release(runner.id)
+        del self._tasks[runner.id]
+        over = [each for each in self.runners.values() if each.done.is_set()]
+        for oldest in over[:-REMEMBERED_RUNS]:
+            del self.runners[oldest.id]
 
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
         self.plugins.records_committed(run, records)

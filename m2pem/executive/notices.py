@@ -1,8 +1,9 @@
 """Tells subscribers what was committed, in order; nobody ever waits for a subscriber."""
 
 import asyncio
+import weakref
 from collections import deque
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 
 from m2pem.api.control import Notice, RunId
 from m2pem.errors import OperatorError
@@ -11,10 +12,9 @@ from m2pem.errors import OperatorError
 class Subscription:
     """Notices for one reader. A reader that falls `size` behind is cut off with an error."""
 
-    def __init__(self, run: RunId | None, size: int, forget: Callable[["Subscription"], None]):
-        self.run = run
+    def __init__(self, run: RunId | None, size: int) -> None:
+        self._run = run
         self._size = size
-        self._forget = forget
         self._waiting: deque[Notice] = deque()
         self._wake = asyncio.Event()
         self._overrun = False
@@ -22,7 +22,7 @@ class Subscription:
 
     def put(self, notice: Notice) -> None:
         """Hand a notice over, unless it is of another run."""
-        if self._overrun or (self.run is not None and notice.run != self.run):
+        if self._overrun or (self._run is not None and notice.run != self._run):
             return
         if len(self._waiting) >= self._size:
             self._overrun = True
@@ -35,14 +35,15 @@ class Subscription:
         self._ended = True
         self._wake.set()
 
-    def close(self) -> None:
-        """The reader wants no more."""
-        self._forget(self)
-
     def __aiter__(self) -> AsyncIterator[Notice]:
         return self
 
     async def __anext__(self) -> Notice:
+        """The next notice; ends with the executive.
+
+        Raises:
+            OperatorError: this reader was too slow.
+        """
         while not self._waiting:
             if self._overrun:
                 raise OperatorError(
@@ -57,10 +58,11 @@ class Subscription:
 
 
 class Notices:
-    """All subscriptions of an executive."""
+    """All subscriptions of an executive, held weakly: a reader that is gone leaves nothing."""
 
     def __init__(self) -> None:
-        self._subscriptions: dict[Subscription, None] = {}
+        self._subscriptions: list[weakref.ref[Subscription]] = []
+        self._ended = False
 
     @property
     def anybody(self) -> bool:
@@ -69,20 +71,32 @@ class Notices:
 
     def subscribe(self, run: RunId | None, size: int) -> Subscription:
         """Everything from now on."""
-        subscription = Subscription(run, size, self._drop)
-        self._subscriptions[subscription] = None
+        subscription = Subscription(run, size)
+        if self._ended:
+            subscription.end()
+        else:
+            # A new list: one may be let go while `publish` walks over the old.
+            self._subscriptions = [
+                *self._subscriptions,
+                weakref.ref(subscription, self._forget),
+            ]
         return subscription
 
     def publish(self, notice: Notice) -> None:
         """Tell all."""
-        for subscription in list(self._subscriptions):
-            subscription.put(notice)
+        for reference in self._subscriptions:
+            subscription = reference()
+            if subscription is not None:
+                subscription.put(notice)
 
     def end(self) -> None:
-        """Let every reader come to its end."""
-        for subscription in list(self._subscriptions):
-            subscription.end()
-        self._subscriptions.clear()
+        """Let every reader come to its end, after what waits for it."""
+        self._ended = True
+        for reference in self._subscriptions:
+            subscription = reference()
+            if subscription is not None:
+                subscription.end()
+        self._subscriptions = []
 
-    def _drop(self, subscription: Subscription) -> None:
-        self._subscriptions.pop(subscription, None)
+    def _forget(self, gone: "weakref.ref[Subscription]") -> None:
+        self._subscriptions = [kept for kept in self._subscriptions if kept is not gone]

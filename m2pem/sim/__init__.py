@@ -1,1 +1,1 @@
-"""The built-in simulated arbiter: vehicles and payloads on any clock."""
+"""The built-in simulated arbiter: vehicles and payloads whose motion is a function of time."""

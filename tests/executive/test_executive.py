@@ -191,23 +191,32 @@ def test_subscribers_get_every_record_in_order(play):
     async def story(world: World):
         control = world.executive.control
         stream = control.subscribe()
-        reading = stream.__aiter__()
-        first = reading.__anext__()
-        import asyncio
-
-        pending = asyncio.ensure_future(first)
-        await asyncio.sleep(0)
         run = await control.start(ASK)
         await world.clock.sleep(1)
         await control.answer(run, "p1", "yes")
         await control.wait(run)
-        got = [await pending]
-        while not (isinstance(got[-1], StampedRecord) and isinstance(got[-1].record, RunEnded)):
-            got.append(await reading.__anext__())
-        return [notice.seq for notice in got if isinstance(notice, StampedRecord)]
+        seqs = []
+        async for notice in stream:
+            if isinstance(notice, StampedRecord):
+                seqs.append(notice.seq)
+                if isinstance(notice.record, RunEnded):
+                    return seqs
 
     seqs = play(story)
     assert seqs == list(range(1, len(seqs) + 1))
+
+
+def test_a_subscriber_that_does_not_read_is_cut_off_and_told(play):
+    async def story(world: World):
+        control = world.executive.control
+        stream = control.subscribe(size=5)
+        await control.start(ASK)
+        for _ in range(5):
+            await anext(stream)
+        with pytest.raises(OperatorError, match="5 notices behind"):
+            await anext(stream)
+
+    play(story)
 
 
 def test_leaving_the_executive_stops_what_still_runs(play):

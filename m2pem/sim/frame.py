@@ -1,0 +1,51 @@
+"""Between WGS-84 and the plane in which simulated vehicles move.
+
+East and north are of the ENU frame at the fleet's origin; `up` is the difference of altitudes. The
+ground is flat: below a plane that touches the Earth, "up" of ENU would sink by 8 m at 10 km.
+"""
+
+import math
+
+import pymap3d
+
+from m2pem.api.telemetry import GeoPosition
+from m2pem.sim.phases import Vector
+
+MAX_RANGE_M = 500_000.0
+"""Farther from the origin the plane is no longer a picture of the Earth."""
+
+_MEAN_RADIUS_M = 6_371_000.0
+
+
+class Frame:
+    """The local frame at `origin`: latitude and longitude in degrees, altitude in metres."""
+
+    def __init__(self, origin: tuple[float, float, float]) -> None:
+        self.origin = origin
+
+    def level(self, latitude_deg: float, longitude_deg: float) -> tuple[float, float]:
+        """East and north of the origin, in metres.
+
+        Raises:
+            ValueError: it is too far from the origin to be simulated.
+        """
+        if not (math.isfinite(latitude_deg) and math.isfinite(longitude_deg)):
+            raise ValueError(f"[{latitude_deg}, {longitude_deg}] is no position")
+        east, north, up = pymap3d.geodetic2enu(
+            latitude_deg, longitude_deg, self.origin[2], *self.origin
+        )
+        distance = math.hypot(east, north, up)
+        if distance > MAX_RANGE_M:
+            raise ValueError(
+                f"[{latitude_deg}, {longitude_deg}] is {distance / 1000:.0f} km from the fleet's "
+                f"origin [{self.origin[0]}, {self.origin[1]}]; the simulation reaches "
+                f"{MAX_RANGE_M / 1000:.0f} km: set the fleet's `origin` near the vehicles"
+            )
+        return float(east), float(north)
+
+    def geo(self, place: Vector) -> GeoPosition:
+        """The WGS-84 position of a place."""
+        east, north, up = place
+        drop = (east * east + north * north) / (2 * _MEAN_RADIUS_M)
+        latitude, longitude, _ = pymap3d.enu2geodetic(east, north, up - drop, *self.origin)
+        return GeoPosition(float(latitude), float(longitude), self.origin[2] + up)

@@ -1,0 +1,66 @@
+"""A simulated payload: where it looks, as a function of time."""
+
+import math
+
+from m2pem.api.arbiter import Connection
+from m2pem.api.telemetry import Detection, LinkState, PayloadState
+from m2pem.model.catalogue import ResourceId
+from m2pem.sim.gimbals import Mount
+from m2pem.sim.phases import Look, Pose, Slew
+from m2pem.sim.settings import Settings
+from m2pem.sim.track import Plan, Track
+from m2pem.sim.vehicles import carrier_of
+
+
+class SimPayload:
+    """Looks straight ahead at first. `detector`: whether it finds planted targets."""
+
+    def __init__(self, connection: Connection, settings: Settings, now_us: int) -> None:
+        self.id: ResourceId = connection.resource
+        self.carrier = carrier_of(connection.resource)
+        self.settings = settings
+        self.detector = connection.detector or settings.kind == "gpr"
+        self.behavior = ""
+        self.held = False
+        self.track: Track[Look] = Track(Plan([Slew(Look(), Look(), 0.0)]), now_us)
+
+    def mount(self, now_us: int, carrier: Pose | None, ground_up_m: float) -> Mount:
+        """As a behavior sees it."""
+        look = self.look(now_us)
+        return Mount(self.id, self.settings.gimbal, look, carrier, ground_up_m)
+
+    def look(self, now_us: int) -> Look:
+        """Where it looks; pan within half a turn."""
+        look = self.track.at(now_us)
+        return Look(math.remainder(look.pan, math.tau), look.tilt, look.zoom)
+
+    def take(self, plan: Plan[Look], now_us: int) -> None:
+        """Follow another plan, which must begin where it looks."""
+        self.track = Track(plan, now_us)
+
+    def stop(self, now_us: int) -> None:
+        """Look on where it looks."""
+        look = self.look(now_us)
+        self.take(Plan([Slew(look, look, 0.0)]), now_us)
+
+    def hold(self, now_us: int) -> None:
+        """Stop at once, keeping the plan."""
+        self.track.hold(now_us, 0.0)
+
+    def go_on(self, now_us: int) -> None:
+        """Take the plan up again."""
+        self.track.go_on(now_us)
+
+    def state(self, now_us: int, detections: tuple[Detection, ...] = ()) -> PayloadState:
+        """What it says about itself."""
+        look = self.look(now_us)
+        return PayloadState(
+            resource=self.id,
+            time_us=now_us,
+            pan_rad=look.pan,
+            tilt_rad=look.tilt,
+            zoom=look.zoom,
+            detections=detections,
+            link=LinkState.CONNECTED,
+            behavior=self.behavior,
+        )

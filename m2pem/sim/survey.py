@@ -1,0 +1,106 @@
+"""Lawn-mower tracks over a polygon.
+
+Each strip of the given width is driven along its middle from where the polygon begins in the strip
+to where it ends, so that every point of the polygon is within half a spacing of a track.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from typing import TypeAlias
+
+Ring: TypeAlias = Sequence[tuple[float, float]]
+"""A closed ring of (east, north) in metres; the first point is repeated last."""
+
+MAX_STRIPS = 5_000
+
+
+def longest_edge_yaw(ring: Ring) -> float:
+    """Direction of the longest edge: few turns. From east, counter-clockwise, in rad."""
+    a, b = max(pairwise(ring), key=lambda edge: math.dist(*edge))
+    return math.atan2(b[1] - a[1], b[0] - a[0])
+
+
+def lawn_mower(
+    rings: Sequence[Ring], spacing_m: float, yaw_rad: float, overshoot_m: float = 0.0
+) -> list[tuple[float, float]]:
+    """The points to pass, in order; each pair of them is one pass over the area.
+
+    Args:
+        rings: the outer ring, then holes.
+        spacing_m: at most this between two passes.
+        yaw_rad: direction of the passes, from east, counter-clockwise.
+        overshoot_m: how far each pass goes on beyond the area at both ends.
+
+    Raises:
+        ValueError: it would take more than `MAX_STRIPS` passes.
+    """
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    turned = [[(e * cos + n * sin, n * cos - e * sin) for e, n in ring] for ring in rings]
+    low = min(y for _, y in turned[0])
+    height = max(y for _, y in turned[0]) - low
+    strips = max(1, math.ceil(height / spacing_m - 1e-9))
+    if strips > MAX_STRIPS:
+        raise ValueError(
+            f"spacing: {spacing_m:g} m makes {strips} passes over an area that is {height:.0f} m "
+            f"wide; at most {MAX_STRIPS} are flown or driven"
+        )
+    width = height / strips
+    points: list[tuple[float, float]] = []
+    for strip in range(strips):
+        bottom = low + strip * width
+        passes = _passes(turned, bottom, bottom + width)
+        middle = bottom + width / 2
+        row = [((a - overshoot_m, middle), (b + overshoot_m, middle)) for a, b in passes]
+        if strip % 2:
+            row = [(b, a) for a, b in reversed(row)]
+        points.extend(point for pair in row for point in pair)
+    return [(x * cos - y * sin, x * sin + y * cos) for x, y in points]
+
+
+def _passes(rings: Sequence[Ring], bottom: float, top: float) -> list[tuple[float, float]]:
+    """The spans of x that the polygon takes between two y."""
+    corners = sorted({y for ring in rings for _, y in ring if bottom < y < top} | {bottom, top})
+    spans: list[tuple[float, float]] = []
+    for low, high in pairwise(corners):
+        middle = (low + high) / 2
+        # Between two corners' heights the edges do not cross, so their order in the middle holds.
+        edges = sorted(_edges_at(rings, middle), key=lambda edge: _x(edge, middle))
+        for left, right in zip(edges[::2], edges[1::2], strict=False):
+            spans.append(
+                (
+                    min(_x(left, low), _x(left, high)),
+                    max(_x(right, low), _x(right, high)),
+                )
+            )
+    return list(_merged(sorted(spans)))
+
+
+_Edge: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
+
+
+def _edges_at(rings: Sequence[Ring], y: float) -> Iterator[_Edge]:
+    for ring in rings:
+        for a, b in pairwise(ring):
+            if (a[1] <= y) != (b[1] <= y):
+                yield a, b
+
+
+def _x(edge: _Edge, y: float) -> float:
+    (ax, ay), (bx, by) = edge
+    part = min(1.0, max(0.0, (y - ay) / (by - ay)))
+    return ax + (bx - ax) * part
+
+
+def _merged(spans: Iterable[tuple[float, float]]) -> Iterator[tuple[float, float]]:
+    current: tuple[float, float] | None = None
+    for span in spans:
+        if current is None:
+            current = span
+        elif span[0] <= current[1]:
+            current = (current[0], max(current[1], span[1]))
+        else:
+            yield current
+            current = span
+    if current is not None:
+        yield current
