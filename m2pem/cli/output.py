@@ -14,7 +14,6 @@ from m2pem.journal.codec import record_line
 from m2pem.model.elements import Mission
 
 US_PER_S = 1_000_000
-PAUSE_S = 0.05
 
 
 def wants_colour(stream: TextIO) -> bool:
@@ -52,8 +51,8 @@ class Output:
         async for notice in notices:
             if isinstance(notice, StampedRecord):
                 self.show(notice)
-                while self.writer.full and not self.writer.broken:
-                    await asyncio.sleep(PAUSE_S)
+                if self.writer.full:
+                    await self.drain()
 
     async def drain(self) -> None:
         """Wait until all is printed."""

@@ -120,7 +120,9 @@ def _service_ended(story: Story, run: RunId, record: r.ServiceEnded) -> Told:
     label = story.label(run, record.element)
     if not record.code:
         return f"{label}: done", ""
-    return f"{label}: failed, {record.code}" + (f" ({record.reason})" if record.reason else ""), "red"
+    return f"{label}: failed, {record.code}" + (
+        f" ({record.reason})" if record.reason else ""
+    ), "red"
 
 
 def _escalation(story: Story, run: RunId, record: r.EscalationThrown) -> Told:
