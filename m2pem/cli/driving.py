@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 from m2pem.api.control import RunId, RunStatus
 from m2pem.cli.entry import STOPPED, ignore_closed_stdout
 from m2pem.cli.interruption import Interruption
-from m2pem.cli.ocus import Operators
+from m2pem.cli.ocus import PLAIN, Operators
 from m2pem.cli.output import Output
 from m2pem.executive.executive import Executive
 from m2pem.model.elements import Mission
@@ -29,15 +29,18 @@ EXIT_STATUS = {
 
 @asynccontextmanager
 async def driving(
-    executive: Executive, output: Output, operators: Operators
+    executive: Executive, output: Output, operators: Operators, *, one: bool
 ) -> AsyncIterator[Interruption]:
-    """Connect, print and serve within the block; at its end, stop what still runs and close."""
+    """Connect, print and serve within the block; at its end, stop what still runs and close.
+
+    `one`: there is one run that matters, or several.
+    """
 
     def mission(run: RunId) -> Mission | None:
         runner = executive.runners.get(run)
         return runner.run.state.mission if runner is not None else None
 
-    output.about(mission)
+    output.tell_by(mission, one=one, asks=PLAIN not in operators.names)
     loop = asyncio.get_running_loop()
     with Interruption(executive) as interruption:
 
@@ -73,7 +76,7 @@ async def drive_run(
     Raises:
         M2pemError: it cannot begin, or its executive can drive it no further.
     """
-    async with driving(executive, output, operators) as interruption:
+    async with driving(executive, output, operators, one=True) as interruption:
         if interruption.asked.is_set():
             return STOPPED
         run = await begin()

@@ -30,10 +30,9 @@ class Output:
         self._as_json = as_json
         self.writer: LineWriter = writer_for(stream)
 
-    def about(self, mission: Callable[[RunId], Mission | None], main: RunId = "") -> Story:
-        """Say where the diagrams are; records can be printed from now on."""
-        self.story = Story(mission, colour=wants_colour(self._stream), main=main)
-        return self.story
+    def tell_by(self, mission: Callable[[RunId], Mission | None], *, one: bool, asks: bool) -> None:
+        """Say where the diagrams are, and the rest of `Story`; then records can be printed."""
+        self.story = Story(mission, colour=wants_colour(self._stream), one=one, asks=asks)
 
     def show(self, stamped: StampedRecord) -> None:
         """Print a record."""

@@ -41,6 +41,7 @@ class PlainOcu:
         self._active: dict[RunId, bool] = {}
         """Runs that have not ended, and whether they are paused."""
         self._listening = True
+        self._end_noted = False
         self._commands: dict[str, Callable[[list[str]], Awaitable[None]]] = {
             "stop": self._stop,
             "pause": self._pause,
@@ -60,8 +61,7 @@ class PlainOcu:
                     return
                 await self._obey(line)
             self._listening = False
-            if self._prompts:
-                self._say_nobody_answers()
+            self._note_the_end()
             await watching
         finally:
             watching.cancel()
@@ -96,9 +96,8 @@ class PlainOcu:
         self._say(f"[{self._name(key)}] {prompt.element}: {prompt.text}")
         for number, decision in enumerate(prompt.decisions, 1):
             value = "" if _same(decision.label, decision.value) else f" ({decision.value})"
-            self._say(f"    {number}  {decision.label or decision.value}{value}")
-        if not self._listening:
-            self._say_nobody_answers()
+            self._say(f"{number}  {decision.label or decision.value}{value}", indent=4)
+        self._note_the_end()
 
     def _close(self, closed: PromptClosed) -> None:
         key = (closed.run, closed.prompt)
@@ -110,11 +109,14 @@ class PlainOcu:
         else:
             self._say(f"[{name}] is not asked any more")
 
-    def _say(self, text: str) -> None:
-        self._out.put(printable(text) if text.strip() == text else f"    {printable(text)}")
+    def _say(self, text: str, indent: int = 0) -> None:
+        self._out.put(" " * indent + printable(text))
 
-    def _say_nobody_answers(self) -> None:
-        self._say("the input has ended: nobody answers here any more")
+    def _note_the_end(self) -> None:
+        """Once, when somebody is asked and it can't be here."""
+        if not self._listening and self._prompts and not self._end_noted:
+            self._end_noted = True
+            self._say("the input has ended: nobody answers here any more")
 
     def _name(self, key: tuple[RunId, str]) -> str:
         """p1; with more than one run, r2 p1."""

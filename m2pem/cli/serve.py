@@ -68,7 +68,7 @@ async def _serve(
     if fleet_file == MADE_UP:
         raise click.UsageError(f"--fleet {MADE_UP}: a fleet is made up from a mission; name a file")
     plugins = PluginManager()
-    names = chosen(ocu_names, plugins)
+    operators = Operators(chosen(ocu_names, plugins), plugins)
     url = url_of(journal_url)
     fleet = with_shared_state(load_fleet(fleet_file), file_of(url), simulated=simulated)
     refuse_speed(fleet, speed, simulated=simulated)
@@ -82,11 +82,9 @@ async def _serve(
             simulated=simulated,
         )
         with output_of(output) as out:
-            async with driving(executive, out, Operators(names, plugins)) as interruption:
-                click.echo(
-                    f"m2pem: serving {fleet.name}; operators: {', '.join(names) or 'nobody'}",
-                    err=True,
-                )
+            async with driving(executive, out, operators, one=False) as interruption:
+                who = ", ".join(operators.names) or "nobody"
+                click.echo(f"m2pem: serving {fleet.name}; operators: {who}", err=True)
                 for line in others:
                     click.echo(
                         f"m2pem: {line.run} was interrupted with other vehicles, or at another "
