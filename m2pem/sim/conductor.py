@@ -132,7 +132,7 @@ class Conductor:
         self._turn(body, EffectKind.RESUME, now_us)
 
     def restore(self, executions: Collection[Execution], now_us: int) -> None:
-        """Go on with behaviors from a file, and catch up with what they did since."""
+        """Go on with behaviors from a file: all that they did since is scheduled, as past."""
         for execution in executions:
             if any(resource not in self._bodies for resource in execution.resources):
                 continue  # the fleet has changed: nobody can tell any more
@@ -152,7 +152,6 @@ class Conductor:
         for body in self._bodies.values():
             if isinstance(body, SimVehicle):
                 self._batteries.look(body, body.track.started_us)
-        self._agenda.run_due(now_us)
 
     # --- from start to end ----------------------------------------------------------------------
 

@@ -47,7 +47,5 @@ class Frame:
         """The WGS-84 position of a place."""
         east, north, up = place
         sunk = -(east * east + north * north) / (2 * _MEAN_RADIUS_M)
-        _, _, altitude = pymap3d.enu2geodetic(east, north, sunk, *self.origin)
-        sunk -= altitude - self.origin[2]
         latitude, longitude, _ = pymap3d.enu2geodetic(east, north, sunk, *self.origin)
         return GeoPosition(float(latitude), float(longitude), self.origin[2] + up)

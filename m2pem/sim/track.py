@@ -107,7 +107,7 @@ class Warp(msgspec.Struct, frozen=True):
 
     def at(self, now_us: int) -> tuple[float, float]:
         """Plan time in seconds, and its rate."""
-        t = (now_us - self.since_us) / US_PER_S
+        t = max(0, now_us - self.since_us) / US_PER_S
         if t >= self.ramp_s:
             ramp = (self.rate + self.target) / 2 * self.ramp_s
             return self.tau + ramp + self.target * (t - self.ramp_s), self.target

@@ -1,4 +1,5 @@
 import math
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -108,7 +109,7 @@ def test_random_routes_are_continuous_and_never_too_fast(
     step_s = max(0.02, plan.duration_s / 4000)
     limit = kinematics.max_speed_m_s
     poses = samples(plan, step_s)
-    for before, after in zip(poses, poses[1:], strict=False):
+    for before, after in pairwise(poses):
         assert after.speed <= limit + 1e-6
         assert math.dist(before.place, after.place) <= limit * step_s + 1e-6
         turn = abs(math.remainder(after.yaw - before.yaw, math.tau))

@@ -1,4 +1,5 @@
 import math
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -13,7 +14,7 @@ def inside(rings: list[Ring], point: tuple[float, float]) -> bool:
     x, y = point
     odd = False
     for ring in rings:
-        for (ax, ay), (bx, by) in zip(ring, ring[1:], strict=False):
+        for (ax, ay), (bx, by) in pairwise(ring):
             if (ay > y) != (by > y) and x < (bx - ax) * (y - ay) / (by - ay) + ax:
                 odd = not odd
     return odd
@@ -21,7 +22,7 @@ def inside(rings: list[Ring], point: tuple[float, float]) -> bool:
 
 def distance(points: list[tuple[float, float]], place: tuple[float, float]) -> float:
     best = math.inf
-    for a, b in zip(points, points[1:], strict=False):
+    for a, b in pairwise(points):
         length2 = math.dist(a, b) ** 2
         part = 0.0
         if length2:
@@ -50,7 +51,8 @@ def test_a_hole_is_not_surveyed() -> None:
 
 def test_the_longest_edge_gives_the_direction() -> None:
     assert longest_edge_yaw([(0, 0), (0, 50), (10, 50), (0, 0)]) in (
-        pytest.approx(math.pi / 2), pytest.approx(math.atan2(-50, -10)),
+        pytest.approx(math.pi / 2),
+        pytest.approx(math.atan2(-50, -10)),
     )
 
 

@@ -10,7 +10,10 @@ from m2pem.sim.track import Plan, Track, Warp
 
 S = 1_000_000
 STRAIGHT = Travel(
-    (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.0, fit(100.0, 5.0, v_in=0.0, v_out=0.0, accel=1.0, decel=1.0)
+    (0.0, 0.0, 0.0),
+    (1.0, 0.0, 0.0),
+    0.0,
+    fit(100.0, 5.0, v_in=0.0, v_out=0.0, accel=1.0, decel=1.0),
 )
 
 
@@ -22,7 +25,7 @@ def test_a_plan_stands_at_its_end() -> None:
 
 def test_a_plan_that_repeats_comes_back_to_the_same_place() -> None:
     pause = Stand((0.0, 0.0, 0.0), 0.0, 7.0, 0.0)
-    plan = Plan([pause, STRAIGHT, pause], cycle_from=1)
+    plan: Plan[Pose] = Plan([pause, STRAIGHT, pause], cycle_from=1)
     lap_s = STRAIGHT.duration_s + 7.0
     assert plan.duration_s == math.inf
     assert plan.at(17.0 + 3 * lap_s).place == pytest.approx(plan.at(17.0).place)
@@ -56,7 +59,10 @@ def test_a_pause_moves_the_end_by_exactly_the_pause(hold_us: int, pause_us: int)
 
 
 @given(
-    st.floats(0, 100), st.floats(0, 1), st.sampled_from([0.0, 1.0]), st.floats(0, 10),
+    st.floats(0, 100),
+    st.floats(0, 1),
+    st.sampled_from([0.0, 1.0]),
+    st.floats(0, 10),
     st.integers(0, 60 * S),
 )
 def test_when_is_the_inverse_of_at(
