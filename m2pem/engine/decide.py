@@ -71,7 +71,11 @@ def _defer(x: Steps, item: i.Input) -> None:
 
 
 def _start(x: Steps, item: i.StartRun) -> None:
-    process = x.mission.process(item.process)
+    try:
+        process = x.mission.process(item.process)
+    except KeyError:
+        ignore(x, f"the mission has no process {item.process!r}")
+        return
     x.emit(r.RunStarted(process.id, x.now_us, item.by))
     x.emit(r.ScopeOpened(1, process.id, process.id))
     root = x.state.scopes[1]
