@@ -127,7 +127,9 @@ def _tick(x: Steps, item: i.Tick) -> None:
 def _give_up(x: Steps, item: i.GiveUp) -> None:
     state = x.state
     awaited = [
-        f"{behavior.element} (behavior {behavior.name})" for behavior in state.behaviors.values()
+        f"{behavior.element} (behavior {behavior.name})"
+        for behavior in state.behaviors.values()
+        if behavior.phase is not BehaviorPhase.CANCELLING
     ]
     awaited += [f"{prompt.token.node.id} (an answer)" for prompt in state.prompts.values()]
     awaited += [f"{service.token.node.id} ({service.name})" for service in state.services.values()]
