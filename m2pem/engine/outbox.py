@@ -36,7 +36,9 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
                 if behavior is not None:
                     commands.append(_cancel(state, behavior))
             case r.BehaviorUnsettled():
-                commands.extend(_hold(state, record.behavior))
+                behavior = state.behaviors.get(record.behavior)
+                if behavior is not None:
+                    commands.extend(_hold(behavior))
             case r.BehaviorContinued():
                 behavior = state.behaviors.get(record.behavior)
                 if behavior is not None:
@@ -75,7 +77,7 @@ def outstanding(state: RunState) -> list[Command]:
         if behavior.phase is BehaviorPhase.CANCELLING:
             commands.append(_cancel(state, behavior))
         elif behavior.phase is BehaviorPhase.UNSETTLED:
-            commands.extend(_hold(state, behavior.id))
+            commands.extend(_hold(behavior))
         else:
             commands.append(_start(state, behavior))
     commands.extend(_open(prompt) for prompt in state.prompts.values())
@@ -112,8 +114,8 @@ def _cancel(state: RunState, behavior: Behavior) -> CancelBehavior:
     return CancelBehavior(behavior.id, state.epoch, behavior.resources)
 
 
-def _hold(state: RunState, behavior: str) -> list[Command]:
-    return [HoldResource(resource) for resource in state.behaviors[behavior].resources]
+def _hold(behavior: Behavior) -> list[Command]:
+    return [HoldResource(resource) for resource in behavior.resources]
 
 
 def _open(prompt: Prompt) -> OpenPrompt:

@@ -136,9 +136,14 @@ class Executive:
             self._listen(f"reports of {name}", partial(self._read_reports, arbiter))
             self._listen(f"telemetry of {name}", partial(self._read_telemetry, arbiter))
         if self._watch_links:
+            # On a fast clock our own hesitation would look like the silence of a vehicle.
+            stretch = max(1.0, self._speed)
             bounds = {
-                vehicle.id: vehicle.lost_after_s
-                or self.arbiters.of(vehicle.id).limits(vehicle.id).lost_after_s
+                vehicle.id: stretch
+                * (
+                    vehicle.lost_after_s
+                    or self.arbiters.of(vehicle.id).limits(vehicle.id).lost_after_s
+                )
                 for vehicle in self.fleet.vehicles.values()
             }
             rules = Watch(bounds, self.clock.now_us())

@@ -1,6 +1,6 @@
 """A scripted outside world: what operators, services and vehicles do in a rehearsal.
 
-An answers file (FORMATS, section 3) lists for each element what happens at the first visit, the
+An answers file (docs/rehearsal.md) lists for each element what happens at the first visit, the
 second, and so on. A visit is counted when its record is committed, and known by the id of its
 prompt, service or behavior from then on: so two instances of one element take their entries first
 come, first served, and a run that is taken up after a crash goes on with the next ones.

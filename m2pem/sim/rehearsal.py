@@ -61,7 +61,7 @@ class RehearsalResult(SimulationResult):
 
     @property
     def exit_status(self) -> int:
-        """What `m2pem simulate` ends with (FORMATS, section 3)."""
+        """What `m2pem simulate` ends with (docs/cli.md)."""
         return EXIT_STATUS[self.summary.status]
 
 
