@@ -92,11 +92,11 @@ def simulate(
     loaded = parse_mission(source, name)
     fleet = get_fleet(fleet_file, loaded) if fleet_file is not None else None
     script = get_answers(answers, loaded)
-    kept: list[StampedRecord] = []
+    kept: "list[StampedRecord]" = []
     with output_of(output) as out:
         out.tell_by(lambda _: loaded, one=True, asks=True)
 
-        def show(stamped: StampedRecord) -> None:
+        def show(stamped: "StampedRecord") -> None:
             out.show(stamped)
             if gantt is not None:
                 kept.append(stamped)
