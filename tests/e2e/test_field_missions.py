@@ -30,8 +30,8 @@ MISSIONS = REPOSITORY / "missions"
 ANSWERS = MISSIONS / "answers"
 FLEET = REPOSITORY / "fleet_configs" / "mehds.yaml"
 
-BLOCKS = {"sweep": "road_sweep", "follow": "road_following_formation", "stop": "drive_stop"}
-"""Short names of what is commanded most."""
+FULL_NAMES = {"sweep": "road_sweep", "follow": "road_following_formation", "stop": "drive_stop"}
+"""Of what is commanded most, by the words of the stories."""
 
 
 class Story(NamedTuple):
@@ -252,6 +252,11 @@ def test_every_answers_file_of_the_vignettes_is_tried() -> None:
     assert files == {story.answers for story in STORIES}
 
 
+def test_the_page_on_the_field_tests_names_every_answers_file() -> None:
+    page = (REPOSITORY / "docs" / "field-tests.md").read_text(encoding="utf-8")
+    assert [story.answers for story in STORIES if f"`{story.answers}.yaml`" not in page] == []
+
+
 @every_story
 def test_the_answers_fit_the_mission(story: Story) -> None:
     answers = load_answers(ANSWERS / f"{story.answers}.yaml")
@@ -284,7 +289,9 @@ def test_the_story_comes_to_its_end(story: Story) -> None:
 def test_vehicles_and_payloads_do_what_the_story_says(story: Story) -> None:
     told = result(story)
     for resource, expected in story.commanded.items():
-        assert commanded(told, resource) == [BLOCKS.get(word, word) for word in expected.split()]
+        assert commanded(told, resource) == [
+            FULL_NAMES.get(word, word) for word in expected.split()
+        ]
     if not story.commanded:
         assert not any(isinstance(s.record, r.BehaviorRequested) for s in told.records)
 

@@ -14,6 +14,13 @@ const VIEWER = new URL('node_modules/bpmn-js/dist/bpmn-viewer.production.min.js'
 const BROWSERS = process.env.CHROMIUM
   ? [process.env.CHROMIUM]
   : ['chromium', 'chromium-browser', 'google-chrome'];
+// Root has no sandbox. What is drawn is all in the page: nothing is to be asked of any host.
+const OPTIONS = [
+  ...(process.getuid?.() === 0 ? ['--no-sandbox'] : []),
+  '--headless', '--disable-gpu', '--no-first-run', '--disable-background-networking',
+  '--disable-component-update', '--host-resolver-rules=MAP * ~NOTFOUND',
+  '--virtual-time-budget=30000',
+];
 const TIMEOUT_MS = 60_000;
 
 const run = promisify(execFile);
@@ -56,8 +63,7 @@ async function draw(xml) {
     const file = join(folder, 'page.html');
     await writeFile(file, page(xml));
     const { stdout } = await browse([
-      '--headless', '--no-sandbox', '--disable-gpu', '--virtual-time-budget=30000',
-      `--user-data-dir=${join(folder, 'profile')}`, '--dump-dom', `file://${file}`,
+      ...OPTIONS, `--user-data-dir=${join(folder, 'profile')}`, '--dump-dom', `file://${file}`,
     ]);
     const [, hex] = stdout.match(/<pre id="result">([0-9a-f]*)<\/pre>/) ?? [];
     if (!hex) throw new Error('the browser drew nothing');
