@@ -69,14 +69,11 @@ class Program:
     def rest(self) -> tuple[int, str]:
         """Read to the end: its exit status, and what it said on standard error."""
         assert self.process.stdout is not None
-        if self.process.stdin is not None and not self.process.stdin.closed:
-            # The end of the input must not be what ends it.
-            out, err = self.process.communicate()
-        else:
-            self.process.stdin = None
-            out, err = self.process.communicate()
-        self.lines += out.splitlines()
-        return self.process.returncode, err or ""
+        assert self.process.stderr is not None
+        # Not `communicate`, which overlooks what `until` has read ahead.
+        self.lines += self.process.stdout.read().splitlines()
+        errors = self.process.stderr.read()
+        return self.process.wait(), errors
 
     @property
     def records(self) -> list[Record]:

@@ -42,7 +42,8 @@ def m2pem_records_committed(run_id, records):
     if seen >= int(os.environ.get("DIE_AFTER", "1000000")):
         die()
     for record in records:
-        if [type(record).__name__, getattr(record, "element", "")] == os.environ.get("DIE_AT", "").split():
+        here = type(record).__name__, getattr(record, "element", "")
+        if " ".join(here) == os.environ.get("DIE_AT"):
             die()
 
 if "DIE_IN" in os.environ:
