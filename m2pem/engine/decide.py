@@ -71,7 +71,11 @@ def _defer(x: Steps, item: i.Input) -> None:
 
 
 def _start(x: Steps, item: i.StartRun) -> None:
-    process = x.mission.process(item.process)
+    try:
+        process = x.mission.process(item.process)
+    except KeyError:
+        ignore(x, f"the mission has no process {item.process!r}")
+        return
     x.emit(r.RunStarted(process.id, x.now_us, item.by))
     x.emit(r.ScopeOpened(1, process.id, process.id))
     root = x.state.scopes[1]
@@ -123,7 +127,9 @@ def _tick(x: Steps, item: i.Tick) -> None:
 def _give_up(x: Steps, item: i.GiveUp) -> None:
     state = x.state
     awaited = [
-        f"{behavior.element} (behavior {behavior.name})" for behavior in state.behaviors.values()
+        f"{behavior.element} (behavior {behavior.name})"
+        for behavior in state.behaviors.values()
+        if behavior.phase is not BehaviorPhase.CANCELLING
     ]
     awaited += [f"{prompt.token.node.id} (an answer)" for prompt in state.prompts.values()]
     awaited += [f"{service.token.node.id} ({service.name})" for service in state.services.values()]

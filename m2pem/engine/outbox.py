@@ -60,7 +60,7 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
             case r.RunPaused():
                 commands.extend(HoldResource(resource) for resource in _commanded(state))
             case r.RunResumed():
-                commands.extend(ResumeResource(resource) for resource in _commanded(state))
+                commands.extend(ResumeResource(name) for name in _still_wanted(state, records))
             case _:
                 pass
     return commands
@@ -94,6 +94,17 @@ def _commanded(state: RunState) -> list[str]:
         for resource, holders in state.held.items()
         if any(state.behaviors[holder].phase is BehaviorPhase.ACTIVE for holder in holders)
     ]
+
+
+def _still_wanted(state: RunState, records: Sequence[Record]) -> list[str]:
+    """Resources that go on with what a pause held: not those that what came in the pause has given
+    something else to do, which says so by a command of its own."""
+    new = {
+        record.behavior
+        for record in records
+        if isinstance(record, r.BehaviorRequested | r.BehaviorRestarted | r.BehaviorContinued)
+    }
+    return [name for name in _commanded(state) if new.isdisjoint(state.held[name])]
 
 
 def _start(state: RunState, behavior: Behavior) -> StartBehavior:

@@ -35,7 +35,7 @@ from m2pem.sim.answers_file import AnswersModel, TimedEntry, read_answers
 
 log = logging.getLogger("m2pem.answers")
 
-BY_SCRIPT = "answers"
+BY_SCRIPT = "answers file"
 """Who the journal says has answered a prompt or sent a signal that is scripted."""
 
 BY_DEFAULT = "default"

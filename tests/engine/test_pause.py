@@ -14,7 +14,7 @@ from m2pem.engine.inputs import (
     Tick,
 )
 from m2pem.model.catalogue import ResumePolicy
-from tests.engine.kit import CANCELLED, SUCCEEDED, Play
+from tests.engine.kit import CANCELLED, RUNNING, SUCCEEDED, Play
 from tests.engine.snapshot import snapshot
 from tests.engine.trace import table
 
@@ -70,7 +70,6 @@ def test_inputs_are_deferred_and_decided_in_order_at_resume() -> None:
     assert play.at == "scan back v"
     assert play.orders() == [
         "resume evsg1/ptz",
-        "resume evsg1",
         "cancel b1",
         "start b4 reverse evsg1",
         "close p1 b",
@@ -191,6 +190,19 @@ def test_a_behavior_that_ended_during_the_pause_needs_no_resume() -> None:
     play = Play(TWO).start().pause()
     play.report("drive").report("team").orders()
     assert play.resume().orders() == ["resume evsg1/ptz"]
+
+
+def test_a_behavior_that_an_operator_lets_go_on_in_the_pause_is_resumed_once() -> None:
+    play = Play(TWO).start()
+    play.give(BehaviorMissing("r1.b1", ResumePolicy.HOLD, RUNNING)).orders()
+    held = ["hold alpha_1", "hold alpha_2", "hold alpha_3", "hold evsg1/ptz"]
+    assert play.pause().orders() == held
+    play.answer("resume", prompt="drive")
+    assert play.resume().orders() == [
+        *(line.replace("hold", "resume") for line in held),
+        "close p2 resume",
+        "resume evsg1",
+    ]
 
 
 def test_a_run_that_a_deferred_input_ends_ignores_the_later_ones() -> None:
