@@ -1,20 +1,16 @@
 """Random missions in the tests' notation.
 
-`structured`: blocks within blocks (sequence, choice, fork, loop, subprocess, call), each entered and
-left by one token, so that no token can get stuck. `graphs`: anything that the reader takes.
+`structured`: blocks within blocks (sequence, choice, fork, loop, subprocess, call), each entered
+and left by one token, so that no token can get stuck. `graph`: anything that the reader takes.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
-
-from hypothesis import strategies as st
-
-Draw: TypeAlias = Callable[[st.SearchStrategy[Any]], Any]
+from random import Random
 
 CONDITIONS = ("a < 2", "b == 1", "a > b", "c == null", "not (a == 1)", "a + b > c", "1 / b > 0")
 ASSIGNMENTS = ("a = 0", "a = a + 1", "b = 1", "b = a", "c = a * b", "b = 0", "c.d = b")
-ROLES = ("evsg1", "evsg2", "uav1", "evsg1/ptz", "team:alpha", "alpha_2", "evsg1 evsg2")
+ROLES = ("evsg1", "evsg2", "uav1", "uav2", "evsg1/ptz", "team:alpha", "alpha_2", "evsg1 evsg2")
 EVENTS = ("signal s1", "signal s2", "message m1", "timer PT3S", "cycle R3/PT2S", "cycle R/PT4S")
 CAUGHT = (*EVENTS, "error", "error E1", "escalation", "escalation X1")
 THROWN = ("signal s1", "signal s2", "message m1", "message m2", "escalation X1", "escalation X2")
@@ -32,7 +28,7 @@ class _Block:
 
 @dataclass
 class _Draft:
-    draw: Draw
+    dice: Random
     budget: int
     processes: list[str] = field(default_factory=list)
     number: int = 100
@@ -41,12 +37,11 @@ class _Draft:
         self.number += 1
         return f"{prefix}{self.number}"
 
-    def one_of(self, items: tuple[str, ...]) -> str:
-        chosen: str = self.draw(st.sampled_from(items))
-        return chosen
+    def one_of(self, items: Sequence[str]) -> str:
+        return self.dice.choice(items)
 
     def chance(self, percent: int) -> bool:
-        return bool(self.draw(st.integers(0, 99)) < percent)
+        return self.dice.randrange(100) < percent
 
     # --- leaves ---------------------------------------------------------------------------------
 
@@ -66,7 +61,7 @@ class _Draft:
             block = _Block([f'<{tag} id="{name}"/>'], name, name)
         else:
             block = _Block([f'<{tag} id="{name}">{text}</{tag}>'], name, name)
-        if tag.endswith("Task") and tag != "manualTask" and self.chance(60):
+        if tag.endswith("Task") and self.chance(60):
             return self.guarded(block, ("error", *CAUGHT), depth=9)
         return block
 
@@ -74,8 +69,7 @@ class _Draft:
         """Boundary events on an activity; what interrupts merges with what it interrupted."""
         merge = self.name("x")
         lines = [*block.lines, f'<exclusiveGateway id="{merge}"/>', f"{block.exit} -> {merge}"]
-        kinds = self.draw(st.lists(st.sampled_from(caught), min_size=1, max_size=2, unique=True))
-        for kind in kinds:
+        for kind in dict.fromkeys((self.one_of(caught), self.one_of(caught))):
             boundary = self.name("b")
             interrupting = kind.startswith("error") or self.chance(50)
             attribute = "" if interrupting else ' cancelActivity="false"'
@@ -94,7 +88,7 @@ class _Draft:
 
     def block(self, depth: int, *, inside: bool = False) -> _Block:
         self.budget -= 1
-        if depth > 3 or self.budget <= 0:
+        if depth > 5 or self.budget <= 0:
             return self.leaf(inside=inside)
         kind = self.one_of(("leaf", "seq", "xor", "and", "or", "loop", "sub", "call"))
         if kind == "leaf":
@@ -115,7 +109,7 @@ class _Draft:
         split, join, default = self.name("g"), self.name("g"), self.name("d")
         attribute = "" if kind == "and" else f' default="{default}"'
         lines = [f'<{tag} id="{split}"{attribute}/>', f'<{tag} id="{join}"/>']
-        for number in range(self.draw(st.integers(2, 3))):
+        for number in range(self.dice.randint(2, 3)):
             branch = self.block(depth + 1, inside=inside)
             flow = f"{split} -> {branch.entry}"
             if kind != "and":
@@ -129,11 +123,12 @@ class _Draft:
         count, key = self.name("s"), self.name("n")
         lines = [
             *body.lines,
-            f'<exclusiveGateway id="{merge}"/> <exclusiveGateway id="{split}" default="{default}"/>',
+            f'<exclusiveGateway id="{merge}"/>',
+            f'<exclusiveGateway id="{split}" default="{default}"/>',
             f'<scriptTask id="{count}">{key} = max([0, {key}]) + 1</scriptTask> <task id="{key}"/>',
             f"{merge} -> {body.entry}",
             f"{body.exit} -> {count} -> {split}",
-            f"{split} -> {merge} if {key} < {self.draw(st.integers(1, 3))}",
+            f"{split} -> {merge} if {key} < {self.dice.randint(1, 3)}",
             f"{default}: {split} -> {key}",
         ]
         return _Block(lines, merge, key)
@@ -169,7 +164,6 @@ class _Draft:
 
 _LEAVES = (
     "task -",
-    "manualTask -",
     "scriptTask {set}; {set}",
     "scriptTask {set}",
     "userTask ask a b",
@@ -177,6 +171,8 @@ _LEAVES = (
     "scriptTask do drive_stop {roles}",
     "scriptTask do drive_stop {roles}",
     "serviceTask call Look",
+    "scriptTask do drive_stop {roles}",
+    "userTask ask a b",
     "scriptTask do hold duration=2",
     "intermediateCatchEvent {event}",
     "intermediateThrowEvent {thrown}",
@@ -186,10 +182,9 @@ _LEAVES = (
 )
 
 
-@st.composite
-def structured(draw: Draw) -> str:
+def structured(dice: Random) -> str:
     """A mission of nested blocks, with perhaps a second process that a signal or message starts."""
-    draft = _Draft(draw, draw(st.integers(1, 16)))
+    draft = _Draft(dice, dice.randint(1, 30))
     main = "\n".join(draft.container(0, inside=False))
     other = ""
     if draft.chance(30):
@@ -220,24 +215,23 @@ _NODES = (
 )
 
 
-@st.composite
-def graphs(draw: Draw) -> str:
+def graph(dice: Random) -> str:
     """Nodes joined at random, all of which some start event can reach."""
-    draft = _Draft(draw, 0)
-    inside = _graph(draft, draw(st.integers(1, 9)), 0)
+    draft = _Draft(dice, 0)
+    inside = _graph(draft, dice.randint(1, 12), 0)
     return f'<process id="MAIN" isExecutable="true">\n{inside}\n</process>'
 
 
 def _graph(draft: _Draft, size: int, depth: int) -> str:
-    draw = draft.draw
     lines = []
     start = draft.name("start")
-    sources, targets, activities, conditional = [start], [], [], set()
+    sources, targets, activities = [start], list[str](), list[str]()
+    conditional: set[str] = set()
     lines.append(f'<startEvent id="{start}"/>')
     for _ in range(size):
         tag, _, text = draft.one_of(_NODES if depth < 2 else _NODES[:-2]).partition(" ")
         name = draft.name("n")
-        came = draw(st.sampled_from(sources))
+        came = draft.one_of(sources)
         lines.append(_flow(draft, came, name, conditional))
         lines.append(_element(draft, tag, text, name, depth))
         targets.append(name)
@@ -251,11 +245,11 @@ def _graph(draft: _Draft, size: int, depth: int) -> str:
             boundary = draft.name("b")
             kind = draft.one_of(CAUGHT)
             cancel = "" if kind.startswith("error") or draft.chance(50) else "false"
-            host = draw(st.sampled_from(activities))
+            host = draft.one_of(activities)
             lines.append(_boundary(boundary, host, kind, cancel))
             sources.append(boundary)
-    for _ in range(draw(st.integers(0, size + 1)) if targets else 0):
-        source, target = draw(st.sampled_from(sources)), draw(st.sampled_from(targets))
+    for _ in range(draft.dice.randint(0, size + 1) if targets else 0):
+        source, target = draft.one_of(sources), draft.one_of(targets)
         lines.append(_flow(draft, source, target, conditional))
     return "\n".join(lines)
 
@@ -274,7 +268,7 @@ def _flow(draft: _Draft, source: str, target: str, conditional: set[str]) -> str
 
 def _element(draft: _Draft, tag: str, text: str, name: str, depth: int) -> str:
     if tag == "subProcess":
-        inside = _graph(draft, draft.draw(st.integers(0, 4)), depth + 1)
+        inside = _graph(draft, draft.dice.randint(0, 4), depth + 1)
         return f'<subProcess id="{name}">\n{inside}\n</subProcess>'
     if tag == "callActivity":
         return f'<callActivity id="{name}" calledElement="MAIN"/>'
