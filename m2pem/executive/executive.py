@@ -323,7 +323,7 @@ class Executive:
 
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
         if self._script is not None:
-            self._script.seen(records)
+            self._script.seen(run, records)
         if self._observed:
             self.plugins.records_committed(run, records)
 

@@ -223,22 +223,22 @@ class _Script:
         self._answers = answers
         self.ending: set[str] = set()
 
-    def seen(self, records: Sequence[Record]) -> None:
-        self._answers.seen(records)
+    def seen(self, run: str, records: Sequence[Record]) -> None:
+        self._answers.seen(run, records)
         for record in records:
             if isinstance(record, ServiceEnded | ServiceWithdrawn):
                 self.ending.discard(record.service)
 
-    def service(self, element: str, name: str, service: str) -> ScriptedService | None:
-        scripted = self._answers.service(element, name, service)
+    def service(self, run: str, element: str, name: str, service: str) -> ScriptedService | None:
+        scripted = self._answers.service(run, element, name, service)
         if scripted is None and name != DETECTOR_SERVICE:
             scripted = ScriptedService()
         if scripted is not None:
             self.ending.add(service)
         return scripted
 
-    def behavior(self, element: str, behavior: str) -> ScriptedBehavior | None:
-        return self._answers.behavior(element, behavior)
+    def behavior(self, run: str, element: str, behavior: str) -> ScriptedBehavior | None:
+        return self._answers.behavior(run, element, behavior)
 
 
 class _TellingJournal(MemoryJournal):
