@@ -1,4 +1,4 @@
-"""Reading and writing the data store (FORMATS section 1, "Data").
+"""Reading and writing the data store (docs/missions.md, "Data").
 
 Every scope may hold values. A name belongs to the nearest enclosing scope that declares it, for
 reads as for writes, else to the process instance; no further: a called process has its own store.

@@ -94,7 +94,7 @@ class Execution:
     def triggered_starts(self) -> tuple[StartEvent, ...]:
         """Start events of processes that neither the run began with nor a call activity calls.
 
-        Each trigger of theirs makes an instance (FORMATS section 1).
+        Each trigger of theirs makes an instance (docs/missions.md).
         """
         if self._triggered_starts is None:
             assert self.state.root is not None

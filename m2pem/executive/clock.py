@@ -74,6 +74,14 @@ class VirtualClock:
         """Microseconds since the Unix epoch, exact."""
         return self._start_us + self._loop.elapsed_us
 
+    def when_idle(self, act: Callable[[float | None], bool]) -> None:
+        """Have `act` called when nothing is ready, each time before the loop jumps ahead.
+
+        It is told by how many seconds, or None when no timer is set. If it returns True, it has
+        made something happen now, and time stands still for it.
+        """
+        self._loop.when_idle = act
+
     async def sleep(self, seconds: float) -> None:
         """Wait for `seconds` of virtual time, to the nearest microsecond."""
         await asyncio.sleep(seconds)
@@ -118,6 +126,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     def __init__(self) -> None:
         self.elapsed_us = 0
+        self.when_idle: Callable[[float | None], bool] = lambda _: False
         self._threads_at_work = 0
         self._timer_numbers = itertools.count()
         super().__init__(_JumpingSelector(self))
@@ -170,6 +179,8 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """
         if self._threads_at_work:
             return True
+        if self.when_idle(timeout_s):
+            return False
         if timeout_s is None:
             waiting = sorted(
                 getattr(task.get_coro(), "__qualname__", task.get_name())

@@ -216,7 +216,10 @@ class Dispatcher:
         return next((spec for spec in specs if spec is not None), None)
 
     def _apply_script(self, command: StartBehavior, arbiter: Arbiter) -> None:
-        scripted = self._script.behavior(command.element) if self._script is not None else None
+        if self._script is None:
+            return
+        run = command.behavior.partition(".")[0]
+        scripted = self._script.behavior(run, command.element, command.behavior)
         if scripted is None:
             return
         script = getattr(arbiter, "script", None)

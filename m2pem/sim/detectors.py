@@ -51,10 +51,8 @@ class Detectors:
                 vehicle = carrier if isinstance(carrier, SimVehicle) else None
                 self._detectors.append(_Detector(body, vehicle))
 
-    def begin(
-        self, began_us: int, known: Callable[[ResourceId], Iterable[int]], now_us: int
-    ) -> None:
-        """Schedule what is planned, and look out for what is planted."""
+    def begin(self, began_us: int, known: Callable[[ResourceId], Iterable[int]]) -> None:
+        """Schedule what is planned, and look out for what is planted, also what is past."""
         for detector in self._detectors:
             settings = detector.payload.settings
             detector.found = set(known(detector.payload.id))
@@ -62,7 +60,8 @@ class Detectors:
                 if number not in detector.found:
                     at_us = began_us + round(planned.at_s * US_PER_S)
                     self._agenda.at(at_us, self._finder(detector, number))
-            self._look(detector, now_us)
+            if detector.carrier is not None:
+                self._look(detector, detector.carrier.track.started_us)
 
     def moved(self, vehicle: ResourceId, now_us: int) -> None:
         """The motion of a vehicle has changed."""
@@ -88,6 +87,16 @@ class Detectors:
             for detector in self._detectors
         )
 
+    @property
+    def searching(self) -> bool:
+        """Whether a vehicle at work carries a detector that has not found all that is planted."""
+        return any(
+            detector.carrier is not None
+            and detector.carrier.behavior
+            and any(True for _ in self._unfound(detector))
+            for detector in self._detectors
+        )
+
     def _unfound(self, detector: _Detector) -> Iterable[tuple[int, tuple[float, float]]]:
         settings = detector.payload.settings
         for index, target in enumerate(settings.targets):
@@ -106,7 +115,7 @@ class Detectors:
             at_us, near = _approach(detector.carrier, target, reach, now_us)
             if at_us is not None:
                 call = self._finder(detector, number) if near else self._looker(detector)
-                detector.entries.append(self._agenda.at(at_us, call))
+                detector.entries.append(self._agenda.at(at_us, call, background=not near))
 
     def _finder(self, detector: _Detector, number: int) -> Callable[[int], None]:
         return lambda at_us: self._find(detector, number, at_us)
