@@ -122,11 +122,13 @@ class Control:
         self._executive.set_geometry(name, geometry, run, by)
 
     async def _ask(self, run: RunId, item: i.Input) -> None:
-        """Have an input decided; one that the engine ignored is the operator's to know."""
-        step = await self._executive.runner(run).tell(item)
-        for record in step.records:
-            if isinstance(record, r.InputIgnored):
-                raise OperatorError(f"{run}: {record.reason}")
+        """Have an input decided; one that the engine ignored is the operator's to know.
+
+        What came during a pause is decided with the resume, and may be ignored then: after it.
+        """
+        match (await self._executive.runner(run).tell(item)).records:
+            case [r.InputIgnored(reason), *_]:
+                raise OperatorError(f"{run}: {reason}")
 
     # --- watching -------------------------------------------------------------------------------
 
