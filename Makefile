@@ -79,8 +79,9 @@ test: lint ## check all but the long tests
 test-long: lint ## check everything: fuzzing, large random counts, foreign corpora too
 	@$(BIN)/pytest -n 2 --timeout 1800
 
-pictures: npm-packages ## draw the missions for the docs (needs Chromium)
-	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn
+pictures: npm-packages ## draw the missions and examples for the docs (needs Chromium)
+	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn && \
+	for example in ../../examples/*/; do node draw_bpmn.mjs "$$example" "$$example"*.bpmn; done
 
 clean: ## remove all that can be made again
 	@rm -rf $(VENV) $(JS)/node_modules build dist
