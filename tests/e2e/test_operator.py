@@ -179,6 +179,26 @@ def test_in_the_background_of_a_shell_it_goes_on_and_listens_when_it_is_back(
     shell.close()
 
 
+def test_a_run_killed_during_a_pause_is_paused_when_it_is_resumed(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    fleet, state = fleet_with_state(tmp_path)
+    program = driving(m2pem, fleet)
+    program.type("pause")
+    program.until_record("RunPaused")
+    program.kill()
+    resumed = m2pem.start("resume", "r1")
+    resumed.until_text("r1 taken up again")
+    resumed.type("resume")
+    resumed.until_text("r1 goes on by plain")
+    resumed.type("stop")
+    status, errors = resumed.rest()
+    assert status == 130
+    assert "r1 is paused" in errors
+    once = ["start", "hold", "resume", "cancel", "end"]
+    assert effects(state) == Counter((kind, "evsg1") for kind in once)
+
+
 def test_a_vehicle_that_was_lost_in_a_crash_is_held_and_asked_about(
     m2pem: CommandLine, tmp_path: Path
 ) -> None:
