@@ -134,7 +134,7 @@ class MissionControl(Protocol):
         data: Mapping[str, Value] | None = None,
         by: str = "",
     ) -> None:
-        """Emit a signal, by its id, to one run or (None) to all."""
+        """Emit a signal, by its id or its name, to one run or (None) to all that have it."""
         ...
 
     async def message(
@@ -154,7 +154,7 @@ class MissionControl(Protocol):
         ...
 
     def subscribe(self, run: RunId | None = None, size: int = 10_000) -> AsyncIterator[Notice]:
-        """What is committed from now on, and first the prompts that stand now."""
+        """What is committed from this call on, and first the prompts that stand now."""
         ...
 
     def telemetry(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
@@ -164,7 +164,8 @@ class MissionControl(Protocol):
     async def records(
         self, run: RunId, after_seq: int = 0, limit: int = 1000
     ) -> Sequence[StampedRecord]:
-        """A page of a run's records."""
+        """The records after `after_seq`, about `limit` of them: a page ends with all records of
+        an input, so it may be longer. `after_seq` is 0, or the last of a page."""
         ...
 
     async def runs(self) -> Sequence[RunSummary]:

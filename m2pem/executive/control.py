@@ -23,6 +23,7 @@ from m2pem.findings import Finding
 from m2pem.journal.base import RunLine
 from m2pem.model.bpmn import parse_mission
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.model.events import Signal
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
 
@@ -70,19 +71,34 @@ class Control:
         by: str = "",
     ) -> None:
         """Emit a signal to one run or to all that are active."""
-        item = i.SignalReceived(signal, dict(data or {}), by)
-        if run is not None:
-            known = self._executive.runner(run).run.state.mission.signals
-            if signal not in known:
+        runners = (
+            [self._executive.runner(run)]
+            if run is not None
+            else [
+                runner
+                for runner in self._executive.runners.values()
+                if runner.run.state.status is not EngineStatus.ENDED
+            ]
+        )
+        known = [(runner, runner.run.state.mission.signals) for runner in runners]
+        meant = [(runner, _named(signal, signals)) for runner, signals in known]
+        if not any(ids for _, ids in meant):
+            there = {each.id: each.name for _, signals in known for each in signals.values()}
+            listed = (
+                ", ".join(f"{name} ({key})" if name else key for key, name in there.items())
+                or "none"
+            )
+            raise OperatorError(
+                f"{run or 'no run'} has {'no' if run else 'a'} signal {signal!r}; known: {listed}"
+            )
+        for runner, ids in meant:
+            if len(ids) > 1:
                 raise OperatorError(
-                    f"{run} has no signal {signal!r}; its signals: {', '.join(known) or 'none'}"
+                    f"{runner.id} has several signals named {signal!r}; say which: {', '.join(ids)}"
                 )
-            await self._ask(run, item)
-            return
-        for runner in list(self._executive.runners.values()):
-            state = runner.run.state
-            if signal in state.mission.signals and state.status is not EngineStatus.ENDED:
-                await self._ask(runner.id, item)
+        for runner, ids in meant:
+            for key in ids:
+                await self._ask(runner.id, i.SignalReceived(key, dict(data or {}), by))
 
     async def message(
         self, message: str, *, run: RunId, data: Mapping[str, Value] | None = None, by: str = ""
@@ -123,15 +139,15 @@ class Control:
     async def records(
         self, run: RunId, after_seq: int = 0, limit: int = 1000
     ) -> Sequence[StampedRecord]:
-        """A page of a run's records."""
+        """A page of a run's records; it ends with those of an input, so it may be longer."""
         page: list[StampedRecord] = []
         async for entry in self._executive.journal.read(run, after_seq):
-            for place, record in enumerate(entry.records):
-                seq = entry.seq + place
-                if seq > after_seq:
-                    page.append(StampedRecord(run, seq, entry.t_us / 1_000_000, record))
-                if len(page) == limit:
-                    return page
+            page += (
+                StampedRecord(run, entry.seq + place, entry.t_us / 1_000_000, record)
+                for place, record in enumerate(entry.records)
+            )
+            if len(page) >= limit:
+                break
         return page
 
     async def runs(self) -> Sequence[RunSummary]:
@@ -180,6 +196,13 @@ class Control:
     async def simulate(self, mission: Path | str | bytes, **options: Any) -> SimulationResult:
         """Rehearse a mission on a virtual clock, in a thread of its own."""
         raise OperatorError("this executive cannot rehearse missions")
+
+
+def _named(name: str, signals: Mapping[str, Signal]) -> list[str]:
+    """The ids of the signals that a name, or an id, may mean."""
+    if name in signals:
+        return [name]
+    return [key for key, signal in signals.items() if name and signal.name == name]
 
 
 def summary(line: RunLine) -> RunSummary:

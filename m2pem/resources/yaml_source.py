@@ -71,13 +71,19 @@ class YamlSource:
 
 def read_yaml(path: Path) -> YamlSource:
     """Read a file; whatever is wrong with it is in `findings`, all of it."""
-    source = YamlSource(str(path))
     try:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except OSError as error:
+        source = YamlSource(str(path))
         source.error((), "unreadable", f"cannot be read: {error.strerror}")
         return source
+    return parse_yaml(content, str(path))
+
+
+def parse_yaml(content: bytes, name: str) -> YamlSource:
+    """As `read_yaml`, for text from elsewhere; `name` is what findings call it."""
+    source = YamlSource(name)
     if len(content) > MAX_BYTES:
         source.error((), "too-large", f"is larger than {MAX_BYTES:,} bytes")
         return source
