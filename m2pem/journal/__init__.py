@@ -15,7 +15,6 @@ __all__ = [
     "RunHeader",
     "RunLine",
     "default_url",
-    "journal_file",
     "open_journal",
 ]
 
@@ -26,30 +25,15 @@ def open_journal(url: str) -> Journal:
     Raises:
         JournalError: it cannot be opened, or nothing opens such a URL.
     """
-    path = journal_file(url)
-    if path is None:
-        return MemoryJournal()
-    # Half of the import time of this package, which most commands don't need.
-    from m2pem.journal.sqlite import SqliteJournal  # noqa: PLC0415
-
-    return SqliteJournal.open(path)
-
-
-def journal_file(url: str) -> Path | None:
-    """The file of the journal that `url` names, which need not be there; None for `memory:`.
-
-    Raises:
-        JournalError: nothing opens such a URL.
-    """
     if url == "memory:":
-        return None
+        return MemoryJournal()
     parts = urlsplit(url)
     if parts.scheme == "sqlite":
         if parts.netloc or parts.query or parts.fragment or not parts.path.strip("/"):
             raise JournalError(
                 f"{url} is not a journal's URL: write sqlite:///absolute/path, or the path alone"
             )
-        return Path(unquote(parts.path)).resolve()
+        return _open_file(Path(unquote(parts.path)))
     if parts.scheme in ("postgresql", "postgres"):
         raise JournalError(
             f"{_without_password(url)}: journals in PostgreSQL are reserved for a later version; "
@@ -60,7 +44,7 @@ def journal_file(url: str) -> Path | None:
             f"{_without_password(url)!r} is not a journal's URL: "
             "write a path, sqlite:///absolute/path or memory:"
         )
-    return Path(url).expanduser().resolve()
+    return _open_file(Path(url).expanduser())
 
 
 def default_url() -> str:
@@ -80,6 +64,13 @@ def default_url() -> str:
     except OSError as error:
         raise JournalError(f"{folder} cannot be made: {error.strerror}") from error
     return f"sqlite://{quote(str(folder / 'journal.db'))}"
+
+
+def _open_file(path: Path) -> Journal:
+    # Half of the import time of this package, which most commands don't need.
+    from m2pem.journal.sqlite import SqliteJournal  # noqa: PLC0415
+
+    return SqliteJournal.open(path)
 
 
 def _without_password(url: str) -> str:

@@ -33,8 +33,9 @@ def flow(source: str, target: str, more: str = "") -> str:
 def line_of(*elements: str) -> str:
     """Start S, the elements' ids in a row, end E, each flow on the last line of the text."""
     ids = ["S", *elements, "E"]
-    return '<startEvent id="S"/><endEvent id="E"/>' + "".join(
-        flow(one, two) for one, two in zip(ids, ids[1:], strict=False)
+    return (
+        '<startEvent id="S"/><endEvent id="E"/>'
+        + "".join(flow(one, two) for one, two in zip(ids, ids[1:], strict=False))
     )
 
 

@@ -32,9 +32,7 @@ WARNINGS = {
         [("element-order", 4, "P")],
     ),
     "misplaced extension": (
-        around(
-            '<task id="T"><extensionElements>\n<m2pem:prompt>x</m2pem:prompt></extensionElements></task>'
-        ),
+        around('<task id="T"><extensionElements>\n<m2pem:prompt>x</m2pem:prompt></extensionElements></task>'),
         [("misplaced-extension", 4, "T")],
     ),
     "unknown extension": (
