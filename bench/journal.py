@@ -70,17 +70,24 @@ async def bulk(journal: Journal, inputs: int, elements: int) -> dict[str, float]
     for n in range(inputs):
         await journal.append([entry(run, 1 + n * len(records), Continue(), records)])
     took = time.perf_counter() - began
-    began = time.perf_counter()
-    count = 0
-    async for found in journal.read(run):
-        count += len(found.records)
-    replay = time.perf_counter() - began
-    assert count == inputs * len(records)
     return {
         "elements_per_s": round(inputs * elements / took),
         "records_per_s": round(inputs * len(records) / took),
-        "records_read_per_s": round(count / replay),
     }
+
+
+async def replay(journal: Journal) -> dict[str, float]:
+    """Read the first run back."""
+    began = time.perf_counter()
+    count = 0
+    async for found in journal.read("r1"):
+        count += len(found.records)
+    return {"records_read_per_s": round(count / (time.perf_counter() - began))}
+
+
+async def bulk_and_replay(journal: Journal) -> dict[str, float]:
+    """One run, written and read."""
+    return await bulk(journal, 200, 1000) | await replay(journal)
 
 
 async def drive(journal: Journal, run: str, inputs: int) -> None:
@@ -142,7 +149,7 @@ async def single(journal: SqliteJournal, scratch: Path, inputs: int) -> dict[str
 async def measure(folder: Path) -> dict[str, dict[str, float]]:
     """All cases, each with a journal of its own."""
     cases: dict[str, Callable[[SqliteJournal], Awaitable[dict[str, float]]]] = {
-        "sqlite, bulk": lambda journal: bulk(journal, 200, 1000),
+        "sqlite, bulk": bulk_and_replay,
         "sqlite, 100 runs": lambda journal: concurrent(journal, 100, 200),
         "sqlite, 1 run": lambda journal: single(journal, folder, 1000),
     }

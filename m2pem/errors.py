@@ -2,8 +2,8 @@
 
 The class says whose fault it is, the message says where it is and what would be right:
 
-* `MissionError`, `FleetError`, `ExpressionSyntaxError`: what a person wrote is wrong;
-  the first two carry *every* finding at once.
+* `MissionError`, `FleetError`, `AnswersError`, `ExpressionSyntaxError`: what a person wrote is
+  wrong; the first three carry *every* finding at once.
 * `OperatorError`: a request that cannot be met now (unknown run, prompt already answered).
 * `PluginError`: a plugin broke its contract.
 * `JournalError`: the journal cannot be read or written.
@@ -41,6 +41,10 @@ class MissionError(FindingsError):
 
 class FleetError(FindingsError):
     """The fleet file, or a file that it names, cannot be used."""
+
+
+class AnswersError(FindingsError):
+    """The answers file cannot be used, or does not fit the mission."""
 
 
 class ExpressionSyntaxError(M2pemError):

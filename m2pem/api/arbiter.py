@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
-from m2pem.resources.parameters import ResolvedValue
+from m2pem.resources.parameters import ResolvedValue as ResolvedValue
 
 if TYPE_CHECKING:
     import logging

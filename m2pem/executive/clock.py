@@ -74,6 +74,13 @@ class VirtualClock:
         """Microseconds since the Unix epoch, exact."""
         return self._start_us + self._loop.elapsed_us
 
+    def when_idle(self, act: Callable[[], bool]) -> None:
+        """Have `act` called when nothing is ready, each time before the loop jumps ahead.
+
+        If it returns True, it has made something happen now, and time stands still for it.
+        """
+        self._loop.when_idle = act
+
     async def sleep(self, seconds: float) -> None:
         """Wait for `seconds` of virtual time, to the nearest microsecond."""
         await asyncio.sleep(seconds)
@@ -118,6 +125,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     def __init__(self) -> None:
         self.elapsed_us = 0
+        self.when_idle: Callable[[], bool] = lambda: False
         self._threads_at_work = 0
         self._timer_numbers = itertools.count()
         super().__init__(_JumpingSelector(self))
@@ -170,6 +178,8 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """
         if self._threads_at_work:
             return True
+        if self.when_idle():
+            return False
         if timeout_s is None:
             waiting = sorted(
                 getattr(task.get_coro(), "__qualname__", task.get_name())

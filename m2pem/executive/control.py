@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,9 @@ from m2pem.resources.fleet import Fleet
 
 if TYPE_CHECKING:
     from m2pem.executive.executive import Executive
+
+REHEARSED_STEPS = 100_000
+"""Engine steps after which a rehearsal beside live missions is given up, unless said otherwise."""
 
 
 class Control:
@@ -214,8 +218,20 @@ class Control:
         )
 
     async def simulate(self, mission: Path | str | bytes, **options: Any) -> SimulationResult:
-        """Rehearse a mission on a virtual clock, in a thread of its own."""
-        raise OperatorError("this executive cannot rehearse missions")
+        """Rehearse a mission with this fleet on a virtual clock, in a thread of its own.
+
+        Options: `process`, `data`, `answers` (path of an answers file), `start_us` (microseconds
+        since the Unix epoch), `max_steps` (100,000: all records are kept in memory).
+
+        Raises:
+            FindingsError: the mission or the answers cannot be used.
+        """
+        executive = self._executive
+        if executive.rehearse is None:
+            raise OperatorError("this executive cannot rehearse missions")
+        rehearse = partial(executive.rehearse, plugins=executive.plugins, observed=False)
+        settings = {"max_steps": REHEARSED_STEPS, **options}
+        return await asyncio.to_thread(rehearse, mission, executive.fleet, **settings)
 
 
 def _named(name: str, signals: Mapping[str, Signal]) -> list[str]:

@@ -216,7 +216,9 @@ class Dispatcher:
         return next((spec for spec in specs if spec is not None), None)
 
     def _apply_script(self, command: StartBehavior, arbiter: Arbiter) -> None:
-        scripted = self._script.behavior(command.element) if self._script is not None else None
+        if self._script is None:
+            return
+        scripted = self._script.behavior(command.element, command.behavior)
         if scripted is None:
             return
         script = getattr(arbiter, "script", None)

@@ -17,7 +17,7 @@ from typing import Any, Self
 
 from m2pem.api.arbiter import Arbiter, ArbiterContext, BehaviorReport
 from m2pem.api.clock import Clock
-from m2pem.api.control import RunId
+from m2pem.api.control import RunId, SimulationResult
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import LinkState
 from m2pem.engine.inputs import BehaviorReported, GeometrySet, ResourceFault, StartRun, StopRun
@@ -53,12 +53,16 @@ log = logging.getLogger("m2pem.executive")
 REMEMBERED_RUNS = 100
 """Runs that are over whose last state is kept in memory; the journal has them all."""
 
+STEPS_AT_ONCE = 10_000
+"""Engine steps after which a run that does not wait lets others run."""
+
 
 class Executive:
     """`simulated`: every arbiter is the simulated one, with `settings` for its connections.
 
     `speed`: of the clock against the wall clock, kept in the journal for a resume. `watch_links`:
-    whether silence of a vehicle ends its behaviors. `max_steps` as in `Runner`.
+    whether silence of a vehicle ends its behaviors. `max_steps` as in `Runner`. `observed`: whether
+    plugins are told of records. `rehearse`: what `MissionControl.simulate` calls, in a thread.
     """
 
     def __init__(
@@ -74,6 +78,8 @@ class Executive:
         speed: float = 1.0,
         watch_links: bool = True,
         max_steps: int | None = None,
+        observed: bool = True,
+        rehearse: Callable[..., SimulationResult] | None = None,
     ) -> None:
         self.fleet = fleet
         self.journal = journal
@@ -85,6 +91,9 @@ class Executive:
         self.availability = Availability(fleet)
         self.runners: dict[RunId, Runner] = {}
         self.control = Control(self)
+        self.rehearse = rehearse
+        self._observed = observed
+        self._script = script
         self._speed = speed
         self._watch_links = watch_links
         self._max_steps = max_steps
@@ -126,9 +135,14 @@ class Executive:
             self._listen(f"reports of {name}", partial(self._read_reports, arbiter))
             self._listen(f"telemetry of {name}", partial(self._read_telemetry, arbiter))
         if self._watch_links:
+            # On a fast clock our own hesitation would look like the silence of a vehicle.
+            stretch = max(1.0, self._speed)
             bounds = {
-                vehicle.id: vehicle.lost_after_s
-                or self.arbiters.of(vehicle.id).limits(vehicle.id).lost_after_s
+                vehicle.id: stretch
+                * (
+                    vehicle.lost_after_s
+                    or self.arbiters.of(vehicle.id).limits(vehicle.id).lost_after_s
+                )
                 for vehicle in self.fleet.vehicles.values()
             }
             rules = Watch(bounds, self.clock.now_us())
@@ -203,6 +217,14 @@ class Executive:
         """
         name, source = read_source(mission)
         loaded = parse_mission(source, name)
+        return loaded, self.admit(loaded, process, data)
+
+    def admit(self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None) -> str:
+        """Check a mission; returns the id of the process to begin with.
+
+        Raises:
+            MissionError: with every finding.
+        """
         findings = findings_for(
             loaded,
             self.arbiters,
@@ -211,8 +233,8 @@ class Executive:
             process,
             simulated=self.simulated,
         )
-        refuse_errors(f"{name} cannot run with fleet {self.fleet.file}", findings)
-        return loaded, loaded.process(process).id
+        refuse_errors(f"{loaded.file} cannot run with fleet {self.fleet.file}", findings)
+        return loaded.process(process).id
 
     async def start(
         self,
@@ -224,6 +246,12 @@ class Executive:
         """Begin a run. Returns when its first records are durable."""
         # Reading and checking take a while, and a URL may take longer: not in the event loop.
         loaded, process_id = await asyncio.to_thread(self.load, mission, process, data)
+        return await self.begin(loaded, process_id, data, by)
+
+    async def begin(
+        self, loaded: Mission, process_id: str, data: Mapping[str, Value] | None, by: str
+    ) -> RunId:
+        """Begin a run of a mission that was admitted. Returns when its beginning is durable."""
         header = RunHeader(
             loaded.file,
             loaded.source,
@@ -234,7 +262,8 @@ class Executive:
             self.clock.now_us(),
         )
         number = await self.journal.create(header)
-        runner = self._runner(MissionRun(loaded, self.fleet, number), 1)
+        batch = min(STEPS_AT_ONCE, self._max_steps or STEPS_AT_ONCE)
+        runner = self._runner(MissionRun(loaded, self.fleet, number, batch), 1)
         begun = runner.tell(StartRun(process_id, dict(data or {}), by))
         for name, geometry in self._handed_over.items():
             runner.post(GeometrySet(name, geometry))
@@ -259,7 +288,7 @@ class Executive:
         epoch = await self.journal.claim(number)
         mission = parse_mission(line.header.mission, line.header.mission_name)
         run = MissionRun(mission, self.fleet, number)
-        last_us = await replay(self.journal, run)
+        last_us = await replay(self.journal, run, self._script)
         runner = self._runner(run, epoch)
         if run.state.status is RunStatus.NEW:
             runner.post(StartRun(line.header.process))
@@ -292,7 +321,10 @@ class Executive:
             del self.runners[oldest.id]
 
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
-        self.plugins.records_committed(run, records)
+        if self._script is not None:
+            self._script.seen(records)
+        if self._observed:
+            self.plugins.records_committed(run, records)
 
     # --- what happens outside -------------------------------------------------------------------
 

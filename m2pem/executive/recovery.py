@@ -15,6 +15,7 @@ from m2pem.engine.state import Behavior, BehaviorPhase
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.dispatch import Dispatcher
 from m2pem.executive.runner import Runner
+from m2pem.executive.script import Script
 from m2pem.journal.base import Journal
 from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import BehaviorState, ResourceId, ResumePolicy
@@ -25,11 +26,13 @@ QUERY_TIMEOUT_S = 10.0
 """How long an arbiter may take to look at a vehicle before it counts as unreachable."""
 
 
-async def replay(journal: Journal, run: MissionRun) -> int:
+async def replay(journal: Journal, run: MissionRun, script: Script | None) -> int:
     """Fold all of a run's records; returns when the last was decided (us since the Unix epoch)."""
     last_us = 0
     async for entry in journal.read(run.state.run):
         run.replay(entry.records)
+        if script is not None:
+            script.seen(entry.records)
         last_us = max(last_us, entry.at_us)
     return last_us
 

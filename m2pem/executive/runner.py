@@ -50,7 +50,7 @@ class Outside:
 class Runner:
     """One run and its task. `epoch` is the claim under which entries are written.
 
-    `max_steps`: engine steps after which a run that never waits is given up (rehearsals).
+    `max_steps`: engine steps after which a run is given up (rehearsals).
     """
 
     def __init__(
@@ -126,12 +126,13 @@ class Runner:
     async def _next_inputs(self) -> list[Input]:
         """What has happened, or what time or the engine itself wants; waits when nothing does."""
         while True:
+            if self._exhausted():
+                taken = f"given up after {self.run.steps_done} steps"
+                return [GiveUp(f"{taken}: {self._max_steps} are allowed")]
             if self._inbox:
                 batch, self._inbox = self._inbox[:MAX_BATCH], self._inbox[MAX_BATCH:]
                 return batch
             if self.run.wants_continue:
-                if self._max_steps is not None and self.run.steps_done >= self._max_steps:
-                    return [GiveUp(f"{self.run.steps_done} steps without waiting for anything")]
                 await asyncio.sleep(0)
                 if not self._inbox:
                     return [Continue()]
@@ -144,6 +145,13 @@ class Runner:
                 return [Tick()]
             else:
                 await self._wait_until(due_us)
+
+    def _exhausted(self) -> bool:
+        return (
+            self._max_steps is not None
+            and self.run.steps_done >= self._max_steps
+            and self.run.state.status is RunStatus.RUNNING
+        )
 
     async def _wait_until(self, due_us: int) -> None:
         woken = asyncio.ensure_future(self._wake.wait())

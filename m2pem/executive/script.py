@@ -4,10 +4,11 @@ The executive asks it before it runs a service or starts a behavior; `m2pem.sim.
 from a file.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from m2pem.engine.records import Record
 from m2pem.model.values import Value
 
 
@@ -30,12 +31,20 @@ class ScriptedBehavior:
 
 
 class Script(Protocol):
-    """Each call is one visit; None: nothing is scripted for it (any more)."""
+    """What is scripted for each visit to an element; None: nothing (any more).
 
-    def service(self, element: str, name: str) -> ScriptedService | None:
+    A visit is known by the id of the service or behavior: asked again for the same one (after a
+    restart), the script says the same again.
+    """
+
+    def seen(self, records: Sequence[Record]) -> None:
+        """These were committed: visits count in their order, also those of before a restart."""
+        ...
+
+    def service(self, element: str, name: str, service: str) -> ScriptedService | None:
         """What a service task does on this visit."""
         ...
 
-    def behavior(self, element: str) -> ScriptedBehavior | None:
+    def behavior(self, element: str, behavior: str) -> ScriptedBehavior | None:
         """How the behavior of an element ends on this visit."""
         ...

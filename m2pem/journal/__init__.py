@@ -15,6 +15,7 @@ __all__ = [
     "RunHeader",
     "RunLine",
     "default_url",
+    "file_of",
     "open_journal",
 ]
 
@@ -25,15 +26,25 @@ def open_journal(url: str) -> Journal:
     Raises:
         JournalError: it cannot be opened, or nothing opens such a URL.
     """
+    path = file_of(url)
+    return MemoryJournal() if path is None else _open_file(path)
+
+
+def file_of(url: str) -> Path | None:
+    """The file of the journal that `url` names; None for one in memory.
+
+    Raises:
+        JournalError: nothing opens such a URL.
+    """
     if url == "memory:":
-        return MemoryJournal()
+        return None
     parts = urlsplit(url)
     if parts.scheme == "sqlite":
         if parts.netloc or parts.query or parts.fragment or not parts.path.strip("/"):
             raise JournalError(
                 f"{url} is not a journal's URL: write sqlite:///absolute/path, or the path alone"
             )
-        return _open_file(Path(unquote(parts.path)))
+        return Path(unquote(parts.path))
     if parts.scheme in ("postgresql", "postgres"):
         raise JournalError(
             f"{_without_password(url)}: journals in PostgreSQL are reserved for a later version; "
@@ -44,7 +55,7 @@ def open_journal(url: str) -> Journal:
             f"{_without_password(url)!r} is not a journal's URL: "
             "write a path, sqlite:///absolute/path or memory:"
         )
-    return _open_file(Path(url).expanduser())
+    return Path(url).expanduser()
 
 
 def default_url() -> str:

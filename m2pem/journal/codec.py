@@ -5,7 +5,7 @@ equal objects. It is JSON because a journal outlives the program that wrote it.
 """
 
 import re
-from typing import Any, TypeAlias, get_args, get_origin
+from typing import TypeAlias
 
 import msgspec
 
@@ -13,27 +13,12 @@ from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record
 from m2pem.errors import InternalError, JournalError
 from m2pem.journal.base import Entry
-from m2pem.model.values import Value
 
 # 18 digits: what the 64-bit keys of a database hold.
 _RUN_ID = re.compile(r"r[1-9][0-9]{0,17}")
 
 Body: TypeAlias = tuple[Input, tuple[Record, ...]]
 
-
-def _without_recursion(annotation: Any) -> Any:
-    """Replace `Value` by any JSON, which is what it is: msgspec can't follow a recursive alias."""
-    if annotation == Value:
-        return Any
-    arguments = get_args(annotation)
-    if Value in arguments:
-        return get_origin(annotation)[tuple(Any if a == Value else a for a in arguments)]
-    return annotation
-
-
-for _struct in (*get_args(Input), *get_args(Record)):
-    for _name, _annotation in _struct.__annotations__.items():
-        _struct.__annotations__[_name] = _without_recursion(_annotation)
 
 _decoder: msgspec.json.Decoder[Body] = msgspec.json.Decoder(tuple[Input, tuple[Record, ...]])
 _encoder = msgspec.json.Encoder()

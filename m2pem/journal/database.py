@@ -1,7 +1,7 @@
 """The SQLite file of a journal: making and opening it, and its errors in plain words."""
 
-import os
 import sqlite3
+import time
 from pathlib import Path
 from urllib.parse import quote
 
@@ -20,50 +20,66 @@ def open_for_writing(path: Path) -> sqlite3.Connection:
     Raises:
         JournalError: there is no such folder, no permission, it is not a journal, ...
     """
-    if path.is_dir():
-        raise JournalError(f"{path} is a folder; name a file in it")
     try:
-        os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
-    except FileNotFoundError as error:
-        raise JournalError(f"{path}: the folder {path.parent} does not exist; make it") from error
-    except OSError as error:
-        raise JournalError(f"{path} cannot be opened for writing: {error.strerror}") from error
-    try:
-        connection = _connect(path)
+        if path.is_dir():
+            raise JournalError(f"{path} is a folder; name a file in it")
+        if not path.parent.is_dir():
+            raise JournalError(f"{path}: the folder {path.parent} does not exist; make it")
+        new = not path.exists()
+        connection = _connect(path, "rwc")
         try:
+            if new:
+                # Never by opening the file: closing it again would drop SQLite's own locks.
+                path.chmod(0o600)
             _prepare(connection, path)
         except BaseException:
             connection.close()
             raise
     except sqlite3.Error as error:
         raise in_plain_words(error, path) from error
+    except OSError as error:
+        raise JournalError(f"{path} cannot be opened: {error.strerror}") from error
     return connection
 
 
 def _prepare(connection: sqlite3.Connection, path: Path) -> None:
     # Checked before anything is changed: turning WAL on would already mark a foreign database.
-    check(connection, path)
-    (mode,) = connection.execute("PRAGMA journal_mode = WAL").fetchone()
-    if mode != "wal":
+    connection.execute("BEGIN")
+    try:
+        check(connection, path)
+    finally:
+        connection.execute("ROLLBACK")
+    if _turn_wal_on(connection) != "wal":
         raise JournalError(f"{path}: its file system can't carry a write-ahead log; use another")
     connection.execute("PRAGMA synchronous = FULL")
     migrate(connection, path)
 
 
+def _turn_wal_on(connection: sqlite3.Connection) -> str:
+    deadline_s = time.monotonic() + BUSY_TIMEOUT_S
+    while True:
+        try:
+            return str(connection.execute("PRAGMA journal_mode = WAL").fetchone()[0])
+        except sqlite3.OperationalError as error:
+            # Here, alone, SQLite doesn't wait for others who are opening the same new file.
+            if _primary_code(error) != sqlite3.SQLITE_BUSY or time.monotonic() > deadline_s:
+                raise
+            time.sleep(0.01)
+
+
 def open_for_reading(path: Path) -> sqlite3.Connection:
     """Open a second connection to a journal's file, which refuses to write."""
     try:
-        connection = _connect(path)
+        connection = _connect(path, "rw")
         connection.execute("PRAGMA query_only = ON")
     except sqlite3.Error as error:
         raise in_plain_words(error, path) from error
     return connection
 
 
-def _connect(path: Path) -> sqlite3.Connection:
-    # mode=rw: never make a file, so that its permissions are those given above.
+def _connect(path: Path, mode: str) -> sqlite3.Connection:
     return sqlite3.connect(
-        f"file:{quote(str(path))}?mode=rw",
+        f"file:{quote(str(path))}?mode={mode}",
         uri=True,
         timeout=BUSY_TIMEOUT_S,
         isolation_level=None,

@@ -51,11 +51,12 @@ class RunLocks:
         return number in self._held or self._locked_elsewhere(number)
 
     def close(self) -> None:
-        """Let go of all; nothing else may be called afterwards."""
+        """Let go of all. Nothing but `close` and `release`, which then do nothing, may follow."""
         for number in tuple(self._held):
             self.release(number)
-        _open_locks.discard(self)
-        self._close()
+        if self in _open_locks:
+            _open_locks.discard(self)
+            self._close()
 
     def forget(self) -> None:
         """In a forked child: the parent holds the locks, and they must not outlive it here."""

@@ -4,7 +4,7 @@ import asyncio
 import sqlite3
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -189,12 +189,18 @@ class SqliteJournal:
 
     async def close(self) -> None:
         """See `Journal.close`; closing it again does nothing."""
-        if not self._closed:
-            self._closed = True
-            await asyncio.shield(self._writer.stop())
+        if self._closed:
+            return
+        self._closed = True
+        stopped = self._writer.stop()
+        # Looked at so that asyncio doesn't report it: a journal that has failed has said so.
+        stopped.add_done_callback(asyncio.Future.exception)
+        await asyncio.wait([stopped])
 
     def _finish(self) -> None:
         self._reader.submit(self._reading.close)
         self._reader.shutdown()
-        self._writing.close()
+        # What can't be moved from the log into the file now is moved when it is opened next.
+        with suppress(sqlite3.Error):
+            self._writing.close()
         self._locks.close()

@@ -1,9 +1,13 @@
 """The values a mission's data store holds: what JSON can say, with exact 64-bit integers."""
 
 from collections.abc import Callable
-from typing import TypeAlias, Union
+from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
-Value: TypeAlias = Union[bool, int, float, str, list["Value"], dict[str, "Value"], None]
+if TYPE_CHECKING:
+    Value: TypeAlias = Union[bool, int, float, str, list["Value"], dict[str, "Value"], None]
+else:
+    # msgspec, which reads inputs and records back, cannot follow an alias that names itself.
+    Value = Any
 """A value of the data store. Lists and maps are never changed in place once written."""
 
 ReadValue: TypeAlias = Callable[[str], Value]

@@ -1,4 +1,4 @@
-"""Says in a person's words what pydantic found wrong with the shape of a fleet file."""
+"""Says in a person's words what pydantic found wrong with the shape of a YAML file."""
 
 from collections.abc import Mapping
 from types import UnionType
@@ -68,8 +68,8 @@ def _model_at(model: type[BaseModel], path: KeyPath) -> type[BaseModel]:
     for part in path:
         if isinstance(here, type) and issubclass(here, BaseModel):
             here = _unwrapped(here.model_fields[str(part)].annotation)
-        elif get_origin(here) is dict:
-            here = _unwrapped(get_args(here)[1])
+        elif get_origin(here) in (dict, list):
+            here = _unwrapped(get_args(here)[-1])
     return here if isinstance(here, type) and issubclass(here, BaseModel) else model
 
 

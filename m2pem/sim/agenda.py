@@ -12,16 +12,26 @@ from m2pem.api.clock import Clock
 class Entry:
     """One call to come; `cancel` makes it not come."""
 
-    __slots__ = ("at_us", "call", "number")
+    __slots__ = ("_over", "at_us", "call", "number")
 
-    def __init__(self, at_us: int, number: int, call: Callable[[int], None]) -> None:
+    def __init__(
+        self, at_us: int, number: int, call: Callable[[int], None], over: Callable[[], None]
+    ) -> None:
         self.at_us = at_us
         self.number = number
         self.call: Callable[[int], None] | None = call
+        self._over = over
 
     def cancel(self) -> None:
         """Forget it; harmless when it is over."""
-        self.call = None
+        self.take()
+
+    def take(self) -> Callable[[int], None] | None:
+        """The call, once."""
+        call, self.call = self.call, None
+        if call is not None:
+            self._over()
+        return call
 
     def __lt__(self, other: "Entry") -> bool:
         return (self.at_us, self.number) < (other.at_us, other.number)
@@ -29,7 +39,11 @@ class Entry:
 
 class Agenda:
     """Calls get the time that they were scheduled for, however late they come. So what happened
-    while nobody looked can be caught up with, and nothing drifts."""
+    while nobody looked can be caught up with, and nothing drifts.
+
+    `expected` counts the calls to come that may change something by themselves. In the
+    background is what goes on for ever: a pursuit, a battery that drains.
+    """
 
     def __init__(self, clock: Clock, logger: logging.Logger) -> None:
         self._clock = clock
@@ -39,10 +53,13 @@ class Agenda:
         self._sleeper: asyncio.Task[None] | None = None
         self._sleeping_until = 0
         self._awake = False
+        self.expected = 0
 
-    def at(self, time_us: int, call: Callable[[int], None]) -> Entry:
+    def at(self, time_us: int, call: Callable[[int], None], *, background: bool = False) -> Entry:
         """Schedule `call(time_us)`. Calls for the same time come in the order of scheduling."""
-        entry = Entry(time_us, next(self._numbers), call)
+        over = self._background_over if background else self._expected_over
+        self.expected += not background
+        entry = Entry(time_us, next(self._numbers), call, over)
         heapq.heappush(self._entries, entry)
         self._arm()
         return entry
@@ -51,7 +68,7 @@ class Agenda:
         """Make every call that is due, in order, also those that these schedule."""
         while self._entries and self._entries[0].at_us <= now_us:
             entry = heapq.heappop(self._entries)
-            call, entry.call = entry.call, None
+            call = entry.take()
             if call is None:
                 continue
             try:
@@ -72,6 +89,12 @@ class Agenda:
         if sleeper is not None:
             sleeper.cancel()
             await asyncio.gather(sleeper, return_exceptions=True)
+
+    def _expected_over(self) -> None:
+        self.expected -= 1
+
+    def _background_over(self) -> None:
+        pass
 
     def _arm(self) -> None:
         while self._entries and self._entries[0].call is None:

@@ -42,8 +42,8 @@ class SimArbiter:
     `telemetry_hz`: of every resource that does not say its own; 0 tells of changes alone, so that
     nothing happens while nothing moves, and then links can't be watched by silence.
 
-    Beside the protocol, tests and rehearsals look at `effects` and use `script`, `inject`,
-    `lose_link` and `restore_link`.
+    Beside the protocol, tests and rehearsals look at `effects`, `expects` and `searching`, and use
+    `script`, `inject`, `lose_link` and `restore_link`.
     """
 
     def __init__(
@@ -214,6 +214,19 @@ class SimArbiter:
     def effects(self) -> list[Effect]:
         """What physically happened, oldest first; the newest 10,000."""
         return list(self._memory.effects)
+
+    @property
+    def expects(self) -> bool:
+        """Whether anything is to come by itself: a behavior's end, a planned detection, a fault.
+
+        Not what may go on for ever: motion without an end, batteries that drain, telemetry.
+        """
+        return self._agenda.expected > 0
+
+    @property
+    def searching(self) -> bool:
+        """Whether a vehicle at work may yet come near something that its detector finds."""
+        return self._detectors.searching
 
     def script(self, behavior: BehaviorId, after_s: float, end: str, error: str = "") -> None:
         """Say, before it starts, how a behavior ends, instead of by its motion.

@@ -31,5 +31,5 @@ class Batteries:
         due = vehicle.drained_us(level, now_us)
         if due is not None:
             self._entries[vehicle.id] = self._agenda.at(
-                due, lambda at_us: self._drained(vehicle, at_us)
+                due, lambda at_us: self._drained(vehicle, at_us), background=True
             )

@@ -67,5 +67,7 @@ class Broadcast:
             )
             rate = rate if busy else min(rate, SLOWEST_HZ)
             self._next[body.id] = self._agenda.at(
-                now_us + round(US_PER_S / rate), lambda at_us: self.tell(body, at_us)
+                now_us + round(US_PER_S / rate),
+                lambda at_us: self.tell(body, at_us),
+                background=True,
             )

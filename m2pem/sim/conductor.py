@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Mapping
 
 from m2pem.api.arbiter import BehaviorRequest
 from m2pem.model.catalogue import BehaviorState, ResourceId
-from m2pem.sim.agenda import Agenda
+from m2pem.sim.agenda import Agenda, Entry
 from m2pem.sim.batteries import Batteries
 from m2pem.sim.chases import STEP_US, next_step
 from m2pem.sim.effects import Effect, EffectKind
@@ -143,7 +143,7 @@ class Conductor:
             for part in execution.parts:
                 if part.chasing and not part.body.held and not execution.cancelling:
                     since = max(part.body.track.started_us, now_us - LONGEST_CATCH_UP_US)
-                    part.timer = self._agenda.at(since + STEP_US, self._chaser(execution, part))
+                    part.timer = self._next_step(execution, part, since)
                 else:
                     self._schedule(execution, part)
             self._watch(execution)
@@ -278,15 +278,17 @@ class Conductor:
 
     def _step(self, execution: Execution, part: Part, now_us: int) -> None:
         next_step(part, self._launcher, now_us)
-        part.timer = self._agenda.at(now_us + STEP_US, self._chaser(execution, part))
+        part.timer = self._next_step(execution, part, now_us)
 
     def _chase(self, execution: Execution, part: Part, now_us: int) -> None:
         self._step(execution, part, now_us)
         self._changed(part.body, now_us)
         self.memory.save(execution)
 
-    def _chaser(self, execution: Execution, part: Part) -> Callable[[int], None]:
-        return lambda at_us: self._chase(execution, part, at_us)
+    def _next_step(self, execution: Execution, part: Part, now_us: int) -> Entry:
+        return self._agenda.at(
+            now_us + STEP_US, lambda at_us: self._chase(execution, part, at_us), background=True
+        )
 
     def _reschedule(self, execution: Execution, now_us: int) -> None:
         for part in execution.parts:

@@ -88,6 +88,16 @@ class Detectors:
             for detector in self._detectors
         )
 
+    @property
+    def searching(self) -> bool:
+        """Whether a vehicle at work carries a detector that has not found all that is planted."""
+        return any(
+            detector.carrier is not None
+            and detector.carrier.behavior
+            and any(True for _ in self._unfound(detector))
+            for detector in self._detectors
+        )
+
     def _unfound(self, detector: _Detector) -> Iterable[tuple[int, tuple[float, float]]]:
         settings = detector.payload.settings
         for index, target in enumerate(settings.targets):
@@ -106,7 +116,7 @@ class Detectors:
             at_us, near = _approach(detector.carrier, target, reach, now_us)
             if at_us is not None:
                 call = self._finder(detector, number) if near else self._looker(detector)
-                detector.entries.append(self._agenda.at(at_us, call))
+                detector.entries.append(self._agenda.at(at_us, call, background=not near))
 
     def _finder(self, detector: _Detector, number: int) -> Callable[[int], None]:
         return lambda at_us: self._find(detector, number, at_us)

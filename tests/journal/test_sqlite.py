@@ -1,5 +1,8 @@
 import asyncio
+import os
+import sqlite3
 import tracemalloc
+from contextlib import closing
 
 import pytest
 
@@ -73,25 +76,118 @@ async def test_reading_takes_memory_for_a_batch_not_for_the_run(open_journal):
 
 
 @pytest.mark.parametrize("act", ["create", "claim"])
-async def test_a_cancelled_claim_is_not_held_for_ever(open_journal, act):
+async def test_what_a_cancelled_call_took_is_let_go_of(open_journal, act):
     async with opened(open_journal) as journal:
-        run = await journal.create(HEADER)
+        taken = "r2" if act == "create" else await journal.create(HEADER)
         if act == "claim":
-            await journal.release(run)
+            await journal.release(taken)
+        else:
+            await journal.create(HEADER)
         call = asyncio.ensure_future(
-            journal.create(HEADER) if act == "create" else journal.claim(run)
+            journal.create(HEADER) if act == "create" else journal.claim(taken)
         )
         await asyncio.sleep(0)
         call.cancel()
-        assert await asyncio.gather(call, return_exceptions=True) == [call_cancelled(call)]
-        taken = (await journal.runs())[-1].run
-        while (await line(journal, taken)).driven:
-            # Each turn is a round trip through the reading thread.
-            await journal.append([])
-            taken = (await journal.runs())[-1].run
-        assert await journal.claim(taken) >= 2
+        await asyncio.wait([call])
+        assert call.cancelled()
+        # Waiting for it in turns through the writing thread.
+        while (found := (await journal.runs())[-1]).run != taken or found.driven:
+            await journal.release("r9")
+        assert await journal.claim(taken) == found.epoch + 1
 
 
-def call_cancelled(call):
-    assert call.cancelled()
-    return pytest.approx(asyncio.CancelledError()) if False else None
+async def test_a_cancelled_claim_that_fails_takes_nothing_from_who_drives(open_journal):
+    async with opened(open_journal) as journal:
+        run = await journal.create(HEADER)
+        call = asyncio.ensure_future(journal.claim(run))
+        await asyncio.sleep(0)
+        call.cancel()
+        await asyncio.wait([call])
+        await journal.append([entry(run, 1)])
+        assert (await line(journal, run)).driven
+
+
+async def test_a_cancelled_release_still_lets_go(open_journal):
+    async with opened(open_journal) as journal:
+        run = await journal.create(HEADER)
+        call = asyncio.ensure_future(journal.release(run))
+        await asyncio.sleep(0)
+        call.cancel()
+        await asyncio.wait([call])
+        while (await line(journal, run)).driven:
+            await journal.release("r9")
+        assert await journal.claim(run) == 2
+
+
+async def test_a_cancelled_close_still_closes(open_journal):
+    journal = open_journal()
+    run = await journal.create(HEADER)
+    call = asyncio.ensure_future(journal.close())
+    await asyncio.sleep(0)
+    call.cancel()
+    await asyncio.wait([call])
+    async with opened(open_journal) as again:
+        while (await line(again, run)).driven:
+            await again.release("r9")
+        assert await again.claim(run) == 2
+
+
+def test_a_journal_serves_one_event_loop_after_another(open_journal):
+    journal = open_journal()
+    run = asyncio.run(journal.create(HEADER))
+    asyncio.run(journal.append([entry(run, 1)]))
+    assert asyncio.run(written(journal, run)) == [entry(run, 1)]
+    asyncio.run(journal.close())
+
+
+def test_a_loop_that_ends_before_its_append_leaves_the_writer_alive(open_journal):
+    journal = open_journal()
+    run = asyncio.run(journal.create(HEADER))
+
+    async def leave_early():
+        call = asyncio.ensure_future(journal.append([entry(run, 1)]))
+        await asyncio.sleep(0)
+        assert not call.done()
+
+    asyncio.run(leave_early())
+    asyncio.run(journal.append([entry(run, 2)]))
+    assert [found.seq for found in asyncio.run(written(journal, run))] == [1, 2]
+    asyncio.run(journal.close())
+
+
+async def test_many_journals_open_a_new_file_at_once(tmp_path):
+    path = tmp_path / "journal.db"
+    journals = await asyncio.gather(
+        *(asyncio.to_thread(SqliteJournal.open, path) for _ in range(8))
+    )
+    runs = await asyncio.gather(*(journal.create(HEADER) for journal in journals))
+    assert sorted(runs) == [f"r{number}" for number in range(1, 9)]
+    await asyncio.gather(
+        *(journal.append([entry(run, 1)]) for journal, run in zip(journals, runs, strict=True))
+    )
+    assert {found.last_seq for found in await journals[0].runs()} == {1}
+    for journal in journals:
+        await journal.close()
+
+
+async def test_symbolic_links_lead_to_the_same_locks(tmp_path):
+    (tmp_path / "link.db").symlink_to(tmp_path / "journal.db")
+    async with opened(lambda: SqliteJournal.open(tmp_path / "journal.db")) as one:
+        run = await one.create(HEADER)
+        async with opened(lambda: SqliteJournal.open(tmp_path / "link.db")) as two:
+            with pytest.raises(JournalError, match=f"r1 is driven by process {os.getpid()}"):
+                await two.claim(run)
+
+
+async def test_a_damaged_entry_is_named(open_journal, tmp_path):
+    async with opened(open_journal) as journal:
+        run = await journal.create(HEADER)
+        await journal.append([entry(run, 1), entry(run, 2)])
+    with closing(sqlite3.connect(tmp_path / "journal.db")) as connection, connection:
+        connection.execute(
+            "UPDATE entries SET body = replace(body, 'InputIgnored', 'NotYetKnown') WHERE seq = 2"
+        )
+    async with opened(open_journal) as journal:
+        reading = journal.read(run)
+        with pytest.raises(JournalError, match=r"journal\.db: r1, record 2: .*newer m2pem"):
+            _ = [found async for found in reading]

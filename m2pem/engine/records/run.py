@@ -36,7 +36,7 @@ class RunEnded(BaseRecord, frozen=True):
     """Nothing follows but reports of behaviors that were still being cancelled."""
 
     outcome: RunOutcome
-    detail: str = ""
+    detail: str
 
 
 class RunYielded(BaseRecord, frozen=True):

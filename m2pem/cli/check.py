@@ -1,0 +1,123 @@
+"""`m2pem check`: everything that is wrong or doubtful about a mission."""
+
+from typing import TYPE_CHECKING
+
+import click
+
+from m2pem.cli.options import (
+    as_json,
+    data_option,
+    example,
+    fleet_option,
+    format_option,
+    mission_argument,
+    process_option,
+)
+from m2pem.errors import FleetError, MissionError
+from m2pem.findings import Finding, Severity, has_errors
+
+if TYPE_CHECKING:
+    from m2pem.model.elements import Mission
+    from m2pem.model.values import Value
+
+UNUSABLE = 2
+
+
+@click.command(
+    epilog=example(
+        "m2pem check missions/vignette1.bpmn --fleet fleet_configs/vignette1.yaml --strict"
+    )
+)
+@mission_argument
+@fleet_option(required=False)
+@process_option
+@data_option
+@click.option("--strict", is_flag=True, help="Warnings are errors.")
+@format_option
+def check(
+    mission: str,
+    fleet_file: str | None,
+    process: str | None,
+    data: "dict[str, Value]",
+    strict: bool,
+    output: str,
+) -> int:
+    """Check a mission file, alone or against a fleet.
+
+    Prints every finding. Ends with 0 if none is an error, with 1 if one is, and with 2 if the
+    mission is no BPMN at all or the fleet cannot be used.
+    """
+    findings, unusable = _check(mission, fleet_file, process, data)
+    if output == "json":
+        click.echo(as_json(findings))
+    else:
+        for finding in findings:
+            click.echo(str(finding))
+        click.echo(_summary(mission, findings))
+    if unusable:
+        return UNUSABLE
+    return 1 if has_errors(findings) or (strict and findings) else 0
+
+
+def _check(
+    mission_file: str, fleet_file: str | None, process: str | None, data: "dict[str, Value]"
+) -> tuple[list[Finding], bool]:
+    """All findings, and whether there is nothing there to be checked."""
+    from m2pem.executive.loading import read_source
+    from m2pem.model.bpmn import NO_BPMN_RULES, parse_mission
+
+    mission: Mission | None = None
+    findings: list[Finding] = []
+    unusable = False
+    try:
+        name, source = read_source(mission_file)
+        mission = parse_mission(source, name)
+    except MissionError as error:
+        findings += error.findings
+        unusable = any(finding.rule in NO_BPMN_RULES for finding in error.findings)
+    try:
+        findings += _against_fleet(mission, fleet_file, process, data)
+    except FleetError as error:
+        findings += error.findings
+        unusable = True
+    return findings, unusable
+
+
+def _against_fleet(
+    mission: "Mission | None", fleet_file: str | None, process: str | None, data: "dict[str, Value]"
+) -> list[Finding]:
+    from m2pem.cli.fleets import arbiters_of, get_fleet
+    from m2pem.cli.options import MADE_UP
+    from m2pem.executive.loading import findings_for
+    from m2pem.plugins import PluginManager
+    from m2pem.resources.fleet_file import load_fleet
+
+    if mission is None:
+        if fleet_file is not None and fleet_file != MADE_UP:
+            load_fleet(fleet_file)
+        return []
+    plugins = PluginManager()
+    arbiters = None
+    failed: FleetError | None = None
+    if fleet_file is not None:
+        try:
+            arbiters = arbiters_of(get_fleet(fleet_file, mission), plugins)
+        except FleetError as error:
+            failed = error
+    findings = findings_for(mission, arbiters, plugins, tuple(data), process)
+    if failed is not None:
+        raise FleetError(failed.what, [*findings, *failed.findings])
+    return findings
+
+
+def _summary(mission: str, findings: list[Finding]) -> str:
+    errors = sum(finding.severity is Severity.ERROR for finding in findings)
+    warnings = len(findings) - errors
+    if not findings:
+        return f"{mission}: nothing found"
+    counts = [
+        f"{count} {word}{'' if count == 1 else 's'}"
+        for count, word in ((errors, "error"), (warnings, "warning"))
+        if count
+    ]
+    return f"{mission}: {', '.join(counts)}"

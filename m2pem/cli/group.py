@@ -1,0 +1,110 @@
+"""The top command. Its commands' modules, and plugins, are loaded only when they are needed."""
+
+import logging
+from functools import cached_property
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+import click
+
+import m2pem
+
+if TYPE_CHECKING:
+    from m2pem.plugins import PluginManager
+
+COMMANDS = {
+    "run": "Run a mission to its end.",
+    "serve": "Serve operators, who start missions, until stopped.",
+    "check": "Check a mission file, alone or against a fleet.",
+    "simulate": "Rehearse a mission on a virtual clock.",
+    "runs": "List the runs of a journal.",
+    "replay": "Print what happened in a run, and how it stands.",
+    "resume": "Take up a run that was interrupted.",
+    "plugins": "List the plugins and what they provide.",
+    "fleet": "Show a fleet: who is there and can do what.",
+    "completion": "Print what makes a shell complete m2pem's words.",
+}
+"""Built-in commands: module of `m2pem.cli` and first line of its help."""
+
+
+class LazyGroup(click.Group):
+    """A group that imports a built-in command when it is called, and asks the plugins last.
+
+    `--help` shows built-in commands by `COMMANDS`, so that it loads none of them.
+    """
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Built-in commands, then those of plugins."""
+        return [*COMMANDS, *sorted(self._of_plugins.commands)]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of that name; None if nobody has it."""
+        if cmd_name in COMMANDS:
+            command = getattr(import_module(f"m2pem.cli.{cmd_name}"), cmd_name)
+            assert isinstance(command, click.Command)
+            return command
+        return self._of_plugins.commands.get(cmd_name)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As click's; an unknown command that a broken plugin may have had is told as such."""
+        name = args[0]
+        if not name.startswith("-") and self.get_command(ctx, name) is None:
+            raise click.UsageError(str(self._plugins.unknown("command", name)), ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list of commands in `--help`."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+        if added := self._of_plugins.commands:
+            with formatter.section("Commands of plugins"):
+                formatter.write_dl(
+                    [(name, added[name].get_short_help_str(70)) for name in sorted(added)]
+                )
+
+    @cached_property
+    def _plugins(self) -> "PluginManager":
+        from m2pem.plugins import PluginManager
+
+        return PluginManager()
+
+    @cached_property
+    def _of_plugins(self) -> click.Group:
+        group = built_in_names()
+        self._plugins.commands(group)
+        return group
+
+
+def built_in_names() -> click.Group:
+    """What plugins add their commands to: it knows which names are taken."""
+    return _Names("m2pem")
+
+
+class _Names(click.Group):
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return [*COMMANDS, *self.commands]
+
+
+@click.group(
+    cls=LazyGroup,
+    epilog="Each command shows an example with --help. The guide is docs/cli.md.",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.version_option(m2pem.__version__, prog_name="m2pem")
+@click.option("--debug", is_flag=True, help="Log everything, and show tracebacks.")
+def cli(debug: bool) -> None:
+    """Plan, check, rehearse and run missions of unmanned vehicles, drawn in BPMN 2.0."""
+    _log_to_stderr(logging.DEBUG if debug else logging.WARNING)
+
+
+def _log_to_stderr(level: int) -> None:
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
+    logger = logging.getLogger("m2pem")
+    logger.handlers[:] = [handler]
+    logger.propagate = False
+    logger.setLevel(level)
+
+

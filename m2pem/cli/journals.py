@@ -1,0 +1,66 @@
+"""Opens the journal that a command names, and finds runs in it."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from m2pem.cli.options import UnusableError
+from m2pem.journal import Journal, MemoryJournal, RunLine, default_url, file_of, open_journal
+
+
+def url_of(url: str | None) -> str:
+    """The journal's URL: the user's own when none is named."""
+    return url or default_url()
+
+
+@asynccontextmanager
+async def journal_at(url: str) -> AsyncIterator[Journal]:
+    """The journal, open within the block; its file is made where it is missing."""
+    journal = open_journal(url)
+    try:
+        yield journal
+    finally:
+        await journal.close()
+
+
+@asynccontextmanager
+async def existing_journal(url: str | None) -> AsyncIterator[Journal]:
+    """A journal that is to be read, open within the block.
+
+    The user's own may be missing yet; it is then an empty one.
+
+    Raises:
+        UnusableError: there is no such file.
+    """
+    path = file_of(url_of(url))
+    if path is None or path.exists():
+        async with journal_at(url_of(url)) as journal:
+            yield journal
+    elif url is not None:
+        raise UnusableError(f"there is no journal {path}")
+    else:
+        yield MemoryJournal()
+
+
+async def find_run(journal: Journal, run: str) -> RunLine:
+    """What the journal says of a run.
+
+    Raises:
+        UnusableError: it has no such run.
+    """
+    lines = {line.run: line for line in await journal.runs()}
+    if run not in lines:
+        there = f"it has {', '.join(lines)}" if lines else "it has none yet"
+        raise UnusableError(f"the journal has no run {run!r}; {there}")
+    return lines[run]
+
+
+async def last_decided_us(journal: Journal, line: RunLine) -> int:
+    """When the last input of a run was decided, in microseconds since the Unix epoch."""
+    back = 1
+    while True:
+        # An entry is found by its first record, and nobody knows how many the last one has.
+        after = max(0, line.last_seq - back)
+        times = [entry.at_us async for entry in journal.read(line.run, after)]
+        if times or after == 0:
+            return max(times, default=line.started_us)
+        back *= 10

@@ -1,0 +1,127 @@
+"""Options that several commands have."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from m2pem.errors import M2pemError
+
+if TYPE_CHECKING:
+    from m2pem.model.values import Value
+
+MADE_UP = "sim"
+"""The fleet's name that stands for one made up from the mission."""
+
+
+class UnusableError(M2pemError):
+    """What the command line names is not there or cannot be used."""
+
+    exit_status = 2
+
+
+mission_argument = click.argument("mission")
+
+run_argument = click.argument("run_id", metavar="RUN")
+
+format_option = click.option(
+    "--format",
+    "output",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="Print for people, or for programs.",
+)
+
+journal_option = click.option(
+    "--journal",
+    metavar="URL",
+    help="Where runs are kept: a path, sqlite:///path or memory:  "
+    "[default: m2pem/journal.db in $XDG_STATE_HOME or ~/.local/state]",
+)
+
+
+def fleet_option(*, required: bool) -> Any:
+    """`--fleet`; `required` where a mission cannot do without."""
+    return click.option(
+        "--fleet",
+        "fleet_file",
+        metavar="FLEET",
+        required=required,
+        help="The fleet file; `sim` makes vehicles up for the mission.",
+    )
+
+
+process_option = click.option(
+    "--process", metavar="ID", help="The process to begin with  [default: the mission's main one]"
+)
+
+
+def _read_data(_: click.Context, __: click.Parameter, words: tuple[str, ...]) -> "dict[str, Value]":
+    if not words:
+        return {}
+    from m2pem.resources.yaml_source import parse_yaml
+
+    data: dict[str, Value] = {}
+    for word in words:
+        name, equals, text = word.partition("=")
+        name = name.strip()
+        if not equals or not name:
+            raise click.BadParameter(f"{word!r} is not of the form NAME=VALUE")
+        if name in data:
+            raise click.BadParameter(f"{name} is given twice")
+        source = parse_yaml(text.encode("utf-8", "replace"), name)
+        if source.findings:
+            problem = source.findings[0]
+            raise click.BadParameter(f"the value of {name} {problem.message}")
+        data[name] = source.data
+    return data
+
+
+data_option = click.option(
+    "--data",
+    metavar="NAME=VALUE",
+    multiple=True,
+    callback=_read_data,
+    help="Data that the mission starts with; the value is YAML 1.2. Can be given again.",
+)
+
+answers_option = click.option(
+    "--answers",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Script operators, services, signals and behaviors from this file.",
+)
+
+ocu_option = click.option(
+    "--ocu",
+    "ocu_names",
+    metavar="NAMES",
+    help="Operator control units, separated by commas; none for nobody  "
+    "[default: terminal if it is installed and this is one, else plain]",
+)
+
+speed_option = click.option(
+    "--speed",
+    type=click.FloatRange(min=0, min_open=True, max=1_000_000),
+    default=1.0,
+    show_default=True,
+    help="Of simulated vehicles and timers against the wall clock.",
+)
+
+simulate_option = click.option(
+    "--simulate", is_flag=True, help="Simulate every vehicle and payload of the fleet."
+)
+
+
+def example(text: str) -> str:
+    """The end of a command's help: one example."""
+    return f"\b\nExample:\n  {text}"
+
+
+def as_json(value: object, *, lines: bool = False) -> str:
+    """JSON for programs, spread over lines that people can read too unless `lines`."""
+    import msgspec
+
+    encoded = msgspec.json.encode(value)
+    return (encoded if lines else msgspec.json.format(encoded, indent=2)).decode()

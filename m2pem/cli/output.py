@@ -1,0 +1,79 @@
+"""Prints what is committed, as it is: a line for people, or a record as JSON."""
+
+import asyncio
+import os
+import sys
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import contextmanager
+from typing import TextIO
+
+from m2pem.api.control import Notice, RunId, StampedRecord
+from m2pem.cli.story import Story
+from m2pem.cli.writer import LineWriter, writer_for
+from m2pem.journal.codec import record_line
+from m2pem.model.elements import Mission
+
+US_PER_S = 1_000_000
+PAUSE_S = 0.05
+
+
+def wants_colour(stream: TextIO) -> bool:
+    """Whether a stream is a terminal whose owner has not set NO_COLOR."""
+    return stream.isatty() and not os.environ.get("NO_COLOR")
+
+
+class Output:
+    """Standard output, for records. Made by `output_of`."""
+
+    def __init__(self, stream: TextIO, *, as_json: bool) -> None:
+        self.story: Story | None = None
+        self._stream = stream
+        self._as_json = as_json
+        self.writer: LineWriter = writer_for(stream)
+
+    def about(self, mission: Callable[[RunId], Mission | None], main: RunId = "") -> Story:
+        """Say where the diagrams are; records can be printed from now on."""
+        self.story = Story(mission, colour=wants_colour(self._stream), main=main)
+        return self.story
+
+    def show(self, stamped: StampedRecord) -> None:
+        """Print a record."""
+        if self._as_json:
+            t_us = round(stamped.t_s * US_PER_S)
+            self.writer.put(record_line(stamped.run, stamped.seq, t_us, stamped.record).decode())
+            return
+        assert self.story is not None
+        line = self.story.tell(stamped)
+        if line is not None:
+            self.writer.put(line)
+
+    async def follow(self, notices: AsyncIterator[Notice]) -> None:
+        """Print every record that is told, until there will be no more."""
+        async for notice in notices:
+            if isinstance(notice, StampedRecord):
+                self.show(notice)
+                while self.writer.full and not self.writer.broken:
+                    await asyncio.sleep(PAUSE_S)
+
+    async def drain(self) -> None:
+        """Wait until all is printed."""
+        await asyncio.to_thread(self.writer.drain)
+
+
+@contextmanager
+def output_of(wanted: str) -> Iterator[Output]:
+    """The output in a format, `text` or `json`.
+
+    Within, as JSON, whatever else prints (an OCU, a plugin) does so on standard error.
+    """
+    stdout = sys.stdout
+    as_json = wanted == "json"
+    reconfigure = getattr(stdout, "reconfigure", None)
+    if reconfigure is not None:
+        reconfigure(**({"encoding": "utf-8"} if as_json else {"errors": "replace"}))
+    if as_json:
+        sys.stdout = sys.stderr
+    try:
+        yield Output(stdout, as_json=as_json)
+    finally:
+        sys.stdout = stdout
