@@ -1,0 +1,95 @@
+"""The log: what happened in the run that is looked at, all of it or the lines with some text."""
+
+from collections.abc import Iterable
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.containers import Vertical
+from textual.widgets import Input, RichLog
+
+from m2pem_plugin_terminal.story import Line, Weight
+
+STYLES = {
+    Weight.QUIET: "#747c86",
+    Weight.PLAIN: "#c8d0d9",
+    Weight.GOOD: "#8fb89a",
+    Weight.ALARM: "bold #e07a6a",
+}
+
+
+class LogPane(Vertical):
+    """Newest line last; the filter is typed below it."""
+
+    def __init__(self) -> None:
+        super().__init__(id="log")
+        self._filter = ""
+        self._lines: list[Line] = []
+
+    def compose(self) -> ComposeResult:
+        """The lines, and the filter, hidden until asked for."""
+        lines = RichLog(wrap=True, min_width=0, max_lines=2000, markup=False, highlight=False)
+        lines.can_focus = False
+        yield lines
+        yield Input(placeholder="only lines with ...", id="filter", compact=True)
+
+    def on_mount(self) -> None:
+        """Begin without a filter."""
+        self.border_title = "Log"
+        self.query_one(Input).display = False
+
+    def show(self, lines: Iterable[Line]) -> None:
+        """Show these instead."""
+        self._lines = list(lines)
+        self._rewrite()
+
+    def add(self, line: Line) -> None:
+        """One more."""
+        self._lines.append(line)
+        if self._passes(line):
+            self.query_one(RichLog).write(_styled(line))
+
+    def ask_filter(self) -> None:
+        """Let the operator type."""
+        asked = self.query_one(Input)
+        asked.display = True
+        asked.focus()
+
+    def clear_filter(self) -> None:
+        """Show all lines again."""
+        self.query_one(Input).value = ""
+        self._close()
+
+    @property
+    def filtering(self) -> bool:
+        """Whether lines are left out, or the filter is being typed."""
+        return bool(self._filter) or self.query_one(Input).has_focus
+
+    def on_input_changed(self, event: Input.Changed) -> None:
+        """The lines follow while it is typed."""
+        self._filter = event.value.strip().lower()
+        self.border_title = f"Log: {self._filter}" if self._filter else "Log"
+        self._rewrite()
+
+    def on_input_submitted(self) -> None:
+        """The filter stays; keys are commands again."""
+        self._close()
+
+    def _close(self) -> None:
+        asked = self.query_one(Input)
+        asked.display = False
+        self.screen.set_focus(None)
+
+    def _passes(self, line: Line) -> bool:
+        return self._filter in f"{line.time} {line.text}".lower()
+
+    def _rewrite(self) -> None:
+        log = self.query_one(RichLog)
+        log.clear()
+        for line in self._lines:
+            if self._passes(line):
+                log.write(_styled(line))
+
+
+def _styled(line: Line) -> Text:
+    text = " ".join(line.text.split())
+    return Text.assemble((f"{line.time:>7}  ", "#747c86"), (text, STYLES[line.weight]))
