@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
-from m2pem.resources.parameters import ResolvedValue as ResolvedValue
+from m2pem.resources import parameters
 
 if TYPE_CHECKING:
     import logging
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 BehaviorId: TypeAlias = str
 """Unique in a journal: "r1.b3" is the third behavior of run r1."""
+
+ResolvedValue: TypeAlias = parameters.ResolvedValue
+"""A parameter's value after units and names are resolved: SI numbers, texts, geometries."""
 
 
 @dataclass(frozen=True, slots=True)

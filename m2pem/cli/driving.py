@@ -1,17 +1,20 @@
-"""One executive at a command line: what it does is printed, operators are served, signals heeded."""
+"""One executive at a command line: it prints what happens, serves operators, heeds signals."""
 
 import asyncio
-from collections.abc import AsyncIterator, Iterable
+import logging
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
-from pathlib import Path
 
-from m2pem.api.control import MissionControl, RunId, RunStatus, RunSummary
+from m2pem.api.control import RunId, RunStatus
 from m2pem.cli.entry import STOPPED, ignore_closed_stdout
 from m2pem.cli.interruption import Interruption
-from m2pem.cli.ocus import Operators
+from m2pem.cli.ocus import PLAIN, Operators
 from m2pem.cli.output import Output
 from m2pem.executive.executive import Executive
 from m2pem.model.elements import Mission
+from m2pem.sim.answers import Answers
+
+log = logging.getLogger("m2pem.cli")
 
 BACKLOG = 1_000_000
 """Records that may wait to be printed before printing is given up."""
@@ -24,34 +27,20 @@ EXIT_STATUS = {
 }
 
 
-class Driving:
-    """What a command does with its executive while it is open; made by `driving`."""
-
-    def __init__(self, executive: Executive, output: Output, interruption: Interruption) -> None:
-        self.executive = executive
-        self.control: MissionControl = executive.control
-        self.interruption = interruption
-        self.output = output
-
-    async def until_all_ended(self, main: RunId) -> RunSummary:
-        """Wait for a run, and for those that operators started beside it."""
-        summary = await self.control.wait(main)
-        while others := [run for run, each in self.executive.runners.items() if not each.done.is_set()]:
-            await self.control.wait(others[0])
-        return summary
-
-
 @asynccontextmanager
 async def driving(
-    executive: Executive, output: Output, operators: Operators
-) -> AsyncIterator[Driving]:
-    """Connect, print and serve within the block; at its end, stop what still runs and close."""
+    executive: Executive, output: Output, operators: Operators, *, one: bool
+) -> AsyncIterator[Interruption]:
+    """Connect, print and serve within the block; at its end, stop what still runs and close.
+
+    `one`: there is one run that matters, or several.
+    """
 
     def mission(run: RunId) -> Mission | None:
         runner = executive.runners.get(run)
         return runner.run.state.mission if runner is not None else None
 
-    output.about(mission)
+    output.tell_by(mission, one=one, asks=PLAIN not in operators.names)
     loop = asyncio.get_running_loop()
     with Interruption(executive) as interruption:
 
@@ -62,9 +51,9 @@ async def driving(
         async with executive:
             notices = executive.control.subscribe(size=BACKLOG)
             printing = asyncio.create_task(output.follow(notices))
-            operators.begin(executive.control)
             try:
-                yield Driving(executive, output, interruption)
+                operators.begin(executive.control)
+                yield interruption
             finally:
                 await operators.end()
         await printing
@@ -73,8 +62,42 @@ async def driving(
         ignore_closed_stdout()
 
 
-def remove_states(paths: Iterable[str]) -> None:
-    """Delete the files of simulated vehicles that nobody will take up again."""
-    for path in paths:
-        for name in (path, f"{path}-wal", f"{path}-shm"):
-            Path(name).unlink(missing_ok=True)
+async def drive_run(
+    executive: Executive,
+    output: Output,
+    operators: Operators,
+    answers: Answers | None,
+    begin: Callable[[], Awaitable[RunId]],
+) -> int:
+    """Begin a run, see it to its end, and return the exit status.
+
+    Runs that operators start beside it are seen to their ends, too.
+
+    Raises:
+        M2pemError: it cannot begin, or its executive can drive it no further.
+    """
+    async with driving(executive, output, operators, one=True) as interruption:
+        if interruption.asked.is_set():
+            return STOPPED
+        run = await begin()
+        if interruption.asked.is_set():
+            await executive.stop_all("stopped while it began")
+        acting = asyncio.create_task(_act(answers, executive, run))
+        try:
+            summary = await executive.control.wait(run)
+            while others := [
+                key for key, each in executive.runners.items() if not each.done.is_set()
+            ]:
+                await executive.control.wait(others[0])
+        finally:
+            acting.cancel()
+    return EXIT_STATUS[summary.status]
+
+
+async def _act(answers: Answers | None, executive: Executive, run: RunId) -> None:
+    if answers is None:
+        return
+    try:
+        await answers.act(executive.control, run, executive.clock, default_first_decision=False)
+    except Exception:
+        log.exception("the answers file broke off; the mission goes on without it")

@@ -1,38 +1,31 @@
-"""Gets the fleet that a command names, and asks its arbiters what they offer."""
+"""Asks a fleet's arbiters what they offer, without connecting them."""
 
 import logging
 
 from m2pem.api.arbiter import ArbiterContext
-from m2pem.cli.options import MADE_UP
+from m2pem.cli.options import UnusableError
+from m2pem.errors import PluginError
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.clock import SystemClock
 from m2pem.gateway.bus import Bus
-from m2pem.model.elements import Mission
 from m2pem.plugins import PluginManager
 from m2pem.resources.fleet import Fleet
-from m2pem.resources.fleet_file import load_fleet
-from m2pem.resources.madeup import fleet_for
 
 
-def get_fleet(name: str, mission: Mission) -> Fleet:
-    """The fleet of a file, or one that is made up for the mission.
+def arbiters_of(fleet: Fleet, plugins: PluginManager) -> FleetArbiters:
+    """The arbiters of a fleet, for questions alone.
 
     Raises:
-        FleetError: with every finding.
+        UnusableError: the fleet names an arbiter that no plugin provides.
     """
-    return fleet_for(mission) if name == MADE_UP else load_fleet(name)
-
-
-def arbiters_of(
-    fleet: Fleet, plugins: PluginManager, *, simulated: bool = False
-) -> FleetArbiters:
-    """The arbiters of a fleet, for questions alone: they are never connected."""
-    clock = SystemClock()
     context = ArbiterContext(
-        clock,
+        SystemClock(),
         Bus(),
         logging.getLogger("m2pem.arbiter"),
         fleet.origin,
         {team.name: team.members for team in fleet.teams.values()},
     )
-    return FleetArbiters(fleet, plugins, context, simulated=simulated)
+    try:
+        return FleetArbiters(fleet, plugins, context)
+    except PluginError as error:
+        raise UnusableError(f"{fleet.file}: {error}") from error

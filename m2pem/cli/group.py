@@ -106,5 +106,3 @@ def _log_to_stderr(level: int) -> None:
     logger.handlers[:] = [handler]
     logger.propagate = False
     logger.setLevel(level)
-
-

@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM: the first stops cleanly, the second says what is waited for, a third gives up."""
+"""SIGINT and SIGTERM: one stops cleanly, a second says what is waited for, a third gives up."""
 
 import asyncio
 import os

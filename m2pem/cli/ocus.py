@@ -44,6 +44,7 @@ class Operators:
     """The units at work. One that breaks is told of and stops nothing."""
 
     def __init__(self, names: Sequence[str], plugins: PluginManager) -> None:
+        self.names = tuple(names)
         self._factories = {name: plugins.ocu(name) for name in names}
         self._tasks: list[asyncio.Task[None]] = []
 

@@ -1,7 +1,8 @@
 """Options that several commands have."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -9,6 +10,8 @@ from m2pem.errors import M2pemError
 
 if TYPE_CHECKING:
     from m2pem.model.values import Value
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 MADE_UP = "sim"
 """The fleet's name that stands for one made up from the mission."""
@@ -41,7 +44,7 @@ journal_option = click.option(
 )
 
 
-def fleet_option(*, required: bool) -> Any:
+def fleet_option(*, required: bool) -> Callable[[F], F]:
     """`--fleet`; `required` where a mission cannot do without."""
     return click.option(
         "--fleet",

@@ -14,7 +14,6 @@ from m2pem.journal.codec import record_line
 from m2pem.model.elements import Mission
 
 US_PER_S = 1_000_000
-PAUSE_S = 0.05
 
 
 def wants_colour(stream: TextIO) -> bool:
@@ -31,10 +30,9 @@ class Output:
         self._as_json = as_json
         self.writer: LineWriter = writer_for(stream)
 
-    def about(self, mission: Callable[[RunId], Mission | None], main: RunId = "") -> Story:
-        """Say where the diagrams are; records can be printed from now on."""
-        self.story = Story(mission, colour=wants_colour(self._stream), main=main)
-        return self.story
+    def tell_by(self, mission: Callable[[RunId], Mission | None], *, one: bool, asks: bool) -> None:
+        """Say where the diagrams are, and the rest of `Story`; then records can be printed."""
+        self.story = Story(mission, colour=wants_colour(self._stream), one=one, asks=asks)
 
     def show(self, stamped: StampedRecord) -> None:
         """Print a record."""
@@ -52,8 +50,8 @@ class Output:
         async for notice in notices:
             if isinstance(notice, StampedRecord):
                 self.show(notice)
-                while self.writer.full and not self.writer.broken:
-                    await asyncio.sleep(PAUSE_S)
+                if self.writer.full:
+                    await self.drain()
 
     async def drain(self) -> None:
         """Wait until all is printed."""

@@ -58,19 +58,68 @@ def run(
     cannot be started, and with 130 if an operator stopped it. Ctrl-C stops it, and waits until its
     vehicles are released.
     """
-    from m2pem.cli.starting import run_mission
-
     return asyncio.run(
-        run_mission(
+        _run(
             mission,
             fleet_file,
             process=process,
             data=data,
-            journal=journal,
+            journal_url=journal,
             ocu_names=ocu_names,
-            answers=answers,
+            answers_file=answers,
             simulated=simulate,
             speed=speed,
             output=output,
         )
     )
+
+
+async def _run(
+    mission_file: str,
+    fleet_name: str,
+    *,
+    process: str | None,
+    data: "dict[str, Value]",
+    journal_url: str | None,
+    ocu_names: str | None,
+    answers_file: Path | None,
+    simulated: bool,
+    speed: float,
+    output: str,
+) -> int:
+    from m2pem.cli.driving import drive_run
+    from m2pem.cli.journals import journal_at, url_of
+    from m2pem.cli.ocus import Operators, chosen
+    from m2pem.cli.output import output_of
+    from m2pem.cli.setting import get_answers, get_fleet, make_executive, refuse_speed
+    from m2pem.cli.state_files import tidy_up, with_own_state
+    from m2pem.executive.clock import SystemClock
+    from m2pem.executive.loading import read_source
+    from m2pem.journal import file_of
+    from m2pem.model.bpmn import parse_mission
+    from m2pem.plugins import PluginManager
+
+    plugins = PluginManager()
+    operators = Operators(chosen(ocu_names, plugins), plugins)
+    url = url_of(journal_url)
+    name, source = read_source(mission_file)
+    mission = parse_mission(source, name)
+    answers = get_answers(answers_file, mission)
+    fleet = with_own_state(get_fleet(fleet_name, mission), file_of(url), simulated=simulated)
+    refuse_speed(fleet, speed, simulated=simulated)
+    async with journal_at(url) as journal:
+        clock = SystemClock(speed)
+        executive = make_executive(
+            fleet, journal, plugins, clock, simulated=simulated, answers=answers
+        )
+        process_id = executive.admit(mission, process, data)
+        with output_of(output) as out:
+            status = await drive_run(
+                executive,
+                out,
+                operators,
+                answers,
+                lambda: executive.begin(mission, process_id, data, ""),
+            )
+        tidy_up(executive, file_of(url))
+    return status

@@ -14,7 +14,7 @@ from typing import Any
 from m2pem.engine.state import RunStatus
 from m2pem.executive.arbiters import SIMULATED
 from m2pem.executive.executive import Executive
-from m2pem.resources.fleet import Fleet
+from m2pem.resources.fleet import Fleet, Payload, Vehicle
 from m2pem.resources.snapshot import dump
 
 STATE = "state"
@@ -61,7 +61,10 @@ def tidy_up(executive: Executive, journal: Path | None) -> None:
         for runner in executive.runners.values()
     ):
         return
-    everything = [*executive.fleet.vehicles.values(), *executive.fleet.payloads.values()]
+    everything: list[Vehicle | Payload] = [
+        *executive.fleet.vehicles.values(),
+        *executive.fleet.payloads.values(),
+    ]
     for path in {str(each.settings.get(STATE, "")) for each in everything}:
         if path.startswith(_prefix(journal)):
             for suffix in ("", "-wal", "-shm"):

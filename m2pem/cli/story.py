@@ -18,13 +18,20 @@ Told: TypeAlias = tuple[str, str]
 class Story:
     """Tells the records of runs. `mission` gives the diagram of a run.
 
-    `colour`: for a terminal. `main`: the run whose lines need not name it.
+    `colour`: for a terminal. `one`: the lines of the first run need not name it. `asks`: whether
+    prompts are told, which an operator's own unit may do better.
     """
 
     def __init__(
-        self, mission: Callable[[RunId], Mission | None], *, colour: bool, main: RunId = ""
+        self,
+        mission: Callable[[RunId], Mission | None],
+        *,
+        colour: bool = False,
+        one: bool = True,
+        asks: bool = True,
     ) -> None:
-        self.main = main
+        self._main: RunId | None = None if one else ""
+        self._asks = asks
         self._mission = mission
         self._colour = colour
         self._behaviors: dict[tuple[RunId, str], tuple[str, str]] = {}
@@ -36,12 +43,16 @@ class Story:
 
     def tell(self, stamped: StampedRecord) -> str | None:
         """One line for a record; None for one that matters to programs only."""
+        if self._main is None:
+            self._main = stamped.run
+        if not self._asks and isinstance(stamped.record, r.PromptOpened):
+            return None
         teller = _TELLERS.get(type(stamped.record))
         told = teller(self, stamped.run, stamped.record) if teller else None
         if told is None:
             return None
         text, colour = told
-        run = "" if stamped.run == self.main else f"{stamped.run:<4} "
+        run = "" if stamped.run == self._main else f"{stamped.run:<4} "
         line = f"{stamped.t_s:9.1f} s  {run}{printable(text)}"
         return click.style(line, fg=colour) if self._colour and colour else line
 
@@ -120,7 +131,9 @@ def _service_ended(story: Story, run: RunId, record: r.ServiceEnded) -> Told:
     label = story.label(run, record.element)
     if not record.code:
         return f"{label}: done", ""
-    return f"{label}: failed, {record.code}" + (f" ({record.reason})" if record.reason else ""), "red"
+    return f"{label}: failed, {record.code}" + (
+        f" ({record.reason})" if record.reason else ""
+    ), "red"
 
 
 def _escalation(story: Story, run: RunId, record: r.EscalationThrown) -> Told:

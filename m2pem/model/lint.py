@@ -119,7 +119,7 @@ def _outside_only(mission: Mission) -> Iterator[Finding]:
                 f"{waiting} {'wait' if len(catchers) > 1 else 'waits'} for the {what} "
                 f"'{root.name or root.id}', which nothing in the file "
                 f"{'throws' if what == 'signal' else 'sends'}",
-                f'add m2pem:from="operator" to the {what} if operators send it',
+                f'if operators send it, say so: <{what} id="{root.id}" m2pem:from="operator"/>',
             ),
         )
 

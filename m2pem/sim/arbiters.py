@@ -3,7 +3,7 @@
 import asyncio
 import json
 import math
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 
 from m2pem.api.arbiter import (
     ArbiterContext,
@@ -28,9 +28,10 @@ from m2pem.sim.launch import Launcher
 from m2pem.sim.links import Links
 from m2pem.sim.memory import Memory
 from m2pem.sim.payloads import SimPayload
+from m2pem.sim.reach import Reach
 from m2pem.sim.settings import read_settings
 from m2pem.sim.statefile import StateFile
-from m2pem.sim.track import US_PER_S, Warp
+from m2pem.sim.track import Warp
 from m2pem.sim.vehicles import SimVehicle, carrier_of
 
 LOST_AFTER_S = 3.0
@@ -89,7 +90,10 @@ class SimArbiter:
             links=self._links,
             logger=context.logger,
             changed=self._moved,
-            lose_link=self._lose_link,
+            lose_link=lambda vehicle, at_us: self._reach.lose(vehicle, at_us),
+        )
+        self._reach = Reach(
+            self._links, self._agenda, self._memory, self._conductor, self._lost_after_s
         )
         self._detectors = Detectors(
             self._bodies, frame, self._agenda, self._detected, self._keep_found
@@ -97,6 +101,8 @@ class SimArbiter:
         self._epochs = Epochs()
         self._faults = {resource: self._own_faults(resource) for resource in self._bodies}
         self._scripts: dict[BehaviorId, Strike] = {}
+        self._connected = False
+        self._late: list[tuple[SimPayload, Detection]] = []
         self._listener: asyncio.Task[None] | None = None
 
     # --- the protocol ---------------------------------------------------------------------------
@@ -125,9 +131,15 @@ class SimArbiter:
         """
         now_us = self._clock.now_us()
         began_us, known = self._open_files(now_us)
-        self._detectors.begin(began_us, lambda payload: known.get(payload, ()), now_us)
+        self._detectors.begin(began_us, lambda payload: known.get(payload, ()))
+        self._links.muted = True
         self._agenda.run_due(now_us)
+        self._links.muted = False
         self._broadcast.begin(now_us)
+        for payload, detection in self._late:
+            self._broadcast.tell(payload, now_us, (detection,))
+        self._late.clear()
+        self._connected = True
         self._agenda.wake()
         if self._detectors.strangers:
             self._listener = asyncio.get_running_loop().create_task(self._listen())
@@ -147,11 +159,8 @@ class SimArbiter:
         )
         execution.number = known.number if known is not None else 0
         self._memory.register(execution)
-        self._when_linked(
-            execution,
-            f"start {request.id}",
-            lambda at_us: self._start(execution, request, at_us),
-            now_us,
+        self._reach.command(
+            execution, "start", lambda at_us: self._start(execution, request, at_us), now_us
         )
 
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
@@ -163,11 +172,8 @@ class SimArbiter:
         execution = self._memory.executions.get(behavior)
         if execution is None or execution.ended:
             return
-        self._when_linked(
-            execution,
-            f"cancel {behavior}",
-            lambda at_us: self._conductor.cancel(execution, at_us),
-            now_us,
+        self._reach.command(
+            execution, "cancel", lambda at_us: self._conductor.cancel(execution, at_us), now_us
         )
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
@@ -244,7 +250,7 @@ class SimArbiter:
     def lose_link(self, resource: ResourceId) -> None:
         """Cut the link to a vehicle and its payloads. It goes on with what it does; its behaviors
         are LOST, and it stops, when its `lost_after` is over."""
-        self._lose_link(carrier_of(resource), self._catch_up())
+        self._reach.lose(carrier_of(resource), self._catch_up())
 
     def restore_link(self, resource: ResourceId) -> None:
         """Mend the link: what could not be said or commanded meanwhile is now."""
@@ -304,39 +310,6 @@ class SimArbiter:
             # Of hold and resume the newest counts.
             self._links.defer(vehicle, f"turn {resource}", lambda at_us: act(resource, at_us))
 
-    def _when_linked(
-        self, execution: Execution, name: str, command: Callable[[int], None], now_us: int
-    ) -> None:
-        vehicle = self._links.broken_of(execution)
-        if vehicle is None:
-            command(now_us)
-        elif self._links.lost(vehicle):
-            self._conductor.abandon(execution, f"{vehicle} is not heard", now_us)
-        else:
-            # Another of its links may be broken still when this one is mended.
-            self._links.defer(
-                vehicle,
-                name,
-                lambda at_us: self._when_linked(execution, name, command, at_us),
-            )
-
-    def _lose_link(self, vehicle: ResourceId, now_us: int) -> None:
-        if not self._links.up(vehicle):
-            return
-        self._links.cut(vehicle)
-        after_us = round(self._lost_after_s(vehicle) * US_PER_S)
-        generation = self._links.cuts(vehicle)
-        self._agenda.at(now_us + after_us, lambda at_us: self._give_up(vehicle, generation, at_us))
-
-    def _give_up(self, vehicle: ResourceId, generation: int, now_us: int) -> None:
-        if self._links.up(vehicle) or self._links.cuts(vehicle) != generation:
-            return
-        self._links.give_up(vehicle)
-        reason = f"{vehicle} was not heard for {self._lost_after_s(vehicle):g} s"
-        for execution in list(self._memory.executions.values()):
-            if vehicle in execution.carriers and not execution.reported_end:
-                self._conductor.abandon(execution, reason, now_us)
-
     def _lost_after_s(self, resource: ResourceId) -> float:
         own = self._connections[resource].lost_after_s if resource in self._connections else None
         return LOST_AFTER_S if own is None else own
@@ -353,7 +326,10 @@ class SimArbiter:
             self._detectors.moved(body.id, now_us)
 
     def _detected(self, payload: SimPayload, detection: Detection, now_us: int) -> None:
-        if self._links.up(payload.carrier):
+        if not self._connected:
+            # What was found while nobody was there is told when somebody is.
+            self._late.append((payload, detection))
+        elif self._links.up(payload.carrier):
             self._broadcast.tell(payload, now_us, (detection,))
         else:
             self._links.defer(
@@ -387,11 +363,10 @@ class SimArbiter:
         for resource, file in by_resource.items():
             found[resource] = json.loads(file.meta(f"found {resource}", "[]"))
         self._memory.files = by_resource
-        self._links.muted = True
         for execution in executions:
             self._epochs.admit(execution.id, execution.epoch)
+        self._links.muted = True
         self._conductor.restore(executions, now_us)
-        self._links.muted = False
         return began_us, found
 
     def _keep_found(self, payload: ResourceId, found: Iterable[int]) -> None:

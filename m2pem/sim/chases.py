@@ -1,5 +1,6 @@
 """The next step of a body that keeps up with a target."""
 
+from m2pem.sim.domains import STANDING_LOAD
 from m2pem.sim.executions import Aim, Part
 from m2pem.sim.gimbals import aimed
 from m2pem.sim.launch import Launcher
@@ -23,7 +24,14 @@ def next_step(part: Part, launcher: Launcher, now_us: int) -> None:
             station = chase.station(Pose(chase.place, 0.0))
         elif (target := launcher.whereabouts(chase.target, now_us)) is not None:
             station, velocity = chase.station(target), target.velocity
-        phase = steer(body.kinematics, pose, station, velocity, chase.speed_m_s)
+        phase = steer(
+            body.kinematics,
+            pose,
+            station,
+            velocity,
+            speed_m_s=chase.speed_m_s,
+            standing_load=1.0 if body.aloft(now_us) else STANDING_LOAD,
+        )
         body.take(Plan([phase]), now_us)
     elif isinstance(body, SimPayload) and isinstance(part.chase, Aim):
         carrier = launcher.whereabouts(body.carrier, now_us)

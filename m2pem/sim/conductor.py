@@ -132,8 +132,10 @@ class Conductor:
         self._turn(body, EffectKind.RESUME, now_us)
 
     def restore(self, executions: Collection[Execution], now_us: int) -> None:
-        """Go on with behaviors from a file, and catch up with what they did since."""
+        """Go on with behaviors from a file: all that they did since is scheduled, as past."""
         for execution in executions:
+            if any(resource not in self._bodies for resource in execution.resources):
+                continue  # the fleet has changed: nobody can tell any more
             self.memory.register(execution)
             if execution.outcome is not None and not execution.reported_end:
                 outcome = execution.outcome
@@ -150,7 +152,6 @@ class Conductor:
         for body in self._bodies.values():
             if isinstance(body, SimVehicle):
                 self._batteries.look(body, body.track.started_us)
-        self._agenda.run_due(now_us)
 
     # --- from start to end ----------------------------------------------------------------------
 
@@ -162,7 +163,7 @@ class Conductor:
 
     def _begin(self, execution: Execution, assignment: Assignment, now_us: int) -> None:
         body = assignment.body
-        body.behavior, body.held = execution.id, False
+        body.behavior, body.doing, body.held = execution.id, execution.behavior, False
         nothing = assignment.plan is None and assignment.chase is None
         part = Part(body, assignment.chase, idle=nothing)
         execution.parts.append(part)
@@ -210,10 +211,10 @@ class Conductor:
             body = part.body
             if body.behavior != execution.id:
                 continue
-            body.behavior, body.held = "", False
+            body.behavior, body.doing, body.held = "", "", False
             if body.id not in keep:
                 body.stop(now_us)
-                self._changed(body, now_us)
+                self._settle(body, now_us)
         if execution.parts:
             self.memory.note_of(execution, EffectKind.END, now_us)
         self._links.report(execution, outcome.state, outcome.code, outcome.reason)
@@ -234,7 +235,7 @@ class Conductor:
                 execution.deaf = True
                 for part in execution.parts:
                     part.body.stop(now_us)
-                    self._changed(part.body, now_us)
+                    self._settle(part.body, now_us)
                 self.memory.save(execution)
             case "lose_link":
                 execution.strike = None
@@ -339,6 +340,17 @@ class Conductor:
             self._batteries.look(body, now_us)
         self._tell_changed(body, now_us)
 
+    def _settle(self, body: Body, now_us: int) -> None:
+        """A body comes to rest by itself: tell now, and once more when it stands."""
+        self._changed(body, now_us)
+        track, end_us = body.track, body.track.end_us
+        if end_us is not None and end_us > now_us:
+            self._agenda.at(end_us, lambda at_us: self._settled(body, track, at_us))
+
+    def _settled(self, body: Body, track: object, now_us: int) -> None:
+        if body.track is track:
+            self._changed(body, now_us)
+
     def _drained(self, vehicle: SimVehicle, now_us: int) -> None:
         """The battery reached the next level: tell, and stop when it is empty."""
         if vehicle.battery_at(now_us) <= 0:
@@ -349,4 +361,6 @@ class Conductor:
                 self._finish(execution, outcome, now_us)
             vehicle.come_down(now_us)
             self.memory.save(None, vehicle)
-        self._changed(vehicle, now_us)
+            self._settle(vehicle, now_us)
+        else:
+            self._changed(vehicle, now_us)

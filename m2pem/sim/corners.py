@@ -10,6 +10,9 @@ from m2pem.sim.phases import Vector
 SHARPEST_BEND_RAD = math.radians(150)
 """A sharper turn is made on the spot."""
 
+FARTHEST_MISS_M = 3.5
+"""A bend passes its waypoint no farther off: the sharper the corner, the tighter the bend."""
+
 SMALLEST_RADIUS_M = 0.5
 _NOTHING_M = 1e-3
 
@@ -116,6 +119,7 @@ def _bend(before: Line, after: Line, radius_m: float) -> tuple[Bend | None, floa
     if abs(sweep) < 1e-6:
         return None, 0.0
     tangent = math.tan(abs(sweep) / 2)
+    radius_m = min(radius_m, FARTHEST_MISS_M / (1 / math.cos(sweep / 2) - 1 + 1e-9))
     cut_m = min(radius_m * tangent, before.level_m / 2, after.level_m / 2)
     radius_m = cut_m / tangent
     if abs(sweep) > SHARPEST_BEND_RAD or radius_m < SMALLEST_RADIUS_M:

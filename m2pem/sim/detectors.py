@@ -51,10 +51,8 @@ class Detectors:
                 vehicle = carrier if isinstance(carrier, SimVehicle) else None
                 self._detectors.append(_Detector(body, vehicle))
 
-    def begin(
-        self, began_us: int, known: Callable[[ResourceId], Iterable[int]], now_us: int
-    ) -> None:
-        """Schedule what is planned, and look out for what is planted."""
+    def begin(self, began_us: int, known: Callable[[ResourceId], Iterable[int]]) -> None:
+        """Schedule what is planned, and look out for what is planted, also what is past."""
         for detector in self._detectors:
             settings = detector.payload.settings
             detector.found = set(known(detector.payload.id))
@@ -62,7 +60,8 @@ class Detectors:
                 if number not in detector.found:
                     at_us = began_us + round(planned.at_s * US_PER_S)
                     self._agenda.at(at_us, self._finder(detector, number))
-            self._look(detector, now_us)
+            if detector.carrier is not None:
+                self._look(detector, detector.carrier.track.started_us)
 
     def moved(self, vehicle: ResourceId, now_us: int) -> None:
         """The motion of a vehicle has changed."""

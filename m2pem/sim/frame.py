@@ -46,6 +46,6 @@ class Frame:
     def geo(self, place: Vector) -> GeoPosition:
         """The WGS-84 position of a place."""
         east, north, up = place
-        drop = (east * east + north * north) / (2 * _MEAN_RADIUS_M)
-        latitude, longitude, _ = pymap3d.enu2geodetic(east, north, up - drop, *self.origin)
+        sunk = -(east * east + north * north) / (2 * _MEAN_RADIUS_M)
+        latitude, longitude, _ = pymap3d.enu2geodetic(east, north, sunk, *self.origin)
         return GeoPosition(float(latitude), float(longitude), self.origin[2] + up)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from m2pem.sim.corners import turned
-from m2pem.sim.manoeuvres import yaw_of
+from m2pem.sim.manoeuvres import nearest_edge, yaw_of
 from m2pem.sim.phases import Look, Pose, Slew, Vector
 from m2pem.sim.settings import Gimbal
 from m2pem.sim.track import Plan
@@ -165,7 +165,10 @@ def _scan_polygon(mount: Mount, wishes: Wishes) -> Gaze:
     if area is None:
         raise RefusedError("parameter 'area': there is none")
     carrier = mount.pose()
-    seen = [direction(carrier, (e, n, mount.ground_up_m)) for e, n in wishes.rings(area)[0]]
+    ring = wishes.rings(area)[0]
+    # The steepest look down is to the nearest point, which need not be a corner.
+    points = [*ring, nearest_edge(ring, carrier.place)]
+    seen = [direction(carrier, (east, north, mount.ground_up_m)) for east, north in points]
     middle = seen[0][0]
     pans = [middle + turned(middle, pan) for pan, _ in seen]
     tilts = [tilt for _, tilt in seen]

@@ -200,7 +200,7 @@ def observe(craft: Craft, wishes: Wishes, angle_rad: float | None) -> Manoeuvre:
         course = onto_circle(craft, centre, STANDOFF_M, None, angle_rad)
     else:
         course = Course(craft)
-        course.through([(*_nearest_edge(wishes.rings(area)[0], course.place), up)])
+        course.through([(*nearest_edge(wishes.rings(area)[0], course.place), up)])
     course.turn_to(math.atan2(centre[1] - course.place[1], centre[0] - course.place[0]))
     return Manoeuvre(course.stand(math.inf if seconds is None else seconds).plan())
 
@@ -213,7 +213,8 @@ def _middle(wishes: Wishes, area: Area) -> tuple[float, float]:
     )
 
 
-def _nearest_edge(ring: list[tuple[float, float]], place: Vector) -> tuple[float, float]:
+def nearest_edge(ring: list[tuple[float, float]], place: Vector) -> tuple[float, float]:
+    """The point of a ring's edges that is nearest to a place on the map."""
     candidates = []
     for (ae, an), (be, bn) in pairwise(ring):
         de, dn = be - ae, bn - an

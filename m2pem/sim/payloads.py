@@ -13,7 +13,11 @@ from m2pem.sim.vehicles import carrier_of
 
 
 class SimPayload:
-    """Looks straight ahead at first. `detector`: whether it finds planted targets."""
+    """Looks straight ahead at first. `detector`: whether it finds planted targets.
+
+    `behavior`: the id of what it is busy with, `doing` the name; "" when free. `held`: whether
+    `hold` was called on it.
+    """
 
     def __init__(self, connection: Connection, settings: Settings, now_us: int) -> None:
         self.id: ResourceId = connection.resource
@@ -21,6 +25,7 @@ class SimPayload:
         self.settings = settings
         self.detector = connection.detector or settings.kind == "gpr"
         self.behavior = ""
+        self.doing = ""
         self.held = False
         self.track: Track[Look] = Track(Plan([Slew(Look(), Look(), 0.0)]), now_us)
 
@@ -62,5 +67,5 @@ class SimPayload:
             zoom=look.zoom,
             detections=detections,
             link=LinkState.CONNECTED,
-            behavior=self.behavior,
+            behavior=self.doing,
         )

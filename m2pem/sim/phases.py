@@ -163,11 +163,7 @@ class Steer(msgspec.Struct, frozen=True, tag=True):
     yaw: float
     yaw_rate: float
     duration_s: float
-
-    @property
-    def load(self) -> float:
-        """Battery load; 1.0 is that of moving."""
-        return 1.0
+    load: float = 1.0
 
     def at(self, t: float) -> Pose:
         """Where the vehicle is, so many seconds after the start."""

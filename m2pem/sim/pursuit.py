@@ -12,6 +12,7 @@ STEP_S = 1.0
 """How often a pursuit looks where its target is."""
 
 _SLOWEST_TURNING_M_S = 0.3
+_STANDING_M_S = 0.05
 
 
 class Pursuit(msgspec.Struct, frozen=True):
@@ -38,7 +39,13 @@ class Pursuit(msgspec.Struct, frozen=True):
 
 
 def steer(
-    kinematics: Kinematics, pose: Pose, station: Vector, velocity: Vector, speed_m_s: float
+    kinematics: Kinematics,
+    pose: Pose,
+    station: Vector,
+    velocity: Vector,
+    *,
+    speed_m_s: float,
+    standing_load: float,
 ) -> Steer:
     """One step towards a station that moves with `velocity`."""
     error = (station[0] - pose.place[0], station[1] - pose.place[1], station[2] - pose.place[2])
@@ -56,8 +63,17 @@ def steer(
         sweep = turned(pose.yaw, math.atan2(north, east))
         bound = kinematics.turn_rate_rad_s
         yaw_rate = max(-bound, min(bound, sweep / STEP_S))
-    # Longer than a step, so that the vehicle still moves at the moment of the next one.
-    return Steer(pose.place, pose.velocity, acceleration, pose.yaw, yaw_rate, 1.5 * STEP_S)
+    stands = pose.speed < _STANDING_M_S and size < _STANDING_M_S
+    return Steer(
+        pose.place,
+        pose.velocity,
+        acceleration,
+        pose.yaw,
+        yaw_rate,
+        # Longer than a step, so that the vehicle still moves at the moment of the next one.
+        1.5 * STEP_S,
+        standing_load if stands else 1.0,
+    )
 
 
 def _approach(east: float, north: float, decel: float) -> tuple[float, float]:

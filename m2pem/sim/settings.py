@@ -1,7 +1,7 @@
 """What a fleet file may say about a simulated vehicle or payload, in its `connection`.
 
-Keys that are not named here belong to other arbiters and are left alone: any fleet can be
-simulated as it is.
+Keys that are not named here belong to other arbiters and are left alone, so that fleets can be
+simulated as they are. A map named `sim`, if there is one, is read instead of the whole.
 """
 
 import dataclasses
@@ -127,7 +127,8 @@ class _Reader:
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._settings = connection.settings
+        own = connection.settings.get("sim")
+        self._settings = own if isinstance(own, Mapping) else connection.settings
         self._findings: list[Finding] = []
 
     def finish(self) -> None:

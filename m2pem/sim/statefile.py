@@ -52,6 +52,7 @@ class _Vehicle(msgspec.Struct):
     counted_us: int
     warp: Warp
     behavior: str
+    doing: str
     held: bool
     battery: float
     cruise_m_s: float
@@ -63,6 +64,7 @@ class _Payload(msgspec.Struct):
     started_us: int
     warp: Warp
     behavior: str
+    doing: str
     held: bool
 
 
@@ -162,13 +164,15 @@ class StateFile:
             body = bodies.get(ResourceId(resource))
             if isinstance(body, SimVehicle):
                 vehicle = self._decode(data, _Vehicle)
-                body.behavior, body.held = vehicle.behavior, vehicle.held
+                body.behavior, body.doing = vehicle.behavior, vehicle.doing
+                body.held = vehicle.held
                 body.battery, body.cruise_m_s = vehicle.battery, vehicle.cruise_m_s
                 plan = Plan(vehicle.phases, vehicle.cycle_from)
                 body.track = Track(plan, vehicle.started_us, vehicle.warp, vehicle.counted_us)
             elif isinstance(body, SimPayload):
                 payload = self._decode(data, _Payload)
-                body.behavior, body.held = payload.behavior, payload.held
+                body.behavior, body.doing = payload.behavior, payload.doing
+                body.held = payload.held
                 looks = Plan(payload.phases, payload.cycle_from)
                 body.track = Track(looks, payload.started_us, payload.warp)
 
@@ -211,6 +215,7 @@ def _body_record(body: Body) -> _Vehicle | _Payload:
             track.counted_us,
             track.warp,
             body.behavior,
+            body.doing,
             body.held,
             body.battery,
             body.cruise_m_s,
@@ -221,6 +226,7 @@ def _body_record(body: Body) -> _Vehicle | _Payload:
         track.started_us,
         track.warp,
         body.behavior,
+        body.doing,
         body.held,
     )
 

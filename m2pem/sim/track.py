@@ -13,6 +13,7 @@ from typing import Generic, Protocol, Self, TypeVar
 import msgspec
 
 US_PER_S = 1_000_000
+_NOTHING_S = 1e-9
 
 
 class Slowable(Protocol):
@@ -106,7 +107,7 @@ class Warp(msgspec.Struct, frozen=True):
 
     def at(self, now_us: int) -> tuple[float, float]:
         """Plan time in seconds, and its rate."""
-        t = (now_us - self.since_us) / US_PER_S
+        t = max(0, now_us - self.since_us) / US_PER_S
         if t >= self.ramp_s:
             ramp = (self.rate + self.target) / 2 * self.ramp_s
             return self.tau + ramp + self.target * (t - self.ramp_s), self.target
@@ -116,10 +117,10 @@ class Warp(msgspec.Struct, frozen=True):
     def when(self, tau: float) -> int | None:
         """The first microsecond at which plan time has reached `tau`; None: never."""
         missing = tau - self.tau
-        if missing <= 0:
+        if missing <= _NOTHING_S:
             return self.since_us
         ramp = (self.rate + self.target) / 2 * self.ramp_s
-        if missing > ramp:
+        if missing > ramp + _NOTHING_S:
             if self.target <= 0 or math.isinf(missing):
                 return None
             return self._us(self.ramp_s + (missing - ramp) / self.target)

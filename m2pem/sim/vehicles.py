@@ -19,7 +19,8 @@ _PARKING_GAP_M = 10.0
 class SimVehicle:
     """Stands at its `home`, or (without one) in a row south of the fleet's origin.
 
-    `behavior`: what it is busy with, "" when free. `held`: whether `hold` was called on it.
+    `behavior`: the id of what it is busy with, `doing` the name; "" when free. `held`: whether
+    `hold` was called on it.
     """
 
     def __init__(
@@ -30,6 +31,7 @@ class SimVehicle:
         self.settings = settings
         self.kinematics = settings.kinematics
         self.behavior = ""
+        self.doing = ""
         self.held = False
         self.cruise_m_s = min(
             settings.kinematics.cruise_speed_m_s, settings.kinematics.max_speed_m_s
@@ -141,14 +143,14 @@ class SimVehicle:
             ready=battery > 0,
             not_ready_reasons=() if battery > 0 else ("the battery is empty",),
             link=LinkState.CONNECTED,
-            behavior=self.behavior,
+            behavior=self.doing,
         )
 
     def _mode(self, aloft: bool) -> str:
         if self.held:
             return "hold"
         if self.behavior:
-            return "auto"
+            return "manual" if self.doing == "teleop" else "auto"
         if self.domain == "air":
             return "hover" if aloft else "landed"
         return "standby"

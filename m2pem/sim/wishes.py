@@ -78,7 +78,9 @@ class Wishes:
             return (*level, self._up(craft, value.position, value.altitude_frame, up_m))
         if isinstance(value, VehiclePosition):
             east, north, up = self.pose_of(value.vehicle).place
-            return (east, north, self.height(craft) or max(up, up_m) if craft.flies else up_m)
+            if craft.flies and self.height(craft) is None:
+                up_m = max(up, up_m)
+            return (east, north, up_m)
         raise RefusedError("it has no target")
 
     def point(self, ground_up_m: float) -> Vector:

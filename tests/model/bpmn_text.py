@@ -1,5 +1,7 @@
 """Small BPMN texts for the tests of reading: the body of `process` begins on line 3."""
 
+from itertools import pairwise
+
 from m2pem.errors import MissionError
 from m2pem.findings import Finding
 from m2pem.model.bpmn import parse_mission
@@ -33,9 +35,8 @@ def flow(source: str, target: str, more: str = "") -> str:
 def line_of(*elements: str) -> str:
     """Start S, the elements' ids in a row, end E, each flow on the last line of the text."""
     ids = ["S", *elements, "E"]
-    return (
-        '<startEvent id="S"/><endEvent id="E"/>'
-        + "".join(flow(one, two) for one, two in zip(ids, ids[1:], strict=False))
+    return '<startEvent id="S"/><endEvent id="E"/>' + "".join(
+        flow(one, two) for one, two in pairwise(ids)
     )
 
 

@@ -53,7 +53,9 @@ ERRORS = {
         [("not-executed", 4, "C")],
     ),
     "compensation event": (
-        around('<intermediateThrowEvent id="T"><compensateEventDefinition/></intermediateThrowEvent>'),
+        around(
+            '<intermediateThrowEvent id="T"><compensateEventDefinition/></intermediateThrowEvent>'
+        ),
         [("not-executed", 3, "T")],
     ),
     "conditional event": (
@@ -73,7 +75,10 @@ ERRORS = {
         [("not-executed", 3, "L1"), ("not-executed", 4, "L2")],
     ),
     "cancel event": (
-        around(f'{TASK}<boundaryEvent id="B" attachedToRef="T"><cancelEventDefinition/></boundaryEvent>'),
+        around(
+            f'{TASK}<boundaryEvent id="B" attachedToRef="T"><cancelEventDefinition/>'
+            "</boundaryEvent>"
+        ),
         [("not-executed", 3, "B")],
     ),
     "several triggers": (
@@ -86,8 +91,10 @@ ERRORS = {
     ),
     "start quantity": (around('<task id="T" startQuantity="2"/>'), [("not-executed", 3, "T")]),
     "instantiating receive task": (
-        process(f'<receiveTask id="T" messageRef="m" instantiate="true"/>{E}{flow("T", "E")}',
-                '<message id="m"/>'),
+        process(
+            f'<receiveTask id="T" messageRef="m" instantiate="true"/>{E}{flow("T", "E")}',
+            '<message id="m"/>',
+        ),
         [("not-executed", 3, "T")],
     ),
     "global task": (
@@ -133,7 +140,10 @@ ERRORS = {
         [("dangling-reference", 3, "T")],
     ),
     "dangling attachment": (
-        around(f'{TASK}\n<boundaryEvent id="B" attachedToRef="X"><errorEventDefinition/></boundaryEvent>'),
+        around(
+            f'{TASK}\n<boundaryEvent id="B" attachedToRef="X"><errorEventDefinition/>'
+            "</boundaryEvent>"
+        ),
         [("dangling-reference", 4, "B")],
     ),
     "dangling signal": (
@@ -164,7 +174,10 @@ ERRORS = {
         [("dangling-reference", 3, "A"), ("dangling-reference", 4, "B")],
     ),
     "dangling eventDefinitionRef": (
-        process(f'{S}<endEvent id="E">\n<eventDefinitionRef>d</eventDefinitionRef></endEvent>{flow("S", "E")}'),
+        process(
+            f'{S}<endEvent id="E">\n<eventDefinitionRef>d</eventDefinitionRef>'
+            f"</endEvent>{flow('S', 'E')}"
+        ),
         [("dangling-reference", 4, "E")],
     ),
     "called process that is not there": (
@@ -174,9 +187,7 @@ ERRORS = {
     "nothing called": (around('<callActivity id="T"/>'), [("no-called-element", 3, "T")]),
     # --- the graph ------------------------------------------------------------------------------
     "flow into a subprocess": (
-        process(
-            f'<subProcess id="X"><task id="x"/></subProcess>{line_of("X")}\n{flow("S", "x")}'
-        ),
+        process(f'<subProcess id="X"><task id="x"/></subProcess>{line_of("X")}\n{flow("S", "x")}'),
         [("flow-crosses-border", 4, "S-x")],
     ),
     "flow into a start event": (
@@ -258,7 +269,9 @@ ERRORS = {
         [("event-not-allowed", 3, "E")],
     ),
     "catching terminate": (
-        around('<intermediateCatchEvent id="T"><terminateEventDefinition/></intermediateCatchEvent>'),
+        around(
+            '<intermediateCatchEvent id="T"><terminateEventDefinition/></intermediateCatchEvent>'
+        ),
         [("event-not-allowed", 3, "T")],
     ),
     "catch without a trigger": (

@@ -32,12 +32,16 @@ WARNINGS = {
         [("element-order", 4, "P")],
     ),
     "misplaced extension": (
-        around('<task id="T"><extensionElements>\n<m2pem:prompt>x</m2pem:prompt></extensionElements></task>'),
+        around(
+            '<task id="T"><extensionElements>\n<m2pem:prompt>x</m2pem:prompt>'
+            "</extensionElements></task>"
+        ),
         [("misplaced-extension", 4, "T")],
     ),
     "unknown extension": (
         around(
-            '<userTask id="T"><extensionElements>\n<m2pem:promt>x</m2pem:promt></extensionElements></userTask>'
+            '<userTask id="T"><extensionElements>\n<m2pem:promt>x</m2pem:promt>'
+            "</extensionElements></userTask>"
         ),
         [("unknown-extension", 4, "T")],
     ),
@@ -79,6 +83,10 @@ WARNINGS = {
             f"{flow('S', 'E')}"
         ),
         [("missing-reference", 3, "S"), ("missing-reference", 4, "E")],
+    ),
+    "reference to no data object": (
+        around(f'{TASK}\n<dataObjectReference id="R" dataObjectRef="nope"/>'),
+        [("dangling-reference", 4, "R")],
     ),
     "dangling display references": (
         around(

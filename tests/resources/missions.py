@@ -9,11 +9,10 @@ from m2pem.model.behavior import (
     ServiceCall,
 )
 from m2pem.model.elements import Activity, Mission, ScriptTask, ServiceTask
-from m2pem.model.expression import Expression
+from m2pem.model.expression import Expression, template
 
-
-class ReadLater(Expression):
-    """An expression whose value nobody knows before the task starts."""
+READ_LATER = template("${mission.value}")
+"""A value that is read from the data store when the task starts."""
 
 
 def vehicle(resource: str, name: str = "driver", *, optional: bool = False) -> Role:

@@ -11,7 +11,7 @@ from m2pem.resources.check import check_mission
 from m2pem.resources.fleet import Fleet
 
 from .fleets import PATROL, everything, patrol
-from .missions import ReadLater, behavior, drive, mission, payload, team, vehicle
+from .missions import READ_LATER, behavior, drive, mission, payload, team, vehicle
 
 PAYLOAD, TEAM = BehaviorType.PAYLOAD, BehaviorType.TEAM
 
@@ -230,8 +230,8 @@ def test_a_detector_in_a_fleet_without_one_is_a_warning(tmp_path: Path) -> None:
 
 
 def test_a_value_that_is_read_later_counts_as_given(fleet: Fleet) -> None:
-    assert check(fleet, drive(vehicle("evsg1"), route=ReadLater())) == []
-    finding = only(check(fleet, drive(vehicle("evsg1"), rout=ReadLater(), route="alpha")))
+    assert check(fleet, drive(vehicle("evsg1"), route=READ_LATER)) == []
+    finding = only(check(fleet, drive(vehicle("evsg1"), rout=READ_LATER, route="alpha")))
     assert finding.rule == "unknown-parameter"
 
 

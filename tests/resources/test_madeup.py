@@ -8,7 +8,7 @@ from m2pem.resources.fleet import Domain, Fleet
 from m2pem.resources.madeup import ORIGIN, fleet_for
 
 from .fleets import everything
-from .missions import ReadLater, behavior, drive, mission, payload, team, vehicle
+from .missions import READ_LATER, behavior, drive, mission, payload, team, vehicle
 
 PAYLOAD, TEAM = BehaviorType.PAYLOAD, BehaviorType.TEAM
 
@@ -95,7 +95,7 @@ def test_names_of_an_arbiters_own_behavior_are_guessed_from_its_parameters() -> 
 
 
 def test_a_value_that_is_read_later_names_nothing() -> None:
-    fleet = fleet_for(mission(drive(vehicle("evsg1"), route=ReadLater())))
+    fleet = fleet_for(mission(drive(vehicle("evsg1"), route=READ_LATER)))
     assert fleet.geometries == {}
 
 

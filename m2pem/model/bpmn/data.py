@@ -6,6 +6,7 @@ from m2pem.model.bpmn.names import local
 from m2pem.model.bpmn.reading import DataEnd, Reading, reference
 from m2pem.model.bpmn.scan import scan
 from m2pem.model.elements import Container, DataObject
+from m2pem.model.near import did_you_mean
 
 
 def read_data(reading: Reading, element: etree._Element, container: Container) -> None:
@@ -32,8 +33,16 @@ def resolve_data(reading: Reading) -> None:
 
     Editors draw and name the *reference*; the data object itself has only an id.
     """
-    for end in reading.data.values():
+    for identifier, end in reading.data.items():
         target = reading.data.get(end.refers_to)
+        if target is None and end.refers_to:
+            reading.report.warning(
+                end.carriers[0],
+                identifier,
+                "dangling-reference",
+                f"it refers to '{end.refers_to}', which is no data object or data store",
+                did_you_mean(end.refers_to, reading.data, "correct it, or delete it"),
+            )
         if target is None or target.declared is None:
             continue
         declared = target.declared

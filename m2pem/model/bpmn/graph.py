@@ -11,9 +11,11 @@ def check_graph(reading: Reading) -> None:
     """Find what can never begin, and conditions that nothing decides."""
     _check_processes(reading)
     for container in _containers(reading):
-        if container.nodes and container not in reading.broken:
+        if container in reading.broken:
+            continue
+        if container.nodes:
             _check_start(reading, container)
-        elif not container.nodes and isinstance(container, SubProcess):
+        elif isinstance(container, SubProcess):
             reading.report.warning(
                 container.line,
                 container.id,

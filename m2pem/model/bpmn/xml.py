@@ -124,8 +124,8 @@ def _declared_encoding(data: bytes) -> str:
     name = declaration.group(1).decode("ascii", "replace")
     try:
         encoding = codecs.lookup(name).name
-        b"".decode(encoding)
-    except LookupError:
+        b" ".decode(encoding, "replace")
+    except (LookupError, UnicodeError):
         encoding = ""
     if not encoding or encoding.replace("_", "-") in _REFUSED_CODECS:
         raise XmlError(

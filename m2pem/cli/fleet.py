@@ -1,0 +1,116 @@
+"""`m2pem fleet`: who is there and can do what."""
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from m2pem.cli.options import MADE_UP, as_json, example, format_option
+
+if TYPE_CHECKING:
+    from m2pem.executive.arbiters import FleetArbiters
+
+
+@click.command(epilog=example("m2pem fleet fleet_configs/vignette1.yaml"))
+@click.argument("fleet_file", metavar="FLEET", required=False)
+@click.option("--schema", is_flag=True, help="Print the JSON Schema of fleet files instead.")
+@format_option
+def fleet(fleet_file: str | None, schema: bool, output: str) -> None:
+    """Show a fleet: who is there and can do what."""
+    if schema:
+        from m2pem.resources.fleet_schema import fleet_schema
+
+        click.echo(as_json(fleet_schema()))
+        return
+    if fleet_file is None:
+        raise click.UsageError("name a fleet file, or say --schema")
+    if fleet_file == MADE_UP:
+        raise click.UsageError(f"{MADE_UP!r} is made up from a mission; name a fleet file")
+    from m2pem.cli.fleets import arbiters_of
+    from m2pem.plugins import PluginManager
+    from m2pem.resources.fleet_file import load_fleet
+
+    arbiters = arbiters_of(load_fleet(fleet_file), PluginManager())
+    if output == "json":
+        click.echo(as_json(_as_data(arbiters)))
+    else:
+        click.echo(_as_text(arbiters))
+
+
+def _as_data(arbiters: "FleetArbiters") -> dict[str, Any]:
+    from m2pem.model.behavior import BehaviorType
+
+    fleet = arbiters.fleet
+    # What a vehicle can do in a team stands with the team.
+    offers = {
+        resource: [spec.name for spec in specs if spec.type is not BehaviorType.TEAM]
+        for resource, specs in arbiters.catalogue().items()
+    }
+    return {
+        "name": fleet.name,
+        "file": fleet.file,
+        "vehicles": {
+            vehicle.id: {
+                "domain": vehicle.domain.value,
+                "arbiter": vehicle.arbiter,
+                "manned": vehicle.manned,
+                "behaviors": offers[vehicle.id],
+            }
+            for vehicle in fleet.vehicles.values()
+        },
+        "payloads": {
+            payload.id: {
+                "arbiter": payload.arbiter,
+                "detector": payload.detector,
+                "behaviors": offers[payload.id],
+            }
+            for payload in fleet.payloads.values()
+        },
+        "teams": {
+            team.name: {
+                "members": team.members,
+                "lead": team.lead,
+                "behaviors": [spec.name for spec in arbiters.graph.offers(team.name)],
+            }
+            for team in fleet.teams.values()
+        },
+        "geometries": {
+            name: type(geometry).__name__.lower() for name, geometry in fleet.geometries.items()
+        },
+    }
+
+
+def _as_text(arbiters: "FleetArbiters") -> str:
+    from m2pem.cli.table import table
+
+    data = _as_data(arbiters)
+    vehicles = [
+        (
+            name,
+            f"{'manned ' if vehicle['manned'] else ''}{vehicle['domain']} vehicle",
+            vehicle["arbiter"],
+        )
+        for name, vehicle in data["vehicles"].items()
+    ]
+    payloads = [
+        (name, "detector" if payload["detector"] else "payload", payload["arbiter"])
+        for name, payload in data["payloads"].items()
+    ]
+    parts = [
+        f"{data['name']} ({data['file']})",
+        table(("RESOURCE", "IS A", "ARBITER"), sorted([*vehicles, *payloads])),
+    ]
+    if data["teams"]:
+        rows = [
+            (name, team["lead"], ", ".join(team["members"])) for name, team in data["teams"].items()
+        ]
+        parts.append(table(("TEAM", "LEAD", "MEMBERS"), rows))
+    if data["geometries"]:
+        parts.append(table(("GEOMETRY", "IS A"), list(data["geometries"].items())))
+    offered: dict[str, list[str]] = {}
+    for section in ("vehicles", "payloads", "teams"):
+        for name, entry in data[section].items():
+            for behavior in entry["behaviors"]:
+                offered.setdefault(behavior, []).append(name)
+    behaviors = [(name, ", ".join(who)) for name, who in sorted(offered.items())]
+    parts.append(table(("BEHAVIOR", "OFFERED BY"), behaviors))
+    return "\n\n".join(parts)

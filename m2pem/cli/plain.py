@@ -1,0 +1,226 @@
+"""The plain operator control unit: prompts on standard output, lines from standard input."""
+
+import asyncio
+import sys
+from collections.abc import Awaitable, Callable
+
+from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId, StampedRecord
+from m2pem.cli.stdin import Lines
+from m2pem.cli.story import printable
+from m2pem.cli.writer import writer_for
+from m2pem.engine.records import RunClaimed, RunEnded, RunPaused, RunResumed, RunStarted
+from m2pem.errors import M2pemError, OperatorError
+from m2pem.model.behavior import Decision
+
+NAME = "plain"
+BACKLOG = 1_000_000
+
+HELP = """\
+  2, or abort        answer the open prompt, by number or by decision
+  p3 2               answer prompt p3, when several are open (r2 p3 2: of run r2)
+  signal NAME        send a signal, by its name or its id
+  pause, resume      hold the vehicles and the clock; go on
+  stop               end the mission: every vehicle is told to stop
+  start FILE         start another mission
+  runs               list what ran, and how it stands
+  quit               leave; missions go on without an operator here
+With several runs, say which: stop r2."""
+
+
+class PlainOcu:
+    """One line, one command. It serves until its operator quits.
+
+    At the end of the input nobody answers any more, and it goes on showing what is asked.
+    """
+
+    def __init__(self, control: MissionControl) -> None:
+        self._control = control
+        self._out = writer_for(sys.stdout)
+        self._notices = control.subscribe(size=BACKLOG)
+        self._prompts: dict[tuple[RunId, str], OpenPrompt] = {}
+        self._active: dict[RunId, bool] = {}
+        """Runs that have not ended, and whether they are paused."""
+        self._listening = True
+        self._end_noted = False
+        self._commands: dict[str, Callable[[list[str]], Awaitable[None]]] = {
+            "stop": self._stop,
+            "pause": self._pause,
+            "resume": self._resume,
+            "signal": self._signal,
+            "start": self._start,
+            "runs": self._runs,
+            "help": self._help,
+        }
+
+    async def serve(self) -> None:
+        """Show and obey until the operator quits."""
+        watching = asyncio.create_task(self._watch())
+        try:
+            async for line in Lines():
+                if line.strip() == "quit":
+                    return
+                await self._obey(line)
+            self._listening = False
+            self._note_the_end()
+            await watching
+        finally:
+            watching.cancel()
+
+    # --- showing --------------------------------------------------------------------------------
+
+    async def _watch(self) -> None:
+        async for notice in self._notices:
+            match notice:
+                case StampedRecord(run=run, record=record):
+                    self._note(run, record)
+                case OpenPrompt():
+                    self._open(notice)
+                case PromptClosed():
+                    self._close(notice)
+
+    def _note(self, run: RunId, record: object) -> None:
+        match record:
+            case RunStarted() | RunClaimed() | RunResumed():
+                self._active[run] = False
+            case RunPaused():
+                self._active[run] = True
+            case RunEnded():
+                self._active.pop(run, None)
+
+    def _open(self, prompt: OpenPrompt) -> None:
+        key = (prompt.run, prompt.prompt)
+        if key in self._prompts:
+            return
+        self._active.setdefault(prompt.run, False)
+        self._prompts[key] = prompt
+        self._say(f"[{self._name(key)}] {prompt.element}: {prompt.text}")
+        for number, decision in enumerate(prompt.decisions, 1):
+            value = "" if _same(decision.label, decision.value) else f" ({decision.value})"
+            self._say(f"{number}  {decision.label or decision.value}{value}", indent=4)
+        self._note_the_end()
+
+    def _close(self, closed: PromptClosed) -> None:
+        key = (closed.run, closed.prompt)
+        name = self._name(key)
+        if self._prompts.pop(key, None) is None or closed.by == NAME:
+            return
+        if closed.decision:
+            self._say(f"[{name}] answered by {closed.by or 'another'}: {closed.decision}")
+        else:
+            self._say(f"[{name}] is not asked any more")
+
+    def _say(self, text: str, indent: int = 0) -> None:
+        self._out.put(" " * indent + printable(text))
+
+    def _note_the_end(self) -> None:
+        """Once, when somebody is asked and it can't be here."""
+        if not self._listening and self._prompts and not self._end_noted:
+            self._end_noted = True
+            self._say("the input has ended: nobody answers here any more")
+
+    def _name(self, key: tuple[RunId, str]) -> str:
+        """p1; with more than one run, r2 p1."""
+        run, prompt = key
+        return prompt if len(self._active) <= 1 else f"{run} {prompt}"
+
+    # --- obeying --------------------------------------------------------------------------------
+
+    async def _obey(self, line: str) -> None:
+        words = line.split()
+        if not words:
+            return
+        try:
+            command = self._commands.get(words[0])
+            if command is not None and not self._is_recovery_answer(words):
+                await command(words[1:])
+            else:
+                await self._answer(words)
+        except M2pemError as error:
+            self._say(str(error))
+
+    def _is_recovery_answer(self, words: list[str]) -> bool:
+        """`resume` of a run that is not paused answers whether its vehicle is to go on."""
+        asked = any(
+            decision.value == "resume"
+            for prompt in self._prompts.values()
+            for decision in prompt.decisions
+        )
+        return words == ["resume"] and asked and not any(self._active.values())
+
+    async def _answer(self, words: list[str]) -> None:
+        prompt, rest = self._addressed(words)
+        decision = _decision(prompt, rest)
+        await self._control.answer(prompt.run, prompt.prompt, decision.value, by=NAME)
+
+    def _addressed(self, words: list[str]) -> tuple[OpenPrompt, str]:
+        """The prompt that a line is for, and the rest of the line."""
+        for (run, name), prompt in self._prompts.items():
+            if words[:2] == [run, name]:
+                return prompt, " ".join(words[2:])
+        named = [prompt for (_, name), prompt in self._prompts.items() if name == words[0]]
+        if len(named) == 1:
+            return named[0], " ".join(words[1:])
+        if len(self._prompts) == 1:
+            return next(iter(self._prompts.values())), " ".join(words)
+        if not self._prompts:
+            raise OperatorError(f"{words[0]!r} is no command, and nothing is asked; try: help")
+        names = ", ".join(map(self._name, self._prompts))
+        raise OperatorError(f"several prompts are open: {names}; begin with the one you answer")
+
+    def _which(self, words: list[str]) -> RunId:
+        if words:
+            return words[0]
+        if len(self._active) != 1:
+            raise OperatorError(
+                f"which run: {', '.join(self._active)}?" if self._active else "no mission runs"
+            )
+        return next(iter(self._active))
+
+    async def _stop(self, words: list[str]) -> None:
+        await self._control.stop(self._which(words), by=NAME)
+
+    async def _pause(self, words: list[str]) -> None:
+        await self._control.pause(self._which(words), by=NAME)
+
+    async def _resume(self, words: list[str]) -> None:
+        await self._control.resume(self._which(words), by=NAME)
+
+    async def _signal(self, words: list[str]) -> None:
+        if not words:
+            raise OperatorError("say which: signal NAME")
+        run = words.pop(0) if len(words) > 1 and words[0] in self._active else None
+        await self._control.signal(" ".join(words), run=run, by=NAME)
+
+    async def _start(self, words: list[str]) -> None:
+        if not words:
+            raise OperatorError("say which: start FILE")
+        await self._control.start(" ".join(words), by=NAME)
+
+    async def _runs(self, _: list[str]) -> None:
+        for run in await self._control.runs():
+            detail = f": {run.detail}" if run.detail else ""
+            self._say(f"{run.run} {run.status.value} {run.mission} ({run.process}){detail}")
+
+    async def _help(self, _: list[str]) -> None:
+        self._out.put(HELP)
+
+
+def _decision(prompt: OpenPrompt, text: str) -> Decision:
+    if text.isdecimal() and 1 <= int(text) <= len(prompt.decisions):
+        return prompt.decisions[int(text) - 1]
+    for decision in prompt.decisions:
+        if text == decision.value:
+            return decision
+    alike = [
+        each for each in prompt.decisions if _same(text, each.value) or _same(text, each.label)
+    ]
+    if len(alike) == 1:
+        return alike[0]
+    choices = ", ".join(
+        f"{number} {decision.value}" for number, decision in enumerate(prompt.decisions, 1)
+    )
+    raise OperatorError(f"{text!r} does not answer {prompt.prompt}; its decisions: {choices}")
+
+
+def _same(one: str, other: str) -> bool:
+    return one.casefold() == other.casefold()

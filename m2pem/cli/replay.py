@@ -1,0 +1,87 @@
+"""`m2pem replay`: a run from its journal, by applying its records alone."""
+
+import asyncio
+import sys
+from typing import TYPE_CHECKING
+
+import click
+
+from m2pem.cli.options import as_json, example, format_option, journal_option, run_argument
+
+if TYPE_CHECKING:
+    from m2pem.cli.progress import Progress
+    from m2pem.journal.base import Journal, RunLine
+
+
+@click.command(epilog=example("m2pem replay r1 --verify"))
+@run_argument
+@journal_option
+@click.option("--verify", is_flag=True, help="Decide every input again, and compare.")
+@click.option("--state", "state_only", is_flag=True, help="Print only how it stands.")
+@format_option
+def replay(run_id: str, journal: str | None, verify: bool, state_only: bool, output: str) -> int:
+    """Print what happened in a run, and how it stands.
+
+    The state is rebuilt by applying the journaled records alone, as after a crash. With --verify
+    every input is decided again instead, and the first difference ends it with status 1.
+    """
+    if verify and state_only:
+        raise click.UsageError("--verify and --state do not go together")
+    return asyncio.run(_replay(run_id, journal, verify, state_only, output))
+
+
+async def _replay(run_id: str, url: str | None, verify: bool, state_only: bool, output: str) -> int:
+    from m2pem.cli.journals import existing_journal, find_run
+    from m2pem.cli.progress import progress
+
+    async with existing_journal(url) as journal:
+        line = await find_run(journal, run_id)
+        # On a terminal the records themselves are the progress.
+        shown = verify or state_only or not sys.stdout.isatty()
+        with progress(f"{run_id}: records", line.last_seq, shown=shown) as done:
+            if verify:
+                return await _verify(journal, line, output, done)
+            return await _print(journal, line, state_only, output, done)
+
+
+async def _print(
+    journal: "Journal", line: "RunLine", state_only: bool, output: str, done: "Progress"
+) -> int:
+    from m2pem.api.control import StampedRecord
+    from m2pem.cli.output import US_PER_S, wants_colour
+    from m2pem.cli.standing import Standing
+    from m2pem.cli.story import Story
+    from m2pem.journal.codec import record_line
+
+    standing = Standing(line)
+    story = Story(lambda _: standing.mission, colour=wants_colour(sys.stdout))
+    async for entry in journal.read(line.run):
+        for seq, record in enumerate(entry.records, entry.seq):
+            standing.take(record)
+            if state_only:
+                continue
+            if output == "json":
+                print(record_line(line.run, seq, entry.t_us, record).decode())
+            elif told := story.tell(StampedRecord(line.run, seq, entry.t_us / US_PER_S, record)):
+                print(told)
+        done(len(entry.records))
+    if output == "text":
+        print(standing.as_text())
+    elif state_only:
+        print(as_json(standing.as_data()))
+    return 0
+
+
+async def _verify(journal: "Journal", line: "RunLine", output: str, done: "Progress") -> int:
+    from m2pem.cli.verification import Verification
+
+    verification = Verification(line)
+    async for entry in journal.read(line.run):
+        if not verification.agrees(entry):
+            break
+        done(len(entry.records))
+    if output == "json":
+        print(as_json(verification.as_data()))
+    else:
+        print(verification.as_text())
+    return 1 if verification.difference else 0

@@ -1,0 +1,91 @@
+"""`m2pem resume`: a run that its executive left without ending it."""
+
+import asyncio
+import time
+from pathlib import Path
+
+import click
+
+from m2pem.cli.options import (
+    UnusableError,
+    answers_option,
+    example,
+    format_option,
+    journal_option,
+    ocu_option,
+    run_argument,
+)
+
+
+@click.command(epilog=example("m2pem resume r1"))
+@run_argument
+@journal_option
+@ocu_option
+@answers_option
+@format_option
+def resume(
+    run_id: str,
+    journal: str | None,
+    ocu_names: str | None,
+    answers: Path | None,
+    output: str,
+) -> int:
+    """Take up a run that was interrupted.
+
+    The mission, the fleet, whether it is simulated, and its speed, are in the journal. Ends as
+    `m2pem run` does.
+    """
+    return asyncio.run(_resume(run_id, journal, ocu_names, answers, output))
+
+
+async def _resume(
+    run_id: str,
+    journal_url: str | None,
+    ocu_names: str | None,
+    answers_file: Path | None,
+    output: str,
+) -> int:
+    from m2pem.cli.driving import drive_run
+    from m2pem.cli.journals import existing_journal, find_run, last_decided_us, url_of
+    from m2pem.cli.ocus import Operators, chosen
+    from m2pem.cli.output import output_of
+    from m2pem.cli.setting import get_answers, make_executive
+    from m2pem.cli.state_files import tidy_up
+    from m2pem.executive.clock import SystemClock
+    from m2pem.journal import file_of
+    from m2pem.model.bpmn import parse_mission
+    from m2pem.plugins import PluginManager
+    from m2pem.resources.snapshot import restore
+
+    plugins = PluginManager()
+    operators = Operators(chosen(ocu_names, plugins), plugins)
+    async with existing_journal(journal_url) as journal:
+        line = await find_run(journal, run_id)
+        header = line.header
+        if line.outcome is not None:
+            raise UnusableError(f"{run_id} has ended ({line.outcome.value}): nothing to resume")
+        if line.driven:
+            raise UnusableError(f"{run_id} is being driven by an executive that is alive")
+        mission = parse_mission(header.mission, header.mission_name)
+        answers = get_answers(answers_file, mission)
+        # Simulated time may have run ahead of the wall clock; it never goes back.
+        start_us = max(time.time_ns() // 1000, await last_decided_us(journal, line))
+        executive = make_executive(
+            restore(header.fleet),
+            journal,
+            plugins,
+            SystemClock(header.speed, start_us),
+            simulated=header.simulated,
+            answers=answers,
+        )
+        with output_of(output) as out:
+
+            async def take_up() -> str:
+                await executive.resume(run_id)
+                if out.story is not None:
+                    out.story.know(executive.runner(run_id).run.state)
+                return run_id
+
+            status = await drive_run(executive, out, operators, answers, take_up)
+        tidy_up(executive, file_of(url_of(journal_url)))
+    return status

@@ -1,0 +1,56 @@
+"""`m2pem runs`: what ran, and how it stands."""
+
+import asyncio
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+import click
+
+from m2pem.cli.options import as_json, example, format_option, journal_option
+
+if TYPE_CHECKING:
+    from m2pem.api.control import RunSummary
+
+US_PER_S = 1_000_000
+
+
+@click.command(epilog=example("m2pem runs"))
+@journal_option
+@format_option
+def runs(journal: str | None, output: str) -> None:
+    """List the runs of a journal."""
+    found = asyncio.run(_runs(journal))
+    if output == "json":
+        click.echo(as_json(found))
+        return
+    from m2pem.cli.table import table
+
+    if not found:
+        click.echo("no runs yet")
+        return
+    header = ("RUN", "STATUS", "STARTED (UTC)", "RECORDS", "PROCESS", "MISSION", "DETAIL")
+    rows = [
+        (
+            run.run,
+            run.status.value,
+            _time(run.started_us),
+            str(run.records),
+            run.process,
+            run.mission,
+            run.detail,
+        )
+        for run in found
+    ]
+    click.echo(table(header, rows))
+
+
+async def _runs(url: str | None) -> "list[RunSummary]":
+    from m2pem.cli.journals import existing_journal
+    from m2pem.executive.control import summary
+
+    async with existing_journal(url) as journal:
+        return [summary(line) for line in await journal.runs()]
+
+
+def _time(time_us: int) -> str:
+    return f"{datetime.fromtimestamp(time_us / US_PER_S, UTC):%Y-%m-%d %H:%M:%S}"

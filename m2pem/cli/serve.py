@@ -1,0 +1,132 @@
+"""`m2pem serve`: the executive as a service; operators start missions."""
+
+import asyncio
+import time
+from typing import TYPE_CHECKING
+
+import click
+
+from m2pem.cli.options import (
+    MADE_UP,
+    example,
+    fleet_option,
+    format_option,
+    journal_option,
+    ocu_option,
+    simulate_option,
+    speed_option,
+)
+
+if TYPE_CHECKING:
+    from m2pem.executive.executive import Executive
+    from m2pem.journal.base import Journal, RunLine
+    from m2pem.resources.fleet import Fleet
+
+
+@click.command(epilog=example("m2pem serve --fleet fleet_configs/vignette1.yaml --ocu plain"))
+@fleet_option(required=True)
+@journal_option
+@ocu_option
+@simulate_option
+@speed_option
+@format_option
+def serve(
+    fleet_file: str,
+    journal: str | None,
+    ocu_names: str | None,
+    simulate: bool,
+    speed: float,
+    output: str,
+) -> int:
+    """Serve operators, who start missions, until stopped.
+
+    Takes up runs of the journal that were interrupted, if they had this fleet. Ctrl-C or SIGTERM
+    stop the runs, wait until their vehicles are released, and end it with 0.
+    """
+    return asyncio.run(_serve(fleet_file, journal, ocu_names, simulate, speed, output))
+
+
+async def _serve(
+    fleet_file: str,
+    journal_url: str | None,
+    ocu_names: str | None,
+    simulated: bool,
+    speed: float,
+    output: str,
+) -> int:
+    from m2pem.cli.driving import driving
+    from m2pem.cli.journals import journal_at, url_of
+    from m2pem.cli.ocus import Operators, chosen
+    from m2pem.cli.output import output_of
+    from m2pem.cli.setting import make_executive, refuse_speed
+    from m2pem.cli.state_files import tidy_up, with_shared_state
+    from m2pem.executive.clock import SystemClock
+    from m2pem.journal import file_of
+    from m2pem.plugins import PluginManager
+    from m2pem.resources.fleet_file import load_fleet
+
+    if fleet_file == MADE_UP:
+        raise click.UsageError(f"--fleet {MADE_UP}: a fleet is made up from a mission; name a file")
+    plugins = PluginManager()
+    operators = Operators(chosen(ocu_names, plugins), plugins)
+    url = url_of(journal_url)
+    fleet = with_shared_state(load_fleet(fleet_file), file_of(url), simulated=simulated)
+    refuse_speed(fleet, speed, simulated=simulated)
+    async with journal_at(url) as journal:
+        mine, others = await _interrupted(journal, fleet, simulated, speed)
+        executive = make_executive(
+            fleet,
+            journal,
+            plugins,
+            SystemClock(speed, await _start_us(journal, mine)),
+            simulated=simulated,
+        )
+        with output_of(output) as out:
+            async with driving(executive, out, operators, one=False) as interruption:
+                who = ", ".join(operators.names) or "nobody"
+                click.echo(f"m2pem: serving {fleet.name}; operators: {who}", err=True)
+                for line in others:
+                    click.echo(
+                        f"m2pem: {line.run} was interrupted with other vehicles, or at another "
+                        f"speed: `m2pem resume {line.run}` takes it up",
+                        err=True,
+                    )
+                await _take_up(executive, mine)
+                await interruption.asked.wait()
+        tidy_up(executive, file_of(url))
+    return 0
+
+
+async def _interrupted(
+    journal: "Journal", fleet: "Fleet", simulated: bool, speed: float
+) -> "tuple[list[RunLine], list[RunLine]]":
+    """The runs that nobody drives: those with this very fleet, and the others."""
+    from m2pem.resources.snapshot import dump
+
+    here = (dump(fleet), simulated, speed)
+    mine: list[RunLine] = []
+    others: list[RunLine] = []
+    for line in await journal.runs():
+        if line.outcome is None and not line.driven:
+            header = line.header
+            same = (header.fleet, header.simulated, header.speed) == here
+            (mine if same else others).append(line)
+    return mine, others
+
+
+async def _start_us(journal: "Journal", lines: "list[RunLine]") -> int:
+    """Now, or when the last of these runs was, if simulated time has run ahead."""
+    from m2pem.cli.journals import last_decided_us
+
+    times = [await last_decided_us(journal, line) for line in lines]
+    return max([time.time_ns() // 1000, *times])
+
+
+async def _take_up(executive: "Executive", lines: "list[RunLine]") -> None:
+    from m2pem.errors import M2pemError
+
+    for line in lines:
+        try:
+            await executive.resume(line.run)
+        except M2pemError as error:
+            click.echo(f"m2pem: {line.run} cannot be taken up: {error}", err=True)

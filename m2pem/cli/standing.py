@@ -1,0 +1,97 @@
+"""How a run stands by its journal: tokens, behaviors, prompts, data."""
+
+from typing import Any
+
+import msgspec
+
+from m2pem.cli.table import table
+from m2pem.engine.records import DataWritten, Record
+from m2pem.engine.run import MissionRun
+from m2pem.executive.control import summary
+from m2pem.journal.base import RunLine
+from m2pem.model.bpmn import parse_mission
+from m2pem.model.values import Value
+from m2pem.resources.snapshot import restore
+
+
+def run_of(line: RunLine) -> MissionRun:
+    """The run of a journal before anything has happened in it."""
+    header = line.header
+    mission = parse_mission(header.mission, header.mission_name)
+    return MissionRun(mission, restore(header.fleet) if header.fleet else None, line.run)
+
+
+class Standing:
+    """The state of a run, rebuilt by applying its records."""
+
+    def __init__(self, line: RunLine) -> None:
+        self._summary = summary(line)
+        self._run = run_of(line)
+        self._data: dict[str, Value] = {}
+        self.mission = self._run.state.mission
+
+    def take(self, record: Record) -> None:
+        """The next record."""
+        state = self._run.state
+        self._run.replay([record])
+        # Kept here, as the state forgets the root's data when it ends.
+        if isinstance(record, DataWritten) and state.root and record.store == state.root.id:
+            self._data[record.key] = record.value
+
+    def as_data(self) -> dict[str, Any]:
+        """For programs."""
+        state = self._run.state
+        return {
+            "run": state.run,
+            "status": self._summary.status.value,
+            "detail": state.detail,
+            "tokens": [
+                {
+                    "token": token.id,
+                    "process": token.scope.container.process.id,
+                    "element": token.node.id,
+                    "scope": token.scope.id,
+                }
+                for token in state.tokens.values()
+            ],
+            "behaviors": [
+                {
+                    "behavior": behavior.id,
+                    "name": behavior.name,
+                    "resources": behavior.resources,
+                    "phase": behavior.phase.value,
+                    "state": behavior.state.value if behavior.state is not None else None,
+                }
+                for behavior in state.behaviors.values()
+            ],
+            "prompts": [
+                {"prompt": prompt.id, "element": prompt.token.node.id, "text": prompt.text}
+                for prompt in state.prompts.values()
+            ],
+            "data": self._data,
+        }
+
+    def as_text(self) -> str:
+        """For people."""
+        state = self._run.state
+        detail = f": {state.detail}" if state.detail else ""
+        parts = [f"\n{state.run} is {self._summary.status.value}{detail}"]
+        if state.tokens:
+            rows = [
+                (str(token.id), token.scope.container.process.id, token.node.label)
+                for token in state.tokens.values()
+            ]
+            parts.append(table(("TOKEN", "PROCESS", "IS ON"), rows))
+        if state.behaviors:
+            rows = [
+                (each.name, ", ".join(each.resources), (each.state or each.phase).value.lower())
+                for each in state.behaviors.values()
+            ]
+            parts.append(table(("BEHAVIOR", "OF", "STATE"), rows))
+        if self._data:
+            written = [
+                (key, msgspec.json.encode(value).decode())
+                for key, value in sorted(self._data.items())
+            ]
+            parts.append(table(("DATA", "VALUE"), written))
+        return "\n\n".join(parts)

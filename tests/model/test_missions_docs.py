@@ -1,0 +1,52 @@
+"""The examples of docs/missions.md are read as they stand there."""
+
+import re
+from pathlib import Path
+
+import pytest
+from bpmn_text import definitions, load
+
+from m2pem.model.elements import CallActivity, ServiceTask
+from m2pem.model.lint import lint
+
+DOCS = (Path(__file__).parent.parent.parent / "docs" / "missions.md").read_text()
+EXAMPLES = re.findall(r"```xml\n(.*?)```", DOCS, re.DOTALL)
+
+
+def example(start: str) -> str:
+    (found,) = (each for each in EXAMPLES if each.lstrip().startswith(start))
+    return str(found)
+
+
+def test_the_whole_mission_has_no_finding() -> None:
+    mission = load(example("<definitions").encode())
+    assert mission.warnings == ()
+    assert lint(mission) == []
+
+
+@pytest.mark.parametrize(
+    ("start", "wrapper"),
+    [
+        ("<extensionElements", '<scriptTask id="T">{}</scriptTask>'),
+        (
+            "<m2pem:userTask",
+            '<userTask id="T"><extensionElements>{}</extensionElements></userTask>',
+        ),
+        ("<serviceTask", "{}"),
+        ("<callActivity", "{}"),
+    ],
+)
+def test_an_example_has_no_warning(start: str, wrapper: str) -> None:
+    task = wrapper.format(example(start))
+    called = '<process id="DETECTION"><task id="t"/></process>'
+    mission = load(definitions(f'<process id="P">{task}</process>{called}'))
+    assert mission.warnings == ()
+    (node, _) = mission.nodes
+    if isinstance(node, ServiceTask):
+        assert node.call is not None
+    if isinstance(node, CallActivity):
+        assert len(node.mappings.inputs) == 2
+
+
+def test_every_example_is_tested() -> None:
+    assert len(EXAMPLES) == 5
