@@ -3,6 +3,7 @@
 import logging
 from functools import cached_property
 from importlib import import_module
+from keyword import iskeyword
 from typing import TYPE_CHECKING
 
 import click
@@ -20,6 +21,12 @@ COMMANDS = {
     "runs": "List the runs of a journal.",
     "replay": "Print what happened in a run, and how it stands.",
     "resume": "Take up a run that was interrupted.",
+    "answer": "Answer a prompt of a run that is running on this host.",
+    "signal": "Send a signal to a run that is running on this host.",
+    "stop": "Stop a run that is running on this host.",
+    "pause": "Pause a run that is running on this host.",
+    "continue": "Let a run on this host go on after a pause.",
+    "attach": "Serve an operator of an executive that is running on this host.",
     "plugins": "List the plugins and what they provide.",
     "fleet": "Show a fleet: who is there and can do what.",
     "completion": "Print what makes a shell complete m2pem's words.",
@@ -40,7 +47,8 @@ class LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The command of that name; None if nobody has it."""
         if cmd_name in COMMANDS:
-            command = getattr(import_module(f"m2pem.cli.{cmd_name}"), cmd_name)
+            name = f"{cmd_name}_" if iskeyword(cmd_name) else cmd_name
+            command = getattr(import_module(f"m2pem.cli.{name}"), name)
             assert isinstance(command, click.Command)
             return command
         return self._of_plugins.commands.get(cmd_name)

@@ -86,6 +86,8 @@ async def _resume(
                     out.story.know(executive.runner(run_id).run.state)
                 return run_id
 
-            status = await drive_run(executive, out, operators, answers, take_up)
+            status = await drive_run(
+                executive, out, operators, answers, file_of(url_of(journal_url)), take_up
+            )
         tidy_up(executive, file_of(url_of(journal_url)))
     return status

@@ -36,15 +36,47 @@ def ask_driver(journal: Path, run: str, method: str, **params: Any) -> Any:
         OperatorError: it refused, or none drives the run.
         ControlSocketError: it is gone, or does not answer.
     """
-    driven: list[str] = []
+    elsewhere: list[str] = []
     for path in live_sockets(journal):
         try:
             return ask(path, method, run=run, **params)
         except NotDrivenError as error:
-            driven.append(str(error))
-    if driven:
-        raise OperatorError("; ".join(driven))
-    raise OperatorError(
+            elsewhere.append(str(error))
+    if elsewhere:
+        raise OperatorError("; ".join(elsewhere))
+    raise _nobody(journal)
+
+
+def find_executive(journal: Path, run: str | None) -> Path:
+    """The socket of the executive that drives `run`; of the only one on the journal if None.
+
+    Raises:
+        OperatorError: there is none, or (without a run) more than one.
+    """
+    paths = list(live_sockets(journal))
+    if not paths:
+        raise _nobody(journal)
+    if run is None:
+        if len(paths) > 1:
+            raise OperatorError(
+                f"{len(paths)} executives write to {journal}: name a run of the one you mean"
+            )
+        return paths[0]
+    elsewhere: list[str] = []
+    for path in paths:
+        try:
+            ask(path, "mission_time_s", run=run)
+        except NotDrivenError as error:
+            elsewhere.append(str(error))
+        except OperatorError:
+            return path  # it drove the run to its end
+        else:
+            return path
+    raise OperatorError("; ".join(elsewhere))
+
+
+def _nobody(journal: Path) -> OperatorError:
+    return OperatorError(
         f"no executive with the journal {journal} is running here; "
         "name the journal of the one you mean with --journal"
     )

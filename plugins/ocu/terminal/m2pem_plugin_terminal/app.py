@@ -1,40 +1,24 @@
-"""The screen of the operator control unit, and what its keys do."""
+"""What the keys of the operator control unit do."""
 
 import time
 from collections.abc import Awaitable, Callable
 from typing import Any, ClassVar
 
-from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Horizontal, VerticalScroll
-from textual.widgets import RichLog, Static
+from textual.containers import VerticalScroll
+from textual.widgets import RichLog
 
-from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId, RunStatus
+from m2pem.api.control import MissionControl, RunId, RunStatus
 from m2pem.api.operator import operator_name
 from m2pem.errors import M2pemError
 from m2pem_plugin_terminal.board import Board
 from m2pem_plugin_terminal.dialogs import Choice, Choose, Read, help_text
-from m2pem_plugin_terminal.feed import Feed
-from m2pem_plugin_terminal.header import header
-from m2pem_plugin_terminal.log_pane import LogPane
-from m2pem_plugin_terminal.notice import NoticeLine
-from m2pem_plugin_terminal.questions import Questions
-from m2pem_plugin_terminal.stop import StopBar, Trigger
-from m2pem_plugin_terminal.story import Line
-from m2pem_plugin_terminal.theme import THEME
-from m2pem_plugin_terminal.tree import mission_tree
-from m2pem_plugin_terminal.vehicles import Vehicles
-
-REFRESH_S = 0.25
+from m2pem_plugin_terminal.display import Display
 
 
-class TerminalApp(App[None], inherit_bindings=False):
-    """Shows one run at a time. `now`: the operator's clock; `by`: the name that is journaled."""
+class TerminalApp(Display):
+    """The display with its keys. `by`: the name that is journaled."""
 
-    CSS_PATH = "terminal.tcss"
-    ENABLE_COMMAND_PALETTE = False
-    AUTO_FOCUS = ""  # keys are commands until a field is asked for
-    TITLE = "m2pem"
     BINDINGS: ClassVar[list[BindingType]] = [
         # Before any dialog or text field gets to see them:
         Binding("ctrl+x", "stop", priority=True),
@@ -63,170 +47,13 @@ class TerminalApp(App[None], inherit_bindings=False):
         now: Callable[[], float] = time.monotonic,
         by: str | None = None,
     ) -> None:
-        super().__init__()
-        self.control = control
-        self.now = now
+        super().__init__(control, now=now)
         self.by = operator_name() if by is None else by
-        self.feed = Feed(control, self, now)
-        self.run_shown: RunId = ""
-        self.trigger = Trigger(now)
-        self._vehicles = Vehicles(control.fleet())
-        self._time_s = 0.0
-        self._asking_time = False
-        self._answers: set[tuple[RunId, str]] = set()
-
-    # --- life -----------------------------------------------------------------------------------
-
-    def compose(self) -> ComposeResult:
-        """From top to bottom."""
-        yield Static(id="header")
-        with Horizontal(id="middle"):
-            with VerticalScroll(id="mission", can_focus=False):
-                yield Static(id="tree")
-            with VerticalScroll(id="vehicles", can_focus=False):
-                yield Static(id="fleet")
-        yield Questions(self.now)
-        yield LogPane()
-        yield NoticeLine(self.now)
-        yield StopBar()
-
-    def on_mount(self) -> None:
-        """Begin to follow."""
-        self.register_theme(THEME)
-        self.theme = THEME.name
-        self.query_one("#mission").border_title = "Mission"
-        self.query_one("#vehicles").border_title = "Vehicles"
-        self.run_worker(self._follow())
-        self.run_worker(self._hear())
-        self.set_interval(REFRESH_S, self.show)
-
-    async def _follow(self) -> None:
-        try:
-            await self.feed.follow()
-            self.say("The executive has ended.", alarm=True)
-        except M2pemError as error:
-            self.say(f"The executive cannot be followed any more: {error}", alarm=True)
-
-    async def _hear(self) -> None:
-        try:
-            async for state in self.control.telemetry():
-                self._vehicles.hear(state, self.now())
-        except M2pemError as error:
-            self.say(f"No telemetry any more: {error}", alarm=True)
-
-    # --- what is shown --------------------------------------------------------------------------
-
-    @property
-    def board(self) -> Board | None:
-        """The run that is shown."""
-        return self.feed.boards.get(self.run_shown)
-
-    def show(self) -> None:
-        """Bring everything up to date."""
-        screen = self.screen_stack[0]
-        board, now = self.board, self.now()
-        if board is not None and not board.status.ended and not self._asking_time:
-            self._asking_time = True
-            self.run_worker(self._ask_time(board), exit_on_error=False)
-        time_s = (
-            self._time_s if board and not board.status.ended else board.time_s if board else 0.0
-        )
-        active = [b for b in self.feed.boards.values() if not b.status.ended]
-        others = sum(1 for each in active if each is not board)
-        top = screen.query_one("#header", Static)
-        top.update(header(board, others, time_s, screen.size.width))
-        if board is not None:
-            tree = screen.query_one("#tree", Static)
-            width = screen.query_one("#mission").scrollable_content_region.width
-            tree.update(mission_tree(board, now, time_s, width))
-        width = screen.query_one("#vehicles").scrollable_content_region.width
-        screen.query_one("#fleet", Static).update(
-            self._vehicles.table(now, width, self._behavior_name)
-        )
-        screen.query_one(Questions).show(self.feed.prompts, self._label, self.run_shown)
-        screen.query_one(NoticeLine).show()
-        paused = board is not None and board.status is RunStatus.PAUSED
-        for each in self.screen_stack:
-            for bar in each.query(StopBar):
-                bar.show(self.trigger, paused)
-
-    async def _ask_time(self, board: Board) -> None:
-        try:
-            self._time_s = await self.control.mission_time_s(board.run)
-        except M2pemError:
-            self._time_s = board.time_s
-        finally:
-            self._asking_time = False
-
-    def _behavior_name(self, behavior: str) -> str:
-        names = (board.behavior_name(behavior) for board in self.feed.boards.values())
-        return next((name for name in names if name), behavior)
-
-    def _label(self, prompt: OpenPrompt) -> str:
-        board = self.feed.boards.get(prompt.run)
-        return board.label(prompt.element) if board is not None else prompt.element
-
-    def look_at(self, run: RunId) -> None:
-        """Show another run."""
-        self.run_shown = run
-        board = self.feed.boards[run]
-        self._time_s = board.time_s
-        self._log_pane.show(self.feed.logs[run])
-        self.show()
-
-    def say(self, text: str, *, alarm: bool = False) -> None:
-        """Tell the operator something, for some seconds."""
-        if self.is_running:
-            self.screen_stack[0].query_one(NoticeLine).say(text, alarm=alarm)
-
-    @property
-    def _log_pane(self) -> LogPane:
-        return self.screen_stack[0].query_one(LogPane)
-
-    @property
-    def _questions(self) -> Questions:
-        return self.screen_stack[0].query_one(Questions)
-
-    # --- what the feed tells --------------------------------------------------------------------
-
-    def logged(self, run: RunId, line: Line) -> None:
-        """One more line."""
-        if run == self.run_shown:
-            self._log_pane.add(line)
-
-    def answered(self, prompt: OpenPrompt, closed: PromptClosed) -> None:
-        """Tell who answered, unless it was this operator here."""
-        key = (prompt.run, prompt.prompt)
-        if key in self._answers:
-            self._answers.discard(key)
-        elif closed.by or closed.decision:
-            label = {d.value: d.label for d in prompt.decisions}.get(closed.decision)
-            who = closed.by or "Somebody"
-            self.say(f"{who} answered {self._label(prompt)}: {label or closed.decision}")
-        elif not self.feed.boards[prompt.run].status.ended:
-            self.say(f"{self._label(prompt)} is no longer asked")
-
-    def began(self, run: RunId) -> None:
-        """Look at a new run, unless one that still runs is looked at."""
-        board = self.board
-        if board is None or board.status.ended:
-            self.look_at(run)
-        elif not self.feed.boards[run].status.ended:
-            self.say(f"{run} has begun; press r to look at it")
-
-    def ended(self, run: RunId) -> None:
-        """Tell how it ended."""
-        board = self.feed.boards[run]
-        detail = f": {board.outcome_detail}" if board.outcome_detail else ""
-        bad = board.status in (RunStatus.FAILED, RunStatus.STOPPED)
-        self.say(f"{run} {board.status.value}{detail}", alarm=bad)
-
-    # --- what keys do ---------------------------------------------------------------------------
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Escape and Tab are left to dialogs and fields unless they are needed here."""
         if action == "disarm":
-            return self.trigger.armed or (not self._in_dialog and self._log_pane.filtering)
+            return self.trigger.armed or (not self._in_dialog and self.log_pane.filtering)
         if action == "next_question":
             return not self._in_dialog
         return True
@@ -276,31 +103,31 @@ class TerminalApp(App[None], inherit_bindings=False):
         if self.trigger.armed:
             self.trigger.disarm()
         else:
-            self._log_pane.clear_filter()
+            self.log_pane.clear_filter()
         self.show()
 
     def action_answer(self, number: int) -> None:
         """Answer the question that is shown."""
-        prompt, decision = self._questions.current, self._questions.decide(number)
+        prompt, decision = self.questions.current, self.questions.decide(number)
         if prompt is None or decision is None:
             return
-        if not self._questions.settled:
+        if not self.questions.settled:
             self.say("Not taken: the question has only just appeared. Read it, then press again")
             return
-        self._answers.add((prompt.run, prompt.prompt))
+        self.own_answers.add((prompt.run, prompt.prompt))
 
         async def answer() -> None:
             try:
                 await self.control.answer(prompt.run, prompt.prompt, decision, by=self.by)
             except M2pemError:
-                self._answers.discard((prompt.run, prompt.prompt))
+                self.own_answers.discard((prompt.run, prompt.prompt))
                 raise
 
         self._carry_out("Not taken", answer())
 
     def action_next_question(self) -> None:
         """Tab."""
-        self._questions.turn()
+        self.questions.turn()
         self.show()
 
     def action_pause(self) -> None:
@@ -361,7 +188,7 @@ class TerminalApp(App[None], inherit_bindings=False):
 
     def action_filter(self) -> None:
         """Type what log lines must have in them."""
-        self._log_pane.ask_filter()
+        self.log_pane.ask_filter()
 
     async def action_help(self) -> None:
         """All keys."""
