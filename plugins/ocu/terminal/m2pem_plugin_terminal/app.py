@@ -85,6 +85,8 @@ class TerminalApp(Display):
         board = self._active_board()
         if board is not None and self.trigger.press(f"STOP {board.run}"):
             self.say(f"Stopping {board.run} ...", alarm=True)
+            while self._in_dialog:
+                self.pop_screen()
             reason = f"by {self.by}"
             self._carry_out("Stop", self.control.stop(board.run, by=self.by, reason=reason))
         self.show()

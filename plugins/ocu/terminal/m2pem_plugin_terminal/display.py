@@ -48,28 +48,33 @@ class Display(App[None], inherit_bindings=False):
         self._time_s = 0.0
         self._asking_time = False
         self.own_answers: set[tuple[RunId, str]] = set()
+        # Held, not looked up: while the screen is being taken down they can no longer be found.
+        self._header = Static(id="header")
+        self._tree = Static(id="tree")
+        self._mission = VerticalScroll(self._tree, id="mission", can_focus=False)
+        self._fleet = Static(id="fleet")
+        self._around = VerticalScroll(self._fleet, id="vehicles", can_focus=False)
+        self._notice = NoticeLine(now)
+        self.questions = Questions(now)
+        self.log_pane = LogPane()
 
     # --- life -----------------------------------------------------------------------------------
 
     def compose(self) -> ComposeResult:
         """From top to bottom."""
-        yield Static(id="header")
-        with Horizontal(id="middle"):
-            with VerticalScroll(id="mission", can_focus=False):
-                yield Static(id="tree")
-            with VerticalScroll(id="vehicles", can_focus=False):
-                yield Static(id="fleet")
-        yield Questions(self.now)
-        yield LogPane()
-        yield NoticeLine(self.now)
+        yield self._header
+        yield Horizontal(self._mission, self._around, id="middle")
+        yield self.questions
+        yield self.log_pane
+        yield self._notice
         yield StopBar()
 
     def on_mount(self) -> None:
         """Begin to follow."""
         self.register_theme(THEME)
         self.theme = THEME.name
-        self.query_one("#mission").border_title = "Mission"
-        self.query_one("#vehicles").border_title = "Vehicles"
+        self._mission.border_title = "Mission"
+        self._around.border_title = "Vehicles"
         self.run_worker(self._follow())
         self.run_worker(self._hear())
         self.set_interval(REFRESH_S, self.show)
@@ -97,7 +102,6 @@ class Display(App[None], inherit_bindings=False):
 
     def show(self) -> None:
         """Bring everything up to date."""
-        screen = self.screen_stack[0]
         board, now = self.board, self.now()
         if board is not None and not board.status.ended and not self._asking_time:
             self._asking_time = True
@@ -107,18 +111,14 @@ class Display(App[None], inherit_bindings=False):
         )
         active = [b for b in self.feed.boards.values() if not b.status.ended]
         others = sum(1 for each in active if each is not board)
-        top = screen.query_one("#header", Static)
-        top.update(header(board, others, time_s, screen.size.width))
+        self._header.update(header(board, others, time_s, self.size.width))
         if board is not None:
-            tree = screen.query_one("#tree", Static)
-            width = screen.query_one("#mission").scrollable_content_region.width
-            tree.update(mission_tree(board, now, time_s, width))
-        width = screen.query_one("#vehicles").scrollable_content_region.width
-        screen.query_one("#fleet", Static).update(
-            self._vehicles.table(now, width, self._behavior_name)
-        )
-        screen.query_one(Questions).show(self.feed.prompts, self._label, self.run_shown)
-        screen.query_one(NoticeLine).show()
+            width = self._mission.scrollable_content_region.width
+            self._tree.update(mission_tree(board, now, time_s, width))
+        width = self._around.scrollable_content_region.width
+        self._fleet.update(self._vehicles.table(now, width, self._behavior_name))
+        self.questions.show(self.feed.prompts, self._label, self.run_shown)
+        self._notice.show()
         paused = board is not None and board.status is RunStatus.PAUSED
         for each in self.screen_stack:
             for bar in each.query(StopBar):
@@ -150,18 +150,7 @@ class Display(App[None], inherit_bindings=False):
 
     def say(self, text: str, *, alarm: bool = False) -> None:
         """Tell the operator something, for some seconds."""
-        if self.is_running:
-            self.screen_stack[0].query_one(NoticeLine).say(text, alarm=alarm)
-
-    @property
-    def log_pane(self) -> LogPane:
-        """The log, also when a dialog is over it."""
-        return self.screen_stack[0].query_one(LogPane)
-
-    @property
-    def questions(self) -> Questions:
-        """The questions, also when a dialog is over them."""
-        return self.screen_stack[0].query_one(Questions)
+        self._notice.say(text, alarm=alarm)
 
     # --- what the feed tells --------------------------------------------------------------------
 

@@ -24,18 +24,19 @@ class LogPane(Vertical):
         super().__init__(id="log")
         self._filter = ""
         self._lines: list[Line] = []
+        self._shown = RichLog(wrap=True, min_width=0, max_lines=2000, markup=False, highlight=False)
+        self._shown.can_focus = False
+        self._asked = Input(placeholder="only lines with ...", id="filter", compact=True)
+        self._asked.display = False
 
     def compose(self) -> ComposeResult:
         """The lines, and the filter, hidden until asked for."""
-        lines = RichLog(wrap=True, min_width=0, max_lines=2000, markup=False, highlight=False)
-        lines.can_focus = False
-        yield lines
-        yield Input(placeholder="only lines with ...", id="filter", compact=True)
+        yield self._shown
+        yield self._asked
 
     def on_mount(self) -> None:
         """Begin without a filter."""
         self.border_title = "Log"
-        self.query_one(Input).display = False
 
     def show(self, lines: Iterable[Line]) -> None:
         """Show these instead."""
@@ -46,23 +47,22 @@ class LogPane(Vertical):
         """One more."""
         self._lines.append(line)
         if self._passes(line):
-            self.query_one(RichLog).write(_styled(line))
+            self._shown.write(_styled(line))
 
     def ask_filter(self) -> None:
         """Let the operator type."""
-        asked = self.query_one(Input)
-        asked.display = True
-        asked.focus()
+        self._asked.display = True
+        self._asked.focus()
 
     def clear_filter(self) -> None:
         """Show all lines again."""
-        self.query_one(Input).value = ""
+        self._asked.value = ""
         self._close()
 
     @property
     def filtering(self) -> bool:
         """Whether lines are left out, or the filter is being typed."""
-        return bool(self._filter) or self.query_one(Input).has_focus
+        return bool(self._filter) or self._asked.has_focus
 
     def on_input_changed(self, event: Input.Changed) -> None:
         """The lines follow while it is typed."""
@@ -75,19 +75,17 @@ class LogPane(Vertical):
         self._close()
 
     def _close(self) -> None:
-        asked = self.query_one(Input)
-        asked.display = False
+        self._asked.display = False
         self.screen.set_focus(None)
 
     def _passes(self, line: Line) -> bool:
         return self._filter in f"{line.time} {line.text}".lower()
 
     def _rewrite(self) -> None:
-        log = self.query_one(RichLog)
-        log.clear()
+        self._shown.clear()
         for line in self._lines:
             if self._passes(line):
-                log.write(_styled(line))
+                self._shown.write(_styled(line))
 
 
 def _styled(line: Line) -> Text:

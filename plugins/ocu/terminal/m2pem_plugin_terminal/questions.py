@@ -20,6 +20,8 @@ class Questions(Vertical):
 
     def __init__(self, now: Callable[[], float]) -> None:
         super().__init__(id="questions")
+        self._text = Static(id="question")
+        self._decisions = Static(id="decisions")
         self._now = now
         self._standing: dict[tuple[RunId, str], OpenPrompt] = {}
         self._current: tuple[RunId, str] | None = None
@@ -27,9 +29,8 @@ class Questions(Vertical):
 
     def compose(self) -> ComposeResult:
         """The text, which scrolls if it is long, and the decisions, which are always seen."""
-        with VerticalScroll(id="question-text", can_focus=False):
-            yield Static(id="question")
-        yield Static(id="decisions")
+        yield VerticalScroll(self._text, id="question-text", can_focus=False)
+        yield self._decisions
 
     @property
     def current(self) -> OpenPrompt | None:
@@ -63,8 +64,8 @@ class Questions(Vertical):
         role = f" for {prompt.role}" if prompt.role else ""
         self.border_title = f"{count}{role}: {label(prompt)}{of_run}"
         self.border_subtitle = "Tab: next question" if len(self._standing) > 1 else ""
-        self.query_one("#question", Static).update(Text(prompt.text))
-        self.query_one("#decisions", Static).update(_decisions(prompt))
+        self._text.update(Text(prompt.text))
+        self._decisions.update(_decisions(prompt))
 
     def turn(self) -> None:
         """Show the next one."""
