@@ -11,7 +11,7 @@ from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
-from tests.executive.conftest import Fakes, FakePlugins, fleet, mission, question, sequence
+from tests.executive.conftest import FakePlugins, Fakes, fleet, mission, question, sequence
 
 
 @dataclass

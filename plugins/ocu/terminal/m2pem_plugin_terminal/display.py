@@ -159,6 +159,10 @@ class Display(App[None], inherit_bindings=False):
         if run == self.run_shown:
             self.log_pane.add(line)
 
+    def asked(self, prompt: OpenPrompt) -> None:
+        """Show it at once."""
+        self.show()
+
     def answered(self, prompt: OpenPrompt, closed: PromptClosed) -> None:
         """Tell who answered, unless it was this operator here."""
         key = (prompt.run, prompt.prompt)
@@ -170,6 +174,7 @@ class Display(App[None], inherit_bindings=False):
             self.say(f"{who} answered {self._label(prompt)}: {label or closed.decision}")
         elif not self.feed.boards[prompt.run].status.ended:
             self.say(f"{self._label(prompt)} is no longer asked")
+        self.show()
 
     def began(self, run: RunId) -> None:
         """Look at a new run, unless one that still runs is looked at."""

@@ -28,6 +28,10 @@ class Listener(Protocol):
         """A line was added to the log of a run."""
         ...
 
+    def asked(self, prompt: OpenPrompt) -> None:
+        """A question stands."""
+        ...
+
     def answered(self, prompt: OpenPrompt, closed: PromptClosed) -> None:
         """A question no longer stands."""
         ...
@@ -107,6 +111,7 @@ class Feed:
                     self._listener.ended(run)
             case OpenPrompt(run=run, prompt=prompt):
                 self.prompts[run, prompt] = notice
+                self._listener.asked(notice)
             case PromptClosed(run=run, prompt=prompt):
                 asked = self.prompts.pop((run, prompt), None)
                 if asked is not None:

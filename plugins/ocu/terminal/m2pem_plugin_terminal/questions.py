@@ -63,7 +63,8 @@ class Questions(Vertical):
         of_run = f" ({prompt.run})" if prompt.run != run else ""
         role = f" for {prompt.role}" if prompt.role else ""
         self.border_title = f"{count}{role}: {label(prompt)}{of_run}"
-        self.border_subtitle = "Tab: next question" if len(self._standing) > 1 else ""
+        turn = "   Tab: next question" if len(self._standing) > 1 else ""
+        self.border_subtitle = f"{prompt.prompt}{turn}"
         self._text.update(Text(prompt.text))
         self._decisions.update(_decisions(prompt))
 
