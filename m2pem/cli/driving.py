@@ -6,6 +6,8 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+import click
+
 from m2pem.api.control import RunId, RunStatus
 from m2pem.cli.entry import STOPPED, ignore_closed_stdout
 from m2pem.cli.interruption import Interruption
@@ -56,8 +58,18 @@ async def driving(
             printing = asyncio.create_task(output.follow(notices))
             if operators.take_terminal:
                 output.cover()
+
+            def left() -> None:
+                output.uncover()
+                if any(not each.done.is_set() for each in executive.runners.values()):
+                    click.echo(
+                        "m2pem: no operator at this terminal any more; missions go on "
+                        "(m2pem attach), and Ctrl-C stops them",
+                        err=True,
+                    )
+
             try:
-                operators.begin(executive.control, output.uncover)
+                operators.begin(executive.control, left)
                 yield interruption
             finally:
                 await operators.end()

@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
-from textual.widgets import RichLog
 
 from m2pem.api.control import MissionControl, RunId, RunStatus
 from m2pem.api.operator import operator_name
@@ -34,8 +33,8 @@ class TerminalApp(Display):
         Binding("q", "leave"),
         Binding("up", "scroll('#mission', -1)"),
         Binding("down", "scroll('#mission', 1)"),
-        Binding("pageup", "scroll('RichLog', -4)"),
-        Binding("pagedown", "scroll('RichLog', 4)"),
+        Binding("pageup", "scroll_log(-4)"),
+        Binding("pagedown", "scroll_log(4)"),
         Binding("shift+up", "scroll('#question-text', -1)"),
         Binding("shift+down", "scroll('#question-text', 1)"),
     ]
@@ -215,6 +214,9 @@ class TerminalApp(Display):
 
     def action_scroll(self, what: str, lines: int) -> None:
         """Move through what does not fit."""
-        found = self.screen_stack[0].query_one(what)
-        if isinstance(found, (VerticalScroll, RichLog)):
-            found.scroll_relative(y=lines, animate=False)
+        found = self.screen_stack[0].query_one(what, VerticalScroll)
+        found.scroll_relative(y=lines, animate=False)
+
+    def action_scroll_log(self, lines: int) -> None:
+        """Move through the log."""
+        self.log_pane.move(lines)

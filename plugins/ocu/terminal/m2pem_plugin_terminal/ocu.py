@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from m2pem.errors import OperatorError
+from m2pem.errors import OperatorError, PluginError
 
 if TYPE_CHECKING:
     from m2pem.api.control import MissionControl
@@ -31,6 +31,7 @@ class TerminalOcu:
 
         Raises:
             OperatorError: this is no terminal.
+            PluginError: the screen broke; Textual has printed how.
         """
         from m2pem_plugin_terminal.app import TerminalApp  # noqa: PLC0415  # half a second
 
@@ -54,6 +55,8 @@ class TerminalOcu:
                 app.exit()
                 await serving
                 raise
+        if app.return_code:
+            raise PluginError("the terminal's screen broke")
 
 
 @contextmanager

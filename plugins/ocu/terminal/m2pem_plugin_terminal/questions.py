@@ -57,14 +57,12 @@ class Questions(Vertical):
         if prompt is None:
             return
         place = list(self._standing).index((prompt.run, prompt.prompt)) + 1
-        count = (
-            f"Question {place} of {len(self._standing)}" if len(self._standing) > 1 else "Question"
-        )
-        of_run = f" ({prompt.run})" if prompt.run != run else ""
+        several = len(self._standing) > 1
+        count = f"Question {place} of {len(self._standing)}" if several else "Question"
+        address = prompt.prompt if prompt.run == run else f"{prompt.run} {prompt.prompt}"
         role = f" for {prompt.role}" if prompt.role else ""
-        self.border_title = f"{count}{role}: {label(prompt)}{of_run}"
-        turn = "   Tab: next question" if len(self._standing) > 1 else ""
-        self.border_subtitle = f"{prompt.prompt}{turn}"
+        turn = "   (Tab: next)" if several else ""
+        self.border_title = Text(f"{count}{role}: {label(prompt)} ({address}){turn}")
         self._text.update(Text(prompt.text))
         self._decisions.update(_decisions(prompt))
 

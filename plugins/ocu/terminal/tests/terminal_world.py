@@ -15,6 +15,7 @@ from textual.pilot import Pilot
 
 from m2pem.api.arbiter import ArbiterContext, Connection
 from m2pem.api.control import MissionControl, RunId
+from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
 from m2pem.model.catalogue import ResourceId
@@ -79,6 +80,19 @@ def fleet() -> Fleet:
             uav: Vehicle(uav, Domain.AIR, "fake", {}, payloads=(eye,), lost_after_s=5.0),
         },
         {eye: Payload(eye, uav, "fake", {})},
+    )
+
+
+def scout(battery: float, **more: Any) -> VehicleState:
+    """The ground vehicle, on its way."""
+    return VehicleState(
+        ResourceId("scout"),
+        0,
+        GeoPosition(38.1075, -77.3192, 60.0),
+        velocity_enu_m_s=(3.0, 4.0, 0.0),
+        battery_fraction=battery,
+        mode="auto",
+        **more,
     )
 
 

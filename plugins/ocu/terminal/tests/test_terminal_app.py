@@ -1,21 +1,11 @@
 """What the other keys do, and what the screen shows of missions."""
 
-from terminal_world import MISSION, World
+from terminal_world import MISSION, World, scout
 
 from m2pem.api.telemetry import GeoPosition, LinkState, PayloadState, VehicleState
 from m2pem.model.catalogue import BehaviorState, ResourceId
 
-
-def scout(battery: float, **more: object) -> VehicleState:
-    return VehicleState(
-        ResourceId("scout"),
-        0,
-        GeoPosition(38.1075, -77.3192, 60.0),
-        velocity_enu_m_s=(3.0, 4.0, 0.0),
-        battery_fraction=battery,
-        mode="auto",
-        **more,  # type: ignore[arg-type]
-    )
+POINT = {"type": "Point", "coordinates": [-77.3, 38.1]}
 
 
 async def test_the_tree_shows_who_does_what_and_where(world: World) -> None:
@@ -141,7 +131,7 @@ async def test_a_second_run_is_told_and_can_be_looked_at(world: World) -> None:
         await terminal.press("r")
         await terminal.until_shown("Look at a run")
         await terminal.press("1")
-        await terminal.until_shown("r2  +1 more (r)", "GATE (r1)")
+        await terminal.until_shown("r2  +1 more (r)", "GATE (r1 p")
 
 
 async def test_the_end_is_told_and_the_screen_stays(world: World) -> None:
@@ -192,3 +182,21 @@ async def test_the_executives_end_is_told(world: World) -> None:
         await terminal.until_shown("no mission is running")
         world.executive.notices.end()
         await terminal.until_shown("The executive has ended.")
+
+
+async def test_the_log_follows_unless_looked_back(world: World) -> None:
+    async with world.terminal() as terminal:
+        run = await world.start()
+        await terminal.until_shown("BRIDGE asks")
+        for number in range(8):
+            await world.control.set_geometry(f"g{number}", POINT, run=run, by="anna")
+        await terminal.until_shown("g7 received")
+        await terminal.press("pageup")
+        await terminal.until_gone("g7 received")
+        await world.control.set_geometry("g8", POINT, run=run, by="anna")
+        await terminal.until(lambda: len(terminal.app.feed.logs[run]) == 13)
+        assert not terminal.shows("g8 received")
+        await terminal.press("pagedown", "pagedown")
+        await terminal.until_shown("g8 received")
+        await world.control.set_geometry("g9", POINT, run=run, by="anna")
+        await terminal.until_shown("g9 received")
