@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.control_socket.client import ask, ask_driver
+from m2pem.control_socket.client import ask, ask_driver, find_executive
 from m2pem.control_socket.place import ControlSocketError
 from m2pem.errors import NotDrivenError, OperatorError
 from tests.control_socket.conftest import Served
@@ -44,3 +44,22 @@ def test_without_an_executive_the_journal_is_named(tmp_path: Path) -> None:
 def test_a_socket_that_is_gone_is_told(tmp_path: Path) -> None:
     with pytest.raises(ControlSocketError, match="does not answer"):
         ask(tmp_path / "1.sock", "runs")
+
+
+async def test_the_executive_of_a_journal_is_found(served: Served, tmp_path: Path) -> None:
+    run, _ = await served.asked()
+    for wanted in (None, run):
+        assert await asyncio.to_thread(find_executive, served.journal, wanted) == served.path
+    with pytest.raises(OperatorError, match="r9 is not driven"):
+        await asyncio.to_thread(find_executive, served.journal, "r9")
+    with pytest.raises(OperatorError, match="no executive"):
+        find_executive(tmp_path / "other.db", None)
+
+
+async def test_which_of_several_executives_is_asked(served: Served) -> None:
+    run, _ = await served.asked()
+    second = served.path.with_name("1.sock")
+    second.symlink_to(served.path)
+    with pytest.raises(OperatorError, match="2 executives"):
+        await asyncio.to_thread(find_executive, served.journal, None)
+    assert (await asyncio.to_thread(find_executive, served.journal, run)).exists()

@@ -5,6 +5,7 @@ A change that is meant is drawn anew with M2PEM_DRAW=1, and looked at.
 
 import os
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -23,14 +24,19 @@ def normalised(svg: str) -> str:
     return svg.replace("Fira Code, monospace", "monospace").rstrip() + "\n"
 
 
-def compare(terminal: Terminal, name: str) -> None:
-    drawn = normalised(terminal.app.export_screenshot(title="m2pem"))
+def drawn(terminal: Terminal) -> str:
+    return normalised(terminal.app.export_screenshot(title="m2pem"))
+
+
+async def compare(terminal: Terminal, name: str) -> None:
     picture = PICTURES / f"terminal_{name}.svg"
     if os.environ.get("M2PEM_DRAW"):
-        picture.write_text(drawn, encoding="utf-8")
+        picture.write_text(drawn(terminal), encoding="utf-8")
     expected = picture.read_text(encoding="utf-8")
-    assert characters(drawn, 80, 24) == characters(expected, 80, 24)
-    assert drawn == expected
+    with suppress(TimeoutError):
+        await terminal.until(lambda: drawn(terminal) == expected)
+    assert characters(drawn(terminal), 80, 24) == characters(expected, 80, 24)
+    assert drawn(terminal) == expected
 
 
 @pytest.fixture
@@ -52,7 +58,7 @@ async def terminal(world: World, monkeypatch: pytest.MonkeyPatch):
 
 async def test_a_mission_that_asks(world: World, terminal: Terminal) -> None:
     await terminal.until_shown("Question 1 of 2")
-    compare(terminal, "question")
+    await compare(terminal, "question")
 
 
 async def test_stop_over_a_dialog(world: World, terminal: Terminal) -> None:
@@ -60,11 +66,11 @@ async def test_stop_over_a_dialog(world: World, terminal: Terminal) -> None:
     await terminal.until_shown("Send a signal")
     await terminal.press("ctrl+x")
     await terminal.until_shown("STOP r1?")
-    compare(terminal, "stop")
+    await compare(terminal, "stop")
 
 
 async def test_somebody_else_answered_and_things_are_done(world: World, terminal: Terminal) -> None:
     for state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING, BehaviorState.FAILED):
         world.fake.report("r1.b1", state, "ROUTE_BLOCKED" if state == "FAILED" else "")
-    await terminal.until_shown("FAILED")
-    compare(terminal, "failed")
+    await terminal.until_shown("FAILED", "mission failed", "drive_stop ended FAILED")
+    await compare(terminal, "failed")
