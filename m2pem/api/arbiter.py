@@ -88,7 +88,7 @@ class BehaviorReport:
     """What became of a behavior. `number` rises from 1 with each report of one behavior.
 
     ACCEPTED comes before RUNNING, exactly one terminal state comes last. `code` is an error code
-    of FORMATS ("FAILED", "ROUTE_BLOCKED", ...), "" unless it failed; `reason` is for people.
+    of docs/missions.md ("ROUTE_BLOCKED", ...), "" unless it failed; `reason` is for people.
     `native_ref`: the arbiter's own name for it, handed back to `query` after a restart.
     """
 

@@ -1,5 +1,6 @@
 """The top command. Its commands' modules, and plugins, are loaded only when they are needed."""
 
+import difflib
 import logging
 from functools import cached_property
 from importlib import import_module
@@ -59,7 +60,7 @@ class LazyGroup(click.Group):
         """As click's; an unknown command that a broken plugin may have had is told as such."""
         name = args[0]
         if not name.startswith("-") and self.get_command(ctx, name) is None:
-            raise click.UsageError(str(self._plugins.unknown("command", name)), ctx)
+            raise click.UsageError(self._unknown(ctx, name), ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -71,6 +72,14 @@ class LazyGroup(click.Group):
                 formatter.write_dl(
                     [(name, added[name].get_short_help_str(70)) for name in sorted(added)]
                 )
+
+    def _unknown(self, ctx: click.Context, name: str) -> str:
+        """There is no such command; if a plugin is broken, it may have had it."""
+        known = self.list_commands(ctx)
+        near = difflib.get_close_matches(name, known, n=1)
+        meant = f"; did you mean {near[0]!r}?" if near else f"; there are: {', '.join(known)}"
+        broken = "".join(f"\n{failure}" for failure in self._plugins.failures)
+        return f"there is no command {name!r}{meant}{broken}"
 
     @cached_property
     def _plugins(self) -> "PluginManager":

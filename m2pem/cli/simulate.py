@@ -96,7 +96,7 @@ def simulate(
     with output_of(output) as out:
         out.tell_by(lambda _: loaded, one=True, asks=True)
 
-        def show(stamped: StampedRecord) -> None:
+        def show(stamped: "StampedRecord") -> None:
             out.show(stamped)
             if gantt is not None:
                 kept.append(stamped)

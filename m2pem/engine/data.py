@@ -1,7 +1,7 @@
-"""Reading and writing the data store (FORMATS section 1, "Data").
+"""Reading and writing the data store (docs/missions.md, "Data").
 
-Every scope may hold values; a name is looked up from the reader's scope outwards, to the process
-instance that contains it and no further: a called process has a store of its own.
+Every scope may hold values. A name belongs to the nearest enclosing scope that declares it, for
+reads as for writes, else to the process instance; no further: a called process has its own store.
 """
 
 from collections.abc import Iterator
@@ -11,13 +11,17 @@ from m2pem.model.elements import Process
 from m2pem.model.values import ReadValue, Value
 
 
-def _visible(scope: Scope) -> Iterator[Scope]:
-    """The scope and those around it, out to its process instance."""
+def _stores(scope: Scope, name: str) -> Iterator[Scope]:
+    """Where a name may be: outwards to the scope that declares it, else to the process."""
     current: Scope | None = scope
     while current is not None:
         yield current
-        if isinstance(current.container, Process):
+        container = current.container
+        if isinstance(container, Process):
             return
+        for declared in container.data:
+            if name == declared.key or name.startswith(f"{declared.key}."):
+                return
         current = current.parent
 
 
@@ -25,7 +29,7 @@ def reader(scope: Scope) -> ReadValue:
     """Reads names as an element in `scope` sees them; a missing name is None."""
 
     def read(name: str) -> Value:
-        for store in _visible(scope):
+        for store in _stores(scope, name):
             if name in store.data:
                 return store.data[name]
         return _entry_of_map(scope, name)
@@ -37,7 +41,7 @@ def _entry_of_map(scope: Scope, name: str) -> Value:
     """`item.pose.x` of a map that is stored whole under `item`."""
     head, dot, tail = name.rpartition(".")
     while dot:
-        for store in _visible(scope):
+        for store in _stores(scope, head):
             value = store.data.get(head)
             if isinstance(value, dict):
                 return _descend(value, tail)
@@ -56,12 +60,7 @@ def _descend(value: Value, path: str) -> Value:
 
 def store_for(scope: Scope, key: str) -> Scope:
     """Where a write goes: the nearest scope that declares the name, else the process instance."""
-    outermost = scope
-    for store in _visible(scope):
-        for declared in store.container.data:
-            if key == declared.key or key.startswith(f"{declared.key}."):
-                return store
-        outermost = store
+    *_, outermost = _stores(scope, key)
     return outermost
 
 

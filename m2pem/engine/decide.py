@@ -48,11 +48,9 @@ def decide(x: Steps, item: i.Input) -> None:
             _defer(x, item)
         case Welcome.DECIDE:
             number = getattr(item, "id", "")
-            if number:
-                if number in x.state.seen:
-                    ignore(x, f"{type(item).__name__} {number} was taken before")
-                    return
-                x.emit(r.InputSeen(number))
+            if number in x.state.seen:
+                ignore(x, f"{type(item).__name__} {number} was taken before")
+                return
             _DECIDERS[type(item)](x, item)
 
 
@@ -62,19 +60,22 @@ def ignore(x: Steps, reason: str) -> None:
 
 
 def _defer(x: Steps, item: i.Input) -> None:
-    if isinstance(item, i.PromptAnswer):
-        for earlier in x.state.deferred:
-            if isinstance(earlier, i.PromptAnswer) and earlier.prompt == item.prompt:
-                ignore(x, f"prompt {item.prompt} was answered by {earlier.by or 'another'}")
-                return
-    x.emit(r.InputDeferred(item))
+    refusal = _why_no_answer(x, item) if isinstance(item, i.PromptAnswer) else ""
+    if refusal:
+        ignore(x, refusal)
+    else:
+        x.emit(r.InputDeferred(item))
 
 
 # --- the run ------------------------------------------------------------------------------------
 
 
 def _start(x: Steps, item: i.StartRun) -> None:
-    process = x.mission.process(item.process)
+    try:
+        process = x.mission.process(item.process)
+    except KeyError:
+        ignore(x, f"the mission has no process {item.process!r}")
+        return
     x.emit(r.RunStarted(process.id, x.now_us, item.by))
     x.emit(r.ScopeOpened(1, process.id, process.id))
     root = x.state.scopes[1]
@@ -126,7 +127,9 @@ def _tick(x: Steps, item: i.Tick) -> None:
 def _give_up(x: Steps, item: i.GiveUp) -> None:
     state = x.state
     awaited = [
-        f"{behavior.element} (behavior {behavior.name})" for behavior in state.behaviors.values()
+        f"{behavior.element} (behavior {behavior.name})"
+        for behavior in state.behaviors.values()
+        if behavior.phase is not BehaviorPhase.CANCELLING
     ]
     awaited += [f"{prompt.token.node.id} (an answer)" for prompt in state.prompts.values()]
     awaited += [f"{service.token.node.id} ({service.name})" for service in state.services.values()]
@@ -159,10 +162,9 @@ def _reported(x: Steps, item: i.BehaviorReported) -> None:
 def _ended(
     x: Steps, behavior: Behavior, state: BehaviorState, code: str = "", reason: str = ""
 ) -> None:
-    wanted = state is BehaviorState.SUCCEEDED or (
-        state is BehaviorState.CANCELLED and behavior.phase is BehaviorPhase.CANCELLING
-    )
-    if not wanted:
+    if state is BehaviorState.SUCCEEDED:
+        code = ""
+    elif state is not BehaviorState.CANCELLED or behavior.phase is not BehaviorPhase.CANCELLING:
         code = code or DEFAULT_CODES[state]
     token = x.state.tokens.get(behavior.token)
     if token is not None and token.behavior != behavior.id:
@@ -243,37 +245,38 @@ def _settle(x: Steps, behavior: Behavior, answer: i.PromptAnswer) -> None:
 
 
 def _fault(x: Steps, item: i.ResourceFault) -> None:
-    holders = [
-        behavior
-        for holder in x.state.held.get(item.resource, ())
-        if (behavior := x.state.behaviors[holder]).phase is not BehaviorPhase.CANCELLING
-        or not item.reachable
-    ]
-    if not holders:
-        ignore(x, f"{item.code} of {item.resource}, which does nothing for this run")
-    for behavior in holders:
-        if not item.reachable:
+    told = False
+    for holder in list(x.state.held.get(item.resource, ())):
+        behavior = x.state.behaviors[holder]
+        if not item.reachable and len(behavior.resources) == 1:
             _ended(x, behavior, BehaviorState.LOST, item.code, item.reason)
-            continue
-        token = x.state.tokens[behavior.token]
-        if token.prompt:
-            x.emit(r.PromptWithdrawn(token.prompt))
-        x.emit(r.BehaviorCancelRequested(behavior.id, item.code, item.reason))
-        throw_error(x, token, item.code, item.reason)
+        elif behavior.phase is not BehaviorPhase.CANCELLING:
+            _give_behavior_up(x, behavior, item)
+        else:
+            continue  # it ends by its report, or when it has not answered its cancel in time
+        told = True
+    if not told:
+        ignore(x, f"{item.code} of {item.resource}, which does nothing for this run")
+
+
+def _give_behavior_up(x: Steps, behavior: Behavior, item: i.ResourceFault) -> None:
+    """Cancel it, for what can still be reached of its resources must stop."""
+    token = x.state.tokens[behavior.token]
+    if token.prompt:
+        x.emit(r.PromptWithdrawn(token.prompt))
+    x.emit(r.BehaviorCancelRequested(behavior.id, item.code, item.reason))
+    throw_error(x, token, item.code, item.reason)
 
 
 # --- operators, services, the outside -----------------------------------------------------------
 
 
 def _answer(x: Steps, item: i.PromptAnswer) -> None:
-    prompt = x.state.prompts.get(item.prompt)
-    if prompt is None:
-        ignore(x, f"prompt {item.prompt} is not open: it was answered or withdrawn")
+    refusal = _why_no_answer(x, item)
+    if refusal:
+        ignore(x, refusal)
         return
-    values = [decision["value"] for decision in prompt.decisions]
-    if item.decision not in values:
-        ignore(x, f"{item.decision!r} is no decision of prompt {item.prompt}: {', '.join(values)}")
-        return
+    prompt = x.state.prompts[item.prompt]
     token = prompt.token
     node = token.node
     x.emit(
@@ -291,6 +294,19 @@ def _answer(x: Steps, item: i.PromptAnswer) -> None:
         _settle(x, x.state.behaviors[prompt.behavior], item)
     else:
         answered(x, token, item.decision)
+
+
+def _why_no_answer(x: Steps, item: i.PromptAnswer) -> str:
+    prompt = x.state.prompts.get(item.prompt)
+    if prompt is None:
+        return f"prompt {item.prompt} is not open: it was answered or withdrawn"
+    values = [decision["value"] for decision in prompt.decisions]
+    if item.decision not in values:
+        return f"{item.decision!r} is no decision of prompt {item.prompt}: {', '.join(values)}"
+    for earlier in x.state.deferred:
+        if isinstance(earlier, i.PromptAnswer) and earlier.prompt == item.prompt:
+            return f"prompt {item.prompt} was answered by {earlier.by or 'another'}"
+    return ""
 
 
 def _service_completed(x: Steps, item: i.ServiceCompleted) -> None:
@@ -328,13 +344,22 @@ def _service_failed(x: Steps, item: i.ServiceFailed) -> None:
 
 
 def _signal(x: Steps, item: i.SignalReceived) -> None:
+    _note_id(x, item.id)
     x.emit(r.SignalThrown(item.signal, by=item.by or "outside"))
     throw_signal(x, item.signal, item.data)
 
 
 def _message(x: Steps, item: i.MessageReceived) -> None:
-    if not receive(x, item.message, item.data, item.by or "outside"):
+    if item.message not in x.receivable:
         ignore(x, f"nothing in the mission receives message {item.message}")
+        return
+    _note_id(x, item.id)
+    receive(x, item.message, item.data, item.by or "outside")
+
+
+def _note_id(x: Steps, number: str) -> None:
+    if number:
+        x.emit(r.InputSeen(number))
 
 
 _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {

@@ -6,14 +6,25 @@ Every change is a record that is applied at once, so that what is decided next s
 """
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from m2pem.engine import records as r
 from m2pem.engine.apply import apply
 from m2pem.engine.data import flatten, store_for
 from m2pem.engine.records import Record, TokenOutcome
 from m2pem.engine.state import RunState, Scope, Token
-from m2pem.model.elements import CallActivity, FlowNode, Mission, SequenceFlow, StartEvent
+from m2pem.model.elements import (
+    CallActivity,
+    EndEvent,
+    Event,
+    FlowNode,
+    IntermediateThrowEvent,
+    Mission,
+    ReceiveTask,
+    SequenceFlow,
+    StartEvent,
+)
+from m2pem.model.events import MessageEventDefinition
 from m2pem.model.upstream import upstream
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
@@ -27,6 +38,7 @@ class Execution:
 
     __slots__ = (
         "_reach",
+        "_receivable",
         "_triggered_starts",
         "fleet",
         "mission",
@@ -46,6 +58,7 @@ class Execution:
         self.queue: deque[Token | Scope] = deque()
         self.process_ids = [node.container.process.id for node in self.mission.nodes]
         self._reach: dict[FlowNode, dict[FlowNode, int]] = {}
+        self._receivable: frozenset[str] | None = None
         self._triggered_starts: tuple[StartEvent, ...] | None = None
 
     def emit(self, record: Record) -> None:
@@ -65,10 +78,17 @@ class Execution:
         return reach
 
     @property
+    def receivable(self) -> frozenset[str]:
+        """Ids of the messages that something in the mission catches."""
+        if self._receivable is None:
+            self._receivable = frozenset(_caught_messages(self.mission))
+        return self._receivable
+
+    @property
     def triggered_starts(self) -> tuple[StartEvent, ...]:
         """Start events of processes that neither the run began with nor a call activity calls.
 
-        Each trigger of theirs makes an instance (FORMATS section 1).
+        Each trigger of theirs makes an instance (docs/missions.md).
         """
         if self._triggered_starts is None:
             assert self.state.root is not None
@@ -161,3 +181,14 @@ class Execution:
         """Write several values."""
         for key, value in data.items():
             self.write(token, key, value)
+
+
+def _caught_messages(mission: Mission) -> Iterator[str]:
+    for node in mission.nodes:
+        if isinstance(node, ReceiveTask):
+            if node.message is not None:
+                yield node.message.id
+        elif isinstance(node, Event) and not isinstance(node, EndEvent | IntermediateThrowEvent):
+            for definition in node.definitions:
+                if isinstance(definition, MessageEventDefinition):
+                    yield definition.message.id

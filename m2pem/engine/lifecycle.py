@@ -6,7 +6,7 @@
 * NEW takes only StartRun.
 * PAUSED takes what changes nothing in the mission (a claim, a second pause), ResumeRun and
   StopRun; every other input is deferred: journaled now, decided in order at resume.
-* ENDED takes only reports of behaviors that are still being cancelled.
+* ENDED takes only claims, and what ends behaviors that are still being cancelled.
 * What is not welcome is ignored with a reason, never an error.
 
 `WELCOME` is the whole of it: what to do with an input, by status.
@@ -15,6 +15,7 @@
 from enum import Enum
 
 from m2pem.engine.inputs import (
+    BehaviorMissing,
     BehaviorReported,
     ClaimRun,
     Continue,
@@ -22,6 +23,7 @@ from m2pem.engine.inputs import (
     GiveUp,
     Input,
     PauseRun,
+    ResourceFault,
     ResumeRun,
     StartRun,
     StopRun,
@@ -52,7 +54,12 @@ _EXCEPTIONS: dict[RunStatus, dict[type, Welcome]] = {
         ClaimRun: Welcome.DECIDE,
         GeometrySet: Welcome.DECIDE,
     },
-    RunStatus.ENDED: {BehaviorReported: Welcome.DECIDE, ClaimRun: Welcome.DECIDE},
+    RunStatus.ENDED: {
+        BehaviorReported: Welcome.DECIDE,
+        BehaviorMissing: Welcome.DECIDE,
+        ResourceFault: Welcome.DECIDE,
+        ClaimRun: Welcome.DECIDE,
+    },
 }
 
 _OTHERWISE: dict[RunStatus, Welcome] = {

@@ -36,7 +36,9 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
                 if behavior is not None:
                     commands.append(_cancel(state, behavior))
             case r.BehaviorUnsettled():
-                commands.extend(_hold(state, record.behavior))
+                behavior = state.behaviors.get(record.behavior)
+                if behavior is not None:
+                    commands.extend(_hold(behavior))
             case r.BehaviorContinued():
                 behavior = state.behaviors.get(record.behavior)
                 if behavior is not None:
@@ -58,7 +60,7 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
             case r.RunPaused():
                 commands.extend(HoldResource(resource) for resource in _commanded(state))
             case r.RunResumed():
-                commands.extend(ResumeResource(resource) for resource in _commanded(state))
+                commands.extend(ResumeResource(name) for name in _still_wanted(state, records))
             case _:
                 pass
     return commands
@@ -75,7 +77,7 @@ def outstanding(state: RunState) -> list[Command]:
         if behavior.phase is BehaviorPhase.CANCELLING:
             commands.append(_cancel(state, behavior))
         elif behavior.phase is BehaviorPhase.UNSETTLED:
-            commands.extend(_hold(state, behavior.id))
+            commands.extend(_hold(behavior))
         else:
             commands.append(_start(state, behavior))
     commands.extend(_open(prompt) for prompt in state.prompts.values())
@@ -92,6 +94,17 @@ def _commanded(state: RunState) -> list[str]:
         for resource, holders in state.held.items()
         if any(state.behaviors[holder].phase is BehaviorPhase.ACTIVE for holder in holders)
     ]
+
+
+def _still_wanted(state: RunState, records: Sequence[Record]) -> list[str]:
+    """Resources that go on with what a pause held: not those that what came in the pause has given
+    something else to do, which says so by a command of its own."""
+    new = {
+        record.behavior
+        for record in records
+        if isinstance(record, r.BehaviorRequested | r.BehaviorRestarted | r.BehaviorContinued)
+    }
+    return [name for name in _commanded(state) if new.isdisjoint(state.held[name])]
 
 
 def _start(state: RunState, behavior: Behavior) -> StartBehavior:
@@ -112,8 +125,8 @@ def _cancel(state: RunState, behavior: Behavior) -> CancelBehavior:
     return CancelBehavior(behavior.id, state.epoch, behavior.resources)
 
 
-def _hold(state: RunState, behavior: str) -> list[Command]:
-    return [HoldResource(resource) for resource in state.behaviors[behavior].resources]
+def _hold(behavior: Behavior) -> list[Command]:
+    return [HoldResource(resource) for resource in behavior.resources]
 
 
 def _open(prompt: Prompt) -> OpenPrompt:

@@ -33,17 +33,27 @@ class Steps(Execution):
         """Execute tokens until none can move, or the batch is used up."""
         state, queue = self.state, self.queue
         while state.status is RunStatus.RUNNING:
-            while queue and self.left:
-                self.left -= 1
+            while queue:
                 item = queue.popleft()
+                if not self._is_there(item):
+                    continue
+                if not self.left:
+                    queue.appendleft(item)
+                    return
+                self.left -= 1
                 if type(item) is Token:
-                    if state.tokens.get(item.id) is item:
-                        EXECUTE[type(item.node)](self, item)
+                    EXECUTE[type(item.node)](self, item)
                 else:
                     assert isinstance(item, Scope)
                     look_at(self, item)
-            if queue or not fire_inclusive_joins(self):
+            if not fire_inclusive_joins(self):
                 return
+
+    def _is_there(self, item: Token | Scope) -> bool:
+        """Whether it is still where it was when it was queued, and not ended before its turn."""
+        if type(item) is Token:
+            return self.state.tokens.get(item.id) is item
+        return self.state.scopes.get(item.id) is item
 
     def finish(self) -> list[Record]:
         """All records of the input: its steps are done, or left over in a `RunYielded`."""
@@ -60,7 +70,7 @@ class Steps(Execution):
         steps = tuple(
             item.id if isinstance(item, Token) else -item.id
             for item in self.queue
-            if isinstance(item, Scope) or self.state.tokens.get(item.id) is item
+            if self._is_there(item)
         )
         self.queue.clear()
         self.emit(r.RunYielded(steps))

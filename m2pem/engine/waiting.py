@@ -108,11 +108,10 @@ def _arm_timer(
         await_event(x, token, node, Trigger.TIMER, due_us=date_us(text), calendar=True)
         return
     rounds = cycle(text)
-    if rounds.repetitions == 0:
-        return
     left = -1 if rounds.repetitions is None else rounds.repetitions - 1
     if rounds.start_us is not None:
-        await_event(x, token, node, Trigger.TIMER, "", rounds.start_us, True, left, rounds.period)
+        due_us = rounds.first_us(x.now_us)
+        await_event(x, token, node, Trigger.TIMER, "", due_us, True, left, rounds.period)
     else:
         due_us = x.state.mission_time_us(x.now_us) + duration_us(rounds.period, x.now_us)
         await_event(x, token, node, Trigger.TIMER, "", due_us, False, left, rounds.period)
@@ -133,14 +132,16 @@ def arm_boundary(x: Execution, token: Token, activity: Activity) -> bool:
 
 def collect_letters(x: Execution, token: Token) -> bool:
     """Let a token that waits for messages have those kept for it. False: it has left with one."""
-    if not x.state.mailbox or token.waits is None:
-        return True
-    for wait in list(token.waits.values()):
-        if wait.trigger is Trigger.MESSAGE and wait.ref in x.state.mailbox:
-            data = x.state.mailbox[wait.ref][0]
-            trigger(x, wait, data, kept=True)
-            if x.state.tokens.get(token.id) is not token:
-                return False
+    found = bool(x.state.mailbox)
+    while found and token.waits is not None:
+        found = False
+        for wait in list(token.waits.values()):
+            letters = x.state.mailbox.get(wait.ref) if wait.trigger is Trigger.MESSAGE else None
+            if letters:
+                found = True
+                trigger(x, wait, letters[0], kept=True)
+                if x.state.tokens.get(token.id) is not token:
+                    return False
     return True
 
 
@@ -170,7 +171,10 @@ def _arm_again(x: Execution, wait: Wait) -> None:
     elif wait.left != 0:
         left = wait.left - 1 if wait.left > 0 else -1
         at_us = wait.due_us + (0 if wait.calendar else x.state.started_us)
-        due_us = wait.due_us + duration_us(wait.cycle, at_us)
+        try:
+            due_us = wait.due_us + duration_us(wait.cycle, at_us)
+        except ExpressionSyntaxError:  # the next round is beyond the calendar: it never comes
+            return
         await_event(
             x, wait.token, wait.node, Trigger.TIMER, "", due_us, wait.calendar, left, wait.cycle
         )

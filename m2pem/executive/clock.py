@@ -74,10 +74,11 @@ class VirtualClock:
         """Microseconds since the Unix epoch, exact."""
         return self._start_us + self._loop.elapsed_us
 
-    def when_idle(self, act: Callable[[], bool]) -> None:
+    def when_idle(self, act: Callable[[float | None], bool]) -> None:
         """Have `act` called when nothing is ready, each time before the loop jumps ahead.
 
-        If it returns True, it has made something happen now, and time stands still for it.
+        It is told by how many seconds, or None when no timer is set. If it returns True, it has
+        made something happen now, and time stands still for it.
         """
         self._loop.when_idle = act
 
@@ -125,7 +126,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     def __init__(self) -> None:
         self.elapsed_us = 0
-        self.when_idle: Callable[[], bool] = lambda: False
+        self.when_idle: Callable[[float | None], bool] = lambda _: False
         self._threads_at_work = 0
         self._timer_numbers = itertools.count()
         super().__init__(_JumpingSelector(self))
@@ -178,7 +179,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """
         if self._threads_at_work:
             return True
-        if self.when_idle():
+        if self.when_idle(timeout_s):
             return False
         if timeout_s is None:
             waiting = sorted(

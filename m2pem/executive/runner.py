@@ -127,8 +127,7 @@ class Runner:
         """What has happened, or what time or the engine itself wants; waits when nothing does."""
         while True:
             if self._exhausted():
-                taken = f"given up after {self.run.steps_done} steps"
-                return [GiveUp(f"{taken}: {self._max_steps} are allowed")]
+                return [GiveUp(f"it has taken the {self._max_steps} steps that are allowed")]
             if self._inbox:
                 batch, self._inbox = self._inbox[:MAX_BATCH], self._inbox[MAX_BATCH:]
                 return batch

@@ -39,7 +39,7 @@ class ResumePolicy(StrEnum):
 
 
 class BehaviorState(StrEnum):
-    """Where a behavior is (ARCHITECTURE section 7); the last six are terminal."""
+    """Where a behavior is (docs/architecture.md, "Plugins"); the last six are terminal."""
 
     ACCEPTED = "ACCEPTED"
     RUNNING = "RUNNING"

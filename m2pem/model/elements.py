@@ -68,7 +68,7 @@ class DataObject(Element):
 
     @property
     def key(self) -> str:
-        """The key in the data store (FORMATS: a property's or data object's name, else its id)."""
+        """The key in the data store (docs/missions.md): its name, else its id."""
         return self.name or self.id
 
 

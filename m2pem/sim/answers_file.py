@@ -1,4 +1,4 @@
-"""The shape of an answers file (FORMATS, section 3), as pydantic models.
+"""The shape of an answers file (docs/rehearsal.md), as pydantic models.
 
 Unknown keys are refused. Whether its names fit a mission is checked by `answers_check`.
 """

@@ -90,7 +90,7 @@ class SimArbiter:
             links=self._links,
             logger=context.logger,
             changed=self._moved,
-            lose_link=lambda vehicle, at_us: self._reach.lose(vehicle, at_us),
+            lose_link=self._lose_link,
         )
         self._reach = Reach(
             self._links, self._agenda, self._memory, self._conductor, self._lost_after_s
@@ -309,6 +309,9 @@ class SimArbiter:
         else:
             # Of hold and resume the newest counts.
             self._links.defer(vehicle, f"turn {resource}", lambda at_us: act(resource, at_us))
+
+    def _lose_link(self, vehicle: ResourceId, now_us: int) -> None:
+        self._reach.lose(vehicle, now_us)
 
     def _lost_after_s(self, resource: ResourceId) -> float:
         own = self._connections[resource].lost_after_s if resource in self._connections else None

@@ -52,6 +52,8 @@ class _Row:
     lanes: list[int] = field(default_factory=list)
     free: list[tuple[float, float]] = field(default_factory=list)
     """Beside each bar, to its left and right."""
+    labelled: dict[int, float] = field(default_factory=dict)
+    """By lane: how far the last label reaches."""
 
     @property
     def height(self) -> float:
@@ -137,11 +139,13 @@ class _Chart:
             main = why
         needed = max(text_width(main), text_width(below, 10)) + 8
         inside, (left, right) = end - x, row.free[place]
+        left = min(left, x - row.labelled.get(lane, LEFT))
         anchor = ""
         if needed <= inside or inside >= max(right, left):
             at, room = x + 5, inside
         elif needed <= right or right >= left:
             at, room = end + 4, right
+            row.labelled[lane] = end + min(needed, right)
         else:
             at, room, anchor = x - 4, left, "end"
         group.text(at, y + 15, cut(main, room - 8), INK, anchor=anchor)

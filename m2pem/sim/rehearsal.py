@@ -16,7 +16,7 @@ from m2pem.engine.records import Record, ServiceEnded, ServiceWithdrawn
 from m2pem.engine.state import BehaviorPhase
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import AnswersError
-from m2pem.executive.clock import VirtualClock, run_virtual
+from m2pem.executive.clock import US_PER_S, VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.executive.loading import read_source
 from m2pem.executive.runner import Runner
@@ -39,7 +39,7 @@ START_US = 1_767_225_600_000_000
 
 MAX_STEPS = 10_000_000
 
-SEARCH_US = 3_600_000_000
+SEARCH_US = 3600 * US_PER_S
 """How long a vehicle whose motion has no end may go on looking for something to detect."""
 
 SETTINGS = {"telemetry_hz": 0, "state": ""}
@@ -61,12 +61,12 @@ class RehearsalResult(SimulationResult):
 
     @property
     def exit_status(self) -> int:
-        """What `m2pem simulate` ends with (FORMATS, section 3)."""
+        """What `m2pem simulate` ends with (docs/cli.md)."""
         return EXIT_STATUS[self.summary.status]
 
 
 def rehearse(
-    mission: Path | str | bytes,
+    mission: Path | str | bytes | Mission,
     fleet: Fleet | None,
     *,
     plugins: PluginManager,
@@ -80,17 +80,21 @@ def rehearse(
 ) -> RehearsalResult:
     """Run a mission to its end on a virtual clock that begins at `start_us` (since the epoch).
 
-    `fleet` None: for a mission that commands no resource. `answers`: a file, or one that was
-    loaded and has not been used. `on_record` gets each record as soon as it is committed; what it
-    raises ends the rehearsal. `observed`: whether observers among the plugins are told.
+    `mission`: a path, a `file:` or `http:` URL, BPMN bytes, or one that was loaded. `fleet` None:
+    for a mission that commands no resource. `answers`: a file, or one that was loaded and has not
+    been used. `on_record` gets each record as soon as it is committed; what it raises ends the
+    rehearsal. `observed`: whether observers among the plugins are told.
 
     Raises:
         MissionError: the mission cannot be loaded, does not fit the fleet, or needs one.
         AnswersError: the answers cannot be used, or do not fit the mission.
         FleetError: the fleet cannot be simulated.
     """
-    name, source = read_source(mission)
-    loaded = parse_mission(source, name)
+    if isinstance(mission, Mission):
+        loaded = mission
+    else:
+        name, source = read_source(mission)
+        loaded = parse_mission(source, name)
     if fleet is None:
         refuse_commands(loaded)
         fleet = NO_FLEET
@@ -157,7 +161,7 @@ class _Rehearsal:
         async with executive:
             run = await executive.begin(self._mission, process_id, data, "")
             runner = executive.runner(run)
-            clock.when_idle(lambda: self._give_up(executive, runner))
+            clock.when_idle(lambda ahead_s: self._give_up(executive, runner, ahead_s))
             acting = asyncio.ensure_future(
                 self._answers.act(executive.control, run, clock, default_first_decision=True)
             )
@@ -176,18 +180,18 @@ class _Rehearsal:
 
     # --- nothing can happen any more ------------------------------------------------------------
 
-    def _give_up(self, executive: Executive, runner: Runner) -> bool:
+    def _give_up(self, executive: Executive, runner: Runner, ahead_s: float | None) -> bool:
         """Called when nothing is ready: end the run if nothing that is scheduled can change it."""
         if runner.run.state.status is not EngineStatus.RUNNING:
             return False
         if self._expects(executive, runner):
             self._quiet_since_us = None
             return False
-        now_us = executive.clock.now_us()
-        if any(arbiter.searching for arbiter in _arbiters(executive)):
+        if ahead_s is not None and any(arbiter.searching for arbiter in _arbiters(executive)):
+            now_us = executive.clock.now_us()
             if self._quiet_since_us is None:
                 self._quiet_since_us = now_us
-            if now_us < self._quiet_since_us + SEARCH_US:
+            if now_us + ahead_s * US_PER_S <= self._quiet_since_us + SEARCH_US:
                 return False
         runner.post(GiveUp("nothing that is scheduled can happen any more"))
         return True
@@ -219,22 +223,22 @@ class _Script:
         self._answers = answers
         self.ending: set[str] = set()
 
-    def seen(self, records: Sequence[Record]) -> None:
-        self._answers.seen(records)
+    def seen(self, run: str, records: Sequence[Record]) -> None:
+        self._answers.seen(run, records)
         for record in records:
             if isinstance(record, ServiceEnded | ServiceWithdrawn):
                 self.ending.discard(record.service)
 
-    def service(self, element: str, name: str, service: str) -> ScriptedService | None:
-        scripted = self._answers.service(element, name, service)
+    def service(self, run: str, element: str, name: str, service: str) -> ScriptedService | None:
+        scripted = self._answers.service(run, element, name, service)
         if scripted is None and name != DETECTOR_SERVICE:
             scripted = ScriptedService()
         if scripted is not None:
             self.ending.add(service)
         return scripted
 
-    def behavior(self, element: str, behavior: str) -> ScriptedBehavior | None:
-        return self._answers.behavior(element, behavior)
+    def behavior(self, run: str, element: str, behavior: str) -> ScriptedBehavior | None:
+        return self._answers.behavior(run, element, behavior)
 
 
 class _TellingJournal(MemoryJournal):
@@ -256,6 +260,6 @@ class _TellingJournal(MemoryJournal):
             for entry in entries:
                 for place, record in enumerate(entry.records):
                     seq = entry.seq + place
-                    self._on_record(StampedRecord(entry.run, seq, entry.t_us / 1_000_000, record))
+                    self._on_record(StampedRecord(entry.run, seq, entry.t_us / US_PER_S, record))
         except Exception as error:  # it is the caller's, who gets it back
             self.broken.set_exception(error)

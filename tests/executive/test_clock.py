@@ -71,6 +71,48 @@ async def test_sleeping_until_the_past_lets_others_run() -> None:
 # --- virtual time -------------------------------------------------------------------------------
 
 
+def test_what_to_do_when_idle_is_asked_before_every_jump_and_may_stop_it() -> None:
+    asked: list[tuple[float, float | None]] = []
+
+    async def main(clock: VirtualClock) -> tuple[int, float]:
+        loop = asyncio.get_running_loop()
+        woken = asyncio.Event()
+
+        def act(ahead_s: float | None) -> bool:
+            asked.append((loop.time(), ahead_s))
+            if loop.time() < 3 or woken.is_set():
+                return False
+            woken.set()
+            return True
+
+        clock.when_idle(act)
+        await clock.sleep(3)
+        timer = asyncio.ensure_future(clock.sleep(100))
+        await woken.wait()
+        timer.cancel()
+        clock.when_idle(lambda _: False)
+        return clock.now_us() - START_US, loop.time()
+
+    assert run_virtual(main, START_US) == (3_000_000, 3.0)
+    assert asked == [(0.0, 3.0), (3.0, 100.0)]
+
+
+def test_what_to_do_when_idle_may_end_a_deadlock() -> None:
+    async def main(clock: VirtualClock) -> str:
+        answer: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+
+        def act(ahead_s: float | None) -> bool:
+            if not answer.done():
+                answer.set_result(f"woken with {ahead_s}")
+                return True
+            return False
+
+        clock.when_idle(act)
+        return await answer
+
+    assert run_virtual(main, START_US) == "woken with None"
+
+
 def test_virtual_time_is_exact_to_the_microsecond_after_many_sleeps() -> None:
     async def main(clock: VirtualClock) -> int:
         for _ in range(1000):

@@ -10,6 +10,7 @@ from m2pem.model.elements import CallActivity, ServiceTask
 from m2pem.model.lint import lint
 
 DOCS = (Path(__file__).parent.parent.parent / "docs" / "missions.md").read_text()
+CODE = r'"([A-Z]{2,}(?:_[A-Z]+)+|EXPRESSION|RECURSION)"'
 EXAMPLES = re.findall(r"```xml\n(.*?)```", DOCS, re.DOTALL)
 
 
@@ -50,3 +51,15 @@ def test_an_example_has_no_warning(start: str, wrapper: str) -> None:
 
 def test_every_example_is_tested() -> None:
     assert len(EXAMPLES) == 5
+
+
+def test_every_error_that_the_program_throws_is_documented() -> None:
+    package = Path(__file__).parent.parent.parent / "m2pem"
+    thrown = {
+        code
+        for folder in ("engine", "executive", "gateway", "sim")
+        for module in (package / folder).rglob("*.py")
+        for code in re.findall(CODE, module.read_text())
+    }
+    assert {"NO_FLOW", "LINK_LOST"} <= thrown
+    assert thrown <= set(re.findall(r"^\| `([A-Z_]+)` \|", DOCS, re.MULTILINE))

@@ -75,3 +75,21 @@ def test_a_call_that_fails_is_logged_and_the_others_come(caplog: pytest.LogCaptu
         assert "ZeroDivisionError" in caplog.text
 
     run_virtual(main, 0)
+
+
+def test_what_may_go_on_for_ever_is_not_counted_as_expected() -> None:
+    async def main(clock: VirtualClock) -> None:
+        agenda = Agenda(clock, LOGGER)
+        agenda.at(10, lambda _: None)
+        cancelled = agenda.at(20, lambda _: None)
+        agenda.at(30, lambda _: None, background=True)
+        assert agenda.expected == 2
+        cancelled.cancel()
+        cancelled.cancel()
+        assert agenda.expected == 1
+        agenda.run_due(15)
+        assert agenda.expected == 0
+        agenda.run_due(40)
+        assert agenda.expected == 0
+
+    run_virtual(main, 0)

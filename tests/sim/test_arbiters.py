@@ -384,6 +384,19 @@ def test_an_empty_battery_fails_the_behavior_and_brings_the_vehicle_down(
     simulate({"uav": ("air", {"battery": "50 %", "endurance": "20 min"})}, main)
 
 
+def test_an_idle_aircraft_sinks_to_the_ground_when_its_battery_is_empty(
+    simulate: Simulate,
+) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        await bench.start("r1.b1", "takeoff", "uav", altitude=30.0)
+        await bench.ended("r1.b1", 60)
+        await bench.clock.sleep(700)
+        assert state(bench, "uav").altitude_above_home_m == pytest.approx(0)
+        assert state(bench, "uav").battery_fraction == 0
+
+    simulate({"uav": ("air", {"endurance": "10 min"})}, main)
+
+
 def test_every_twentieth_of_the_battery_is_told_without_a_telemetry_rate(
     simulate: Simulate,
 ) -> None:

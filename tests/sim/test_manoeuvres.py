@@ -337,3 +337,31 @@ def test_areas_with_holes_are_read(simulate: Simulate) -> None:
         await do(bench, "r1.b1", "area_survey", "ugv", area=both, spacing=20.0)
 
     simulate(UGV, main)
+
+
+def test_a_vehicle_begins_at_home_and_altitudes_count_from_there(simulate: Simulate) -> None:
+    latitude, longitude, _ = place(70, -30)
+    home = {"home": [latitude, longitude, 90.0], "heading": "180 deg"}
+
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        await do(bench, "r1.b1", "takeoff", "uav", altitude=12.0)
+        state = bench.latest("uav")
+        assert isinstance(state, VehicleState)
+        assert state.position is not None
+        assert local(state.position) == pytest.approx((70, -30), abs=0.01)
+        assert state.position.altitude_m == pytest.approx(102.0)
+        assert state.altitude_above_home_m == pytest.approx(12.0)
+        assert math.remainder(heading(bench, "uav") - math.pi, math.tau) == pytest.approx(0)
+
+    simulate({"uav": ("air", home)}, main)
+
+
+def test_goto_a_vehicle_goes_to_where_it_is_at_the_start(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        await do(bench, "r1.b1", "goto", "lead", target=Point(place(90, 0)))
+        await do(bench, "r1.b2", "goto", "uav", target=VehiclePosition("lead"), altitude=15.0)
+        assert at(bench, "uav") == pytest.approx((90, 0, 15), abs=0.01)
+        await do(bench, "r1.b3", "goto", "lead", target=VehiclePosition("uav"))
+        assert at(bench, "lead") == pytest.approx((90, 0, 0), abs=0.01)
+
+    simulate(UAV, main)

@@ -1,3 +1,4 @@
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable
@@ -215,6 +216,34 @@ def test_a_file_that_is_no_state_is_refused_by_name(state: str) -> None:
 
     with pytest.raises(StateFileError, match=r"state\.sqlite"):
         lives(state, never)
+
+
+@pytest.mark.parametrize(
+    ("statement", "said"),
+    [
+        ("UPDATE meta SET value = '0' WHERE key = 'format'", "format 0"),
+        ("UPDATE bodies SET state = x'00'", "another version"),
+    ],
+)
+def test_a_file_of_another_version_is_refused(state: str, statement: str, said: str) -> None:
+    lives(state, drive)
+    with sqlite3.connect(state) as connection:
+        connection.execute(statement)
+    with pytest.raises(StateFileError, match=said):
+        lives(state, drive)
+
+
+def test_what_could_not_be_said_before_the_end_is_known_afterwards(state: str) -> None:
+    async def unheard(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+        await bench.start("r1.b1", "hold", "ugv", duration=1.0)
+        arbiter.lose_link(ResourceId("ugv"))
+        await bench.clock.sleep(2)
+        assert (await arbiter.query("r1.b1", None)).state is BehaviorState.RUNNING
+
+    async def again(_: ArbiterBench, arbiter: SimArbiter) -> None:
+        assert (await arbiter.query("r1.b1", None)).state is BehaviorState.SUCCEEDED
+
+    lives(state, unheard, again)
 
 
 KILLED = """

@@ -15,6 +15,9 @@ from m2pem.model.values import Value
 from m2pem.resources.allocation import AllocationError, allocate
 from m2pem.resources.units import Dimension, UnitError, quantity
 
+YEAR_10000_US = 253_402_300_800_000_000
+"""The end of the calendar, in microseconds since the Unix epoch: no timer runs longer."""
+
 
 def request_behavior(x: Execution, token: Token, behavior: Behavior) -> None:
     """Have the arbiters start a behavior; their terminal report completes the task.
@@ -92,7 +95,16 @@ def _wait(x: Execution, token: Token, duration: Value) -> None:
 
 
 def wait_us(duration: Value, at_us: int) -> int:
-    """A `hold`'s duration in microseconds: "30 s", a number of seconds, or ISO 8601."""
+    """A `hold`'s duration in microseconds: "30 s", a number of seconds, or ISO 8601.
+
+    Raises:
+        UnitError, ExpressionSyntaxError: no duration, a negative one, or beyond the year 9999.
+    """
     if isinstance(duration, str) and duration.startswith("P"):
         return duration_us(duration, at_us)
-    return round(quantity(duration, Dimension.DURATION) * 1_000_000)
+    seconds = quantity(duration, Dimension.DURATION)
+    if seconds < 0:
+        raise UnitError(f"{duration!r} is negative")
+    if at_us + seconds * 1_000_000 >= YEAR_10000_US:
+        raise UnitError(f"{duration!r} ends after the year 9999")
+    return round(seconds * 1_000_000)

@@ -65,9 +65,8 @@ def begin(x: Execution, scope: Scope) -> None:
 
 def look_at(x: Execution, scope: Scope) -> None:
     """A scope in which a token was consumed: if it was the last one, the scope has completed."""
-    if scope.tokens or x.state.scopes.get(scope.id) is not scope:
-        return
-    finish(x, scope)
+    if not scope.tokens:
+        finish(x, scope)
 
 
 def finish(x: Execution, scope: Scope) -> None:

@@ -1,0 +1,199 @@
+"""What every arbiter must keep to from the start of a behavior to its end."""
+
+from collections.abc import Callable
+from itertools import pairwise
+
+from m2pem.model.catalogue import BehaviorState
+from m2pem.testing.contracts.arbiter_case import (
+    ArbiterCase,
+    ArbiterFixtures,
+    Main,
+    MakeArbiter,
+    on_bench,
+    start,
+    terminal,
+)
+from m2pem.testing.contracts.bench import ArbiterBench
+
+
+class ArbiterBehaviors(ArbiterFixtures):
+    """Starting and cancelling."""
+
+    def test_accepted_comes_before_running_and_one_terminal_report_last(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """ACCEPTED, RUNNING, then exactly one terminal report, and none after it."""
+
+        async def main(bench: ArbiterBench) -> None:
+            await start(bench, "r1.b1", case.short, case.vehicle)
+            end = await bench.ended("r1.b1", case.short_s)
+            assert end.state is BehaviorState.SUCCEEDED, end
+            await bench.clock.sleep(5)
+            assert bench.states_of("r1.b1") == [
+                BehaviorState.ACCEPTED,
+                BehaviorState.RUNNING,
+                BehaviorState.SUCCEEDED,
+            ]
+
+        on_bench(make_arbiter, run, main)
+
+    def test_report_numbers_rise_from_one(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """The executive tells old reports from new ones by their numbers."""
+
+        async def main(bench: ArbiterBench) -> None:
+            await start(bench, "r1.b1", case.short, case.vehicle)
+            await bench.ended("r1.b1", case.short_s)
+            numbers = [report.number for report in bench.of("r1.b1")]
+            assert numbers[0] == 1, numbers
+            assert all(a < b for a, b in pairwise(numbers)), numbers
+
+        on_bench(make_arbiter, run, main)
+
+    def test_a_second_start_of_the_same_behavior_has_no_effect(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """The executive sends a start again when it does not know whether it arrived."""
+
+        async def main(bench: ArbiterBench) -> None:
+            await start(bench, "r1.b1", case.short, case.vehicle)
+            await start(bench, "r1.b1", case.short, case.vehicle)
+            await bench.ended("r1.b1", case.short_s)
+            await start(bench, "r1.b1", case.short, case.vehicle)
+            await bench.clock.sleep(case.short_s)
+            assert len(bench.of("r1.b1")) == 3, bench.of("r1.b1")
+
+        on_bench(make_arbiter, run, main)
+
+    def test_an_unknown_behavior_is_rejected_by_name(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """REJECTED, with a code, and a reason that names the behavior."""
+
+        async def main(bench: ArbiterBench) -> None:
+            await bench.start("r1.b1", "no_such_behavior", case.vehicle)
+            end = await bench.ended("r1.b1", 10)
+            assert end.state is BehaviorState.REJECTED, end
+            assert end.code, "a rejection has a code"
+            assert "no_such_behavior" in end.reason, end.reason
+
+        on_bench(make_arbiter, run, main)
+
+    def test_a_bad_parameter_is_rejected_by_name(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """REJECTED, with a reason that names the parameter; nothing has moved."""
+
+        async def main(bench: ArbiterBench) -> None:
+            name, value = case.bad
+            behavior, parameters = case.long
+            await start(bench, "r1.b1", (behavior, {**parameters, name: value}), case.vehicle)
+            end = await bench.ended("r1.b1", 10)
+            assert end.state is BehaviorState.REJECTED, end
+            assert name in end.reason, end.reason
+            assert bench.states_of("r1.b1") == [BehaviorState.REJECTED]
+
+        on_bench(make_arbiter, run, main)
+
+    def test_an_unknown_parameter_is_rejected_by_name(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """A parameter that is not in the catalogue is not silently left out."""
+
+        async def main(bench: ArbiterBench) -> None:
+            behavior, parameters = case.long
+            await start(bench, "r1.b1", (behavior, {**parameters, "colour": 1.0}), case.vehicle)
+            end = await bench.ended("r1.b1", 10)
+            assert end.state is BehaviorState.REJECTED, end
+            assert "colour" in end.reason, end.reason
+
+        on_bench(make_arbiter, run, main)
+
+    def test_a_busy_vehicle_refuses_another_behavior(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """Code RESOURCE_UNAVAILABLE; what runs is not disturbed."""
+
+        async def main(bench: ArbiterBench) -> None:
+            await start(bench, "r1.b1", case.long, case.vehicle)
+            await bench.running("r1.b1")
+            await start(bench, "r1.b2", case.short, case.vehicle)
+            end = await bench.ended("r1.b2", 10)
+            assert (end.state, end.code) == (BehaviorState.REJECTED, "RESOURCE_UNAVAILABLE"), end
+            assert not terminal(bench, "r1.b1"), "the first goes on"
+
+        on_bench(make_arbiter, run, main)
+
+    def test_a_behavior_that_preempts_takes_the_vehicle_over(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """`preempts` names what is being cancelled: it ends CANCELLED at once."""
+
+        async def main(bench: ArbiterBench) -> None:
+            await start(bench, "r1.b1", case.long, case.vehicle)
+            await bench.running("r1.b1")
+            await start(bench, "r1.b2", case.long, case.vehicle, preempts=("r1.b1",))
+            assert (await bench.ended("r1.b1", 10)).state is BehaviorState.CANCELLED
+            await bench.running("r1.b2", 10)
+
+        on_bench(make_arbiter, run, main)
+
+    def test_cancel_ends_a_behavior_within_the_declared_bound(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """Within `limits().cancel_timeout_s`."""
+
+        async def main(bench: ArbiterBench) -> None:
+            await start(bench, "r1.b1", case.long, case.vehicle)
+            await bench.running("r1.b1")
+            await bench.clock.sleep(5)
+            await bench.arbiter.cancel("r1.b1", 1)
+            bound_s = bench.arbiter.limits(case.vehicle).cancel_timeout_s
+            assert (await bench.ended("r1.b1", bound_s)).state is BehaviorState.CANCELLED
+
+        on_bench(make_arbiter, run, main)
+
+    def test_a_second_cancel_changes_nothing(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """One terminal report, however often it is cancelled."""
+
+        async def main(bench: ArbiterBench) -> None:
+            await start(bench, "r1.b1", case.long, case.vehicle)
+            await bench.running("r1.b1")
+            await bench.arbiter.cancel("r1.b1", 1)
+            await bench.arbiter.cancel("r1.b1", 1)
+            await bench.ended("r1.b1", 60)
+            await bench.arbiter.cancel("r1.b1", 1)
+            await bench.clock.sleep(10)
+            assert len(terminal(bench, "r1.b1")) == 1, bench.of("r1.b1")
+
+        on_bench(make_arbiter, run, main)
+
+    def test_cancel_of_an_unknown_behavior_is_quiet(
+        self, make_arbiter: MakeArbiter, run: Callable[[Main], None]
+    ) -> None:
+        """No report and no exception."""
+
+        async def main(bench: ArbiterBench) -> None:
+            await bench.arbiter.cancel("r9.b9", 1)
+            await bench.clock.sleep(5)
+            assert bench.reports == []
+
+        on_bench(make_arbiter, run, main)
+
+    def test_a_cancelled_vehicle_can_be_commanded_again(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """The terminal report says that the vehicle is free."""
+
+        async def main(bench: ArbiterBench) -> None:
+            await start(bench, "r1.b1", case.long, case.vehicle)
+            await bench.running("r1.b1")
+            await bench.arbiter.cancel("r1.b1", 1)
+            await bench.ended("r1.b1", 60)
+            await start(bench, "r1.b2", case.long, case.vehicle)
+            await bench.running("r1.b2", 10)
+
+        on_bench(make_arbiter, run, main)

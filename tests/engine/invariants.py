@@ -1,0 +1,82 @@
+"""What is always true of a run's state between two inputs."""
+
+from m2pem.engine.state import BehaviorPhase, RunState, RunStatus
+from m2pem.model.elements import InclusiveGateway
+
+
+def check_state(state: RunState) -> None:
+    """Assert that all references in the state agree, and that nothing is left over."""
+    _check_tokens(state)
+    _check_waits(state)
+    _check_work(state)
+    if state.status is RunStatus.ENDED:
+        assert not state.tokens
+        assert not state.scopes
+        assert not state.waits
+        assert not state.prompts
+        assert not state.services
+        assert not state.yielded
+        assert all(b.phase is BehaviorPhase.CANCELLING for b in state.behaviors.values())
+        assert not [entry for entry in (*state.timers, *state.dates) if entry[1] in state.waits]
+
+
+def _check_tokens(state: RunState) -> None:
+    tokens = [token for scope in state.scopes.values() for token in scope.tokens.values()]
+    assert {token.id: token for token in tokens} == state.tokens
+    inclusive = set()
+    for scope in state.scopes.values():
+        assert scope.owner is None or state.tokens[scope.owner.id] is scope.owner
+        assert scope.owner is None or scope.owner.inner is scope
+        assert scope.parent is None or state.scopes[scope.parent.id] is scope.parent
+        for node, join in scope.joins.items():
+            for flow, waiting in join.by_flow.items():
+                assert waiting, "an empty flow is absent"
+                assert flow in node.incoming
+                assert all(scope.tokens[t.id] is t and t.node is node for t in waiting)
+            if isinstance(node, InclusiveGateway):
+                inclusive.add((scope.id, node.id))
+    assert set(state.inclusive) == inclusive
+    for token in tokens:
+        assert token.scope.tokens[token.id] is token
+        assert token.node.container is token.scope.container
+        assert token.inner is None or state.scopes[token.inner.id] is token.inner
+        busy = [token.behavior, token.service, token.inner]
+        assert sum(bool(each) for each in busy) <= 1
+
+
+def _check_waits(state: RunState) -> None:
+    of_tokens = {
+        wait.id: wait for token in state.tokens.values() for wait in (token.waits or {}).values()
+    }
+    assert of_tokens == state.waits
+    caught = {wait.id: wait for each in state.catchers.values() for wait in each.values()}
+    timed = {number for _, number in (*state.timers, *state.dates)}
+    for wait in state.waits.values():
+        assert (wait.id in caught) != (wait.id in timed)
+    assert set(caught) <= set(state.waits)
+    for (trigger, ref), waits in state.catchers.items():
+        assert waits, "nobody catches: absent"
+        assert trigger.value == "signal" or ref not in state.mailbox, "a letter and its catcher"
+
+
+def _check_work(state: RunState) -> None:
+    held: dict[str, list[str]] = {}
+    for behavior in state.behaviors.values():
+        for resource in behavior.resources:
+            held.setdefault(resource, []).append(behavior.id)
+        if behavior.phase is not BehaviorPhase.CANCELLING:
+            assert state.tokens[behavior.token].behavior == behavior.id
+    assert {name: sorted(ids) for name, ids in state.held.items()} == {
+        name: sorted(ids) for name, ids in held.items()
+    }
+    for resource, holders in state.held.items():
+        active = [h for h in holders if state.behaviors[h].phase is not BehaviorPhase.CANCELLING]
+        assert len(active) <= 1, f"{resource} is commanded by {active}"
+    for token in state.tokens.values():
+        if token.behavior:
+            assert state.behaviors[token.behavior].phase is not BehaviorPhase.CANCELLING
+    for prompt in state.prompts.values():
+        assert state.tokens[prompt.token.id] is prompt.token
+        assert prompt.token.prompt == prompt.id
+    for service in state.services.values():
+        assert state.tokens[service.token.id] is service.token

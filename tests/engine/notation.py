@@ -1,0 +1,165 @@
+"""Missions in few words: BPMN XML in which flows and the insides of elements are short text.
+
+    <startEvent id="start"/> <exclusiveGateway id="fast" default="no"/> <endEvent id="end"/>
+    <scriptTask id="go">do goto uav1 speed=5</scriptTask>
+    start -> fast -> go -> end if speed > 3
+    no: fast -> end
+
+* A line with `->` is a chain of sequence flows, named f1, f2, ... or as said before a colon; what
+  follows `if` is the condition of its last flow.
+* An event's text says its definition: `signal S`, `message M`, `error E`, `error`, `escalation X`,
+  `escalation`, `timer PT5S`, `date 2026-...`, `cycle R3/PT5S`, `terminate`.
+* A script task's text is `do BEHAVIOR ROLES PARAMETERS` (roles: `uav1`, `evsg1/ptz`, `team:alpha`,
+  with `?` optional), or statements separated by `;`.
+* A service task's is `call SERVICE ROLES PARAMETERS`, a user task's `ask DECISIONS`, a call
+  activity's `in a as b, out c as d`.
+
+What signals, messages, errors and escalations are referred to is declared by itself.
+"""
+
+import re
+from collections.abc import Callable
+from itertools import pairwise
+from xml.sax.saxutils import escape, quoteattr
+
+from m2pem.model.bpmn import parse_mission
+from m2pem.model.elements import Mission
+
+_BPMN = "http://www.omg.org/spec/BPMN/20100524/MODEL"
+_OWN = "https://m2pem.org/schema/1"
+_HEAD = f'<definitions xmlns="{_BPMN}" xmlns:m2pem="{_OWN}" id="defs" targetNamespace="test">'
+
+_FLOWS = re.compile(r"^\s*(?:([\w-]+):)?\s*([\w-]+(?:\s*->\s*[\w-]+)+)(?:\s+if\s+(.+))?\s*$", re.M)
+_SHORT = re.compile(r"<(\w+)\b([^<>]*)(?<!/)>([^<>]*\S[^<>]*)</\1>")
+_TIMES = {"timer": "timeDuration", "date": "timeDate", "cycle": "timeCycle"}
+
+
+def mission(text: str) -> Mission:
+    """The mission that `text` says: processes, or the inside of a process called MAIN."""
+    return parse_mission(xml(text).encode(), "test.bpmn")
+
+
+def xml(text: str) -> str:
+    """The BPMN 2.0 XML of it."""
+    if "<process" not in text:
+        text = f'<process id="MAIN" isExecutable="true">\n{text}\n</process>'
+    body = _SHORT.sub(_long, _flows(text))
+    return f"{_HEAD}{_roots(body)}{body}</definitions>"
+
+
+def _flows(text: str) -> str:
+    number = 0
+
+    def elements(match: re.Match[str]) -> str:
+        nonlocal number
+        name, chain, condition = match.groups()
+        nodes = [node.strip() for node in chain.split("->")]
+        found = []
+        for place, (source, target) in enumerate(pairwise(nodes), 2):
+            number += 1
+            inside = ""
+            if condition and place == len(nodes):
+                inside = f"<conditionExpression>{escape(condition)}</conditionExpression>"
+            identifier = name if name and len(nodes) == 2 else f"{name or 'f'}{number}"
+            found.append(
+                f'<sequenceFlow id="{identifier}" sourceRef="{source}" targetRef="{target}">'
+                f"{inside}</sequenceFlow>"
+            )
+        return "".join(found)
+
+    found = _FLOWS.sub(elements, text)
+    assert "->" not in found, f"a chain of flows has a line of its own: {found}"
+    return found
+
+
+def _roots(body: str) -> str:
+    found = []
+    for kind in ("signal", "message", "error", "escalation"):
+        for name in dict.fromkeys(re.findall(rf'{kind}Ref="([^"]+)"', body)):
+            code = f' {kind}Code="{name}"' if kind in ("error", "escalation") else ""
+            found.append(f'<{kind} id="{name}" name="{name}"{code}/>')
+    return "".join(found)
+
+
+def _long(match: re.Match[str]) -> str:
+    tag, attributes, text = match[1], match[2], match[3].strip()
+    if tag.endswith("Event"):
+        inside = _definition(text)
+    elif tag in _INSIDES:
+        inside = _INSIDES[tag](text)
+    else:
+        return match[0]
+    return f"<{tag}{attributes}>{inside}</{tag}>"
+
+
+def _definition(text: str) -> str:
+    word, _, rest = text.partition(" ")
+    if word in _TIMES:
+        time = _TIMES[word]
+        return f"<timerEventDefinition><{time}>{rest}</{time}></timerEventDefinition>"
+    reference = f' {word}Ref="{rest}"' if rest else ""
+    return f"<{word}EventDefinition{reference}/>"
+
+
+def _script(text: str) -> str:
+    if not text.startswith("do "):
+        return "<script>" + text.replace(";", "\n") + "</script>"
+    _, name, *words = text.split()
+    kind = "vehicle"
+    if any(word.startswith("team:") for word in words):
+        kind = "team"
+    elif any("/" in word and "=" not in word for word in words):
+        kind = "payload"
+    properties, roles = _words(words, "property", "role")
+    return (
+        f'<extensionElements><m2pem:behavior type="{kind}" name="{name}"><m2pem:properties>'
+        f"{properties}</m2pem:properties><m2pem:resources>{roles}</m2pem:resources>"
+        "</m2pem:behavior></extensionElements>"
+    )
+
+
+def _service(text: str) -> str:
+    _, name, *words = text.split()
+    properties, roles = _words(words, "property", "role")
+    return (
+        f'<extensionElements><m2pem:service class="{name}"/>{properties}{roles}</extensionElements>'
+    )
+
+
+def _words(words: list[str], tag: str, role_tag: str) -> tuple[str, str]:
+    properties, roles = "", ""
+    for number, word in enumerate(words, 1):
+        key, equals, value = word.partition("=")
+        if equals:
+            properties += f"<m2pem:{tag} name={quoteattr(key)} value={quoteattr(value)}/>"
+            continue
+        optional = ' optional="true"' if word.endswith("?") else ""
+        resource = word.removesuffix("?")
+        kind = "payload" if "/" in resource else "vehicle"
+        if resource.startswith("team:"):
+            kind, resource = "team", resource.removeprefix("team:")
+        roles += f'<m2pem:{role_tag} name="role{number}" {kind}="{resource}"{optional}/>'
+    return properties, roles
+
+
+def _prompt(text: str) -> str:
+    decisions = "".join(
+        f'<m2pem:decision value="{value}"/>' for value in text.removeprefix("ask ").split()
+    )
+    return f"<extensionElements>{decisions}</extensionElements>"
+
+
+def _mappings(text: str) -> str:
+    found = ""
+    for part in text.split(","):
+        direction, source, _, target = part.split()
+        found += f'<m2pem:{direction} source="{source}" target="{target}"/>'
+    return f"<extensionElements>{found}</extensionElements>"
+
+
+_INSIDES: dict[str, Callable[[str], str]] = {
+    "scriptTask": _script,
+    "serviceTask": _service,
+    "userTask": _prompt,
+    "callActivity": _mappings,
+}

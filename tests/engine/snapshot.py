@@ -1,0 +1,47 @@
+"""The whole of a run's state in a form that compares: what replay and re-deciding must rebuild."""
+
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from m2pem.engine.state import Behavior, Join, Prompt, RunState, Scope, Service, Token, Wait
+from m2pem.model.elements import Element, Mission
+
+_OBJECTS = (Scope, Token, Wait, Behavior, Prompt, Service)
+
+
+def snapshot(state: RunState) -> dict[str, Any]:
+    """Every field of the state and of all that it holds, in order; references are ids."""
+    whole = {
+        each.name: _plain(getattr(state, each.name))
+        for each in fields(state)
+        if each.name not in ("timers", "dates")
+    }
+    for name in ("timers", "dates"):  # stale entries may be in the heaps, or not
+        whole[name] = sorted(entry for entry in getattr(state, name) if entry[1] in state.waits)
+    held: list[object] = [state.root] if state.root is not None else []
+    for kept in (state.scopes, state.tokens, state.waits, state.behaviors):
+        held.extend(kept.values())
+    for also in (state.prompts, state.services):
+        held.extend(also.values())
+    whole["objects"] = [
+        (type(each).__name__, {f.name: _plain(getattr(each, f.name)) for f in fields(each)})  # type: ignore[arg-type]
+        for each in held
+    ]
+    return whole
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Mission):
+        return value.file
+    if isinstance(value, Element):
+        return value.id
+    if isinstance(value, _OBJECTS):
+        return f"{type(value).__name__} {value.id}"
+    if isinstance(value, Join):
+        return _plain(value.by_flow)
+    if isinstance(value, dict):
+        return [(_plain(key), _plain(item)) for key, item in value.items()]
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    assert not is_dataclass(value), f"{type(value).__name__} has no plain form"
+    return value

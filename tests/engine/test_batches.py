@@ -1,0 +1,134 @@
+"""A run yields when one input causes more than a batch of steps, and goes on at `Continue`."""
+
+import pytest
+
+from m2pem.engine import records as r
+from m2pem.engine.inputs import Continue
+from tests.engine.kit import Play
+
+LOOP = """
+    <startEvent id="start"/> <exclusiveGateway id="merge"/>
+    <parallelGateway id="fork"/> <scriptTask id="a">n = n + 1</scriptTask> <task id="b"/>
+    <inclusiveGateway id="join"/> <exclusiveGateway id="more" default="out"/>
+    <subProcess id="sub"> <startEvent id="s"/> <task id="t"/> <endEvent id="e"/>
+      s -> t -> e
+    </subProcess>
+    <endEvent id="end"/>
+    start -> merge -> fork -> a -> join
+    fork -> b -> join -> sub -> more
+    again: more -> merge if n < 10
+    out: more -> end
+"""
+
+
+def without_yields(play: Play) -> list[str]:
+    return [line for line in play.trace() if not line.startswith("yield")]
+
+
+@pytest.mark.parametrize("batch", [1, 2, 3, 7, 50])
+def test_a_run_in_batches_leaves_the_same_trace_as_in_one_go(batch: int) -> None:
+    whole = Play(LOOP).start({"n": 0})
+    parts = Play(LOOP, batch=batch).start({"n": 0})
+    assert whole.ended == parts.ended == "completed"
+    assert without_yields(parts) == without_yields(whole)
+    assert parts.run.steps_done == whole.run.steps_done
+    assert all(len(step.records) < 20 * batch + 20 for step in parts.steps)
+
+
+@pytest.mark.parametrize("batch", [1, 2, 3, 5])
+def test_timers_due_at_once_fire_in_the_same_order_in_batches(batch: int) -> None:
+    text = """
+        <startEvent id="start"/> <task id="x"/> <task id="y"/> <userTask id="u"/>
+        <intermediateCatchEvent id="a">timer PT1S</intermediateCatchEvent>
+        <intermediateCatchEvent id="b">timer PT2S</intermediateCatchEvent>
+        start -> a -> x -> y
+        start -> b
+        start -> u
+        <boundaryEvent id="tick" attachedToRef="u" cancelActivity="false">cycle R3/PT1S
+        </boundaryEvent>
+    """
+    traces = []
+    for size in (10_000, batch):
+        play = Play(text, batch=size).start()
+        play.now_us += 60_000_000
+        play.advance(0)
+        traces.append(without_yields(play))
+    assert traces[0] == traces[1]
+
+
+def test_a_yield_says_what_is_left() -> None:
+    play = Play(LOOP, batch=3)
+    play.goes_on = False
+    play.start({"n": 0})
+    assert play.run.wants_continue
+    [left] = [record for record in play.records() if isinstance(record, r.RunYielded)]
+    assert left.steps == (1, 2)
+    assert play.run.steps_done == 3
+
+
+def test_a_run_can_be_stopped_between_batches() -> None:
+    play = Play(LOOP, batch=3)
+    play.goes_on = False
+    play.start({"n": 0}).stop()
+    assert play.ended == "stopped"
+    assert not play.run.wants_continue
+
+
+def test_a_run_can_be_paused_between_batches_and_goes_on_where_it_was() -> None:
+    whole = Play(LOOP).start({"n": 0})
+    play = Play(LOOP, batch=3)
+    play.goes_on = False
+    play.start({"n": 0}).pause()
+    assert not play.run.wants_continue
+    assert play.give(Continue()).ignored() == "Continue while the run is paused"
+    play.goes_on = True
+    play.resume()
+    assert play.ended == "completed"
+    lines = [line for line in without_yields(play) if line not in ("pause", "resume")]
+    assert [line for line in lines if not line.startswith("ignored:")] == without_yields(whole)
+
+
+def test_continue_without_anything_left_is_ignored() -> None:
+    play = Play('<startEvent id="s"/> <userTask id="u"/>\n s -> u').start().give(Continue())
+    assert play.ignored() == "no step was left over"
+
+
+@pytest.mark.parametrize("batch", range(1, 10))
+def test_a_batch_that_ends_on_a_token_that_is_no_more_leaves_nothing_behind(batch: int) -> None:
+    # Two tokens reach the last join; the second is consumed there before its turn comes.
+    play = Play(
+        """
+        <startEvent id="start"/> <task id="t"/> <parallelGateway id="fork"/>
+        <boundaryEvent id="never" attachedToRef="t">error</boundaryEvent>
+        <inclusiveGateway id="or"/> <parallelGateway id="last"/> <userTask id="u"/>
+        start -> t -> fork -> or -> u
+        never -> or
+        fork -> last
+        fork -> last
+    """,
+        batch=batch,
+    ).start()
+    assert play.at == "u"
+    assert play.answer().ended == "completed"
+
+
+@pytest.mark.parametrize("batch", range(1, 9))
+def test_a_stuck_run_is_noticed_in_batches_too(batch: int) -> None:
+    play = Play(
+        """
+        <startEvent id="start"/> <parallelGateway id="one"/> <parallelGateway id="two"/>
+        <parallelGateway id="fork"/> <task id="t"/>
+        <subProcess id="sub"> <startEvent id="s"/> <task id="x"/>
+          <endEvent id="e">error E</endEvent>
+          s -> x
+          s -> e
+        </subProcess>
+        <boundaryEvent id="catch" attachedToRef="sub">error</boundaryEvent>
+        start -> fork -> one -> two
+        fork -> sub
+        catch -> two -> one
+    """,
+        batch=batch,
+    ).start()
+    assert play.ended == "failed"
+    assert play.detail == "stuck: no token can move from one, two"

@@ -1,0 +1,82 @@
+"""Records and commands as short lines, so that what a test expects reads like a table."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from m2pem.engine import commands as c
+from m2pem.engine import records as r
+
+
+def _short(behavior: str) -> str:
+    return behavior.rpartition(".")[2]
+
+
+def _outcome(record: r.TokenLeft | r.ScopeClosed) -> str:
+    return "" if record.outcome is r.TokenOutcome.COMPLETED else record.outcome.value
+
+
+def _caught(record: r.ErrorThrown | r.EscalationThrown) -> str:
+    return f"caught by {record.caught_by}" if record.caught_by else ""
+
+
+_LINES: dict[type, Callable[[Any], Iterable[object]]] = {
+    r.RunStarted: lambda x: ("begin", x.process),
+    r.RunClaimed: lambda x: ("claim", x.epoch),
+    r.RunPaused: lambda x: ("pause",),
+    r.RunResumed: lambda x: ("resume",),
+    r.RunEnded: lambda x: ("end", x.outcome.value),
+    r.RunYielded: lambda x: ("yield", *x.steps),
+    r.InputIgnored: lambda x: ("ignored:", x.reason),
+    r.InputDeferred: lambda x: ("defer", type(x.input).__name__),
+    r.InputSeen: lambda x: ("seen", x.id),
+    r.GeometryReceived: lambda x: ("geometry", x.name),
+    r.ScopeOpened: lambda x: ("open", x.element),
+    r.ScopeClosed: lambda x: ("close", x.element, _outcome(x)),
+    r.TokenEntered: lambda x: ("enter", x.element),
+    r.TokenLeft: lambda x: ("leave", x.element, _outcome(x)),
+    r.FlowTaken: lambda x: ("take", x.flow),
+    r.BehaviorRequested: lambda x: (
+        "request",
+        _short(x.behavior),
+        x.name,
+        *x.resources,
+        *(f"preempts {_short(other)}" for other in x.preempts),
+    ),
+    r.BehaviorProgressed: lambda x: ("progress", _short(x.behavior), x.state.value),
+    r.BehaviorCancelRequested: lambda x: ("cancel", _short(x.behavior), x.code),
+    r.BehaviorUnsettled: lambda x: ("unsettled", _short(x.behavior)),
+    r.BehaviorContinued: lambda x: ("continued", _short(x.behavior)),
+    r.BehaviorRestarted: lambda x: ("restart", _short(x.behavior)),
+    r.BehaviorEnded: lambda x: ("ended", _short(x.behavior), x.state.value, x.code),
+    r.PromptOpened: lambda x: ("ask", x.prompt, x.element),
+    r.PromptAnswered: lambda x: ("answer", x.prompt, x.decision),
+    r.PromptWithdrawn: lambda x: ("withdraw", x.prompt),
+    r.ServiceRequested: lambda x: ("call", x.service, x.name),
+    r.ServiceEnded: lambda x: ("served", x.service, x.code),
+    r.ServiceWithdrawn: lambda x: ("withdraw", x.service),
+    r.DataWritten: lambda x: ("write", x.key, "=", x.value),
+    r.EventAwaited: lambda x: ("await", x.element),
+    r.EventTriggered: lambda x: ("triggered",),
+    r.SignalThrown: lambda x: ("signal", x.signal),
+    r.MessageThrown: lambda x: ("message", x.message, "kept" if x.kept else ""),
+    r.EscalationThrown: lambda x: ("escalation", x.code, _caught(x)),
+    r.ErrorThrown: lambda x: ("error", x.code, _caught(x)),
+    c.StartBehavior: lambda x: ("start", _short(x.behavior), x.name, *x.resources),
+    c.CancelBehavior: lambda x: ("cancel", _short(x.behavior)),
+    c.HoldResource: lambda x: ("hold", x.resource),
+    c.ResumeResource: lambda x: ("resume", x.resource),
+    c.OpenPrompt: lambda x: ("open", x.prompt, *(d.value for d in x.decisions)),
+    c.ClosePrompt: lambda x: ("close", x.prompt, x.decision),
+    c.RunService: lambda x: ("run", x.service, x.name),
+    c.CancelService: lambda x: ("cancel", x.service),
+}
+
+
+def line(item: r.Record | c.Command) -> str:
+    """One record or command."""
+    return " ".join(str(word) for word in _LINES[type(item)](item) if word != "")
+
+
+def table(text: str) -> list[str]:
+    """The lines of an expected trace; several may stand on one line of text, parted by `;`."""
+    return [part.strip() for part in text.replace("\n", ";").split(";") if part.strip()]

@@ -1,0 +1,254 @@
+"""The contract must find what is wrong with an arbiter, or it proves nothing of a good one."""
+
+import asyncio
+import dataclasses
+from collections.abc import AsyncIterator, Awaitable, Callable
+from pathlib import Path
+
+import pytest
+
+from m2pem.api.arbiter import (
+    ArbiterContext,
+    BehaviorReport,
+    BehaviorRequest,
+    Connection,
+    Limits,
+)
+from m2pem.api.clock import Clock
+from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.executive.clock import run_virtual
+from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.model.geometry import Point, Route
+from m2pem.sim.arbiters import SimArbiter
+from m2pem.testing.contracts.arbiter import ArbiterCase, ArbiterContract
+
+UGV1, UGV2 = ResourceId("ugv1"), ResourceId("ugv2")
+CASE = ArbiterCase(
+    vehicle=UGV1,
+    other=UGV2,
+    long=(
+        "single_vehicle_routing",
+        {"route": Route(((38.108, -77.3192, None), (38.110, -77.3180, None)))},
+    ),
+    short=("goto", {"target": Point((38.1077, -77.3192, None))}),
+    bad=("speed", -1.0),
+)
+
+
+class TwiceReported(SimArbiter):
+    async def reports(self) -> AsyncIterator[BehaviorReport]:
+        async for report in super().reports():
+            yield report
+            if report.state.terminal:
+                yield dataclasses.replace(report, number=report.number + 1)
+
+
+class NeverAccepted(SimArbiter):
+    async def reports(self) -> AsyncIterator[BehaviorReport]:
+        async for report in super().reports():
+            if report.state is not BehaviorState.ACCEPTED:
+                yield report
+
+
+class Unnumbered(SimArbiter):
+    async def reports(self) -> AsyncIterator[BehaviorReport]:
+        async for report in super().reports():
+            yield dataclasses.replace(report, number=1)
+
+
+class Reasonless(SimArbiter):
+    async def reports(self) -> AsyncIterator[BehaviorReport]:
+        async for report in super().reports():
+            yield dataclasses.replace(report, reason="")
+
+
+class Codeless(SimArbiter):
+    async def reports(self) -> AsyncIterator[BehaviorReport]:
+        async for report in super().reports():
+            yield dataclasses.replace(report, code="")
+
+
+class StartsAnew(SimArbiter):
+    async def start(self, request: BehaviorRequest) -> None:
+        await super().start(dataclasses.replace(request, epoch=request.epoch + len(self.effects)))
+
+
+class Careless(SimArbiter):
+    async def start(self, request: BehaviorRequest) -> None:
+        parameters = {k: v for k, v in request.parameters.items() if k in ("route", "target")}
+        await super().start(dataclasses.replace(request, parameters=parameters))
+
+
+class Greedy(SimArbiter):
+    async def start(self, request: BehaviorRequest) -> None:
+        busy = tuple(effect.behavior for effect in self.effects)
+        await super().start(dataclasses.replace(request, preempts=busy))
+
+
+class NeverPreempts(SimArbiter):
+    async def start(self, request: BehaviorRequest) -> None:
+        await super().start(dataclasses.replace(request, preempts=()))
+
+
+class Timeless(SimArbiter):
+    async def start(self, request: BehaviorRequest) -> None:
+        await super().start(dataclasses.replace(request, epoch=9))
+
+    async def cancel(self, behavior: str, epoch: int) -> None:
+        await super().cancel(behavior, 9)
+
+
+class NeverCancels(SimArbiter):
+    async def cancel(self, behavior: str, epoch: int) -> None:
+        pass
+
+
+class CancelsAll(SimArbiter):
+    async def cancel(self, behavior: str, epoch: int) -> None:
+        for effect in self.effects:
+            await super().cancel(effect.behavior, epoch)
+
+
+class RaisesOnUnknown(SimArbiter):
+    async def cancel(self, behavior: str, epoch: int) -> None:
+        if not self.effects:
+            raise KeyError(behavior)
+        await super().cancel(behavior, epoch)
+
+
+class AlwaysRunning(SimArbiter):
+    async def query(self, behavior: str, native_ref: str | None) -> BehaviorReport:
+        return BehaviorReport(behavior, 1, BehaviorState.RUNNING)
+
+
+class Forgetful(SimArbiter):
+    async def query(self, behavior: str, native_ref: str | None) -> BehaviorReport:
+        return BehaviorReport(behavior, 0, BehaviorState.UNKNOWN)
+
+
+class NeverHolds(SimArbiter):
+    async def hold(self, resource: ResourceId) -> None:
+        pass
+
+
+class NeverResumes(SimArbiter):
+    async def resume(self, resource: ResourceId) -> None:
+        pass
+
+
+class Hasty(SimArbiter):
+    def limits(self, resource: ResourceId) -> Limits:
+        return Limits(hold_within_s=0.1, cancel_timeout_s=0.1)
+
+
+class HearsNoLoss(SimArbiter):
+    def lose_link(self, resource: ResourceId) -> None:
+        pass
+
+
+class LosesAll(SimArbiter):
+    def lose_link(self, resource: ResourceId) -> None:
+        for vehicle in (UGV1, UGV2):
+            super().lose_link(vehicle)
+
+
+class Anonymous(SimArbiter):
+    async def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
+        async for state in super().telemetry():
+            yield dataclasses.replace(state, resource=ResourceId("x"))
+
+
+class OwnTime(SimArbiter):
+    async def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
+        async for state in super().telemetry():
+            yield dataclasses.replace(state, time_us=state.time_us + 10**12)
+
+
+class Leaky(SimArbiter):
+    async def connect(self) -> None:
+        await super().connect()
+        self.task = asyncio.create_task(asyncio.sleep(3600))
+
+
+class ClosesOnce(SimArbiter):
+    closed = False
+
+    async def close(self) -> None:
+        if self.closed:
+            raise RuntimeError("closed already")
+        self.closed = True
+        await super().close()
+
+
+FINDS = [
+    (TwiceReported, "accepted_comes_before_running_and_one_terminal_report_last"),
+    (NeverAccepted, "accepted_comes_before_running_and_one_terminal_report_last"),
+    (Unnumbered, "report_numbers_rise_from_one"),
+    (StartsAnew, "a_second_start_of_the_same_behavior_has_no_effect"),
+    (Reasonless, "an_unknown_behavior_is_rejected_by_name"),
+    (Codeless, "an_unknown_behavior_is_rejected_by_name"),
+    (Careless, "a_bad_parameter_is_rejected_by_name"),
+    (Careless, "an_unknown_parameter_is_rejected_by_name"),
+    (Greedy, "a_busy_vehicle_refuses_another_behavior"),
+    (NeverPreempts, "a_behavior_that_preempts_takes_the_vehicle_over"),
+    (NeverCancels, "cancel_ends_a_behavior_within_the_declared_bound"),
+    (Hasty, "cancel_ends_a_behavior_within_the_declared_bound"),
+    (TwiceReported, "a_second_cancel_changes_nothing"),
+    (RaisesOnUnknown, "cancel_of_an_unknown_behavior_is_quiet"),
+    (NeverCancels, "a_cancelled_vehicle_can_be_commanded_again"),
+    (AlwaysRunning, "query_tells_what_runs_and_what_has_ended"),
+    (AlwaysRunning, "query_of_an_unknown_behavior_is_unknown"),
+    (Forgetful, "another_arbiter_finds_the_behavior_again"),
+    (Timeless, "a_start_of_a_past_epoch_is_refused"),
+    (Timeless, "a_cancel_of_a_past_epoch_is_refused"),
+    (NeverHolds, "hold_brings_the_vehicle_to_a_stand_within_the_declared_bound"),
+    (Hasty, "hold_brings_the_vehicle_to_a_stand_within_the_declared_bound"),
+    (NeverHolds, "resume_goes_on_with_the_behavior"),
+    (NeverResumes, "resume_goes_on_with_the_behavior"),
+    (HearsNoLoss, "a_cut_link_is_lost_within_the_declared_bound"),
+    (LosesAll, "a_cut_link_is_lost_within_the_declared_bound"),
+    (CancelsAll, "two_vehicles_do_not_mix"),
+    (Anonymous, "telemetry_names_the_resource_and_rises_in_time"),
+    (OwnTime, "states_are_stamped_by_the_clock_that_was_lent"),
+    (Leaky, "nothing_leaks_after_close"),
+    (ClosesOnce, "close_is_quiet_when_it_was_never_connected_or_is_closed_already"),
+]
+
+
+@pytest.mark.parametrize(
+    ("broken", "test"), FINDS, ids=[f"{broken.__name__}-{test}" for broken, test in FINDS]
+)
+def test_the_contract_finds_what_is_wrong(
+    broken: type[SimArbiter], test: str, tmp_path: Path
+) -> None:
+    def make(context: ArbiterContext) -> SimArbiter:
+        settings = {"state": str(tmp_path / "state.sqlite")}
+        connections = {name: Connection(name, "ground", settings) for name in (UGV1, UGV2)}
+        return broken(connections, context)
+
+    def cut(arbiter: SimArbiter, vehicle: ResourceId) -> None:
+        arbiter.lose_link(vehicle)
+
+    def run(main: Callable[[Clock], Awaitable[None]]) -> None:
+        run_virtual(main, 0)
+
+    offered = {
+        "make_arbiter": make,
+        "case": CASE,
+        "run": run,
+        "cut_link": cut,
+        "reconnects": True,
+    }
+    check = getattr(ArbiterContract, f"test_{test}")
+    wanted = check.__code__.co_varnames[1 : check.__code__.co_argcount]
+    with pytest.raises((AssertionError, KeyError, RuntimeError)):
+        check(ArbiterContract(), **{name: offered[name] for name in wanted})
+
+
+def test_every_test_of_the_contract_but_that_of_the_catalogue_is_shown_to_find_something() -> None:
+    tests = {name.removeprefix("test_") for name in dir(ArbiterContract) if "test_" in name}
+    unproven = tests - {test for _, test in FINDS}
+    assert unproven == {
+        "the_catalogue_needs_no_connection",
+        "hold_and_resume_of_an_idle_vehicle_are_quiet",
+    }
