@@ -4,7 +4,7 @@ import socket
 from pathlib import Path
 from typing import Any
 
-from m2pem.control_socket.place import ControlSocketError, live_sockets
+from m2pem.control_socket.place import ControlSocketError, address, live_sockets
 from m2pem.control_socket.protocol import Request, line, result_of
 from m2pem.errors import NotDrivenError, OperatorError
 
@@ -21,7 +21,8 @@ def ask(path: Path, method: str, **params: Any) -> Any:
     with socket.socket(socket.AF_UNIX) as caller:
         caller.settimeout(TIMEOUT_S)
         try:
-            caller.connect(str(path))
+            with address(path) as there:
+                caller.connect(there)
             caller.sendall(line(Request("2.0", method, params, id=1)))
             with caller.makefile("rb") as answers:
                 return result_of(answers.readline())

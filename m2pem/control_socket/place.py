@@ -7,12 +7,13 @@ import os
 import socket
 import stat
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from m2pem.errors import M2pemError
 
 LONGEST_PATH_BYTES = 107
-"""Of a Unix socket, on Linux."""
+"""Of a Unix socket, as the system takes it."""
 
 
 class ControlSocketError(M2pemError):
@@ -28,14 +29,9 @@ def make_place(journal: Path) -> Path:
     """Where the executive of this process listens; its folder is made or put right.
 
     Raises:
-        ControlSocketError: the folder cannot be private, or its path is too long.
+        ControlSocketError: the folder cannot be made, or is not this user's own.
     """
     folder = folder_of(journal)
-    path = folder / f"{os.getpid()}.sock"
-    if len(os.fsencode(path)) > LONGEST_PATH_BYTES:
-        raise ControlSocketError(
-            f"{path} is longer than the path of a socket may be ({LONGEST_PATH_BYTES} bytes)"
-        )
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
         found = folder.lstat()
@@ -44,7 +40,30 @@ def make_place(journal: Path) -> Path:
         folder.chmod(0o700)
     except OSError as error:
         raise ControlSocketError(f"{folder}: {error.strerror}") from error
-    return path
+    return folder / f"{os.getpid()}.sock"
+
+
+@contextmanager
+def address(path: Path) -> Iterator[str]:
+    """What to bind or connect to within the block: on Linux, a path may be of any length.
+
+    Raises:
+        ControlSocketError: it is longer than a socket's may be here.
+        OSError: its folder is not there.
+    """
+    if len(os.fsencode(path)) <= LONGEST_PATH_BYTES:
+        yield str(path)
+        return
+    descriptors = Path("/proc/self/fd")
+    if not descriptors.is_dir():
+        raise ControlSocketError(
+            f"{path} is longer than the path of a socket may be ({LONGEST_PATH_BYTES} bytes)"
+        )
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        yield str(descriptors / str(folder) / path.name)
+    finally:
+        os.close(folder)
 
 
 def live_sockets(journal: Path) -> Iterator[Path]:
@@ -60,7 +79,8 @@ def _answers(path: Path) -> bool:
     with socket.socket(socket.AF_UNIX) as caller:
         caller.settimeout(1)
         try:
-            caller.connect(str(path))
+            with address(path) as there:
+                caller.connect(there)
         except OSError:
             return False
     return True

@@ -19,7 +19,7 @@ from m2pem.api.control import (
     StampedRecord,
 )
 from m2pem.api.telemetry import PayloadState, VehicleState
-from m2pem.control_socket.place import ControlSocketError
+from m2pem.control_socket.place import ControlSocketError, address
 from m2pem.control_socket.protocol import LONGEST_LINE_BYTES, Request, line, result_of
 from m2pem.errors import OperatorError
 from m2pem.findings import Finding
@@ -64,7 +64,8 @@ class RemoteControl:
 
     async def _connect(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
         try:
-            return await asyncio.open_unix_connection(str(self._path), limit=LONGEST_LINE_BYTES)
+            with address(self._path) as there:
+                return await asyncio.open_unix_connection(there, limit=LONGEST_LINE_BYTES)
         except OSError as error:
             raise ControlSocketError(f"the executive at {self._path} is gone: {error}") from error
 

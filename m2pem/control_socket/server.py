@@ -16,7 +16,7 @@ import msgspec
 
 from m2pem.api.control import MissionControl
 from m2pem.control_socket.methods import METHODS, STREAMS
-from m2pem.control_socket.place import ControlSocketError, live_sockets, make_place
+from m2pem.control_socket.place import ControlSocketError, address, live_sockets, make_place
 from m2pem.control_socket.protocol import (
     LONGEST_LINE_BYTES,
     Code,
@@ -69,7 +69,8 @@ class ControlSocket:
         path.unlink(missing_ok=True)
         listening = socket.socket(socket.AF_UNIX)
         try:
-            listening.bind(str(path))
+            with address(path) as here:
+                listening.bind(here)
             path.chmod(0o600)
             self._server = await asyncio.start_unix_server(
                 self._serve, sock=listening, limit=LONGEST_LINE_BYTES

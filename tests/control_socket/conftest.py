@@ -35,7 +35,8 @@ class Served:
 
 @pytest.fixture
 async def served(tmp_path: Path) -> AsyncIterator[Served]:
-    journal = tmp_path / "j.db"
+    journal = tmp_path / ("a_long_name_" * 10) / "j.db"
+    journal.parent.mkdir()
     executive = Executive(
         fleet("v1"), MemoryJournal(), FakePlugins(Fakes(), []), SystemClock(), watch_links=False
     )

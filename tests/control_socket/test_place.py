@@ -8,7 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.control_socket.place import ControlSocketError, folder_of, live_sockets, make_place
+from m2pem.control_socket.place import (
+    LONGEST_PATH_BYTES,
+    ControlSocketError,
+    address,
+    folder_of,
+    live_sockets,
+    make_place,
+)
 
 
 def leave_behind(path: Path) -> None:
@@ -32,9 +39,22 @@ def test_a_link_to_another_folder_is_refused(tmp_path: Path) -> None:
         make_place(tmp_path / "j.db")
 
 
-def test_a_path_too_long_for_a_socket_is_told(tmp_path: Path) -> None:
-    with pytest.raises(ControlSocketError, match="longer"):
-        make_place(tmp_path / ("j" * 100))
+def test_a_path_too_long_for_a_socket_has_a_short_address(tmp_path: Path) -> None:
+    path = make_place(tmp_path / ("j" * 100))
+    with socket.socket(socket.AF_UNIX) as listening:
+        with address(path) as here:
+            assert len(here) <= LONGEST_PATH_BYTES
+            listening.bind(here)
+        listening.listen()
+        assert list(live_sockets(tmp_path / ("j" * 100))) == [path]
+
+
+def test_a_path_too_long_is_told_where_there_is_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Path, "is_dir", lambda _: False)
+    with pytest.raises(ControlSocketError, match="longer"), address(tmp_path / ("j" * 100)):
+        pass
 
 
 def test_a_missing_folder_of_the_journal_is_told(tmp_path: Path) -> None:

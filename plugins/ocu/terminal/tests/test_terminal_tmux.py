@@ -20,8 +20,6 @@ RUN = (
 PATIENCE_S = 40.0
 NUMBERS = itertools.count(1)
 
-pytestmark = pytest.mark.skipif(shutil.which("tmux") is None, reason="needs tmux")
-
 
 class Pane:
     """A terminal of 80 by 24 in tmux, with a shell command in it."""
@@ -103,6 +101,8 @@ class Tmux:
 
 @pytest.fixture
 def tmux(tmp_path: Path) -> Iterator[Tmux]:
+    if shutil.which("tmux") is None:
+        pytest.fail("needs tmux: run `make setup`, or install it")
     server = Tmux(tmp_path)
     try:
         yield server
