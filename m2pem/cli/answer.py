@@ -13,5 +13,8 @@ from m2pem.cli.steering import by_option, steer
 @journal_option
 @by_option
 def answer(run_id: str, prompt: str, decision: str, journal: str | None, by: str | None) -> None:
-    """Answer a prompt; the first answer wins, and a later one ends with 1."""
+    """Answer a prompt of a run that is running on this host.
+
+    The first answer wins; a later one ends with 1.
+    """
     steer(journal, run_id, "answer", by, prompt=prompt, decision=decision)

@@ -12,7 +12,7 @@ from m2pem.cli.options import UnusableError, example, journal_option, ocu_option
 @journal_option
 @ocu_option
 def attach(run_id: str | None, journal: str | None, ocu_names: str | None) -> None:
-    """Serve an operator of an executive that runs on this host, until the operator leaves.
+    """Serve an operator of an executive that is running on this host.
 
     RUN tells which executive, when several write to the journal. All its operators see the same
     and may do the same; missions go on when this one leaves.

@@ -11,5 +11,5 @@ from m2pem.cli.steering import by_option, steer
 @journal_option
 @by_option
 def continue_(run_id: str, journal: str | None, by: str | None) -> None:
-    """Let a run go on after a pause."""
+    """Let a run on this host go on after a pause."""
     steer(journal, run_id, "resume", by)

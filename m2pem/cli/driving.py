@@ -53,7 +53,8 @@ async def driving(
             loop.call_soon_threadsafe(interruption.stop, "nobody reads its output any more")
 
         output.writer.when_broken(nobody_reads)
-        async with executive, ControlSocket(executive.control, journal):
+        # First, as nothing may come between connecting and taking up a run: reports would be lost.
+        async with ControlSocket(executive.control, journal), executive:
             notices = executive.control.subscribe(size=BACKLOG)
             printing = asyncio.create_task(output.follow(notices))
             if operators.take_terminal:

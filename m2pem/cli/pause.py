@@ -11,5 +11,8 @@ from m2pem.cli.steering import by_option, steer
 @journal_option
 @by_option
 def pause(run_id: str, journal: str | None, by: str | None) -> None:
-    """Pause a run: its vehicles hold, and its timers stand."""
+    """Pause a run that is running on this host.
+
+    Its vehicles hold, and its timers stand.
+    """
     steer(journal, run_id, "pause", by)

@@ -20,5 +20,8 @@ if TYPE_CHECKING:
 def signal(
     run_id: str, signal_id: str, data: "dict[str, Value]", journal: str | None, by: str | None
 ) -> None:
-    """Send a signal, by its id or its name, to a run."""
+    """Send a signal to a run that is running on this host.
+
+    SIGNAL is its id, or its name.
+    """
     steer(journal, run_id, "signal", by, id=signal_id, data=data)

@@ -12,5 +12,8 @@ from m2pem.cli.steering import by_option, steer
 @journal_option
 @by_option
 def stop(run_id: str, reason: str, journal: str | None, by: str | None) -> None:
-    """Stop a run: its tokens end, and its vehicles are told to stop."""
+    """Stop a run that is running on this host.
+
+    Its tokens end, and its vehicles are told to stop.
+    """
     steer(journal, run_id, "stop", by, reason=reason)
