@@ -36,6 +36,14 @@ COMMANDS = {
 """Built-in commands: module of `m2pem.cli` and first line of its help."""
 
 
+def built_in(name: str) -> click.Command:
+    """The built-in command of that name, from its module; one named like a keyword ends with _."""
+    python = f"{name}_" if iskeyword(name) else name
+    command = getattr(import_module(f"m2pem.cli.{python}"), python)
+    assert isinstance(command, click.Command)
+    return command
+
+
 class LazyGroup(click.Group):
     """A group that imports a built-in command when it is called, and asks the plugins last.
 
@@ -49,10 +57,7 @@ class LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The command of that name; None if nobody has it."""
         if cmd_name in COMMANDS:
-            name = f"{cmd_name}_" if iskeyword(cmd_name) else cmd_name
-            command = getattr(import_module(f"m2pem.cli.{name}"), name)
-            assert isinstance(command, click.Command)
-            return command
+            return built_in(cmd_name)
         return self._of_plugins.commands.get(cmd_name)
 
     def resolve_command(
