@@ -27,7 +27,7 @@ def told(*, terminal: bool, cover: bool) -> tuple[str, str]:
     if cover:
         output.cover()
     output.show(StampedRecord("r1", 1, 0.0, RunPaused(5)))
-    output.show(StampedRecord("r1", 2, 0.0, RunEnded(RunOutcome.COMPLETED)))
+    output.show(StampedRecord("r1", 2, 0.0, RunEnded(RunOutcome.COMPLETED, "")))
     output.writer.drain()
     before = stream.getvalue()
     output.uncover()
