@@ -90,6 +90,8 @@ async def _resume(
                     click.echo(f"m2pem: {run_id} is paused: an operator lets it go on", err=True)
                 return run_id
 
-            status = await drive_run(executive, out, operators, answers, take_up)
+            status = await drive_run(
+                executive, out, operators, answers, file_of(url_of(journal_url)), take_up
+            )
         tidy_up(executive, file_of(url_of(journal_url)))
     return status
