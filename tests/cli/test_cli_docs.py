@@ -1,24 +1,17 @@
 """docs/cli.md has every command, option and record."""
 
 import re
-from importlib import import_module
 from typing import get_args
 
 import click
 import pytest
 
-from m2pem.cli.group import COMMANDS
+from m2pem.cli.group import COMMANDS, built_in
 from m2pem.cli.plain import HELP
 from m2pem.engine.records import Record
 from tests.command_line import REPOSITORY
 
 PAGE = (REPOSITORY / "docs" / "cli.md").read_text(encoding="utf-8")
-
-
-def command_named(name: str) -> click.Command:
-    command = getattr(import_module(f"m2pem.cli.{name}"), name)
-    assert isinstance(command, click.Command)
-    return command
 
 
 def test_every_command_says_in_the_table_what_its_help_says() -> None:
@@ -28,7 +21,7 @@ def test_every_command_says_in_the_table_what_its_help_says() -> None:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_is_on_the_page(name: str) -> None:
-    options = [each for each in command_named(name).params if isinstance(each, click.Option)]
+    options = [each for each in built_in(name).params if isinstance(each, click.Option)]
     words = [word for each in options for word in each.opts]
     assert [word for word in words if not re.search(rf"`(m2pem {name} )?{word}[ `]", PAGE)] == []
 

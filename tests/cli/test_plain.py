@@ -20,7 +20,7 @@ from m2pem.api.control import (
 from m2pem.cli import plain
 from m2pem.cli.plain import PlainOcu
 from m2pem.cli.writer import writer_for
-from m2pem.engine.records import Record, RunEnded, RunOutcome, RunPaused, RunStarted
+from m2pem.engine.records import Record, RunEnded, RunOutcome, RunStarted
 from m2pem.errors import OperatorError
 from m2pem.model.behavior import Decision
 
@@ -41,6 +41,7 @@ class Control:
         self.calls: list[tuple[Any, ...]] = []
         self.notices: asyncio.Queue[Notice] = asyncio.Queue()
         self.refuse: OperatorError | None = None
+        self.status = RunStatus.RUNNING
 
     async def subscribe(self, size: int) -> AsyncIterator[Notice]:
         while True:
@@ -59,7 +60,7 @@ class Control:
 
     async def runs(self) -> list[RunSummary]:
         return [
-            RunSummary("r1", "a.bpmn", "A", RunStatus.COMPLETED, 0),
+            RunSummary("r1", "a.bpmn", "A", self.status, 0),
             RunSummary("r2", "b.bpmn", "B", RunStatus.FAILED, 0, detail="stuck"),
         ]
 
@@ -210,14 +211,14 @@ async def test_stop_always_stops_whatever_is_asked(operator: Operator) -> None:
 async def test_resume_answers_what_is_asked_after_a_restart(operator: Operator) -> None:
     await operator.hear(RunStarted("P", 0), prompt(decisions=RECOVERY))
     await operator.type("resume")
-    await operator.hear(RunPaused(0))
+    operator.control.status = RunStatus.PAUSED
     await operator.type("resume")
     assert operator.control.calls == [("answer", "r1", "p1", "resume"), ("resume", "r1")]
 
 
 async def test_runs_are_listed(operator: Operator) -> None:
     await operator.type("runs")
-    assert operator.screen == "r1 completed a.bpmn (A)\nr2 failed b.bpmn (B): stuck\n"
+    assert operator.screen == "r1 running a.bpmn (A)\nr2 failed b.bpmn (B): stuck\n"
 
 
 async def test_help_lists_every_command(operator: Operator) -> None:
