@@ -154,6 +154,21 @@ class MissionControl(Protocol):
         """Hand over a route, area or point (GeoJSON), to one run or to all, now and later."""
         ...
 
+    async def take(self, resource: str, *, by: str = "") -> None:
+        """Take a vehicle or payload from the missions, to steer it by hand.
+
+        What it was doing ends with error TAKEN_OVER; until it is given back no behavior gets it.
+        """
+        ...
+
+    async def give_back(self, resource: str, *, by: str = "") -> None:
+        """Give it back to the missions; signals with `m2pem:returned` of it are thrown."""
+        ...
+
+    async def holders(self) -> Mapping[ResourceId, str]:
+        """Who has each resource: an operator, a behavior ("r1.b3"), or "" when nobody does."""
+        ...
+
     def subscribe(self, run: RunId | None = None, size: int = 10_000) -> AsyncIterator[Notice]:
         """What is committed from this call on, and first the prompts that stand now."""
         ...

@@ -29,6 +29,9 @@ HELP = """\
   pause, resume      hold the vehicles and the clock; go on
   stop               end the mission: every vehicle is told to stop
   start FILE         start another mission
+  takeover evsg1     take a vehicle or payload from the missions, to steer it by hand
+  handback evsg1     give it back
+  who                say who has each vehicle and payload
   runs               list what ran, and how it stands
   quit               leave; missions go on without an operator here
 With several runs, say which: stop r2."""
@@ -55,6 +58,9 @@ class PlainOcu:
             "resume": self._resume,
             "signal": self._signal,
             "start": self._start,
+            "takeover": self._take,
+            "handback": self._give,
+            "who": self._who,
             "runs": self._runs,
             "help": self._help,
         }
@@ -204,6 +210,21 @@ class PlainOcu:
         if not words:
             raise OperatorError("say which: start FILE")
         await self._control.start(" ".join(words), by=NAME)
+
+    async def _take(self, words: list[str]) -> None:
+        if len(words) != 1:
+            raise OperatorError("say which: takeover RESOURCE")
+        await self._control.take(words[0], by=NAME)
+        self._say(f"{words[0]} is yours; handback {words[0]} gives it back")
+
+    async def _give(self, words: list[str]) -> None:
+        if len(words) != 1:
+            raise OperatorError("say which: handback RESOURCE")
+        await self._control.give_back(words[0], by=NAME)
+
+    async def _who(self, _: list[str]) -> None:
+        for resource, holder in (await self._control.holders()).items():
+            self._say(f"{resource}: {holder or 'free'}")
 
     async def _runs(self, _: list[str]) -> None:
         for run in await self._control.runs():

@@ -59,6 +59,13 @@ class Geometry(Params, frozen=True):
     by: str = ""
 
 
+class Resource(Params, frozen=True):
+    """As MissionControl.take and MissionControl.give_back."""
+
+    resource: str
+    by: str = ""
+
+
 class Page(Params, frozen=True):
     """As MissionControl.records."""
 
@@ -99,6 +106,9 @@ METHODS: dict[str, Method] = {
     "pause": (OfRun, lambda c, p: c.pause(p.run, by=p.by)),
     "resume": (OfRun, lambda c, p: c.resume(p.run, by=p.by)),
     "set_geometry": (Geometry, lambda c, p: c.set_geometry(p.name, p.geometry, run=p.run, by=p.by)),
+    "take": (Resource, lambda c, p: c.take(p.resource, by=p.by)),
+    "give_back": (Resource, lambda c, p: c.give_back(p.resource, by=p.by)),
+    "holders": (Nothing, lambda c, _: c.holders()),
     "runs": (Nothing, _runs),
     "prompts": (Nothing, _prompts),
     "records": (Page, lambda c, p: c.records(p.run, p.after_seq, p.limit)),

@@ -154,6 +154,18 @@ class RemoteControl:
         """Hand over a route, area or point (GeoJSON)."""
         await self._ask("set_geometry", name=name, geometry=geometry, run=run, by=by)
 
+    async def take(self, resource: str, *, by: str = "") -> None:
+        """Take a vehicle or payload from the missions."""
+        await self._ask("take", resource=resource, by=by)
+
+    async def give_back(self, resource: str, *, by: str = "") -> None:
+        """Give it back to the missions."""
+        await self._ask("give_back", resource=resource, by=by)
+
+    async def holders(self) -> Mapping[ResourceId, str]:
+        """Who has each resource."""
+        return msgspec.convert(await self._ask("holders"), dict[ResourceId, str])
+
     # --- watching -------------------------------------------------------------------------------
 
     def subscribe(self, run: RunId | None = None, size: int = 10_000) -> AsyncIterator[Notice]:

@@ -100,6 +100,14 @@ def _input_seen(state: RunState, record: r.InputSeen) -> None:
     state.seen[record.id] = None
 
 
+def _control_taken(state: RunState, record: r.OperatorTookControl) -> None:
+    state.taken[record.resource] = record.by
+
+
+def _control_returned(state: RunState, record: r.OperatorGaveControlBack) -> None:
+    del state.taken[record.resource]
+
+
 def _geometry_received(state: RunState, record: r.GeometryReceived) -> None:
     state.geometries[record.name] = record.geometry
 
@@ -341,6 +349,8 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.InputIgnored: _nothing,
     r.InputDeferred: _input_deferred,
     r.InputSeen: _input_seen,
+    r.OperatorTookControl: _control_taken,
+    r.OperatorGaveControlBack: _control_returned,
     r.GeometryReceived: _geometry_received,
     r.ScopeOpened: _scope_opened,
     r.ScopeClosed: _scope_closed,

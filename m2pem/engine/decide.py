@@ -7,6 +7,7 @@ replays it. A handler that finds an input redundant calls `x.ignore` and does no
 from collections.abc import Callable
 from typing import Any
 
+from m2pem.engine import control
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.data import flatten
@@ -56,6 +57,8 @@ def _start(x: Steps, item: i.StartRun) -> None:
         x.ignore(f"the mission has no process {item.process!r}")
         return
     x.emit(r.RunStarted(process.id, x.now_us, item.by))
+    for resource, holder in item.taken.items():
+        x.emit(r.OperatorTookControl(resource, holder))
     x.emit(r.ScopeOpened(1, process.id, process.id))
     root = x.state.scopes[1]
     for name, value in item.data.items():
@@ -216,6 +219,8 @@ def _note_id(x: Steps, number: str) -> None:
 
 
 _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
+    i.ControlTaken: control.taken,
+    i.ControlReturned: control.returned,
     i.StartRun: _start,
     i.ClaimRun: _claim,
     i.StopRun: _stop,

@@ -19,11 +19,15 @@ class _Input(
 
 
 class StartRun(_Input, frozen=True):
-    """Begin: one token for each start event of the process, and the data given at start."""
+    """Begin: one token for each start event of the process, and the data given at start.
+
+    `taken`: resources that operators have at that moment, and who has each.
+    """
 
     process: str
     data: dict[str, Value] = msgspec.field(default_factory=dict)
     by: str = ""
+    taken: dict[str, str] = msgspec.field(default_factory=dict)
 
 
 class ClaimRun(_Input, frozen=True):
@@ -145,6 +149,20 @@ class ResourceFault(_Input, frozen=True):
     reachable: bool = True
 
 
+class ControlTaken(_Input, frozen=True):
+    """An operator has taken a vehicle or payload; `by` has it until `ControlReturned`."""
+
+    resource: str
+    by: str
+
+
+class ControlReturned(_Input, frozen=True):
+    """An operator has given a vehicle or payload back to the missions."""
+
+    resource: str
+    by: str
+
+
 class GeometrySet(_Input, frozen=True):
     """An OCU hands over a route, area or point under a name (paper, section 4.3). GeoJSON."""
 
@@ -170,5 +188,7 @@ Input: TypeAlias = Union[
     SignalReceived,
     MessageReceived,
     ResourceFault,
+    ControlTaken,
+    ControlReturned,
     GeometrySet,
 ]

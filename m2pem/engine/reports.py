@@ -137,7 +137,7 @@ def fault(x: Execution, item: i.ResourceFault) -> None:
         if not item.reachable and len(behavior.resources) == 1:
             _ended(x, behavior, BehaviorState.LOST, item.code, item.reason)
         elif behavior.phase is not BehaviorPhase.CANCELLING:
-            _give_behavior_up(x, behavior, item)
+            give_up(x, behavior, item.code, item.reason)
         else:
             continue  # it ends by its report, or when it has not answered its cancel in time
         told = True
@@ -145,10 +145,10 @@ def fault(x: Execution, item: i.ResourceFault) -> None:
         x.ignore(f"{item.code} of {item.resource}, which does nothing for this run")
 
 
-def _give_behavior_up(x: Execution, behavior: Behavior, item: i.ResourceFault) -> None:
+def give_up(x: Execution, behavior: Behavior, code: str, reason: str) -> None:
     """Cancel it, for what can still be reached of its resources must stop."""
     token = x.state.tokens[behavior.token]
     if token.prompt:
         x.emit(r.PromptWithdrawn(token.prompt))
-    x.emit(r.BehaviorCancelRequested(behavior.id, item.code, item.reason))
-    throw_error(x, token, item.code, item.reason)
+    x.emit(r.BehaviorCancelRequested(behavior.id, code, reason))
+    throw_error(x, token, code, reason)

@@ -165,6 +165,8 @@ class RunState:
     behaviors: dict[str, Behavior] = field(default_factory=dict)
     held: dict[str, list[str]] = field(default_factory=dict)
     """Behaviors that hold a resource: at most one that is not being cancelled."""
+    taken: dict[str, str] = field(default_factory=dict)
+    """Resources that operators have taken, and who has each."""
     prompts: dict[str, Prompt] = field(default_factory=dict)
     services: dict[str, Service] = field(default_factory=dict)
 

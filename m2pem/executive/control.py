@@ -122,6 +122,18 @@ class Control:
         """Hand over a route, area or point (GeoJSON)."""
         self._executive.set_geometry(name, geometry, run, by)
 
+    async def take(self, resource: str, *, by: str = "") -> None:
+        """Take a vehicle or payload from the missions."""
+        await self._executive.handover.take(resource, by, self._executive.runners.values())
+
+    async def give_back(self, resource: str, *, by: str = "") -> None:
+        """Give it back to the missions."""
+        await self._executive.handover.give_back(resource, by, self._executive.runners.values())
+
+    async def holders(self) -> Mapping[ResourceId, str]:
+        """Who has each resource."""
+        return self._executive.handover.holders()
+
     async def _ask(self, run: RunId, item: i.Input) -> None:
         """Have an input decided; one that the engine ignored is the operator's to know.
 

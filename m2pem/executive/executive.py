@@ -28,6 +28,7 @@ from m2pem.errors import JournalError, NotDrivenError, OperatorError, PluginErro
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.control import Control
 from m2pem.executive.dispatch import Dispatcher
+from m2pem.executive.handover import Handover
 from m2pem.executive.loading import findings_for, known_data, read_source, refuse_errors
 from m2pem.executive.notices import Notices
 from m2pem.executive.recovery import replay, take_over
@@ -116,6 +117,7 @@ class Executive:
         self.dispatcher = Dispatcher(
             self.arbiters, self.availability, clock, self._geometry, self._post_report, script
         )
+        self.handover = Handover(self.arbiters, self.availability)
         self.services = Services(
             plugins.service,
             ServiceContext(clock, self.bus, logging.getLogger("m2pem.service"), fleet.detectors),
@@ -201,7 +203,7 @@ class Executive:
             self.bus.publish(state)
             if state.resource in self._lost and state.link is not LinkState.LOST:
                 self._lost.discard(state.resource)
-                self.availability.restore(state.resource)
+                self.handover.restore(state.resource)
 
     # --- runs -----------------------------------------------------------------------------------
 
@@ -265,7 +267,7 @@ class Executive:
         number = await self.journal.create(header)
         batch = min(STEPS_AT_ONCE, self._max_steps or STEPS_AT_ONCE)
         runner = self._runner(MissionRun(loaded, self.fleet, number, batch), 1)
-        begun = runner.tell(StartRun(process_id, dict(data or {}), by))
+        begun = runner.tell(StartRun(process_id, dict(data or {}), by, {**self.handover.taken}))
         for name, geometry in self._handed_over.items():
             runner.post(GeometrySet(name, geometry))
         self._drive(runner)
@@ -286,13 +288,14 @@ class Executive:
             raise JournalError(f"there is no run {number}; the journal has: {known}")
         if line.outcome is not None:
             raise OperatorError(f"{number} has ended: {line.outcome.value}")
+        if line.last_seq == 0:
+            raise OperatorError(f"{number} never began: start its mission again")
         epoch = await self.journal.claim(number)
         mission = parse_mission(line.header.mission, line.header.mission_name)
         run = MissionRun(mission, self.fleet, number)
         last_us = await replay(self.journal, run, self._script)
         runner = self._runner(run, epoch)
-        if run.state.status is RunStatus.NEW:
-            runner.post(StartRun(line.header.process))
+        self.handover.take_up(run.state.taken)
         outage_s = max(0.0, (self.clock.now_us() - last_us) / 1_000_000)
         await take_over(runner, self.arbiters, self.dispatcher, outage_s)
         self._drive(runner)

@@ -17,9 +17,13 @@ class RootElement:
 
 @dataclass(frozen=True, slots=True)
 class Signal(RootElement):
-    """A broadcast (clause 10.5.5). `from_operator`: operators are expected to send it."""
+    """A broadcast (clause 10.5.5). `from_operator`: operators are expected to send it.
+
+    `returned`: the resource whose return by an operator throws it; "" for none.
+    """
 
     from_operator: bool = False
+    returned: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,7 +106,7 @@ def _outside_only(mission: Mission) -> Iterator[Finding]:
             else:
                 caught.setdefault(key, (root, []))[1].append(node)
     for key, (root, catchers) in caught.items():
-        if key in thrown or root.from_operator:
+        if key in thrown or root.from_operator or (isinstance(root, Signal) and root.returned):
             continue
         what = key[0].lower()
         waiting = ", ".join(f"'{node.id}'" for node in catchers)

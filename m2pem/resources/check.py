@@ -1,6 +1,6 @@
 """The static check: whether a mission fits a fleet, before anything moves (paper, section 4.2)."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from m2pem.findings import Finding, Severity
@@ -29,7 +29,24 @@ def check_mission(
     A geometry that the fleet lacks is a warning: an operator may hand it over in time.
     """
     check = _Check(mission.file, fleet, ResourceGraph(fleet, catalogue), catalogue, simulated)
-    return [finding for task in mission.activities() for finding in check.task(task)]
+    findings = [finding for task in mission.activities() for finding in check.task(task)]
+    return [*findings, *_returned(mission, fleet)]
+
+
+def _returned(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
+    """Signals that are thrown when a resource is given back: the fleet must have it."""
+    known = [*fleet.vehicles, *fleet.payloads]
+    for signal in mission.signals.values():
+        if signal.returned and signal.returned not in known:
+            yield Finding(
+                Severity.ERROR,
+                mission.file,
+                signal.line,
+                signal.id,
+                "unknown-resource",
+                f"m2pem:returned='{signal.returned}': {fleet.file} has no such vehicle or payload",
+                did_you_mean(signal.returned, known),
+            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -365,3 +365,39 @@ def test_a_journal_that_fails_holds_the_vehicles_and_starts_nothing(play, monkey
             await control.wait(run)
 
     play(story, "ugv1")
+
+
+def test_an_operator_takes_a_vehicle_and_gives_it_back(play):
+    async def story(world: World):
+        control = world.executive.control
+        first = await control.start(DRIVE)
+        await world.fake.until_called("start", "r1.b1")
+        assert (await control.holders())["ugv1"] == "r1.b1"
+        await control.take("ugv1", by="anna")
+        await world.fake.until_called("cancel", "r1.b1")
+        world.fake.report("r1.b1", BehaviorState.CANCELLED)
+        taken = await control.wait(first)
+        assert await control.holders() == {"ugv1": "anna"}
+        with pytest.raises(OperatorError, match="anna"):
+            await control.take("ugv1", by="ben")
+        refused = await control.wait(await control.start(DRIVE))
+        await control.give_back("ugv1", by="anna")
+        again = await control.start(DRIVE)
+        await world.fake.until_called("start", f"{again}.b1")
+        world.fake.report(f"{again}.b1", BehaviorState.SUCCEEDED)
+        return taken, refused, await control.wait(again)
+
+    taken, refused, again = play(story, "ugv1")
+    assert "TAKEN_OVER" in taken.detail
+    assert "ugv1 is with anna" in refused.detail
+    assert again.status is RunStatus.COMPLETED
+
+
+def test_a_name_that_is_in_no_fleet_cannot_be_taken(play):
+    async def story(world: World):
+        with pytest.raises(OperatorError, match="did you mean 'ugv1'"):
+            await world.executive.control.take("ugv", by="anna")
+        with pytest.raises(OperatorError, match="not with an operator"):
+            await world.executive.control.give_back("ugv1", by="anna")
+
+    play(story, "ugv1")

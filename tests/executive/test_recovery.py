@@ -6,7 +6,7 @@ import pytest
 
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.api.control import RunStatus
-from m2pem.engine.inputs import BehaviorReported, Input, PromptAnswer, StartRun
+from m2pem.engine.inputs import BehaviorReported, ControlTaken, Input, PromptAnswer, StartRun
 from m2pem.engine.records import BehaviorRestarted, PromptOpened
 from m2pem.engine.run import MissionRun
 from m2pem.errors import JournalError, OperatorError
@@ -219,3 +219,25 @@ def test_an_arbiter_that_cannot_be_asked_is_a_lost_vehicle(play):
     summary = play(story, "ugv1", journal=left_behind(GOTO, ACCEPTED), start_us=START_US + 1)
     assert summary.status is RunStatus.FAILED
     assert "LINK_LOST" in summary.detail
+
+
+def test_who_has_a_vehicle_is_known_again_after_a_restart(play):
+    async def story(world: World):
+        return await world.executive.control.holders()
+
+    journal = left_behind(mission(sequence(("Ask", question("Ask")))), ControlTaken("ugv1", "anna"))
+    assert resumed(play, journal, story) == {"ugv1": "anna"}
+
+
+def test_a_run_that_never_began_is_not_resumed(play):
+    async def create() -> MemoryJournal:
+        journal = MemoryJournal()
+        number = await journal.create(RunHeader("m.bpmn", GOTO, "P", dump(fleet("ugv1"))))
+        await journal.release(number)
+        return journal
+
+    async def story(world: World):
+        with pytest.raises(OperatorError, match="never began"):
+            await world.executive.resume("r1")
+
+    play(story, "ugv1", journal=asyncio.run(create()))

@@ -42,6 +42,10 @@ def request_behavior(x: Execution, token: Token, behavior: Behavior) -> None:
         return
     preempts: dict[str, None] = {}
     for resource in allocation.resources:
+        if resource in x.state.taken:
+            reason = f"{resource} is with {x.state.taken[resource]}"
+            throw_error(x, token, "RESOURCE_UNAVAILABLE", reason)
+            return
         for holder in x.state.held.get(resource, ()):
             held_by = x.state.behaviors[holder]
             if held_by.phase is not BehaviorPhase.CANCELLING:

@@ -66,6 +66,20 @@ class InputSeen(BaseRecord, frozen=True):
     id: str
 
 
+class OperatorTookControl(BaseRecord, frozen=True):
+    """`resource` is with an operator: it gets no behavior until it is given back."""
+
+    resource: str
+    by: str
+
+
+class OperatorGaveControlBack(BaseRecord, frozen=True):
+    """`resource` is the missions' again."""
+
+    resource: str
+    by: str
+
+
 class GeometryReceived(BaseRecord, frozen=True):
     """A route, area or point that an OCU handed over (GeoJSON geometry)."""
 

@@ -69,7 +69,9 @@ def _read_event_root(reading: Reading, element: etree._Element, name: str) -> No
     label = element.get("name", "")
     line = reading.report.line(element)
     if name == "signal":
-        signal = Signal(identifier, label, line, _from_operator(reading, element, identifier))
+        returned = element.get(M2PEM + "returned", "").strip()
+        sent = _from_operator(reading, element, identifier)
+        signal = Signal(identifier, label, line, sent, returned)
         reading.signals.setdefault(identifier, signal)
     elif name == "message":
         message = Message(identifier, label, line, _from_operator(reading, element, identifier))
