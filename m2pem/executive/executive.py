@@ -267,7 +267,7 @@ class Executive:
         number = await self.journal.create(header)
         batch = min(STEPS_AT_ONCE, self._max_steps or STEPS_AT_ONCE)
         runner = self._runner(MissionRun(loaded, self.fleet, number, batch), 1)
-        begun = runner.tell(StartRun(process_id, dict(data or {}), by, {**self.handover.taken}))
+        begun = runner.tell(StartRun(process_id, dict(data or {}), by, self.handover.by_name()))
         for name, geometry in self._handed_over.items():
             runner.post(GeometrySet(name, geometry))
         self._drive(runner)

@@ -58,6 +58,10 @@ class Handover:
             if not runner.done.is_set():
                 await runner.tell(ControlReturned(resource, by or SOMEBODY))
 
+    def by_name(self) -> dict[str, str]:
+        """What is taken, and by whom: for a run that begins."""
+        return {str(resource): holder for resource, holder in self.taken.items()}
+
     def take_up(self, taken: Mapping[str, str]) -> None:
         """After a restart: who had what, by the journal of a run."""
         for name, holder in taken.items():
