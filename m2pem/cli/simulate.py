@@ -92,7 +92,7 @@ def simulate(
     loaded = parse_mission(source, name)
     fleet = get_fleet(fleet_file, loaded) if fleet_file is not None else None
     script = get_answers(answers, loaded)
-    kept: "list[StampedRecord]" = []
+    kept: list[StampedRecord] = []
     with output_of(output) as out:
         out.tell_by(lambda _: loaded, one=True, asks=True)
 
