@@ -19,7 +19,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages demo test test-long lint format clean
+.PHONY: help setup python-packages npm-packages demo test test-long lint format pictures clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 12
@@ -78,6 +78,9 @@ test: lint ## check all but the long tests
 
 test-long: lint ## check everything: fuzzing, large random counts, foreign corpora too
 	@$(BIN)/pytest -n 2 --timeout 1800
+
+pictures: npm-packages ## draw the missions for the docs (needs Chromium)
+	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn
 
 clean: ## remove all that can be made again
 	@rm -rf $(VENV) $(JS)/node_modules build dist

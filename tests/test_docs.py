@@ -22,7 +22,7 @@ import pytest
 REPOSITORY = Path(__file__).parents[1]
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
 WHAT_COMMANDS_READ = ("missions", "fleet_configs", "examples")
-MAKE_TARGETS = {"setup", "demo", "test", "test-long", "lint", "format", "clean"}
+MAKE_TARGETS = {"setup", "demo", "test", "test-long", "lint", "format", "pictures", "clean"}
 
 
 @dataclass(frozen=True, slots=True)

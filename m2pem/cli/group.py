@@ -2,6 +2,7 @@
 
 import difflib
 import logging
+from copy import copy
 from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -110,8 +111,20 @@ def cli(debug: bool) -> None:
 
 def _log_to_stderr(level: int) -> None:
     handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
+    formatter = logging.Formatter if level == logging.DEBUG else _WithoutTracebacks
+    handler.setFormatter(formatter("%(levelname)s %(name)s: %(message)s"))
     logger = logging.getLogger("m2pem")
     logger.handlers[:] = [handler]
     logger.propagate = False
     logger.setLevel(level)
+
+
+class _WithoutTracebacks(logging.Formatter):
+    """Says in the same line what was raised."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        error = record.exc_info[1] if record.exc_info else None
+        short = copy(record)
+        short.exc_info = short.exc_text = short.stack_info = None
+        text = super().format(short)
+        return text if error is None else f"{text}: {type(error).__name__}: {error}"

@@ -76,7 +76,7 @@ def _read_data(_: click.Context, __: click.Parameter, words: tuple[str, ...]) ->
         source = parse_yaml(text.encode("utf-8", "replace"), name)
         if source.findings:
             problem = source.findings[0]
-            raise click.BadParameter(f"the value of {name} {problem.message}")
+            raise click.BadParameter(f"the value of {name}: {problem.message}")
         data[name] = source.data
     return data
 
@@ -122,9 +122,8 @@ def example(text: str) -> str:
     return f"\b\nExample:\n  {text}"
 
 
-def as_json(value: object, *, lines: bool = False) -> str:
-    """JSON for programs, spread over lines that people can read too unless `lines`."""
+def as_json(value: object) -> str:
+    """JSON for programs, spread over lines so that people can read it too."""
     import msgspec
 
-    encoded = msgspec.json.encode(value)
-    return (encoded if lines else msgspec.json.format(encoded, indent=2)).decode()
+    return msgspec.json.format(msgspec.json.encode(value), indent=2).decode()

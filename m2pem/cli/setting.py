@@ -1,9 +1,11 @@
 """What a command needs to drive runs, read from its words; refused before anything moves."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
+from m2pem.api.control import SimulationResult
 from m2pem.cli.options import MADE_UP, UnusableError
 from m2pem.errors import AnswersError, PluginError
 from m2pem.executive.arbiters import SIMULATED
@@ -82,6 +84,13 @@ def make_executive(
             simulated=simulated,
             script=answers,
             speed=clock.speed,
+            rehearse=_rehearse,
         )
     except PluginError as error:
         raise UnusableError(f"{fleet.file}: {error}") from error
+
+
+def _rehearse(*arguments: Any, **options: Any) -> SimulationResult:
+    from m2pem.sim.rehearsal import rehearse
+
+    return rehearse(*arguments, **options)

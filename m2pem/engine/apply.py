@@ -149,8 +149,6 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         join = scope.joins.get(node)
         if join is None:
             join = scope.joins[node] = Join()
-            if isinstance(node, InclusiveGateway):
-                state.inclusive[scope.id, node.id] = (scope, node)
         join.by_flow.setdefault(flow, []).append(token)
 
 
@@ -169,7 +167,6 @@ def _token_left(state: RunState, record: r.TokenLeft) -> None:
             del join.by_flow[token.flow]
             if not join.by_flow:
                 del scope.joins[token.node]
-                state.inclusive.pop((scope.id, token.node.id), None)
 
 
 # --- behaviors, prompts, services ---------------------------------------------------------------

@@ -42,6 +42,7 @@ class Execution:
         "_triggered_starts",
         "fleet",
         "mission",
+        "moved",
         "now_us",
         "process_ids",
         "queue",
@@ -56,6 +57,7 @@ class Execution:
         self.now_us = 0
         self.records: list[Record] = []
         self.queue: deque[Token | Scope] = deque()
+        self.moved: set[int] = set()  # scopes whose inclusive joins must be looked at
         self.process_ids = [node.container.process.id for node in self.mission.nodes]
         self._reach: dict[FlowNode, dict[FlowNode, int]] = {}
         self._receivable: frozenset[str] | None = None
@@ -122,6 +124,7 @@ class Execution:
         )
         entered = self.state.tokens[token]
         self.queue.append(entered)
+        self.moved.add(scope.id)
         return entered
 
     def spawn(self, node: FlowNode, scope: Scope) -> Token:
@@ -134,6 +137,7 @@ class Execution:
         self.emit(
             r.TokenLeft(token.id, self.process_ids[node.index], node.id, token.scope.id, outcome)
         )
+        self.moved.add(token.scope.id)
 
     def consume(self, token: Token) -> None:
         """The token has done its part and goes nowhere; its scope may be complete now."""

@@ -18,18 +18,39 @@ from m2pem.engine.records import Record
 from m2pem.engine.state import Behavior, BehaviorPhase, Prompt, RunState, RunStatus, Service
 from m2pem.model.behavior import Decision
 
+_ASKING = frozenset(
+    {
+        r.BehaviorRequested,
+        r.BehaviorRestarted,
+        r.BehaviorCancelRequested,
+        r.BehaviorUnsettled,
+        r.BehaviorContinued,
+        r.PromptOpened,
+        r.PromptAnswered,
+        r.PromptWithdrawn,
+        r.ServiceRequested,
+        r.ServiceWithdrawn,
+        r.RunPaused,
+        r.RunResumed,
+    }
+)
+"""Records that may ask something of the outside: few of those that a run writes."""
+
 
 def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
     """What newly decided records ask of the outside, in their order.
 
-    What was requested and ended within the same records is never asked for.
+    What was requested and is not wanted any more within the same records is never asked for.
     """
     commands: list[Command] = []
+    unasked: set[str] = set()
     for record in records:
+        if type(record) not in _ASKING:
+            continue
         match record:
             case r.BehaviorRequested() | r.BehaviorRestarted():
                 behavior = state.behaviors.get(record.behavior)
-                if behavior is not None:
+                if behavior is not None and behavior.phase is not BehaviorPhase.CANCELLING:
                     commands.append(_start(state, behavior))
             case r.BehaviorCancelRequested():
                 behavior = state.behaviors.get(record.behavior)
@@ -41,22 +62,28 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
                     commands.extend(_hold(behavior))
             case r.BehaviorContinued():
                 behavior = state.behaviors.get(record.behavior)
-                if behavior is not None:
+                if behavior is not None and behavior.phase is BehaviorPhase.ACTIVE:
                     commands.extend(ResumeResource(name) for name in behavior.resources)
             case r.PromptOpened():
                 prompt = state.prompts.get(record.prompt)
                 if prompt is not None:
                     commands.append(_open(prompt))
+                else:
+                    unasked.add(record.prompt)
             case r.PromptAnswered():
                 commands.append(ClosePrompt(record.prompt, record.decision, record.by))
             case r.PromptWithdrawn():
-                commands.append(ClosePrompt(record.prompt))
+                if record.prompt not in unasked:
+                    commands.append(ClosePrompt(record.prompt))
             case r.ServiceRequested():
                 service = state.services.get(record.service)
                 if service is not None:
                     commands.append(_run(service))
+                else:
+                    unasked.add(record.service)
             case r.ServiceWithdrawn():
-                commands.append(CancelService(record.service))
+                if record.service not in unasked:
+                    commands.append(CancelService(record.service))
             case r.RunPaused():
                 commands.extend(HoldResource(resource) for resource in _commanded(state))
             case r.RunResumed():

@@ -11,7 +11,7 @@ from enum import StrEnum
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import RunOutcome, Trigger
 from m2pem.model.catalogue import BehaviorState
-from m2pem.model.elements import Container, FlowNode, InclusiveGateway, Mission, SequenceFlow
+from m2pem.model.elements import Container, FlowNode, Mission, SequenceFlow
 from m2pem.model.values import Value
 
 
@@ -165,8 +165,6 @@ class RunState:
     behaviors: dict[str, Behavior] = field(default_factory=dict)
     held: dict[str, list[str]] = field(default_factory=dict)
     """Behaviors that hold a resource: at most one that is not being cancelled."""
-    inclusive: dict[tuple[int, str], tuple[Scope, InclusiveGateway]] = field(default_factory=dict)
-    """Inclusive joins at which a token waits, by scope and node."""
     prompts: dict[str, Prompt] = field(default_factory=dict)
     services: dict[str, Service] = field(default_factory=dict)
 

@@ -80,6 +80,7 @@ class Steps(Execution):
         steps = self.state.yielded
         if steps:
             self.emit(r.RunYielded(()))
+            self.moved.update(self.state.scopes)  # the batch before may have been another process
         for number in steps:
             if number > 0:
                 token = self.state.tokens.get(number)

@@ -218,7 +218,8 @@ class Dispatcher:
     def _apply_script(self, command: StartBehavior, arbiter: Arbiter) -> None:
         if self._script is None:
             return
-        scripted = self._script.behavior(command.element, command.behavior)
+        run = command.behavior.partition(".")[0]
+        scripted = self._script.behavior(run, command.element, command.behavior)
         if scripted is None:
             return
         script = getattr(arbiter, "script", None)

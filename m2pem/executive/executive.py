@@ -43,6 +43,7 @@ from m2pem.model.elements import Mission
 from m2pem.model.geometry import Geometry
 from m2pem.model.values import Value
 from m2pem.plugins import PluginManager
+from m2pem.resources.allocation import spelled_out
 from m2pem.resources.availability import Availability
 from m2pem.resources.fleet import Fleet
 from m2pem.resources.geojson import GeometryError, parse_geojson
@@ -107,7 +108,7 @@ class Executive:
             self.bus,
             logging.getLogger("m2pem.arbiter"),
             fleet.origin,
-            {team.name: team.members for team in fleet.teams.values()},
+            {team.name: spelled_out(team) for team in fleet.teams.values()},
         )
         self.arbiters = FleetArbiters(
             fleet, plugins, context, simulated=simulated, settings=settings
@@ -322,7 +323,7 @@ class Executive:
 
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
         if self._script is not None:
-            self._script.seen(records)
+            self._script.seen(run, records)
         if self._observed:
             self.plugins.records_committed(run, records)
 

@@ -32,7 +32,7 @@ async def replay(journal: Journal, run: MissionRun, script: Script | None) -> in
     async for entry in journal.read(run.state.run):
         run.replay(entry.records)
         if script is not None:
-            script.seen(entry.records)
+            script.seen(run.state.run, entry.records)
         last_us = max(last_us, entry.at_us)
     return last_us
 

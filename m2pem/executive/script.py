@@ -33,18 +33,18 @@ class ScriptedBehavior:
 class Script(Protocol):
     """What is scripted for each visit to an element; None: nothing (any more).
 
-    A visit is known by the id of the service or behavior: asked again for the same one (after a
-    restart), the script says the same again.
+    Each run counts its own. A visit is known by the id of the service or behavior: asked again for
+    the same one (after a restart), the script says the same again.
     """
 
-    def seen(self, records: Sequence[Record]) -> None:
+    def seen(self, run: str, records: Sequence[Record]) -> None:
         """These were committed: visits count in their order, also those of before a restart."""
         ...
 
-    def service(self, element: str, name: str, service: str) -> ScriptedService | None:
+    def service(self, run: str, element: str, name: str, service: str) -> ScriptedService | None:
         """What a service task does on this visit."""
         ...
 
-    def behavior(self, element: str, behavior: str) -> ScriptedBehavior | None:
+    def behavior(self, run: str, element: str, behavior: str) -> ScriptedBehavior | None:
         """How the behavior of an element ends on this visit."""
         ...

@@ -47,7 +47,7 @@ class Services:
         """Run a service; what comes of it is posted to the run."""
         scripted = None
         if self._script is not None:
-            scripted = self._script.service(command.element, command.name, command.service)
+            scripted = self._script.service(run.id, command.element, command.name, command.service)
         key = (run.id, command.service)
         task = asyncio.create_task(self._serve(run, command, scripted))
         self._tasks[key] = task

@@ -1,5 +1,7 @@
 """Which incoming flows of a gateway a token can still reach: what an inclusive join must know."""
 
+from collections import OrderedDict
+
 from m2pem.model.elements import BoundaryEvent, FlowNode
 
 
@@ -10,15 +12,17 @@ def upstream(join: FlowNode) -> dict[FlowNode, int]:
     can also go by the boundary events attached to it.
     """
     reach: dict[FlowNode, int] = {}
+    news: OrderedDict[FlowNode, int] = OrderedDict()  # more for a node goes with what waits
     for place, flow in enumerate(join.incoming):
-        bit = 1 << place
-        pending = [flow.source]
-        while pending:
-            node = pending.pop()
-            if node is join or reach.get(node, 0) & bit:
-                continue
-            reach[node] = reach.get(node, 0) | bit
-            pending.extend(before.source for before in node.incoming)
-            if isinstance(node, BoundaryEvent):
-                pending.append(node.attached_to)
+        news[flow.source] = news.get(flow.source, 0) | 1 << place
+    while news:
+        node, bits = news.popitem(last=False)
+        bits &= ~reach.get(node, 0)
+        if node is join or not bits:
+            continue
+        reach[node] = reach.get(node, 0) | bits
+        for before in node.incoming:
+            news[before.source] = news.get(before.source, 0) | bits
+        if isinstance(node, BoundaryEvent):
+            news[node.attached_to] = news.get(node.attached_to, 0) | bits
     return reach

@@ -1,4 +1,4 @@
-"""Reads the file of a route, area or point: GeoJSON, QGroundControl `.plan`, `.waypoints`."""
+"""Reads the file of a route, area or point: GeoJSON, CSV, QGroundControl `.plan`, `.waypoints`."""
 
 import json
 from collections.abc import Mapping
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from m2pem.model.geometry import Area, Point, Route
+from m2pem.resources.csv_waypoints import parse_csv
 from m2pem.resources.geojson import GeometryError, kind_of, parse_geojson
 from m2pem.resources.qgroundcontrol import parse_plan, parse_waypoints
 from m2pem.resources.units import article
@@ -14,7 +15,7 @@ __all__ = ["GeometryError", "parse_geojson", "read_geometry"]
 
 MAX_BYTES = 5_000_000
 
-_SUFFIXES = (".geojson", ".json", ".plan", ".waypoints")
+_SUFFIXES = (".geojson", ".json", ".plan", ".waypoints", ".csv")
 
 
 def read_geometry(path: Path, kind: str) -> Point | Route | Area:
@@ -50,6 +51,8 @@ def _read(path: Path, kind: str) -> Point | Route | Area:
         raise GeometryError("is not UTF-8 text") from None
     if path.suffix.lower() == ".waypoints":
         return parse_waypoints(text)
+    if path.suffix.lower() == ".csv":
+        return parse_csv(text, kind)
     value = _json(text)
     if not isinstance(value, Mapping):
         raise GeometryError("a JSON object is expected")

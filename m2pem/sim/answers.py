@@ -35,7 +35,7 @@ from m2pem.sim.answers_file import AnswersModel, TimedEntry, read_answers
 
 log = logging.getLogger("m2pem.answers")
 
-BY_SCRIPT = "answers"
+BY_SCRIPT = "answers file"
 """Who the journal says has answered a prompt or sent a signal that is scripted."""
 
 BY_DEFAULT = "default"
@@ -45,74 +45,79 @@ US_PER_S = 1_000_000
 
 
 class Answers:
-    """Implements `m2pem.executive.script.Script`; made by `load_answers`. Serves one run."""
+    """Implements `m2pem.executive.script.Script`; made by `load_answers`.
+
+    Each run counts its own visits.
+    """
 
     def __init__(self, model: AnswersModel | None = None, source: YamlSource | None = None) -> None:
         self.model = model or AnswersModel()
         self.source = source or YamlSource("")
-        self._visits: dict[tuple[str, str], dict[str, int]] = {}
-        self._sent: Counter[tuple[str, str]] = Counter()
-        self._deferred: Counter[tuple[str, str]] = Counter()
+        self._visits: dict[tuple[str, str, str], dict[str, int]] = {}
+        self._sent: Counter[tuple[str, str, str]] = Counter()
+        self._deferred: Counter[tuple[str, str, str]] = Counter()
         self._to_send = len(self.model.signals) + len(self.model.messages)
 
     # --- visits ---------------------------------------------------------------------------------
 
-    def seen(self, records: Sequence[Record]) -> None:
+    def seen(self, run: str, records: Sequence[Record]) -> None:
         """Count visits and what was sent, in the order of the journal."""
         for record in records:
             match record:
                 case PromptOpened():
-                    self._visit("answers", record.element, record.prompt)
+                    self._visit(run, "answers", record.element, record.prompt)
                 case ServiceRequested():
                     key = self._service(record.element, record.name)
-                    self._visit("services", key, record.service)
+                    self._visit(run, "services", key, record.service)
                 case BehaviorRequested():
-                    self._visit("behaviors", record.element, record.behavior)
+                    self._visit(run, "behaviors", record.element, record.behavior)
                 case SignalThrown(by=by, signal=signal) if by == BY_SCRIPT:
-                    self._sent["signals", signal] += 1
+                    self._sent[run, "signals", signal] += 1
                 case MessageThrown(by=by, message=message) if by == BY_SCRIPT:
-                    self._sent["messages", message] += 1
+                    self._sent[run, "messages", message] += 1
                 case InputDeferred(input=SignalReceived(by=by, signal=signal)) if by == BY_SCRIPT:
-                    self._deferred["signals", signal] += 1
+                    self._deferred[run, "signals", signal] += 1
                 case InputDeferred(input=MessageReceived(by=by, message=name)) if by == BY_SCRIPT:
-                    self._deferred["messages", name] += 1
+                    self._deferred[run, "messages", name] += 1
                 case RunResumed():
-                    self._deferred.clear()  # they are thrown now, with records of their own
+                    # They are thrown now, with records of their own.
+                    for late in [late for late in self._deferred if late[0] == run]:
+                        del self._deferred[late]
                 case _:
                     pass
 
-    def service(self, element: str, name: str, service: str) -> ScriptedService | None:
+    def service(self, run: str, element: str, name: str, service: str) -> ScriptedService | None:
         """What a service task does on this visit; see `Script`."""
         key = self._service(element, name)
-        place = self._visit("services", key, service)
+        place = self._visit(run, "services", key, service)
         if place is None:
             return None
         entry = self.model.services[key][place]
         return ScriptedService(entry.after, entry.write, entry.error or "")
 
-    def behavior(self, element: str, behavior: str) -> ScriptedBehavior | None:
+    def behavior(self, run: str, element: str, behavior: str) -> ScriptedBehavior | None:
         """How a behavior ends on this visit; see `Script`."""
-        place = self._visit("behaviors", element, behavior)
+        place = self._visit(run, "behaviors", element, behavior)
         if place is None:
             return None
         entry = self.model.behaviors[element][place]
         return ScriptedBehavior(entry.after, entry.end, entry.error or "")
 
-    def answer(self, element: str, prompt: str) -> str | None:
+    def answer(self, run: str, element: str, prompt: str) -> str | None:
         """The decision for a prompt of an element; None: nothing is scripted (any more)."""
-        place = self._visit("answers", element, prompt)
+        place = self._visit(run, "answers", element, prompt)
         return None if place is None else self.model.answers[element][place]
 
     def _service(self, element: str, name: str) -> str:
         """A service is scripted by its element, else by its class."""
         return element if element in self.model.services else name
 
-    def _visit(self, section: str, key: str, visit: str) -> int | None:
+    def _visit(self, run: str, section: str, key: str, visit: str) -> int | None:
         """The place in its list of a visit, old or new; None when the list is used up."""
         entries: dict[str, list[object]] = getattr(self.model, section)
         if key not in entries:
             return None
-        places = self._visits.setdefault((section, key), {})
+        places = self._visits.setdefault((run, section, key), {})
         # No more visits are remembered than there are entries: the run may last for months.
         if visit not in places and len(places) < len(entries[key]):
             places[visit] = len(places)
@@ -166,7 +171,7 @@ class Answers:
         self, control: MissionControl, prompt: OpenPrompt, default_first_decision: bool
     ) -> None:
         by = BY_SCRIPT
-        decision = self.answer(prompt.element, prompt.prompt)
+        decision = self.answer(prompt.run, prompt.element, prompt.prompt)
         if decision is None:
             if not default_first_decision:
                 return
@@ -181,8 +186,8 @@ class Answers:
         summary = next(each for each in await control.runs() if each.run == run)
         skip = self._sent + self._deferred
         for kind, entry in self._timed():
-            if skip[kind, entry.id] > 0:
-                skip[kind, entry.id] -= 1
+            if skip[run, kind, entry.id] > 0:
+                skip[run, kind, entry.id] -= 1
             else:
                 await clock.sleep_until(summary.started_us + round(entry.at * US_PER_S))
                 await self._send_one(control, run, kind, entry)

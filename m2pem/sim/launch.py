@@ -93,10 +93,8 @@ class Launcher:
             if vehicle.battery_at(now_us) <= 0:
                 raise RefusedError(f"the battery of {craft.name} is empty", "BATTERY_LOW")
         if type_ is BehaviorType.TEAM:
-            leads = self._lead_first(vehicles)
-            ordered = [vehicle.craft(now_us) for vehicle in leads]
-            done = TEAM_MANOEUVRES[request.behavior](ordered, wishes)
-            return [_assignment(*pair) for pair in zip(leads, done, strict=True)] + idle
+            done = TEAM_MANOEUVRES[request.behavior](crafts, wishes)
+            return [_assignment(*pair) for pair in zip(vehicles, done, strict=True)] + idle
         manoeuvre: Callable[..., Manoeuvre] = MANOEUVRES[request.behavior]
         return [
             _assignment(vehicle, manoeuvre(craft, wishes))
@@ -127,12 +125,6 @@ class Launcher:
                 raise RefusedError(f"the fleet does not allow {body.id} the behavior '{behavior}'")
         hint = suggest(behavior, [spec.name for spec in catalogue], "behaviors")
         raise RefusedError(f"{body.id} has no behavior '{behavior}'; {hint}")
-
-    def _lead_first(self, vehicles: list[SimVehicle]) -> list[SimVehicle]:
-        for members in self._context.teams.values():
-            if set(members) == {vehicle.id for vehicle in vehicles}:
-                return sorted(vehicles, key=lambda vehicle: members.index(vehicle.id))
-        return vehicles
 
     def _gaze(
         self, body: SimPayload, request: BehaviorRequest, wishes: Wishes, now_us: int

@@ -66,7 +66,7 @@ class RehearsalResult(SimulationResult):
 
 
 def rehearse(
-    mission: Path | str | bytes,
+    mission: Path | str | bytes | Mission,
     fleet: Fleet | None,
     *,
     plugins: PluginManager,
@@ -80,17 +80,21 @@ def rehearse(
 ) -> RehearsalResult:
     """Run a mission to its end on a virtual clock that begins at `start_us` (since the epoch).
 
-    `fleet` None: for a mission that commands no resource. `answers`: a file, or one that was
-    loaded and has not been used. `on_record` gets each record as soon as it is committed; what it
-    raises ends the rehearsal. `observed`: whether observers among the plugins are told.
+    `mission`: a path, a `file:` or `http:` URL, BPMN bytes, or one that was loaded. `fleet` None:
+    for a mission that commands no resource. `answers`: a file, or one that was loaded and has not
+    been used. `on_record` gets each record as soon as it is committed; what it raises ends the
+    rehearsal. `observed`: whether observers among the plugins are told.
 
     Raises:
         MissionError: the mission cannot be loaded, does not fit the fleet, or needs one.
         AnswersError: the answers cannot be used, or do not fit the mission.
         FleetError: the fleet cannot be simulated.
     """
-    name, source = read_source(mission)
-    loaded = parse_mission(source, name)
+    if isinstance(mission, Mission):
+        loaded = mission
+    else:
+        name, source = read_source(mission)
+        loaded = parse_mission(source, name)
     if fleet is None:
         refuse_commands(loaded)
         fleet = NO_FLEET
@@ -219,22 +223,22 @@ class _Script:
         self._answers = answers
         self.ending: set[str] = set()
 
-    def seen(self, records: Sequence[Record]) -> None:
-        self._answers.seen(records)
+    def seen(self, run: str, records: Sequence[Record]) -> None:
+        self._answers.seen(run, records)
         for record in records:
             if isinstance(record, ServiceEnded | ServiceWithdrawn):
                 self.ending.discard(record.service)
 
-    def service(self, element: str, name: str, service: str) -> ScriptedService | None:
-        scripted = self._answers.service(element, name, service)
+    def service(self, run: str, element: str, name: str, service: str) -> ScriptedService | None:
+        scripted = self._answers.service(run, element, name, service)
         if scripted is None and name != DETECTOR_SERVICE:
             scripted = ScriptedService()
         if scripted is not None:
             self.ending.add(service)
         return scripted
 
-    def behavior(self, element: str, behavior: str) -> ScriptedBehavior | None:
-        return self._answers.behavior(element, behavior)
+    def behavior(self, run: str, element: str, behavior: str) -> ScriptedBehavior | None:
+        return self._answers.behavior(run, element, behavior)
 
 
 class _TellingJournal(MemoryJournal):

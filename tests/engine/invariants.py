@@ -1,7 +1,6 @@
 """What is always true of a run's state between two inputs."""
 
 from m2pem.engine.state import BehaviorPhase, RunState, RunStatus
-from m2pem.model.elements import InclusiveGateway
 
 
 def check_state(state: RunState) -> None:
@@ -23,7 +22,6 @@ def check_state(state: RunState) -> None:
 def _check_tokens(state: RunState) -> None:
     tokens = [token for scope in state.scopes.values() for token in scope.tokens.values()]
     assert {token.id: token for token in tokens} == state.tokens
-    inclusive = set()
     for scope in state.scopes.values():
         assert scope.owner is None or state.tokens[scope.owner.id] is scope.owner
         assert scope.owner is None or scope.owner.inner is scope
@@ -33,9 +31,6 @@ def _check_tokens(state: RunState) -> None:
                 assert waiting, "an empty flow is absent"
                 assert flow in node.incoming
                 assert all(scope.tokens[t.id] is t and t.node is node for t in waiting)
-            if isinstance(node, InclusiveGateway):
-                inclusive.add((scope.id, node.id))
-    assert set(state.inclusive) == inclusive
     for token in tokens:
         assert token.scope.tokens[token.id] is token
         assert token.node.container is token.scope.container

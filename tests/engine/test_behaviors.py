@@ -153,7 +153,7 @@ def test_a_third_behavior_preempts_all_that_still_end() -> None:
     assert play.behavior("b3").preempts == ("r1.b1", "r1.b2")
 
 
-def test_a_behavior_requested_and_cancelled_by_one_input_is_never_started_for_good() -> None:
+def test_a_behavior_requested_and_cancelled_by_one_input_is_never_started() -> None:
     play = Play("""
         <startEvent id="start"/>
         <subProcess id="sub"> <startEvent id="s"/>
@@ -166,8 +166,7 @@ def test_a_behavior_requested_and_cancelled_by_one_input_is_never_started_for_go
         start -> sub
         catch -> u
     """).start()
-    orders = play.orders()
-    assert orders[-2:] == ["cancel b1", "open p1 done"]
+    assert play.orders() == ["cancel b1", "open p1 done"]
     assert play.report("b1", CANCELLED).run.state.held == {}
 
 

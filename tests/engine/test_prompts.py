@@ -113,3 +113,23 @@ def test_each_round_of_a_loop_asks_anew() -> None:
         "open p2 again enough",
     ]
     assert play.answer("enough").ended == "completed"
+
+
+def test_a_question_taken_back_by_the_input_that_asked_it_is_never_put() -> None:
+    play = Play("""
+        <startEvent id="start"/>
+        <subProcess id="sub"> <startEvent id="s"/> <userTask id="u"/>
+          <serviceTask id="look">call X</serviceTask>
+          <intermediateThrowEvent id="pause"/> <endEvent id="throw">error E</endEvent>
+          s -> u
+          s -> look
+          s -> pause -> throw
+        </subProcess>
+        <boundaryEvent id="catch" attachedToRef="sub">error</boundaryEvent> <endEvent id="end"/>
+        start -> sub
+        catch -> end
+    """).start()
+    assert play.trace("ask", "call", "withdraw") == table("""
+        ask p1 u; call s1 X; withdraw p1; withdraw s1
+    """)
+    assert play.orders() == []

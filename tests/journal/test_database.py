@@ -2,7 +2,9 @@
 
 import os
 import sqlite3
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +13,8 @@ from m2pem.journal.database import open_for_reading, open_for_writing
 from m2pem.journal.migrations import MIGRATIONS
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.testing.contracts.journal import HEADER, entry, opened
+
+NOBODY = 65534
 
 
 @pytest.fixture
@@ -95,6 +99,22 @@ async def test_a_truncated_journal_is_refused(path):
     assert "it is damaged; use a copy" in refused(path)
 
 
+@contextmanager
+def as_an_ordinary_user(folder: Path) -> Iterator[None]:
+    """Root may write anything, so it steps down for as long as this lasts."""
+    if os.geteuid() != 0:
+        yield
+        return
+    for each in (folder, *folder.parents):
+        if each.stat().st_uid == 0 and each != each.parent:
+            each.chmod(each.stat().st_mode | 0o011)
+    os.seteuid(NOBODY)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+
+
 async def test_damage_that_is_met_while_reading_is_told(path):
     await write_some(path)
     content = bytearray(path.read_bytes())
@@ -107,11 +127,11 @@ async def test_damage_that_is_met_while_reading_is_told(path):
             assert [found.seq async for found in journal.read("r1")] != []
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anything")
 def test_a_file_that_may_not_be_written_is_refused(path):
     open_for_writing(path).close()
-    path.chmod(0o400)
-    assert "can only be read; allow writing" in refused(path)
+    path.chmod(0o444)
+    with as_an_ordinary_user(path.parent):
+        assert "can only be read; allow writing" in refused(path)
 
 
 def test_a_connection_for_reading_does_not_write(path):

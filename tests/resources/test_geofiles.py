@@ -17,6 +17,8 @@ def test_the_suffix_says_how_to_read(tmp_path: Path) -> None:
     assert isinstance(read_geometry(tmp_path / "a.plan", "area"), Area)
     assert isinstance(read_geometry(write_json(tmp_path / "a.geojson", POINT), "point"), Point)
     assert isinstance(read_geometry(write_json(tmp_path / "a.json", SQUARE), "area"), Area)
+    (tmp_path / "a.csv").write_text("lat_deg,lon_deg\n1,2\n")
+    assert isinstance(read_geometry(tmp_path / "a.csv", "point"), Point)
 
 
 def test_another_kind_of_geometry_is_refused(tmp_path: Path) -> None:

@@ -76,7 +76,7 @@ def refused(path: Path) -> Sequence[Finding]:
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "answers: {}\n", "answers: {A: []}"])
 def test_a_file_may_say_nothing(answers: Callable[[str], Answers], text: str) -> None:
-    assert answers(text).answer("A", "p1") is None
+    assert answers(text).answer("r1", "A", "p1") is None
 
 
 def test_every_missing_or_wrong_thing_is_found_with_its_line(write: Write) -> None:
@@ -133,7 +133,8 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", sorted((MISSIONS / "answers").glob("*.yaml")), ids=str)
 def test_the_answers_of_the_missions_here_fit_them(path: Path) -> None:
-    mission = load_mission(f"{path.stem.partition('_')[0]}.bpmn")
+    (name,) = (each.name for each in MISSIONS.glob("*.bpmn") if path.stem.startswith(each.stem))
+    mission = load_mission(name)
     assert check_answers(load_answers(path), mission) == []
 
 
@@ -202,35 +203,41 @@ def test_a_list_is_used_visit_by_visit_and_then_used_up(
         "services: {Look: [{after: 2 min, write: {a.b: 1}}, {error: BROKEN}]}\n"
         "behaviors: {Drive: [{after: 1.5 s, end: lost}, {after: 0 s, end: failed, error: E}]}\n"
     )
-    assert [script.answer("Ask", f"p{n}") for n in range(3)] == ["one", "two", None]
-    assert [script.service("Look", "Camera", f"s{n}") for n in range(3)] == [
+    assert [script.answer("r1", "Ask", f"p{n}") for n in range(3)] == ["one", "two", None]
+    assert [script.service("r1", "Look", "Camera", f"s{n}") for n in range(3)] == [
         ScriptedService(120.0, {"a.b": 1}),
         ScriptedService(0.0, {}, "BROKEN"),
         None,
     ]
-    assert [script.behavior("Drive", f"r1.b{n}") for n in range(3)] == [
+    assert [script.behavior("r1", "Drive", f"r1.b{n}") for n in range(3)] == [
         ScriptedBehavior(1.5, "lost"),
         ScriptedBehavior(0.0, "failed", "E"),
         None,
     ]
-    assert script.behavior("Other", "r1.b9") is None
+    assert script.behavior("r1", "Other", "r1.b9") is None
 
 
 def test_the_same_visit_gets_the_same_entry_again(answers: Callable[[str], Answers]) -> None:
     script = answers("behaviors: {Drive: [{after: 1 s, end: lost}, {after: 2 s, end: lost}]}")
-    first = script.behavior("Drive", "r1.b1")
-    assert script.behavior("Drive", "r1.b2") == ScriptedBehavior(2.0, "lost")
-    assert script.behavior("Drive", "r1.b1") == first == ScriptedBehavior(1.0, "lost")
+    first = script.behavior("r1", "Drive", "r1.b1")
+    assert script.behavior("r1", "Drive", "r1.b2") == ScriptedBehavior(2.0, "lost")
+    assert script.behavior("r1", "Drive", "r1.b1") == first == ScriptedBehavior(1.0, "lost")
+
+
+def test_each_run_counts_its_own_visits(answers: Callable[[str], Answers]) -> None:
+    script = answers("answers: {Ask: [one, two]}")
+    assert [script.answer(run, "Ask", "p1") for run in ("r1", "r2")] == ["one", "one"]
+    assert [script.answer(run, "Ask", "p2") for run in ("r1", "r2")] == ["two", "two"]
 
 
 def test_a_service_is_scripted_by_its_element_else_by_its_class(
     answers: Callable[[str], Answers],
 ) -> None:
     script = answers("services: {Near: [{after: 1}], Detector: [{after: 2}, {after: 3}]}")
-    assert script.service("Near", "Detector", "s1") == ScriptedService(1.0, {})
-    assert script.service("Far", "Detector", "s2") == ScriptedService(2.0, {})
-    assert script.service("Near", "Detector", "s3") is None
-    assert script.service("Wide", "Detector", "s4") == ScriptedService(3.0, {})
+    assert script.service("r1", "Near", "Detector", "s1") == ScriptedService(1.0, {})
+    assert script.service("r1", "Far", "Detector", "s2") == ScriptedService(2.0, {})
+    assert script.service("r1", "Near", "Detector", "s3") is None
+    assert script.service("r1", "Wide", "Detector", "s4") == ScriptedService(3.0, {})
 
 
 PLACE = (1, "P", "Ask", 1)
@@ -242,8 +249,8 @@ def opened(prompt: str) -> PromptOpened:
 
 def test_visits_are_counted_in_the_order_of_the_journal(answers: Callable[[str], Answers]) -> None:
     script = answers("answers: {Ask: [one, two]}")
-    script.seen([opened("p1"), opened("p2")])
-    assert (script.answer("Ask", "p2"), script.answer("Ask", "p1")) == ("two", "one")
+    script.seen("r1", [opened("p1"), opened("p2")])
+    assert (script.answer("r1", "Ask", "p2"), script.answer("r1", "Ask", "p1")) == ("two", "one")
 
 
 def test_after_a_restart_the_count_goes_on_and_open_visits_keep_their_entry(
@@ -255,19 +262,20 @@ def test_after_a_restart_the_count_goes_on_and_open_visits_keep_their_entry(
         "behaviors: {Ask: [{after: 1, end: lost}, {after: 2, end: lost}]}\n"
     )
     script.seen(
+        "r1",
         [
             opened("p1"),
             PromptAnswered(*PLACE, "p1", "one", "somebody else"),
             opened("p2"),
             ServiceRequested(*PLACE, "s1", "Detector", {}, {}),
             BehaviorRequested(*PLACE, "r1.b1", "goto", "vehicle", ("a",), {}, {}),
-        ]
+        ],
     )
-    assert script.answer("Ask", "p3") == "three"
-    assert script.answer("Ask", "p2") == "two"
-    assert script.service("Ask", "Detector", "s2") == ScriptedService(2.0, {})
-    assert script.behavior("Ask", "r1.b2") == ScriptedBehavior(2.0, "lost")
-    assert script.behavior("Ask", "r1.b1") == ScriptedBehavior(1.0, "lost")
+    assert script.answer("r1", "Ask", "p3") == "three"
+    assert script.answer("r1", "Ask", "p2") == "two"
+    assert script.service("r1", "Ask", "Detector", "s2") == ScriptedService(2.0, {})
+    assert script.behavior("r1", "Ask", "r1.b2") == ScriptedBehavior(2.0, "lost")
+    assert script.behavior("r1", "Ask", "r1.b1") == ScriptedBehavior(1.0, "lost")
 
 
 # --- the operator and the world outside ---------------------------------------------------------
@@ -405,7 +413,7 @@ def test_after_a_restart_nothing_is_sent_twice_and_what_is_late_at_once(
     answers: Callable[[str], Answers], journal: tuple[Record, ...], left: list[str]
 ) -> None:
     script = answers("signals: [{at: 1, id: s}, {at: 3, id: s}]\nmessages: [{at: 2, id: m}]")
-    script.seen(journal)
+    script.seen("r1", journal)
     said = act(script, start_us=START_US + 60_000_000)
     assert [(at_s, what[1]) for at_s, what in said] == [(60.0, name) for name in left]
 

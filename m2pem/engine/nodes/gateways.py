@@ -55,13 +55,24 @@ def _merge(x: Execution, last: Token, join: Join) -> None:
 
 
 def fire_inclusive_joins(x: Execution) -> bool:
-    """Let every inclusive join go on that needs to wait no more. False: none could.
+    """Let inclusive joins go on that need to wait no more, one in each scope. False: none could.
 
     Called when no other step is left, so that whatever can move without outside input has moved.
+    Whether a join is complete depends on the tokens of its scope alone.
     """
-    for scope, node in list(x.state.inclusive.values()):
-        join = scope.joins.get(node)
-        if join is not None and _is_complete(x, scope, node, join):
+    moved = sorted(x.moved)
+    x.moved.clear()
+    fired = False
+    for number in moved:
+        scope = x.state.scopes.get(number)
+        if scope is not None and scope.joins:
+            fired = _fire_one(x, scope) or fired
+    return fired
+
+
+def _fire_one(x: Execution, scope: Scope) -> bool:
+    for node, join in scope.joins.items():
+        if isinstance(node, InclusiveGateway) and _is_complete(x, scope, node, join):
             last = list(join.by_flow.values())[-1][0]
             _merge(x, last, join)
             _split(x, last, node)

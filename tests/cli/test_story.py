@@ -1,0 +1,131 @@
+import pytest
+
+from m2pem.api.control import StampedRecord
+from m2pem.cli.story import Story, printable
+from m2pem.engine import records as r
+from m2pem.engine.records import Record, RunOutcome, TokenOutcome
+from m2pem.model.bpmn import parse_mission
+from m2pem.model.catalogue import BehaviorState
+from tests.command_line import MISSION
+
+VIGNETTE = parse_mission(MISSION.read_bytes(), str(MISSION))
+ON_ROUTE = (7, "DETECTION", "DriveRoute", 2)
+REQUESTED = r.BehaviorRequested(
+    *ON_ROUTE, "r1.b1", "single_vehicle_routing", "vehicle", ("evsg1",), {}, {}
+)
+STOP = "dc45ff2b-ef6b-45bd-96e6-c7ac8ef055c2"
+
+
+def tell(*records: Record, run: str = "r1") -> str | None:
+    """What is said of the last of these."""
+    story = Story(lambda _: VIGNETTE)
+    said = [story.tell(StampedRecord(run, n, 12.34, record)) for n, record in enumerate(records)]
+    return said[-1] if said[-1] is None else said[-1].removeprefix("     12.3 s  ")
+
+
+@pytest.mark.parametrize(
+    ("record", "said"),
+    [
+        (r.RunStarted("VIGNETTE1", 0, "ann"), "r1 of VIGNETTE1 started by ann"),
+        (r.RunClaimed(2), "r1 taken up again"),
+        (r.RunPaused(0, "ann"), "r1 paused by ann"),
+        (r.RunResumed(0, "ann"), "r1 goes on by ann"),
+        (r.RunEnded(RunOutcome.FAILED, "stuck"), "r1 failed: stuck"),
+        (r.TokenEntered(*ON_ROUTE), "DRIVE ROUTE"),
+        (r.TokenLeft(*ON_ROUTE, TokenOutcome.INTERRUPTED), "DRIVE ROUTE: interrupted"),
+        (REQUESTED, "DRIVE ROUTE: evsg1 begins single_vehicle_routing"),
+        (
+            r.PromptAnswered(1, "VIGNETTE1", "UserSendRoute", 1, "p1", "abort", "ann"),
+            "USER SEND ROUTE: abort, answered by ann",
+        ),
+        (
+            r.PromptOpened(1, "VIGNETTE1", "UserSendRoute", 1, "p1", "Well?", ()),
+            "USER SEND ROUTE asks: Well?",
+        ),
+        (
+            r.ServiceRequested(1, "DETECTION", "Detector", 2, "s1", "Detector", {}, {}),
+            "DETECTOR: runs Detector",
+        ),
+        (r.ServiceEnded(1, "DETECTION", "Detector", 2, "s1"), "DETECTOR: done"),
+        (
+            r.ServiceEnded(1, "DETECTION", "Detector", 2, "s1", "FAILED", "no power"),
+            "DETECTOR: failed, FAILED (no power)",
+        ),
+        (r.SignalThrown(STOP, by="ann"), "ann: signal 'Stop driving'"),
+        (r.SignalThrown(STOP, 1, "DETECTION", "ThrowStop", 2), "stop: signal 'Stop driving'"),
+        (
+            r.EscalationThrown(1, "DETECTION", "EndDetected", 2, "e", "H", "EscalationDetected"),
+            "hazard detected: escalation H, caught by hazard detected",
+        ),
+        (
+            r.ErrorThrown(*ON_ROUTE, "LINK_LOST", "silent"),
+            "DRIVE ROUTE: error LINK_LOST (silent), not caught",
+        ),
+        (r.GeometryReceived("route_alpha", {}, "ann"), "route_alpha received by ann"),
+    ],
+)
+def test_a_record_that_matters_is_a_line(record: Record, said: str) -> None:
+    assert tell(record) == said
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        r.TokenEntered(1, "DETECTION", "ForkDetection", 2),
+        r.TokenLeft(*ON_ROUTE, TokenOutcome.COMPLETED),
+        r.FlowTaken(1, "DETECTION", "ForkDetection", 2, "FlowToDetector"),
+        r.InputIgnored("late"),
+        r.ScopeOpened(1, "VIGNETTE1", "VIGNETTE1"),
+    ],
+)
+def test_what_matters_to_programs_only_is_no_line(record: Record) -> None:
+    assert tell(record) is None
+
+
+@pytest.mark.parametrize(
+    ("state", "code", "reason", "how"),
+    [
+        (BehaviorState.SUCCEEDED, "", "", "succeeded"),
+        (BehaviorState.CANCELLED, "FAILED", "", "cancelled"),
+        (BehaviorState.FAILED, "ROUTE_BLOCKED", "a tree", "failed, ROUTE_BLOCKED (a tree)"),
+    ],
+)
+def test_the_end_of_a_behavior_names_who_did_what(
+    state: BehaviorState, code: str, reason: str, how: str
+) -> None:
+    ended = r.BehaviorEnded(*ON_ROUTE, "r1.b1", state, code, reason)
+    assert tell(REQUESTED, ended) == f"DRIVE ROUTE: evsg1 ends single_vehicle_routing: {how}"
+
+
+def test_a_held_behavior_names_who_does_what() -> None:
+    held = r.BehaviorUnsettled("r1.b1", BehaviorState.UNKNOWN, "not known any more")
+    assert tell(REQUESTED, held) == "evsg1: single_vehicle_routing: held, not known any more"
+
+
+def test_a_second_run_is_named() -> None:
+    story = Story(lambda _: VIGNETTE)
+    first = story.tell(StampedRecord("r1", 1, 0.0, r.RunPaused(0)))
+    second = story.tell(StampedRecord("r2", 1, 0.0, r.RunPaused(0)))
+    assert (first, second) == ("      0.0 s  r1 paused", "      0.0 s  r2   r2 paused")
+
+
+def test_every_run_is_named_when_there_are_several() -> None:
+    story = Story(lambda _: VIGNETTE, one=False)
+    assert story.tell(StampedRecord("r1", 1, 0.0, r.RunPaused(0))) == "      0.0 s  r1   r1 paused"
+
+
+def test_a_run_whose_diagram_is_not_known_is_told_by_ids() -> None:
+    story = Story(lambda _: None)
+    entered = r.TokenEntered(1, "P", "Unknown", 1)
+    assert story.tell(StampedRecord("r1", 1, 0.0, entered)) == "      0.0 s  Unknown"
+
+
+def test_colour_is_for_terminals() -> None:
+    story = Story(lambda _: VIGNETTE, colour=True)
+    line = story.tell(StampedRecord("r1", 1, 0.0, r.RunPaused(0)))
+    assert line is not None
+    assert line.startswith("\x1b[33m")
+
+
+def test_names_cannot_steer_a_terminal() -> None:
+    assert printable("a\x1b[2J\nb\tc\u202e") == "a?[2J b c?"

@@ -1,0 +1,159 @@
+"""An operator at the plain unit, over a pipe and at a terminal."""
+
+import re
+import signal
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pexpect
+
+from m2pem.sim.statefile import recorded_effects
+from tests.command_line import ANSWERS, FLEET, MISSION, CommandLine, Program, fleet_with_state
+
+STOP_DRIVING = "dc45ff2b-ef6b-45bd-96e6-c7ac8ef055c2"
+
+
+def driving(m2pem: CommandLine, fleet: Path = FLEET, speed: str = "20") -> Program:
+    """The mission, with evsg1 on its route and nobody detecting anything."""
+    program = m2pem.start(
+        "run", MISSION, "--fleet", fleet, "--simulate", "--speed", speed, "--format", "json",
+        "--answers", ANSWERS / "vignette1_route_live.yaml",
+    )  # fmt: skip
+    program.until_record("PromptOpened", element="UserSendRoute")
+    program.type("1")
+    program.until_record("BehaviorProgressed", state="RUNNING")
+    return program
+
+
+def effects(state: Path) -> Counter[tuple[str, str]]:
+    return Counter((each.kind.value, each.resource) for each in recorded_effects(state))
+
+
+def test_pause_resume_and_stop_reach_the_vehicle_once_each(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    fleet, state = fleet_with_state(tmp_path)
+    program = driving(m2pem, fleet)
+    program.type("pause")
+    program.until_record("RunPaused", by="plain")
+    program.type("resume")
+    program.until_record("RunResumed", by="plain")
+    program.type("stop")
+    program.until_record("RunEnded", outcome="stopped")
+    ended = program.until_record("BehaviorEnded", state="CANCELLED")
+    assert ended["element"] == "DriveRoute"
+    assert program.rest()[0] == 130
+    once = ["start", "hold", "resume", "cancel", "end"]
+    assert effects(state) == Counter((kind, "evsg1") for kind in once)
+
+
+def test_mission_time_stands_during_a_pause(m2pem: CommandLine) -> None:
+    program = driving(m2pem)
+    program.type("pause")
+    paused = program.until_record("RunPaused")
+    program.type("resume")
+    resumed = program.until_record("RunResumed")
+    program.type("stop")
+    program.rest()
+    assert resumed["at_us"] > paused["at_us"]
+    assert resumed["t"] == paused["t"]
+
+
+def test_a_signal_is_sent_by_its_name_as_by_its_id(m2pem: CommandLine) -> None:
+    program = driving(m2pem)
+    program.type("signal Stop driving")
+    assert program.until_record("SignalThrown")["signal"] == STOP_DRIVING
+    program.until_record("BehaviorEnded", element="DriveStop", state="SUCCEEDED")
+    program.type("stop")
+    assert program.rest()[0] == 130
+
+
+def test_what_cannot_be_done_is_said_and_changes_nothing(m2pem: CommandLine) -> None:
+    program = m2pem.start("run", MISSION, "--fleet", FLEET, "--format", "json")
+    program.until_record("PromptOpened", element="UserSendRoute")
+    for line in ("3", "signal no such", "resume", "stop r9", "start", "p1 continue", "2"):
+        program.type(line)
+    program.until_record("BehaviorProgressed", state="RUNNING")
+    program.type("stop")
+    status, errors = program.rest()
+    assert status == 130
+    assert "no run has a signal 'no such'; known: Stop driving" in errors
+    assert "r1: ResumeRun while the run is running" in errors
+    assert "'2' is no command, and nothing is asked" in errors
+    assert "say which: start FILE" in errors
+    assert "r9 is not driven by this executive" in errors
+    assert "'3' does not answer p1; its decisions: 1 continue, 2 abort" in errors
+
+
+def test_the_run_goes_on_when_the_input_ends(m2pem: CommandLine) -> None:
+    program = driving(m2pem, speed="200")
+    program.end_input()
+    program.until_record("RunEnded", outcome="terminated")
+    assert program.rest()[0] == 0
+
+
+def test_an_operator_who_quits_leaves_the_run_alone(m2pem: CommandLine) -> None:
+    program = driving(m2pem, speed="200")
+    program.type("quit")
+    program.type("stop")
+    program.until_record("RunEnded", outcome="terminated")
+    assert program.rest()[0] == 0
+
+
+def test_the_end_of_the_input_is_noted_when_a_prompt_is_open(m2pem: CommandLine) -> None:
+    program = m2pem.start("run", MISSION, "--fleet", "sim")
+    program.until_text("[p1] UserSendRoute")
+    program.end_input()
+    program.until_text("the input has ended: nobody answers here any more")
+    program.send(signal.SIGTERM)
+    assert program.rest()[0] == 130
+
+
+def test_an_operator_at_a_terminal(m2pem: CommandLine) -> None:
+    terminal = pexpect.spawn(
+        sys.executable,
+        ["-m", "m2pem", "run", str(MISSION), "--fleet", str(FLEET), "--simulate", "--speed", "50",
+         "--answers", str(ANSWERS / "vignette1_detection_live.yaml"), "--ocu", "plain"],
+        cwd=str(m2pem.folder), env={**m2pem.environment, "TERM": "xterm"},
+        encoding="utf-8", timeout=60,
+    )  # fmt: skip
+    terminal.expect(re.escape("[p1] UserSendRoute: Send the route, then continue"))
+    terminal.sendline("Continue")
+    terminal.expect("DRIVE ROUTE: evsg1 begins single_vehicle_routing")
+    terminal.expect("REVERSE: evsg1 ends reverse: succeeded")
+    terminal.expect(re.escape("[p2]"))
+    terminal.sendline("2")
+    terminal.expect("\x1b\\[32m.*r1 terminated")
+    terminal.expect(pexpect.EOF)
+    terminal.close()
+    assert terminal.exitstatus == 0
+
+
+def test_a_terminal_without_colour(m2pem: CommandLine) -> None:
+    terminal = pexpect.spawn(
+        sys.executable,
+        ["-m", "m2pem", "run", str(MISSION), "--fleet", "sim", "--ocu", "plain"],
+        cwd=str(m2pem.folder), env={**m2pem.environment, "NO_COLOR": "1"},
+        encoding="utf-8", timeout=60,
+    )  # fmt: skip
+    terminal.expect(re.escape("[p1]"))
+    terminal.sendline("abort")
+    terminal.expect(pexpect.EOF)
+    terminal.close()
+    assert terminal.exitstatus == 0
+    assert "\x1b" not in terminal.before
+
+
+def test_ctrl_c_at_a_terminal_stops_the_mission(m2pem: CommandLine) -> None:
+    terminal = pexpect.spawn(
+        sys.executable,
+        ["-m", "m2pem", "run", str(MISSION), "--fleet", "sim", "--ocu", "plain"],
+        cwd=str(m2pem.folder), env=m2pem.environment, encoding="utf-8", timeout=60,
+    )  # fmt: skip
+    terminal.expect(re.escape("[p1]"))
+    terminal.sendintr()
+    terminal.expect("r1 stopped: stopped by SIGINT")
+    terminal.expect(pexpect.EOF)
+    terminal.close()
+    assert terminal.exitstatus == 130

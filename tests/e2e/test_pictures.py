@@ -1,0 +1,60 @@
+"""The docs' pictures of missions are those of the files as they are. `make pictures` draws them."""
+
+import re
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+REPOSITORY = Path(__file__).parents[2]
+IMAGES = REPOSITORY / "docs" / "images"
+MISSIONS = sorted((REPOSITORY / "missions").glob("*.bpmn"))
+
+SVG = "{http://www.w3.org/2000/svg}"
+BPMNDI = "{http://www.omg.org/spec/BPMN/20100524/DI}"
+
+every_mission = pytest.mark.parametrize("mission", MISSIONS, ids=lambda path: path.stem)
+
+
+def picture(mission: Path) -> etree._Element:
+    path = IMAGES / f"{mission.stem}.svg"
+    assert path.exists(), f"{mission.name} has no picture: run `make pictures`"
+    return etree.parse(path).getroot()
+
+
+@every_mission
+def test_the_picture_was_drawn_from_the_mission_as_it_is(mission: Path) -> None:
+    hashed = sha256(mission.read_bytes()).hexdigest()
+    drawn_from = picture(mission).findtext(f"{SVG}metadata")
+    assert drawn_from == f"Drawn from {mission.name}, SHA-256 {hashed}", "run `make pictures`"
+
+
+@every_mission
+def test_the_picture_shows_everything_that_the_mission_draws(mission: Path) -> None:
+    diagram = etree.parse(mission).getroot()
+    planned = {
+        element.get("bpmnElement")
+        for tag in ("BPMNShape", "BPMNEdge")
+        for element in diagram.iter(f"{BPMNDI}{tag}")
+    }
+    shown = {element.get("data-element-id") for element in picture(mission).iter(f"{SVG}g")}
+    assert planned - shown == set()
+
+
+@every_mission
+def test_the_picture_is_shown_in_the_docs(mission: Path) -> None:
+    page = (REPOSITORY / "docs" / "field-tests.md").read_text(encoding="utf-8")
+    assert f"](images/{mission.stem}.svg)" in page
+
+
+def test_no_picture_is_left_of_a_mission_that_is_gone() -> None:
+    stems = {mission.stem for mission in MISSIONS}
+    drawn = [path for path in IMAGES.glob("*.svg") if "Drawn from" in path.read_text("utf-8")]
+    assert [path.name for path in drawn if path.stem not in stems] == []
+
+
+def test_pictures_do_not_reach_out_to_the_network() -> None:
+    reaching = re.compile(r'(?:href|src)="(?!#)|url\((?!["\']?(?:&quot;)?#)')
+    images = sorted(IMAGES.glob("*.svg"))
+    assert [path.name for path in images if reaching.search(path.read_text("utf-8"))] == []

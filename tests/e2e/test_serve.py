@@ -1,0 +1,105 @@
+"""The executive as a service."""
+
+import signal
+
+from tests.command_line import FLEET, MISSION, CommandLine, Program
+
+
+def serving(m2pem: CommandLine, *words: str) -> Program:
+    program = m2pem.start("serve", "--fleet", FLEET, "--ocu", "plain", *words)
+    assert program.process.stderr is not None
+    assert "serving mehds-vignette-1; operators: plain" in program.process.stderr.readline()
+    return program
+
+
+def test_several_runs_at_once_and_a_clean_end(m2pem: CommandLine) -> None:
+    program = serving(m2pem)
+    program.type(f"start {MISSION}")
+    program.until_text("[p1] UserSendRoute")
+    program.type(f"start {MISSION}")
+    program.until_text("[r2 p1] UserSendRoute")
+    program.type("abort")
+    program.until_text("several prompts are open: r1 p1, r2 p1")
+    program.type("r2 p1 abort")
+    program.until_text("r2 terminated")
+    program.type("runs")
+    program.until(lambda line: line.startswith("r1 running"))
+    program.until(lambda line: line.startswith("r2 terminated"))
+    program.send(signal.SIGTERM)
+    program.until_text("r1 stopped: stopped by SIGTERM")
+    assert program.rest() == (0, "")
+
+
+def test_a_mission_that_does_not_fit_is_refused_and_the_service_goes_on(
+    m2pem: CommandLine,
+) -> None:
+    program = serving(m2pem)
+    program.type("start nothing.bpmn")
+    program.until_text("nothing.bpmn cannot be read")
+    program.type(f"start {MISSION}")
+    program.until_text("[p1] UserSendRoute")
+    program.send(signal.SIGINT)
+    assert program.rest()[0] == 0
+
+
+def test_interrupted_runs_with_this_fleet_are_taken_up(m2pem: CommandLine) -> None:
+    before = m2pem.start("run", MISSION, "--fleet", "sim")
+    before.until_text("[p1] UserSendRoute")
+    before.kill()
+    program = serving(m2pem)
+    program.type(f"start {MISSION}")
+    program.until_text("[p1] UserSendRoute")
+    program.kill()
+    again = m2pem.start("serve", "--fleet", FLEET, "--ocu", "plain")
+    again.until_text("[p1] UserSendRoute")
+    again.type("abort")
+    again.until_text("r2 terminated")
+    assert any("r2 taken up again" in line for line in again.lines)
+    again.send(signal.SIGTERM)
+    status, errors = again.rest()
+    assert status == 0
+    assert "r1 was interrupted with other vehicles" in errors
+    assert "`m2pem resume r1`" in errors
+
+
+def test_a_run_that_is_driven_cannot_be_resumed(m2pem: CommandLine) -> None:
+    program = serving(m2pem)
+    program.type(f"start {MISSION}")
+    program.until_text("[p1] UserSendRoute")
+    status, _, errors = m2pem.run("resume", "r1", "--ocu", "none")
+    assert status == 2
+    assert "r1 is being driven by an executive that is alive" in errors
+    program.send(signal.SIGTERM)
+    assert program.rest()[0] == 0
+
+
+def test_records_of_all_runs_are_printed(m2pem: CommandLine) -> None:
+    program = m2pem.start(
+        "serve", "--fleet", FLEET, "--ocu", "plain", "--format", "json", "--simulate"
+    )
+    for _ in range(2):
+        program.type(f"start {MISSION}")
+    program.until_record("PromptOpened", run="r1")
+    program.until_record("PromptOpened", run="r2")
+    program.send(signal.SIGTERM)
+    assert program.rest()[0] == 0
+    ended = [each["run"] for each in program.records if each["record"] == "RunEnded"]
+    assert sorted(ended) == ["r1", "r2"]
+
+
+def test_a_fleet_cannot_be_made_up(m2pem: CommandLine) -> None:
+    status, _, errors = m2pem.run("serve", "--fleet", "sim")
+    assert status == 2
+    assert "a fleet is made up from a mission" in errors
+
+
+def test_a_run_waits_for_what_operators_started_beside_it(m2pem: CommandLine) -> None:
+    program = m2pem.start("run", MISSION, "--fleet", FLEET, "--ocu", "plain")
+    program.until_text("[p1] UserSendRoute")
+    program.type(f"start {MISSION}")
+    program.until_text("[r2 p1] UserSendRoute")
+    program.type("r1 p1 abort")
+    program.until_text("r1 terminated")
+    program.type("abort")
+    program.until_text("r2 terminated")
+    assert program.rest()[0] == 0

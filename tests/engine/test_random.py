@@ -1,0 +1,127 @@
+"""Random missions under random inputs: the laws hold whatever happens."""
+
+import builtins
+import random
+import time
+import uuid
+from collections.abc import Callable
+from random import Random
+from typing import Any, NoReturn
+
+import pytest
+from hypothesis import HealthCheck, given, note, settings
+from hypothesis import strategies as st
+
+from m2pem.engine.run import MissionRun
+from tests.engine.kit import Play
+from tests.engine.random_missions import graph, structured
+from tests.engine.random_play import RandomPlay
+from tests.engine.snapshot import snapshot
+
+DICE = st.randoms(use_true_random=False)
+
+QUICK = settings(
+    max_examples=100, deadline=None, suppress_health_check=list(HealthCheck), database=None
+)
+FEW = 150
+MANY = 20_000
+BATCHES = (1, 2, 5, 100, 100)
+
+
+def _forbidden(*_: Any, **__: Any) -> NoReturn:
+    raise AssertionError("the engine is pure")
+
+
+def played(text: str, choices: list[int], batch: int) -> RandomPlay:
+    """Play by numbers, with clock, randomness and files out of the engine's reach."""
+    Play.made.clear()
+    game = RandomPlay(text, batch)
+    with pytest.MonkeyPatch.context() as patched:
+        for module, name in (
+            (time, "time"),
+            (random, "random"),
+            (uuid, "uuid4"),
+            (builtins, "open"),
+        ):
+            patched.setattr(module, name, _forbidden)
+        game.go(choices)
+        game.finish()
+    return game
+
+
+def check_taken_up(play: Play, place: int) -> None:
+    """A run that is rebuilt after `place` inputs decides the others as the first one did."""
+    taken_up = MissionRun(play.mission, play.fleet, "r1", play.run._x.batch)
+    for step in play.steps[:place]:
+        taken_up.replay(step.records)
+    for step in play.steps[place:]:
+        assert list(taken_up.receive(step.input, step.at_us).records) == list(step.records)
+    assert snapshot(taken_up.state) == snapshot(play.run.state)
+
+
+def structured_run(dice: Random, say: Callable[[str], object] = str) -> None:
+    text = structured(dice)
+    say(text)
+    game = played(
+        text, [dice.randrange(10_000) for _ in range(dice.randrange(40))], dice.choice(BATCHES)
+    )
+    play = game.play
+    assert not play.detail.startswith("stuck"), play.detail
+    if not play.ended:
+        assert play.run.wants_continue or play.awaits()
+    check_taken_up(play, dice.randrange(len(play.steps)))
+    game.end()
+    play.verify()
+
+
+def graph_run(dice: Random, say: Callable[[str], object] = str) -> None:
+    text = graph(dice)
+    say(text)
+    game = played(text, [dice.randrange(10_000) for _ in range(dice.randrange(40))], 20)
+    play = game.play
+    if play.ended == "failed":
+        assert play.detail
+    elif not play.ended:
+        assert play.run.wants_continue or play.awaits()
+    assert max(len(step.records) for step in play.steps) < 50_000
+    check_taken_up(play, dice.randrange(len(play.steps)))
+    game.end()
+    assert play.ended
+    play.verify()
+
+
+@given(DICE)
+@QUICK
+def test_structured_missions_keep_the_laws(dice: Random) -> None:
+    structured_run(dice, note)
+
+
+@given(DICE)
+@QUICK
+def test_any_graph_has_a_named_outcome(dice: Random) -> None:
+    graph_run(dice, note)
+
+
+RUNS = pytest.mark.parametrize("run", [structured_run, graph_run])
+
+
+def run_seeds(run: Callable[[Random], None], seeds: range) -> None:
+    """Evenly spread missions, where hypothesis prefers small ones."""
+    for seed in seeds:
+        try:
+            run(Random(seed))
+        except Exception as error:
+            error.add_note(f"seed {seed}")
+            raise
+
+
+@RUNS
+def test_some_missions_of_all_sizes(run: Callable[[Random], None]) -> None:
+    run_seeds(run, range(FEW))
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+@RUNS
+def test_many_missions_of_all_sizes(run: Callable[[Random], None]) -> None:
+    run_seeds(run, range(FEW, MANY))
