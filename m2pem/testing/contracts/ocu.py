@@ -10,7 +10,7 @@ from m2pem.api.control import RunStatus
 from m2pem.errors import OperatorError
 from m2pem.testing import scenarios
 from m2pem.testing.contracts.contract import Contract, needs
-from m2pem.testing.contracts.ocu_bench import MakeOcu, Operate, Operator, OcuBench, seated
+from m2pem.testing.contracts.ocu_bench import MakeOcu, OcuBench, Operate, Operator, seated
 
 __all__ = ["MakeOcu", "OcuContract", "Operate", "Operator"]
 
@@ -281,8 +281,7 @@ class OcuContract(Contract):
             await bench.asked(scenarios.question("Road?"))
             await bench.shows("Road?")
             await bench.leave()
-            leaked = asyncio.all_tasks() - bench.tasks_before
-            assert not leaked, f"tasks go on after it was cancelled: {leaked}"
+            assert not bench.unfinished, f"tasks go on after it was cancelled: {bench.unfinished}"
 
         sit(main)
 

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
+from contextvars import ContextVar, copy_context
 from typing import Any, Protocol
 
 from m2pem.api.control import MissionControl, OpenPrompt, RunId
@@ -16,6 +17,9 @@ WITHIN_S = 10.0
 LOOK_EVERY_S = 0.01
 SPEED = 20.0
 VEHICLE = "ugv1"
+
+
+_MAKER: ContextVar[set[asyncio.Task[Any]] | None] = ContextVar("_MAKER", default=None)
 
 
 class Operator(Protocol):
@@ -94,7 +98,6 @@ class OcuBench:
         self.control = control
         self.end_executive = end_executive
         self.faults = Faults(control)
-        self.tasks_before = asyncio.all_tasks()
         self._make_ocu = make_ocu
         self._operate = operate
         self._questions = 0
@@ -103,10 +106,17 @@ class OcuBench:
 
     def begin(self) -> None:
         """Have the unit serve."""
-        self.tasks_before = asyncio.all_tasks()
-        ocu = self._make_ocu(self.faults)  # type: ignore[arg-type]  # it stands for a MissionControl
+        tasks = self._tasks = _watch_tasks()
+        context = copy_context()
+        context.run(_MAKER.set, tasks)
+        ocu = context.run(self._make_ocu, self.faults)
         self.operator = self._operate(ocu)
-        self._serving = asyncio.create_task(ocu.serve(), name="the unit")
+        self._serving = asyncio.create_task(ocu.serve(), name="the unit", context=context)
+
+    @property
+    def unfinished(self) -> list[asyncio.Task[Any]]:
+        """The tasks that the unit made, and those that they made, which have not ended."""
+        return [task for task in self._tasks if not task.done()]
 
     async def leave(self) -> None:
         """Cancel the unit, and see it end; what broke it is raised."""
@@ -195,6 +205,19 @@ class OcuBench:
             if found or asyncio.get_running_loop().time() > deadline:
                 return found
             await asyncio.sleep(LOOK_EVERY_S)
+
+
+def _watch_tasks() -> set[asyncio.Task[Any]]:
+    """A set that gets every task which is made in a context that has it as `_MAKER`."""
+
+    def make(loop: asyncio.AbstractEventLoop, coro: Any, **options: Any) -> asyncio.Task[Any]:
+        task: asyncio.Task[Any] = asyncio.Task(coro, loop=loop, **options)
+        if (makers := _MAKER.get()) is not None:
+            makers.add(task)
+        return task
+
+    asyncio.get_running_loop().set_task_factory(make)
+    return set()
 
 
 async def until(true: Callable[[], bool], within_s: float = WITHIN_S) -> bool:
