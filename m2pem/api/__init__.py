@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         SimulationResult,
         StampedRecord,
     )
+    from m2pem.api.goals import GoalArbiter
     from m2pem.api.ledger import Ledger
     from m2pem.api.mailbox import Mailbox
     from m2pem.api.ocu import Ocu
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from m2pem.engine.records import Record
     from m2pem.findings import Finding, Severity
     from m2pem.model.behavior import BehaviorType, Decision
+    from m2pem.model.bpmn import parse_mission
     from m2pem.model.catalogue import (
         BehaviorSpec,
         BehaviorState,
@@ -70,6 +72,7 @@ _MODULES = {
         "MissionControl Notice OpenPrompt PromptClosed RunId RunStatus RunSummary"
         " SimulationResult StampedRecord"
     ),
+    "m2pem.api.goals": "GoalArbiter",
     "m2pem.api.ledger": "Ledger",
     "m2pem.api.mailbox": "Mailbox",
     "m2pem.api.ocu": "Ocu",
@@ -78,6 +81,7 @@ _MODULES = {
     "m2pem.engine.records": "Record",
     "m2pem.findings": "Finding Severity",
     "m2pem.model.behavior": "BehaviorType Decision",
+    "m2pem.model.bpmn": "parse_mission",
     "m2pem.model.catalogue": (
         "BehaviorSpec BehaviorState ParameterKind ParameterSpec ResourceId ResumePolicy"
     ),
@@ -108,6 +112,7 @@ __all__ = [
     "Fleet",
     "FleetBus",
     "GeoPosition",
+    "GoalArbiter",
     "Ledger",
     "Limits",
     "LinkState",
@@ -139,6 +144,7 @@ __all__ = [
     "Value",
     "VehiclePosition",
     "VehicleState",
+    "parse_mission",
 ]
 
 

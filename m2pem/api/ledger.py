@@ -4,10 +4,10 @@ import logging
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
 
+from m2pem.api import refusal as parameters
 from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.epochs import Epochs
 from m2pem.api.mailbox import Mailbox
-from m2pem.api.refusal import refusal
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.resources.nearmiss import suggest
 
@@ -50,16 +50,22 @@ class Ledger:
 
     # --- what the executive asks for ------------------------------------------------------------
 
-    def admit(self, request: BehaviorRequest, native_ref: str | None = None) -> bool:
+    def admit(
+        self,
+        request: BehaviorRequest,
+        native_ref: str | None = None,
+        refusal: Callable[[BehaviorRequest], str] = lambda _: "",
+    ) -> bool:
         """Whether to do what `Arbiter.start` was asked. If so, it is reported ACCEPTED.
 
         False: it is known already, or of a past epoch; or it was reported REJECTED, because the
         behavior or a parameter does not fit the catalogue, or a resource is busy. Behaviors that it
-        preempts are reported CANCELLED: the new command must end them on the vehicle.
+        preempts are reported CANCELLED: the new command must end them on the vehicle. `refusal`
+        tells why a request that fits the catalogue cannot be done; "" if it can.
         """
         if not self._is_new(request):
             return False
-        if reason := self._misfit(request):
+        if reason := self._misfit(request) or refusal(request):
             self._reject(request, "REJECTED", reason)
             return False
         holders = {resource: self.holder(resource) for resource in request.resources}
@@ -72,11 +78,6 @@ class Ledger:
         self._holders.update(dict.fromkeys(request.resources, request.id))
         self._enter(request, BehaviorState.ACCEPTED, native_ref=native_ref)
         return True
-
-    def refuse(self, request: BehaviorRequest, reason: str, code: str = "REJECTED") -> None:
-        """Report a request REJECTED for a reason that no catalogue can say, instead of `admit`."""
-        if self._is_new(request):
-            self._reject(request, code, reason)
 
     def may_cancel(self, behavior: BehaviorId, epoch: int) -> bool:
         """Whether to do what `Arbiter.cancel` was asked: it goes on, and the epoch is not past."""
@@ -158,7 +159,8 @@ class Ledger:
             if request.behavior not in offered:
                 known = suggest(request.behavior, offered, "behaviors")
                 return f"{resource} has no behavior '{request.behavior}'; {known}"
-            if reason := refusal(offered[request.behavior], request.parameters):
+            spec = offered[request.behavior]
+            if reason := parameters.refusal(spec, request.parameters):
                 return reason
         return ""
 
