@@ -12,7 +12,7 @@ import asyncio
 import os
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 import pytest
 
@@ -33,6 +33,7 @@ from m2pem.errors import InternalError, JournalError, StaleEpochError
 from m2pem.journal.base import Entry, Journal, RunHeader, RunLine
 from m2pem.model.catalogue import BehaviorState
 from m2pem.model.values import Value
+from m2pem.testing.contracts.contract import Contract, skip_unsupported
 
 HEADER = RunHeader(
     mission_name="vignette1.bpmn",
@@ -83,8 +84,10 @@ async def outcomes(*calls: Awaitable[None]) -> Sequence[BaseException | None]:
 
 
 @pytest.mark.asyncio
-class JournalContract:
+class JournalContract(Contract):
     """Override `open_journal`, and `durable` for a journal that ends with its process."""
+
+    m2pem_contract: ClassVar[str] = "JournalContract"
 
     @pytest.fixture
     def open_journal(self) -> OpenJournal:
@@ -356,7 +359,7 @@ class JournalContract:
     ) -> None:
         """Not driven; claimed with the next epoch; names go on."""
         if not durable:
-            pytest.skip("this journal ends with its process")
+            skip_unsupported("durability", "this journal ends with its process")
         async with opened(open_journal) as journal:
             run = await journal.create(HEADER)
             await journal.append([entry(run, 1, RunStarted("PATROL", 5), RunPaused(6))])
@@ -377,7 +380,7 @@ class JournalContract:
     ) -> None:
         """One sees what the other wrote; only one drives a run; a stale one is shut out."""
         if not durable:
-            pytest.skip("this journal ends with its process")
+            skip_unsupported("durability", "this journal ends with its process")
         async with opened(open_journal) as one, opened(open_journal) as two:
             run = await one.create(HEADER)
             assert await two.create(HEADER) == "r2"
