@@ -178,14 +178,15 @@ class GoalArbiter:
             await self._sleep(RETRY_AFTER_S)
 
     async def _watch(self, resource: ResourceId) -> None:
-        bound_us = self.limits(resource).lost_after_s * SILENT_SHARE * 1_000_000
+        # A whole number: of less than a microsecond no clock would wait to the end.
+        bound_us = round(self.limits(resource).lost_after_s * SILENT_SHARE * 1_000_000)
         heard_us = self.context.clock.now_us()
         while True:
             heard_us = self._heard_us.get(resource, heard_us)
             silent_us = self.context.clock.now_us() - heard_us
             if silent_us >= bound_us:
                 self._ledger.lose(resource, f"not heard for {silent_us / 1_000_000:.1f} s")
-            wait_us = bound_us - silent_us if silent_us < bound_us else bound_us / 4
+            wait_us = bound_us - silent_us if silent_us < bound_us else bound_us
             await self._sleep(wait_us / 1_000_000)
 
     async def _wait_for_all(self) -> None:
