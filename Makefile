@@ -10,7 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/*/pyproject.toml))
 JS := tests/js
-DEBIAN_PACKAGES := nodejs npm
+DEBIAN_PACKAGES := nodejs npm tmux
 
 # An environment holds absolute paths: one made elsewhere, or by another Python, is made anew.
 INSTALLED := $(VENV)/installed
@@ -38,9 +38,10 @@ $(INSTALLED): pyproject.toml constraints.txt $(PLUGINS:%=%/pyproject.toml)
 	  --quiet --disable-pip-version-check --editable '.[dev]' $(PLUGINS:%=--editable %)
 	@echo '$(IDENTITY)' > $@
 
-# The tests of what BPMN editors see need Node.js; nothing else does, so its absence stops nothing.
+# The tests of what BPMN editors see need Node.js, and those of the terminal unit tmux; nothing else
+# does, so their absence stops nothing.
 npm-packages:
-	@command -v npm >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && { \
+	@{ command -v npm && command -v tmux; } >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && { \
 	  echo "Installing Debian packages: $(DEBIAN_PACKAGES)"; \
 	  apt-get update -qq && apt-get install -y -qq $(DEBIAN_PACKAGES) >/dev/null; }; } || true
 	@if command -v npm >/dev/null; then $(MAKE) --silent $(JS)/node_modules/.package-lock.json; \
@@ -67,6 +68,7 @@ lint: setup ## check style, types and layers
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
+	@for plugin in $(PLUGINS); do $(BIN)/mypy $$plugin/m2pem_plugin_*; done
 	@$(BIN)/lint-imports
 
 format: setup ## put the code into shape
@@ -79,8 +81,9 @@ test: lint ## check all but the long tests
 test-long: lint ## check everything: fuzzing, large random counts, foreign corpora too
 	@$(BIN)/pytest -n 2 --timeout 1800
 
-pictures: npm-packages ## draw the missions for the docs (needs Chromium)
-	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn
+pictures: npm-packages ## draw the missions and examples for the docs (needs Chromium)
+	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn && \
+	for example in ../../examples/*/; do node draw_bpmn.mjs "$$example" "$$example"*.bpmn; done
 
 clean: ## remove all that can be made again
 	@rm -rf $(VENV) $(JS)/node_modules build dist

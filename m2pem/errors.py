@@ -70,6 +70,10 @@ class OperatorError(M2pemError):
     """A request of an operator or script that cannot be met now; nothing was changed."""
 
 
+class NotDrivenError(OperatorError):
+    """The run is not driven by this executive; another one may."""
+
+
 class PluginError(M2pemError):
     """A plugin could not be loaded or broke its contract."""
 

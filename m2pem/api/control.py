@@ -14,6 +14,7 @@ from m2pem.model.catalogue import BehaviorSpec, ResourceId
 from m2pem.model.values import Value
 
 if TYPE_CHECKING:
+    from m2pem.model.elements import Mission
     from m2pem.resources.fleet import Fleet
 
 RunId: TypeAlias = str
@@ -174,6 +175,14 @@ class MissionControl(Protocol):
 
     def prompts(self) -> Sequence[OpenPrompt]:
         """The prompts that stand now."""
+        ...
+
+    async def mission(self, run: RunId) -> "Mission":
+        """The mission of a run, also of one that has ended: its elements with their names."""
+        ...
+
+    async def mission_time_s(self, run: RunId) -> float:
+        """Seconds from the start of a run that has not ended; stands during a pause."""
         ...
 
     async def wait(self, run: RunId) -> RunSummary:

@@ -7,7 +7,11 @@ if TYPE_CHECKING:
 
 
 class Ocu(Protocol):
-    """Constructed as `Ocu(control)`; several may serve at once, all in the same manner."""
+    """Constructed as `Ocu(control)`; several may serve at once, all in the same manner.
+
+    A class attribute `takes_terminal = True` says that it draws on the whole terminal: then the
+    command line prints nothing while it serves, and uses `plain` instead where there is none.
+    """
 
     def __init__(self, control: "MissionControl") -> None: ...
 

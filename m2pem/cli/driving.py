@@ -4,12 +4,16 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from pathlib import Path
+
+import click
 
 from m2pem.api.control import RunId, RunStatus
 from m2pem.cli.entry import STOPPED, ignore_closed_stdout
 from m2pem.cli.interruption import Interruption
 from m2pem.cli.ocus import PLAIN, Operators
 from m2pem.cli.output import Output
+from m2pem.control_socket.server import ControlSocket
 from m2pem.executive.executive import Executive
 from m2pem.model.elements import Mission
 from m2pem.sim.answers import Answers
@@ -29,11 +33,12 @@ EXIT_STATUS = {
 
 @asynccontextmanager
 async def driving(
-    executive: Executive, output: Output, operators: Operators, *, one: bool
+    executive: Executive, output: Output, operators: Operators, journal: Path | None, *, one: bool
 ) -> AsyncIterator[Interruption]:
     """Connect, print and serve within the block; at its end, stop what still runs and close.
 
-    `one`: there is one run that matters, or several.
+    `journal`: its file, beside which other processes find the executive. `one`: there is one run
+    that matters, or several.
     """
 
     def mission(run: RunId) -> Mission | None:
@@ -48,14 +53,28 @@ async def driving(
             loop.call_soon_threadsafe(interruption.stop, "nobody reads its output any more")
 
         output.writer.when_broken(nobody_reads)
-        async with executive:
+        # First, as nothing may come between connecting and taking up a run: reports would be lost.
+        async with ControlSocket(executive.control, journal), executive:
             notices = executive.control.subscribe(size=BACKLOG)
             printing = asyncio.create_task(output.follow(notices))
+            if operators.take_terminal:
+                output.cover()
+
+            def left() -> None:
+                output.uncover()
+                if any(not each.done.is_set() for each in executive.runners.values()):
+                    click.echo(
+                        "m2pem: no operator at this terminal any more; missions go on "
+                        "(m2pem attach), and Ctrl-C stops them",
+                        err=True,
+                    )
+
             try:
-                operators.begin(executive.control)
+                operators.begin(executive.control, left)
                 yield interruption
             finally:
                 await operators.end()
+                output.uncover()
         await printing
         await output.drain()
     if output.writer.broken:
@@ -67,6 +86,7 @@ async def drive_run(
     output: Output,
     operators: Operators,
     answers: Answers | None,
+    journal: Path | None,
     begin: Callable[[], Awaitable[RunId]],
 ) -> int:
     """Begin a run, see it to its end, and return the exit status.
@@ -76,7 +96,7 @@ async def drive_run(
     Raises:
         M2pemError: it cannot begin, or its executive can drive it no further.
     """
-    async with driving(executive, output, operators, one=True) as interruption:
+    async with driving(executive, output, operators, journal, one=True) as interruption:
         if interruption.asked.is_set():
             return STOPPED
         run = await begin()

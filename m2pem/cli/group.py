@@ -5,6 +5,7 @@ import logging
 from copy import copy
 from functools import cached_property
 from importlib import import_module
+from keyword import iskeyword
 from typing import TYPE_CHECKING
 
 import click
@@ -22,11 +23,25 @@ COMMANDS = {
     "runs": "List the runs of a journal.",
     "replay": "Print what happened in a run, and how it stands.",
     "resume": "Take up a run that was interrupted.",
+    "answer": "Answer a prompt of a run that is running on this host.",
+    "signal": "Send a signal to a run that is running on this host.",
+    "stop": "Stop a run that is running on this host.",
+    "pause": "Pause a run that is running on this host.",
+    "continue": "Let a run on this host go on after a pause.",
+    "attach": "Serve an operator of an executive that is running on this host.",
     "plugins": "List the plugins and what they provide.",
     "fleet": "Show a fleet: who is there and can do what.",
     "completion": "Print what makes a shell complete m2pem's words.",
 }
 """Built-in commands: module of `m2pem.cli` and first line of its help."""
+
+
+def built_in(name: str) -> click.Command:
+    """The built-in command of that name, from its module; one named like a keyword ends with _."""
+    python = f"{name}_" if iskeyword(name) else name
+    command = getattr(import_module(f"m2pem.cli.{python}"), python)
+    assert isinstance(command, click.Command)
+    return command
 
 
 class LazyGroup(click.Group):
@@ -42,9 +57,7 @@ class LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The command of that name; None if nobody has it."""
         if cmd_name in COMMANDS:
-            command = getattr(import_module(f"m2pem.cli.{cmd_name}"), cmd_name)
-            assert isinstance(command, click.Command)
-            return command
+            return built_in(cmd_name)
         return self._of_plugins.commands.get(cmd_name)
 
     def resolve_command(

@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import sys
-from collections.abc import Awaitable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 
 import click
 
@@ -21,23 +21,37 @@ TERMINAL = "terminal"
 def chosen(names: str | None, plugins: PluginManager) -> tuple[str, ...]:
     """The units that `--ocu` names, or the default: `terminal` where there is one, else `plain`.
 
+    Without a terminal, `plain` stands in for a unit that takes the whole terminal.
+
     Raises:
         UsageError: there is no such unit.
     """
+    on_terminal = sys.stdin.isatty() and sys.stdout.isatty()
     if names is None:
-        on_terminal = sys.stdin.isatty() and sys.stdout.isatty()
         return (TERMINAL if on_terminal and TERMINAL in plugins.ocus() else PLAIN,)
     wanted = tuple(dict.fromkeys(name.strip() for name in names.split(",") if name.strip()))
     if wanted == (NOBODY,):
         return ()
     if not wanted or NOBODY in wanted:
         raise click.UsageError(f"--ocu {names!r}: name units, or `{NOBODY}` alone")
+    found: dict[str, None] = {}
     for name in wanted:
         try:
-            plugins.ocu(name)
+            factory = plugins.ocu(name)
         except PluginError as error:
             raise click.UsageError(str(error)) from error
-    return wanted
+        if takes_terminal(factory) and not on_terminal:
+            click.echo(f"m2pem: no terminal here for --ocu {name}; using {PLAIN}", err=True)
+            name = PLAIN  # noqa: PLW2901
+        found[name] = None
+    if sum(takes_terminal(plugins.ocu(name)) for name in found) > 1:
+        raise click.UsageError(f"--ocu {names!r}: only one of them can have the terminal")
+    return tuple(found)
+
+
+def takes_terminal(factory: object) -> bool:
+    """Whether a unit draws on the whole terminal (`m2pem.api.ocu.Ocu`)."""
+    return bool(getattr(factory, "takes_terminal", False))
 
 
 class Operators:
@@ -48,11 +62,22 @@ class Operators:
         self._factories = {name: plugins.ocu(name) for name in names}
         self._tasks: list[asyncio.Task[None]] = []
 
-    def begin(self, control: MissionControl) -> None:
-        """Let them serve."""
+    @property
+    def take_terminal(self) -> bool:
+        """Whether one of them draws on the whole terminal."""
+        return any(map(takes_terminal, self._factories.values()))
+
+    def begin(self, control: MissionControl, freed: Callable[[], None]) -> None:
+        """Let them serve. `freed` is called when one has given the terminal back."""
         for name, factory in self._factories.items():
-            unit = factory(control)
-            self._tasks.append(asyncio.create_task(self._serve(name, unit.serve()), name=name))
+            task = asyncio.create_task(self._serve(name, factory(control).serve()), name=name)
+            if takes_terminal(factory):
+                task.add_done_callback(lambda _: freed())
+            self._tasks.append(task)
+
+    async def left(self) -> None:
+        """Wait until all of them have left."""
+        await asyncio.gather(*self._tasks, return_exceptions=True)
 
     async def end(self) -> None:
         """Let them go."""

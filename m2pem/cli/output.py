@@ -10,6 +10,7 @@ from typing import TextIO
 from m2pem.api.control import Notice, RunId, StampedRecord
 from m2pem.cli.story import Story
 from m2pem.cli.writer import LineWriter, writer_for
+from m2pem.engine.records import RunEnded
 from m2pem.journal.codec import record_line
 from m2pem.model.elements import Mission
 
@@ -28,22 +29,41 @@ class Output:
         self.story: Story | None = None
         self._stream = stream
         self._as_json = as_json
+        self._covered = False
+        self._ends: list[str] = []
         self.writer: LineWriter = writer_for(stream)
 
     def tell_by(self, mission: Callable[[RunId], Mission | None], *, one: bool, asks: bool) -> None:
         """Say where the diagrams are, and the rest of `Story`; then records can be printed."""
         self.story = Story(mission, colour=wants_colour(self._stream), one=one, asks=asks)
 
+    def cover(self) -> None:
+        """An operator's screen covers the terminal: only how runs end is kept, for `uncover`."""
+        self._covered = self._stream.isatty()
+
+    def uncover(self) -> None:
+        """The terminal is free again."""
+        self._covered = False
+        for line in self._ends:
+            self.writer.put(line)
+        self._ends.clear()
+
     def show(self, stamped: StampedRecord) -> None:
         """Print a record."""
+        line = self._line(stamped)
+        if line is None:
+            return
+        if not self._covered:
+            self.writer.put(line)
+        elif isinstance(stamped.record, RunEnded):
+            self._ends.append(line)
+
+    def _line(self, stamped: StampedRecord) -> str | None:
         if self._as_json:
             t_us = round(stamped.t_s * US_PER_S)
-            self.writer.put(record_line(stamped.run, stamped.seq, t_us, stamped.record).decode())
-            return
+            return record_line(stamped.run, stamped.seq, t_us, stamped.record).decode()
         assert self.story is not None
-        line = self.story.tell(stamped)
-        if line is not None:
-            self.writer.put(line)
+        return self.story.tell(stamped)
 
     async def follow(self, notices: AsyncIterator[Notice]) -> None:
         """Print every record that is told, until there will be no more."""

@@ -5,11 +5,18 @@ import sys
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 
-from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId, StampedRecord
+from m2pem.api.control import (
+    MissionControl,
+    OpenPrompt,
+    PromptClosed,
+    RunId,
+    RunStatus,
+    StampedRecord,
+)
 from m2pem.cli.stdin import Lines
 from m2pem.cli.story import printable
 from m2pem.cli.writer import writer_for
-from m2pem.engine.records import RunClaimed, RunEnded, RunPaused, RunResumed, RunStarted
+from m2pem.engine.records import RunClaimed, RunEnded, RunStarted
 from m2pem.errors import M2pemError, OperatorError
 from m2pem.model.behavior import Decision
 
@@ -40,8 +47,8 @@ class PlainOcu:
         self._out = writer_for(sys.stdout)
         self._notices = control.subscribe(size=BACKLOG)
         self._prompts: dict[tuple[RunId, str], OpenPrompt] = {}
-        self._active: dict[RunId, bool] = {}
-        """Runs that have not ended, and whether they are paused."""
+        self._active: dict[RunId, None] = {}
+        """Runs that have not ended, in the order in which they were heard of."""
         self._lines: asyncio.Queue[str] = asyncio.Queue()
         self._listening = True
         self._end_noted = False
@@ -93,10 +100,8 @@ class PlainOcu:
 
     def _note(self, run: RunId, record: object) -> None:
         match record:
-            case RunStarted() | RunClaimed() | RunResumed():
-                self._active[run] = False
-            case RunPaused():
-                self._active[run] = True
+            case RunStarted() | RunClaimed():
+                self._active[run] = None
             case RunEnded():
                 self._active.pop(run, None)
 
@@ -104,7 +109,7 @@ class PlainOcu:
         key = (prompt.run, prompt.prompt)
         if key in self._prompts:
             return
-        self._active.setdefault(prompt.run, False)
+        self._active[prompt.run] = None
         self._prompts[key] = prompt
         self._say(f"[{self._name(key)}] {prompt.element}: {prompt.text}")
         for number, decision in enumerate(prompt.decisions, 1):
@@ -152,21 +157,12 @@ class PlainOcu:
             return
         try:
             command = self._commands.get(words[0])
-            if command is not None and not self._is_recovery_answer(words):
+            if command is not None:
                 await command(words[1:])
             else:
                 await self._answer(words)
         except M2pemError as error:
             self._say(str(error))
-
-    def _is_recovery_answer(self, words: list[str]) -> bool:
-        """`resume` of a run that is not paused answers whether its vehicle is to go on."""
-        asked = any(
-            decision.value == "resume"
-            for prompt in self._prompts.values()
-            for decision in prompt.decisions
-        )
-        return words == ["resume"] and asked and not any(self._active.values())
 
     async def _answer(self, words: list[str]) -> None:
         prompt, rest = self._addressed(words)
@@ -204,7 +200,20 @@ class PlainOcu:
         await self._control.pause(self._which(words), by=NAME)
 
     async def _resume(self, words: list[str]) -> None:
-        await self._control.resume(self._which(words), by=NAME)
+        """Let a paused run go on; while none is paused, it may answer what a restart has asked."""
+        asked = any(
+            decision.value == "resume"
+            for prompt in self._prompts.values()
+            for decision in prompt.decisions
+        )
+        if asked and not words and not await self._is_any_paused():
+            await self._answer(["resume"])
+        else:
+            await self._control.resume(self._which(words), by=NAME)
+
+    async def _is_any_paused(self) -> bool:
+        runs = await self._control.runs()
+        return any(run.status is RunStatus.PAUSED and run.run in self._active for run in runs)
 
     async def _signal(self, words: list[str]) -> None:
         if not words:

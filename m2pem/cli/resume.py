@@ -51,6 +51,7 @@ async def _resume(
     from m2pem.cli.output import output_of
     from m2pem.cli.setting import get_answers, make_executive
     from m2pem.cli.state_files import tidy_up
+    from m2pem.engine.state import RunStatus
     from m2pem.executive.clock import SystemClock
     from m2pem.journal import file_of
     from m2pem.model.bpmn import parse_mission
@@ -82,10 +83,15 @@ async def _resume(
 
             async def take_up() -> str:
                 await executive.resume(run_id)
+                state = executive.runner(run_id).run.state
                 if out.story is not None:
-                    out.story.know(executive.runner(run_id).run.state)
+                    out.story.know(state)
+                if state.status is RunStatus.PAUSED:
+                    click.echo(f"m2pem: {run_id} is paused: an operator lets it go on", err=True)
                 return run_id
 
-            status = await drive_run(executive, out, operators, answers, take_up)
+            status = await drive_run(
+                executive, out, operators, answers, file_of(url_of(journal_url)), take_up
+            )
         tidy_up(executive, file_of(url_of(journal_url)))
     return status

@@ -119,6 +119,7 @@ async def _run(
                 out,
                 operators,
                 answers,
+                file_of(url),
                 lambda: executive.begin(mission, process_id, data, ""),
             )
         tidy_up(executive, file_of(url))

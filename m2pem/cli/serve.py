@@ -82,7 +82,7 @@ async def _serve(
             simulated=simulated,
         )
         with output_of(output) as out:
-            async with driving(executive, out, operators, one=False) as interruption:
+            async with driving(executive, out, operators, file_of(url), one=False) as interruption:
                 who = ", ".join(operators.names) or "nobody"
                 click.echo(f"m2pem: serving {fleet.name}; operators: {who}", err=True)
                 for line in others:

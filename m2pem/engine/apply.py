@@ -5,7 +5,7 @@ the state and the record, so that a replay by a later release gives the same sta
 """
 
 from collections.abc import Callable
-from heapq import heapify, heappush
+from heapq import heapify, heappop, heappush
 from typing import Any
 
 from m2pem.engine import records as r
@@ -33,7 +33,7 @@ from m2pem.model.elements import (
 )
 
 STALE_TIMERS = 64
-"""Timers that are over stay in their heap until there are this many more than live ones."""
+"""Timers that are over stay inside their heap until there are this many more than live ones."""
 
 
 def apply(state: RunState, record: r.Record) -> None:
@@ -303,6 +303,8 @@ def _end_wait(state: RunState, wait: Wait) -> None:
     del wait.token.waits[wait.id]
     if wait.trigger is r.Trigger.TIMER:
         heap = state.dates if wait.calendar else state.timers
+        while heap and heap[0][1] not in state.waits:
+            heappop(heap)
         if len(heap) > 2 * len(state.waits) + STALE_TIMERS:
             heap[:] = [entry for entry in heap if entry[1] in state.waits]
             heapify(heap)

@@ -68,6 +68,10 @@ class Execution:
         self.records.append(record)
         apply(self.state, record)
 
+    def ignore(self, reason: str) -> None:
+        """Say why an input changes nothing."""
+        self.emit(r.InputIgnored(reason))
+
     def process_of(self, node: FlowNode) -> str:
         """Id of the process that contains a node."""
         return self.process_ids[node.index]

@@ -172,7 +172,7 @@ class RunState:
     catchers: dict[tuple[Trigger, str], dict[int, Wait]] = field(default_factory=dict)
     """Waits for a signal or message, by its id."""
     timers: list[tuple[int, int]] = field(default_factory=list)
-    """Heap of (due mission time, wait); waits that are over may still be in it."""
+    """Heap of (due mission time, wait); waits that are over may still be in it, but not first."""
     dates: list[tuple[int, int]] = field(default_factory=list)
     """Heap of (due time since the Unix epoch, wait); likewise."""
     mailbox: dict[str, list[dict[str, Value]]] = field(default_factory=dict)

@@ -5,7 +5,6 @@ event of the activity that it is on. When it is over it is gone; what catches ag
 """
 
 from collections.abc import Callable
-from heapq import heappop
 
 from m2pem.engine import records as r
 from m2pem.engine.data import reader
@@ -228,13 +227,11 @@ def _instance(x: Execution, start: StartEvent, data: dict[str, Value]) -> None:
 
 
 def next_timer(x: Execution) -> tuple[int, Wait] | None:
-    """The timer that is due first, with its mission time; stale entries are dropped on the way."""
+    """The timer that is due first, with its mission time."""
     state = x.state
     found: tuple[int, int] | None = None
     offset_us = state.started_us + state.paused_total_us
     for heap, shift_us in ((state.timers, 0), (state.dates, offset_us)):
-        while heap and heap[0][1] not in state.waits:
-            heappop(heap)
         if heap:
             candidate = (heap[0][0] - shift_us, heap[0][1])
             if found is None or candidate < found:

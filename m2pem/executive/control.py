@@ -25,6 +25,7 @@ from m2pem.findings import Finding
 from m2pem.journal.base import RunLine
 from m2pem.model.bpmn import parse_mission
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.model.elements import Mission
 from m2pem.model.events import Signal
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
@@ -122,11 +123,13 @@ class Control:
         self._executive.set_geometry(name, geometry, run, by)
 
     async def _ask(self, run: RunId, item: i.Input) -> None:
-        """Have an input decided; one that the engine ignored is the operator's to know."""
-        step = await self._executive.runner(run).tell(item)
-        for record in step.records:
-            if isinstance(record, r.InputIgnored):
-                raise OperatorError(f"{run}: {record.reason}")
+        """Have an input decided; one that the engine ignored is the operator's to know.
+
+        What came during a pause is decided with the resume, and may be ignored then: after it.
+        """
+        match (await self._executive.runner(run).tell(item)).records:
+            case [r.InputIgnored(reason), *_]:
+                raise OperatorError(f"{run}: {reason}")
 
     # --- watching -------------------------------------------------------------------------------
 
@@ -166,6 +169,24 @@ class Control:
             for runner in self._executive.runners.values()
             for prompt in runner.prompts.values()
         ]
+
+    async def mission(self, run: RunId) -> Mission:
+        """The mission of a run, of an older one from the journal."""
+        runner = self._executive.runners.get(run)
+        if runner is not None:
+            return runner.run.state.mission
+        for line in await self._executive.journal.runs():
+            if line.run == run:
+                header = line.header
+                return await asyncio.to_thread(parse_mission, header.mission, header.mission_name)
+        raise OperatorError(f"the journal has no run {run}")
+
+    async def mission_time_s(self, run: RunId) -> float:
+        """Seconds from the start of a run."""
+        state = self._executive.runner(run).run.state
+        if state.status is EngineStatus.ENDED:
+            raise OperatorError(f"{run} has ended")
+        return max(0, state.mission_time_us(self._executive.clock.now_us())) / 1_000_000
 
     async def wait(self, run: RunId) -> RunSummary:
         """Wait until the run has ended and its vehicles are released."""

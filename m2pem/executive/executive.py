@@ -24,7 +24,7 @@ from m2pem.engine.inputs import BehaviorReported, GeometrySet, ResourceFault, St
 from m2pem.engine.records import Record
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
-from m2pem.errors import JournalError, OperatorError, PluginError
+from m2pem.errors import JournalError, NotDrivenError, OperatorError, PluginError
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.control import Control
 from m2pem.executive.dispatch import Dispatcher
@@ -379,12 +379,12 @@ class Executive:
         """The runner of a run that is driven here.
 
         Raises:
-            OperatorError: it is not.
+            NotDrivenError: it is not.
         """
         runner = self.runners.get(run)
         if runner is None:
             known = ", ".join(self.runners) or "none"
-            raise OperatorError(f"{run} is not driven by this executive; it drives: {known}")
+            raise NotDrivenError(f"{run} is not driven by this executive; it drives: {known}")
         return runner
 
     def _geometry(self, run: str, name: str) -> Geometry | None:

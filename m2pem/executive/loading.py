@@ -1,6 +1,6 @@
 """Getting a mission: from a path, a URL or bytes; and checking it against the fleet."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.error import URLError
@@ -10,8 +10,9 @@ from urllib.request import urlopen
 from m2pem.errors import MissionError
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.findings import Finding, Severity, has_errors
-from m2pem.model.elements import Mission
+from m2pem.model.elements import Mission, ServiceTask
 from m2pem.model.lint import lint
+from m2pem.model.near import did_you_mean
 from m2pem.resources.check import check_mission
 
 if TYPE_CHECKING:
@@ -91,8 +92,29 @@ def findings_for(
     fleet = arbiters.fleet if arbiters is not None else None
     if arbiters is not None:
         findings += check_mission(mission, arbiters.fleet, arbiters.offered, simulated=simulated)
+    findings += _unprovided(mission, writes)
     findings += plugins.check_mission(mission, fleet)
     return sorted(findings, key=lambda finding: (finding.line, finding.element, finding.rule))
+
+
+def _unprovided(mission: Mission, services: Collection[str]) -> list[Finding]:
+    """Service tasks whose class nobody registered.
+
+    Warnings: an answers file can stand in for a service, and the plugin may be installed elsewhere.
+    """
+    return [
+        Finding(
+            Severity.WARNING,
+            mission.file,
+            task.call.line,
+            task.id,
+            "unknown-service",
+            f"no plugin provides the service {task.call.service!r}; in a run it fails",
+            did_you_mean(task.call.service, services, "install the plugin that does"),
+        )
+        for task in mission.activities()
+        if isinstance(task, ServiceTask) and task.call and task.call.service not in services
+    ]
 
 
 def refuse_errors(what: str, findings: Sequence[Finding]) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping
 
-from m2pem.engine.decide import RECOVERY_DECISIONS
+from m2pem.engine.reports import RECOVERY_DECISIONS
 from m2pem.findings import Finding
 from m2pem.model.elements import (
     Activity,

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.authoring.author import Author, free_port
-from tests.test_docs import Command, first_unprinted, read_block
+from tests.console import Command, first_unprinted, read_block
 
 PAGE = Path(__file__).parents[2] / "docs" / "writing-a-plugin.md"
 TEXT = PAGE.read_text(encoding="utf-8")

@@ -1,11 +1,10 @@
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-from m2pem.cli.group import COMMANDS, cli
+from m2pem.cli.group import COMMANDS, built_in, cli
 from tests.cli.conftest import Invoke
 from tests.command_line import REPOSITORY, CommandLine, install_plugin
 
@@ -38,7 +37,7 @@ def test_help_imports_nothing_slow(words: list[str], may: list[str]) -> None:
 
 def test_the_list_of_commands_says_what_each_says_of_itself() -> None:
     for name, said in COMMANDS.items():
-        command = getattr(import_module(f"m2pem.cli.{name}"), name)
+        command = built_in(name)
         assert command.help.splitlines()[0] == said
 
 

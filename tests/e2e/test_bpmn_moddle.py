@@ -18,14 +18,21 @@ from lxml import etree
 REPOSITORY = Path(__file__).parents[2]
 JS = REPOSITORY / "tests" / "js"
 SCHEMA = JS / "node_modules" / "bpmn-moddle" / "resources" / "bpmn" / "xsd" / "BPMN20.xsd"
-MISSIONS = sorted((REPOSITORY / "missions").glob("*.bpmn"))
+MISSIONS = sorted(
+    [
+        *(REPOSITORY / "missions").glob("*.bpmn"),
+        *(REPOSITORY / "examples").glob("*/*.bpmn"),
+    ]
+)
 
 BPMN = "{http://www.omg.org/spec/BPMN/20100524/MODEL}"
 BPMNDI = "{http://www.omg.org/spec/BPMN/20100524/DI}"
 DC = "{http://www.omg.org/spec/DD/20100524/DC}"
 DI = "{http://www.omg.org/spec/DD/20100524/DI}"
 
-every_mission = pytest.mark.parametrize("mission", MISSIONS, ids=lambda path: path.stem)
+every_mission = pytest.mark.parametrize(
+    "mission", MISSIONS, ids=lambda path: f"{path.parent.name}-{path.stem}"
+)
 
 
 def read_with_moddle(files: Iterable[Path]) -> Mapping[str, Mapping[str, object]]:

@@ -157,3 +157,63 @@ def test_ctrl_c_at_a_terminal_stops_the_mission(m2pem: CommandLine) -> None:
     terminal.expect(pexpect.EOF)
     terminal.close()
     assert terminal.exitstatus == 130
+
+
+def test_in_the_background_of_a_shell_it_goes_on_and_listens_when_it_is_back(
+    m2pem: CommandLine,
+) -> None:
+    shell = pexpect.spawn(
+        "bash", ["--norc", "-i"], cwd=str(m2pem.folder),
+        env={**m2pem.environment, "PS1": "$ "}, encoding="utf-8", timeout=60,
+    )  # fmt: skip
+    shell.sendline(f"{sys.executable} -m m2pem run {MISSION} --fleet sim --ocu plain &")
+    shell.expect(re.escape("[p1]"))
+    shell.sendline("jobs")
+    shell.expect("Running")
+    shell.sendline("fg")
+    shell.sendline("abort")
+    shell.expect("r1 terminated")
+    shell.expect(re.escape("$ "))
+    shell.sendline("exit")
+    shell.expect(pexpect.EOF)
+    shell.close()
+
+
+def test_a_run_killed_during_a_pause_is_paused_when_it_is_resumed(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    fleet, state = fleet_with_state(tmp_path)
+    program = driving(m2pem, fleet)
+    program.type("pause")
+    program.until_record("RunPaused")
+    program.kill()
+    resumed = m2pem.start("resume", "r1")
+    resumed.until_text("r1 taken up again")
+    resumed.type("resume")
+    resumed.until_text("r1 goes on by plain")
+    resumed.type("stop")
+    status, errors = resumed.rest()
+    assert status == 130
+    assert "r1 is paused" in errors
+    once = ["start", "hold", "resume", "cancel", "end"]
+    assert effects(state) == Counter((kind, "evsg1") for kind in once)
+
+
+def test_a_vehicle_that_was_lost_in_a_crash_is_held_and_asked_about(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    fleet, state = fleet_with_state(tmp_path)
+    program = driving(m2pem, fleet)
+    program.kill()
+    for file in tmp_path.glob(f"{state.name}*"):
+        file.unlink()
+    resumed = m2pem.start("resume", "r1")
+    resumed.until_text("evsg1: single_vehicle_routing: held")
+    resumed.until_text("[p2] DriveRoute")
+    resumed.type("resume")
+    resumed.until_text("evsg1: single_vehicle_routing: started again by plain")
+    resumed.type("stop")
+    resumed.until_text("r1 stopped: stopped by plain")
+    assert resumed.rest()[0] == 130
+    kinds = [each.kind.value for each in recorded_effects(state) if each.resource == "evsg1"]
+    assert kinds.count("start") == 1

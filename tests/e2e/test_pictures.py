@@ -10,15 +10,23 @@ from lxml import etree
 REPOSITORY = Path(__file__).parents[2]
 IMAGES = REPOSITORY / "docs" / "images"
 MISSIONS = sorted((REPOSITORY / "missions").glob("*.bpmn"))
+EXAMPLES = sorted((REPOSITORY / "examples").glob("*/*.bpmn"))
 
 SVG = "{http://www.w3.org/2000/svg}"
 BPMNDI = "{http://www.omg.org/spec/BPMN/20100524/DI}"
 
-every_mission = pytest.mark.parametrize("mission", MISSIONS, ids=lambda path: path.stem)
+every_mission = pytest.mark.parametrize(
+    "mission", [*MISSIONS, *EXAMPLES], ids=lambda path: f"{path.parent.name}-{path.stem}"
+)
+
+
+def image(mission: Path) -> Path:
+    """An example's is beside it."""
+    return mission.with_suffix(".svg") if mission in EXAMPLES else IMAGES / f"{mission.stem}.svg"
 
 
 def picture(mission: Path) -> etree._Element:
-    path = IMAGES / f"{mission.stem}.svg"
+    path = image(mission)
     assert path.exists(), f"{mission.name} has no picture: run `make pictures`"
     return etree.parse(path).getroot()
 
@@ -44,17 +52,21 @@ def test_the_picture_shows_everything_that_the_mission_draws(mission: Path) -> N
 
 @every_mission
 def test_the_picture_is_shown_in_the_docs(mission: Path) -> None:
-    page = (REPOSITORY / "docs" / "field-tests.md").read_text(encoding="utf-8")
-    assert f"](images/{mission.stem}.svg)" in page
+    in_docs = REPOSITORY / "docs" / "field-tests.md"
+    page = mission.with_name("README.md") if mission in EXAMPLES else in_docs
+    shown = image(mission).relative_to(page.parent)
+    assert f"]({shown})" in page.read_text(encoding="utf-8")
 
 
 def test_no_picture_is_left_of_a_mission_that_is_gone() -> None:
     stems = {mission.stem for mission in MISSIONS}
     drawn = [path for path in IMAGES.glob("*.svg") if "Drawn from" in path.read_text("utf-8")]
     assert [path.name for path in drawn if path.stem not in stems] == []
+    beside = (REPOSITORY / "examples").glob("*/*.svg")
+    assert [path for path in beside if path.with_suffix(".bpmn") not in EXAMPLES] == []
 
 
 def test_pictures_do_not_reach_out_to_the_network() -> None:
     reaching = re.compile(r'(?:href|src)="(?!#)|url\((?!["\']?(?:&quot;)?#)')
-    images = sorted(IMAGES.glob("*.svg"))
+    images = sorted([*IMAGES.glob("*.svg"), *map(image, EXAMPLES)])
     assert [path.name for path in images if reaching.search(path.read_text("utf-8"))] == []

@@ -16,7 +16,8 @@ def check_state(state: RunState) -> None:
         assert not state.services
         assert not state.yielded
         assert all(b.phase is BehaviorPhase.CANCELLING for b in state.behaviors.values())
-        assert not [entry for entry in (*state.timers, *state.dates) if entry[1] in state.waits]
+        assert not state.timers
+        assert not state.dates
 
 
 def _check_tokens(state: RunState) -> None:
@@ -44,6 +45,8 @@ def _check_waits(state: RunState) -> None:
         wait.id: wait for token in state.tokens.values() for wait in (token.waits or {}).values()
     }
     assert of_tokens == state.waits
+    for heap in (state.timers, state.dates):
+        assert not heap or heap[0][1] in state.waits
     caught = {wait.id: wait for each in state.catchers.values() for wait in each.values()}
     timed = {number for _, number in (*state.timers, *state.dates)}
     for wait in state.waits.values():

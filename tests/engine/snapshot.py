@@ -11,13 +11,7 @@ _OBJECTS = (Scope, Token, Wait, Behavior, Prompt, Service)
 
 def snapshot(state: RunState) -> dict[str, Any]:
     """Every field of the state and of all that it holds, in order; references are ids."""
-    whole = {
-        each.name: _plain(getattr(state, each.name))
-        for each in fields(state)
-        if each.name not in ("timers", "dates")
-    }
-    for name in ("timers", "dates"):  # stale entries may be in the heaps, or not
-        whole[name] = sorted(entry for entry in getattr(state, name) if entry[1] in state.waits)
+    whole = {each.name: _plain(getattr(state, each.name)) for each in fields(state)}
     held: list[object] = [state.root] if state.root is not None else []
     for kept in (state.scopes, state.tokens, state.waits, state.behaviors):
         held.extend(kept.values())

@@ -1,6 +1,9 @@
 """Subprocesses and call activities: their data, their depth, their ends."""
 
+import pytest
+
 from m2pem.engine import records as r
+from m2pem.model.bpmn import MAX_DEPTH
 from tests.engine.kit import Play
 from tests.engine.trace import table
 
@@ -154,8 +157,9 @@ def nested(depth: int) -> str:
     return text
 
 
-def test_subprocesses_nest_500_deep() -> None:
-    play = Play(nested(500)).start()
+@pytest.mark.parametrize("depth", [500, MAX_DEPTH])
+def test_subprocesses_nest_as_deep_as_they_can_be_read(depth: int) -> None:
+    play = Play(nested(depth)).start()
     assert play.at == "deep"
     assert play.answer().ended == "completed"
 

@@ -97,8 +97,14 @@ def test_an_error_that_nobody_catches_fails_the_run_and_cancels_every_behavior()
         start -> sub
     """).start()
     play.orders()
+    play.trace()
     play.answer()
     assert play.ended == "failed"
+    assert play.trace("leave", "close") == table("""
+        leave u; leave bad
+        leave b failed; leave c failed; close sub failed
+        leave a failed; leave sub failed; close MAIN failed
+    """)
     assert play.detail == "error E from bad was caught by no boundary: thrown by Oh no"
     assert sorted(play.orders()) == ["cancel b1", "cancel b2", "cancel s1", "close p1 done"]
     play.report("b1", CANCELLED).report("b2", CANCELLED)

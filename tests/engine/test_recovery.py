@@ -66,7 +66,10 @@ def test_what_is_outstanding_is_read_off_the_state() -> None:
 
 
 def test_policy_restart_requests_the_behavior_again_under_its_id() -> None:
-    play = claimed().give(missing(ResumePolicy.RESTART))
+    play = Play(DRIVE).start().report("drive", RUNNING, number=3).give(ClaimRun(2))
+    play.trace()
+    play.orders()
+    play.give(missing(ResumePolicy.RESTART))
     assert play.trace() == ["restart b1"]
     assert play.orders() == ["start b1 drive_stop evsg1"]
     behavior = play.behavior("b1")

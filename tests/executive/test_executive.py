@@ -78,6 +78,25 @@ def test_pause_holds_and_resume_resumes_each_commanded_resource_once(play):
     assert play(story, "ugv1") == [("start", "r1.b1"), ("hold", "ugv1"), ("resume", "ugv1")]
 
 
+def test_a_resume_is_done_though_something_that_came_during_the_pause_is_ignored(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await control.start(DRIVE)
+        await world.fake.until_called("start")
+        await control.pause(run)
+        await control.message("nobody-receives-it", run=run)
+        await control.resume(run)
+        world.fake.report(f"{run}.b1", BehaviorState.SUCCEEDED)
+        await control.wait(run)
+        return world.names()
+
+    names = play(story, "ugv1")
+    assert [n for n in names if n in ("RunResumed", "InputIgnored")] == [
+        "RunResumed",
+        "InputIgnored",
+    ]
+
+
 def test_nothing_is_started_while_paused(play):
     two = mission(
         sequence(

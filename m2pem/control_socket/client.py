@@ -1,0 +1,83 @@
+"""One question to a running executive, for commands that ask and end."""
+
+import socket
+from pathlib import Path
+from typing import Any
+
+from m2pem.control_socket.place import ControlSocketError, address, live_sockets
+from m2pem.control_socket.protocol import Request, line, result_of
+from m2pem.errors import NotDrivenError, OperatorError
+
+TIMEOUT_S = 10.0
+
+
+def ask(path: Path, method: str, **params: Any) -> Any:
+    """Call a method of the executive that listens at `path`.
+
+    Raises:
+        OperatorError: it refused.
+        ControlSocketError: it is gone, or does not answer.
+    """
+    with socket.socket(socket.AF_UNIX) as caller:
+        caller.settimeout(TIMEOUT_S)
+        try:
+            with address(path) as there:
+                caller.connect(there)
+            caller.sendall(line(Request("2.0", method, params, id=1)))
+            with caller.makefile("rb") as answers:
+                return result_of(answers.readline())
+        except OSError as error:
+            raise ControlSocketError(f"the executive at {path} does not answer: {error}") from error
+
+
+def ask_driver(journal: Path, run: str, method: str, **params: Any) -> Any:
+    """Call a method of the executive that drives `run`, among those on the journal.
+
+    Raises:
+        OperatorError: it refused, or none drives the run.
+        ControlSocketError: it is gone, or does not answer.
+    """
+    elsewhere: list[str] = []
+    for path in live_sockets(journal):
+        try:
+            return ask(path, method, run=run, **params)
+        except NotDrivenError as error:
+            elsewhere.append(str(error))
+    if elsewhere:
+        raise OperatorError("; ".join(elsewhere))
+    raise _nobody(journal)
+
+
+def find_executive(journal: Path, run: str | None) -> Path:
+    """The socket of the executive that drives `run`; of the only one on the journal if None.
+
+    Raises:
+        OperatorError: there is none, or (without a run) more than one.
+    """
+    paths = list(live_sockets(journal))
+    if not paths:
+        raise _nobody(journal)
+    if run is None:
+        if len(paths) > 1:
+            raise OperatorError(
+                f"{len(paths)} executives write to {journal}: name a run of the one you mean"
+            )
+        return paths[0]
+    elsewhere: list[str] = []
+    for path in paths:
+        try:
+            ask(path, "mission_time_s", run=run)
+        except NotDrivenError as error:
+            elsewhere.append(str(error))
+        except OperatorError:
+            return path  # it drove the run to its end
+        else:
+            return path
+    raise OperatorError("; ".join(elsewhere))
+
+
+def _nobody(journal: Path) -> OperatorError:
+    return OperatorError(
+        f"no executive with the journal {journal} is running here; "
+        "name the journal of the one you mean with --journal"
+    )

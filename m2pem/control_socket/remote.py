@@ -1,0 +1,219 @@
+"""MissionControl of an executive in another process: what `m2pem attach` gives to an OCU."""
+
+import asyncio
+import itertools
+from base64 import b64decode
+from collections.abc import AsyncIterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+import msgspec
+
+from m2pem.api.control import (
+    Notice,
+    OpenPrompt,
+    PromptClosed,
+    RunId,
+    RunSummary,
+    SimulationResult,
+    StampedRecord,
+)
+from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.control_socket.place import ControlSocketError, address
+from m2pem.control_socket.protocol import LONGEST_LINE_BYTES, Request, line, result_of
+from m2pem.errors import OperatorError
+from m2pem.findings import Finding
+from m2pem.model.bpmn import parse_mission
+from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.model.elements import Mission
+from m2pem.model.values import Value
+from m2pem.resources.fleet import Fleet
+from m2pem.resources.snapshot import restore
+
+_KINDS: dict[str, type] = {
+    kind.__name__: kind
+    for kind in (StampedRecord, OpenPrompt, PromptClosed, VehicleState, PayloadState)
+}
+
+
+class RemoteControl:
+    """Implements `m2pem.api.control.MissionControl`; enter it before use.
+
+    Missions cannot be started, checked or rehearsed through it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._numbers = itertools.count(1)
+        self._missions: dict[RunId, Mission] = {}
+        self._prompts: dict[tuple[RunId, str], OpenPrompt] = {}
+        self._turn = asyncio.Lock()
+
+    async def __aenter__(self) -> Self:
+        self._reader, self._writer = await self._connect()
+        self._fleet = restore(b64decode(await self._ask("fleet")))
+        catalogue = await self._ask("catalogue")
+        self._catalogue = msgspec.convert(catalogue, dict[ResourceId, tuple[BehaviorSpec, ...]])
+        self._listening = asyncio.create_task(self._follow_prompts())
+        return self
+
+    async def __aexit__(self, *reason: object) -> None:
+        self._listening.cancel()
+        await asyncio.gather(self._listening, return_exceptions=True)
+        self._writer.close()
+
+    async def _connect(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+        try:
+            with address(self._path) as there:
+                return await asyncio.open_unix_connection(there, limit=LONGEST_LINE_BYTES)
+        except OSError as error:
+            raise ControlSocketError(f"the executive at {self._path} is gone: {error}") from error
+
+    async def _ask(self, method: str, **params: Any) -> Any:
+        """Calls take turns on one connection; one that was cancelled leaves its answer unread."""
+        number = next(self._numbers)
+        async with self._turn:
+            try:
+                self._writer.write(line(Request("2.0", method, params, number)))
+                await self._writer.drain()
+                while answer := await self._reader.readline():
+                    if msgspec.json.decode(answer).get("id") == number:
+                        break
+            except OSError as error:
+                raise ControlSocketError(f"the executive is gone: {error}") from error
+        return result_of(answer)
+
+    async def _stream(self, method: str, **params: Any) -> AsyncIterator[Any]:
+        reader, writer = await self._connect()
+        try:
+            writer.write(line(Request("2.0", method, params, next(self._numbers))))
+            await writer.drain()
+            result_of(await reader.readline())
+            while message := await reader.readline():
+                told = msgspec.json.decode(message, type=Request).params
+                yield msgspec.convert(told["value"], _KINDS[told["kind"]])
+        finally:
+            writer.close()
+
+    async def _follow_prompts(self) -> None:
+        async for notice in self.subscribe():
+            if isinstance(notice, OpenPrompt):
+                self._prompts[notice.run, notice.prompt] = notice
+            elif isinstance(notice, PromptClosed):
+                self._prompts.pop((notice.run, notice.prompt), None)
+
+    # --- runs -----------------------------------------------------------------------------------
+
+    async def start(
+        self,
+        mission: Path | str | bytes,
+        *,
+        process: str | None = None,
+        data: Mapping[str, Value] | None = None,
+        by: str = "",
+    ) -> RunId:
+        """Refused."""
+        raise OperatorError("missions are started where the executive runs: m2pem run")
+
+    async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
+        """End every token, cancel every behavior."""
+        await self._ask("stop", run=run, by=by, reason=reason)
+
+    async def pause(self, run: RunId, *, by: str = "") -> None:
+        """Hold every commanded resource and freeze timers."""
+        await self._ask("pause", run=run, by=by)
+
+    async def resume(self, run: RunId, *, by: str = "") -> None:
+        """Go on after a pause."""
+        await self._ask("resume", run=run, by=by)
+
+    async def signal(
+        self,
+        signal: str,
+        *,
+        run: RunId | None = None,
+        data: Mapping[str, Value] | None = None,
+        by: str = "",
+    ) -> None:
+        """Emit a signal to one run or to all."""
+        await self._ask("signal", id=signal, run=run, data=data or {}, by=by)
+
+    async def message(
+        self, message: str, *, run: RunId, data: Mapping[str, Value] | None = None, by: str = ""
+    ) -> None:
+        """Send a message."""
+        await self._ask("message", id=message, run=run, data=data or {}, by=by)
+
+    async def answer(self, run: RunId, prompt: str, decision: str, *, by: str = "") -> None:
+        """Answer a prompt; the first answer wins."""
+        await self._ask("answer", run=run, prompt=prompt, decision=decision, by=by)
+
+    async def set_geometry(
+        self, name: str, geometry: Mapping[str, Value], *, run: RunId | None = None, by: str = ""
+    ) -> None:
+        """Hand over a route, area or point (GeoJSON)."""
+        await self._ask("set_geometry", name=name, geometry=geometry, run=run, by=by)
+
+    # --- watching -------------------------------------------------------------------------------
+
+    def subscribe(self, run: RunId | None = None, size: int = 10_000) -> AsyncIterator[Notice]:
+        """What is committed from now on, and first the prompts that stand now."""
+        return self._stream("subscribe", run=run, size=size)
+
+    def telemetry(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
+        """Telemetry from now on."""
+        return self._stream("telemetry", size=size)
+
+    async def records(
+        self, run: RunId, after_seq: int = 0, limit: int = 1000
+    ) -> Sequence[StampedRecord]:
+        """A page of a run's records."""
+        page = await self._ask("records", run=run, after_seq=after_seq, limit=limit)
+        return msgspec.convert(page, list[StampedRecord])
+
+    async def runs(self) -> Sequence[RunSummary]:
+        """Every run of the journal."""
+        return msgspec.convert(await self._ask("runs"), list[RunSummary])
+
+    def prompts(self) -> Sequence[OpenPrompt]:
+        """The prompts that stand now."""
+        return list(self._prompts.values())
+
+    async def mission(self, run: RunId) -> Mission:
+        """The mission of a run."""
+        if run not in self._missions:
+            told = await self._ask("mission", run=run)
+            source = b64decode(told["source"])
+            self._missions[run] = await asyncio.to_thread(parse_mission, source, told["file"])
+        return self._missions[run]
+
+    async def mission_time_s(self, run: RunId) -> float:
+        """Seconds from the start of a run."""
+        return float(await self._ask("mission_time_s", run=run))
+
+    async def wait(self, run: RunId) -> RunSummary:
+        """Wait until the run has ended and its vehicles are released."""
+        reader, writer = await self._connect()
+        try:
+            writer.write(line(Request("2.0", "wait", {"run": run}, next(self._numbers))))
+            return msgspec.convert(result_of(await reader.readline()), RunSummary)
+        finally:
+            writer.close()
+
+    # --- what there is --------------------------------------------------------------------------
+
+    def fleet(self) -> Fleet:
+        """The fleet in use."""
+        return self._fleet
+
+    def catalogue(self) -> Mapping[ResourceId, Sequence[BehaviorSpec]]:
+        """What every resource can do."""
+        return self._catalogue
+
+    def check(self, mission: Path | str | bytes) -> Sequence[Finding]:
+        """Refused."""
+        raise OperatorError("missions are checked where the executive runs: m2pem check")
+
+    async def simulate(self, mission: Path | str | bytes, **options: Any) -> SimulationResult:
+        """Refused."""
+        raise OperatorError("missions are rehearsed where the executive runs: m2pem simulate")

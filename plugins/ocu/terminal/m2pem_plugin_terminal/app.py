@@ -1,0 +1,222 @@
+"""What the keys of the operator control unit do."""
+
+import time
+from collections.abc import Awaitable, Callable
+from typing import Any, ClassVar
+
+from textual.binding import Binding, BindingType
+from textual.containers import VerticalScroll
+
+from m2pem.api.control import MissionControl, RunId, RunStatus
+from m2pem.api.operator import operator_name
+from m2pem.errors import M2pemError
+from m2pem_plugin_terminal.board import Board
+from m2pem_plugin_terminal.dialogs import Choice, Choose, Read, help_text
+from m2pem_plugin_terminal.display import Display
+
+
+class TerminalApp(Display):
+    """The display with its keys. `by`: the name that is journaled."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        # Before any dialog or text field gets to see them:
+        Binding("ctrl+x", "stop", priority=True),
+        Binding("ctrl+c", "interrupt", priority=True),
+        Binding("escape", "disarm", priority=True),
+        *(Binding(str(number), f"answer({number})") for number in range(1, 10)),
+        Binding("tab", "next_question", priority=True),
+        Binding("p", "pause"),
+        Binding("s", "signals"),
+        Binding("r", "runs"),
+        Binding("slash", "filter"),
+        Binding("question_mark", "help"),
+        Binding("q", "leave"),
+        Binding("up", "scroll('#mission', -1)"),
+        Binding("down", "scroll('#mission', 1)"),
+        Binding("pageup", "scroll_log(-4)"),
+        Binding("pagedown", "scroll_log(4)"),
+        Binding("shift+up", "scroll('#question-text', -1)"),
+        Binding("shift+down", "scroll('#question-text', 1)"),
+    ]
+
+    def __init__(
+        self,
+        control: MissionControl,
+        *,
+        now: Callable[[], float] = time.monotonic,
+        by: str | None = None,
+    ) -> None:
+        super().__init__(control, now=now)
+        self.by = operator_name() if by is None else by
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Escape and Tab are left to dialogs and fields unless they are needed here."""
+        if action == "disarm":
+            return self.trigger.armed or (not self._in_dialog and self.log_pane.filtering)
+        if action == "next_question":
+            return not self._in_dialog
+        return True
+
+    @property
+    def _in_dialog(self) -> bool:
+        return len(self.screen_stack) > 1
+
+    def _carry_out(self, what: str, call: Awaitable[Any]) -> None:
+        """Ask the executive without waiting; what it refuses is told."""
+
+        async def asked() -> None:
+            try:
+                await call
+            except M2pemError as error:
+                self.say(f"{what}: {error}", alarm=True)
+
+        self.run_worker(asked(), exit_on_error=False)
+
+    def _active_board(self) -> Board | None:
+        board = self.board
+        if board is None or board.status.ended:
+            self.say("No mission is running here")
+            return None
+        return board
+
+    def action_stop(self) -> None:
+        """STOP, at the second press."""
+        board = self._active_board()
+        if board is not None and self.trigger.press(f"STOP {board.run}"):
+            self.say(f"Stopping {board.run} ...", alarm=True)
+            while self._in_dialog:
+                self.pop_screen()
+            reason = f"by {self.by}"
+            self._carry_out("Stop", self.control.stop(board.run, by=self.by, reason=reason))
+        self.show()
+
+    def action_interrupt(self) -> None:
+        """Ctrl-C: STOP; when nothing runs, leave."""
+        board = self.board
+        if board is not None and not board.status.ended:
+            self.action_stop()
+        elif self.trigger.press("Quit"):
+            self.exit()
+        self.show()
+
+    def action_disarm(self) -> None:
+        """Not STOP after all; or the whole log again."""
+        if self.trigger.armed:
+            self.trigger.disarm()
+        else:
+            self.log_pane.clear_filter()
+        self.show()
+
+    def action_answer(self, number: int) -> None:
+        """Answer the question that is shown."""
+        prompt, decision = self.questions.current, self.questions.decide(number)
+        if prompt is None or decision is None:
+            return
+        if not self.questions.settled:
+            self.say("Not taken: the question has only just appeared. Read it, then press again")
+            return
+        self.own_answers.add((prompt.run, prompt.prompt))
+
+        async def answer() -> None:
+            try:
+                await self.control.answer(prompt.run, prompt.prompt, decision, by=self.by)
+            except M2pemError:
+                self.own_answers.discard((prompt.run, prompt.prompt))
+                raise
+
+        self._carry_out("Not taken", answer())
+
+    def action_next_question(self) -> None:
+        """Tab."""
+        self.questions.turn()
+        self.show()
+
+    def action_pause(self) -> None:
+        """Pause, or go on."""
+        board = self._active_board()
+        if board is None:
+            return
+        if board.status is RunStatus.PAUSED:
+            self._carry_out("Go on", self.control.resume(board.run, by=self.by))
+        else:
+            self._carry_out("Pause", self.control.pause(board.run, by=self.by))
+
+    async def action_signals(self) -> None:
+        """Choose a signal by its name; those that are awaited come first."""
+        board = self._active_board()
+        if board is None:
+            return
+        signals = sorted(board.signals().items(), key=lambda item: not item[1][1])
+        if not signals:
+            self.say("This mission has no signals")
+            return
+        choices = [
+            Choice(signal, name, "awaited" if awaited else "")
+            for signal, (name, awaited) in signals
+        ]
+
+        def send(signal: str | None) -> None:
+            if signal is not None:
+                self._carry_out("Signal", self.control.signal(signal, run=board.run, by=self.by))
+
+        await self.push_screen(Choose("Send a signal", choices), send)
+        self.show()
+
+    async def action_runs(self) -> None:
+        """Choose the run to look at."""
+        try:
+            runs = await self.control.runs()
+        except M2pemError as error:
+            self.say(str(error), alarm=True)
+            return
+        choices = [Choice(each.run, f"{each.run}  {each.mission}", each.status) for each in runs]
+        choices.reverse()
+
+        def look(run: str | None) -> None:
+            if run is not None:
+                self.run_worker(self._load_and_look(run), exit_on_error=False)
+
+        await self.push_screen(Choose("Look at a run", choices), look)
+        self.show()
+
+    async def _load_and_look(self, run: RunId) -> None:
+        try:
+            await self.feed.load(run)
+        except M2pemError as error:
+            self.say(str(error), alarm=True)
+        else:
+            self.look_at(run)
+
+    def action_filter(self) -> None:
+        """Type what log lines must have in them."""
+        self.log_pane.ask_filter()
+
+    async def action_help(self) -> None:
+        """All keys."""
+        await self.push_screen(Read("Keys", help_text()))
+        self.show()
+
+    async def action_leave(self) -> None:
+        """Leave; what becomes of a mission that runs is asked."""
+        board = self.board
+        if board is None or board.status.ended:
+            self.exit()
+            return
+
+        def done(choice: str | None) -> None:
+            if choice == "leave":
+                self.exit()
+
+        choices = [Choice("leave", "Quit, and let the mission go on"), Choice("stay", "Stay")]
+        text = f"{board.run} is running. To stop it, press ^X twice."
+        await self.push_screen(Choose("Quit", choices, text), done)
+        self.show()
+
+    def action_scroll(self, what: str, lines: int) -> None:
+        """Move through what does not fit."""
+        found = self.screen_stack[0].query_one(what, VerticalScroll)
+        found.scroll_relative(y=lines, animate=False)
+
+    def action_scroll_log(self, lines: int) -> None:
+        """Move through the log."""
+        self.log_pane.move(lines)

@@ -1,0 +1,119 @@
+"""Dialogs: choose from a list, or read the keys. STOP stays in sight and works over them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rich.text import Text
+from textual import events
+from textual.app import ComposeResult
+from textual.binding import BindingType
+from textual.containers import Vertical
+from textual.screen import ModalScreen
+from textual.widgets import OptionList, Static
+from textual.widgets.option_list import Option
+
+from m2pem_plugin_terminal.stop import StopBar
+from m2pem_plugin_terminal.words import shortened
+
+WIDTH = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A line to choose: what it stands for, what it says, and a remark in grey."""
+
+    value: str
+    label: str
+    remark: str = ""
+
+
+class Choose(ModalScreen[str | None]):
+    """A list; Enter or a digit chooses, Escape does not. Gives the value, or None."""
+
+    AUTO_FOCUS = "OptionList"
+    BINDINGS: ClassVar[list[BindingType]] = [("escape", "dismiss(None)", "Close")]
+
+    def __init__(self, title: str, choices: Sequence[Choice], text: str = "") -> None:
+        super().__init__()
+        self._title = title
+        self._choices = tuple(choices)
+        self._text = text
+
+    def compose(self) -> ComposeResult:
+        """The list, with digits before the first nine."""
+        with Vertical(classes="dialog") as box:
+            box.border_title = self._title
+            box.border_subtitle = "Enter or a digit: choose   Esc: close"
+            if self._text:
+                yield Static(Text(self._text), classes="dialog-text")
+            yield OptionList(*[self._option(place) for place in range(len(self._choices))])
+        yield StopBar()
+
+    def _option(self, place: int) -> Option:
+        choice = self._choices[place]
+        digit = f"{place + 1} " if place < 9 else "  "
+        remark = f"  {choice.remark}" if choice.remark else ""
+        label = shortened(choice.label, WIDTH - 6 - len(remark))
+        return Option(Text.assemble((digit, "bold #e8c468"), label, (remark, "#9aa4af")))
+
+    def on_key(self, event: events.Key) -> None:
+        """A digit chooses at once."""
+        if event.key.isdigit() and 1 <= int(event.key) <= min(9, len(self._choices)):
+            event.stop()
+            self.dismiss(self._choices[int(event.key) - 1].value)
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Enter chooses what is marked."""
+        self.dismiss(self._choices[event.option_index].value)
+
+
+class Read(ModalScreen[None]):
+    """A text to be read; any of Escape, Enter and ? closes it."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [("escape,enter,question_mark", "dismiss", "Close")]
+
+    def __init__(self, title: str, text: Text) -> None:
+        super().__init__()
+        self._title = title
+        self._text = text
+
+    def compose(self) -> ComposeResult:
+        """The text."""
+        with Vertical(classes="dialog") as box:
+            box.border_title = self._title
+            box.border_subtitle = "Esc: close"
+            yield Static(self._text, classes="dialog-text")
+        yield StopBar()
+
+
+KEYS = (
+    ("1 ... 9", "answer the question"),
+    ("Tab", "the next question, when there are several"),
+    ("p", "pause: vehicles hold, timers stand; or go on"),
+    ("^X ^X", "STOP the mission and release its vehicles"),
+    ("^C ^C", "the same; when nothing runs, quit"),
+    ("s", "send a signal"),
+    ("r", "look at another run"),
+    ("/", "log: only lines with some text; Esc: all"),
+    ("Up Down", "move through the mission"),
+    ("PgUp PgDn", "move through the log"),
+    ("q", "quit"),
+)
+
+
+def help_text() -> Text:
+    """All keys."""
+    text = Text()
+    for key, what in KEYS:
+        text.append(f"{key:<11}", "bold #c8d0d9")
+        text.append(f"{what}\n", "#9aa4af")
+    text.append("\n●", "#7fc8a9")
+    text.append(" at work   ", "#9aa4af")
+    text.append("?", "bold #e8c468")
+    text.append(" asks   ", "#9aa4af")
+    text.append("○", "#8ab4d8")
+    text.append(" waits   ", "#9aa4af")
+    text.append("✓ - ✗", "#9aa4af")
+    text.append(" done, given up, failed", "#9aa4af")
+    return text

@@ -1,0 +1,81 @@
+"""The terminal as an operator control unit."""
+
+import asyncio
+import logging
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from m2pem.errors import OperatorError, PluginError
+
+if TYPE_CHECKING:
+    from m2pem.api.control import MissionControl
+    from m2pem_plugin_terminal.app import TerminalApp
+
+LINGERS_FOR_S = 2.0
+"""How long the end of a mission is shown when whoever serves this is done with it."""
+
+
+class TerminalOcu:
+    """Takes the whole terminal while it serves, and gives it back as it was."""
+
+    takes_terminal = True
+    """The command line prints nothing meanwhile."""
+
+    def __init__(self, control: "MissionControl") -> None:
+        self._control = control
+
+    async def serve(self) -> None:
+        """Show and ask until cancelled, or until the operator leaves.
+
+        Raises:
+            OperatorError: this is no terminal.
+            PluginError: the screen broke; Textual has printed how.
+        """
+        from m2pem_plugin_terminal.app import TerminalApp  # noqa: PLC0415  # half a second
+
+        if not (sys.__stdin__ and sys.__stdin__.isatty()):
+            raise OperatorError(
+                "the terminal unit needs a terminal to read keys from; "
+                "use --ocu plain, or m2pem answer"
+            )
+        app = TerminalApp(self._control)
+        loop = asyncio.get_running_loop()
+        task_factory = loop.get_task_factory()
+        serving = asyncio.create_task(app.run_async(mouse=False))
+        with _log_to(app):
+            # Textual makes tasks of the whole loop eager; the executive's are not its own.
+            loop.call_soon(lambda: loop.set_task_factory(task_factory))
+            try:
+                await asyncio.shield(serving)
+            except asyncio.CancelledError:
+                if app.board is not None and app.board.status.ended:
+                    await asyncio.wait([serving], timeout=LINGERS_FOR_S)
+                app.exit()
+                await serving
+                raise
+        if app.return_code:
+            raise PluginError("the terminal's screen broke")
+
+
+@contextmanager
+def _log_to(app: "TerminalApp") -> Iterator[None]:
+    """Warnings are shown on the screen, which they would spoil otherwise."""
+    logger = logging.getLogger("m2pem")
+    before = logger.handlers[:]
+    logger.handlers[:] = [_ToScreen(app)]
+    try:
+        yield
+    finally:
+        logger.handlers[:] = before
+
+
+class _ToScreen(logging.Handler):
+    def __init__(self, app: "TerminalApp") -> None:
+        super().__init__(logging.WARNING)
+        self._app = app
+
+    def emit(self, record: logging.LogRecord) -> None:
+        text = record.getMessage()
+        self._app.call_later(lambda: self._app.say(text, alarm=True))

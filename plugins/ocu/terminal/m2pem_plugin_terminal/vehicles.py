@@ -1,0 +1,117 @@
+"""The vehicles pane: the latest of every vehicle, greyed when nothing is heard of it any more."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rich.text import Text
+
+from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
+from m2pem_plugin_terminal.words import shortened
+
+if TYPE_CHECKING:
+    from m2pem.resources.fleet import Fleet
+
+SILENT_AFTER_S = 3.0
+"""Where the fleet does not say when a vehicle counts as lost."""
+
+GREY = "#5f6771"
+DETAIL = "#9aa4af"
+LINKS = {
+    LinkState.CONNECTED: ("●", "#7fc8a9"),
+    LinkState.DEGRADED: ("◐", "#e8c468"),
+    LinkState.LOST: ("✗", "#e07a6a"),
+}
+NAME_CELLS = 9
+LOW_BATTERY = 0.2
+
+
+@dataclass(slots=True)
+class _Heard:
+    state: VehicleState | PayloadState
+    at: float
+
+
+class Vehicles:
+    """Remembers the newest telemetry of each vehicle and payload of the fleet."""
+
+    def __init__(self, fleet: "Fleet") -> None:
+        self._fleet = fleet
+        self._heard: dict[str, _Heard] = {}
+
+    def hear(self, state: VehicleState | PayloadState, now: float) -> None:
+        """Take telemetry in; `now` is the operator's clock, in seconds."""
+        self._heard[state.resource] = _Heard(state, now)
+
+    def table(self, now: float, width: int, named: Callable[[str], str]) -> Text:
+        """All vehicles, each on two or three lines of `width` cells.
+
+        `named` gives the name of a behavior by its id.
+        """
+        lines: list[Text] = []
+        for vehicle in self._fleet.vehicles.values():
+            silent_s = vehicle.lost_after_s or SILENT_AFTER_S
+            heard = self._heard.get(vehicle.id)
+            if heard is None or not isinstance(heard.state, VehicleState):
+                lines.append(Text(f"○ {_name(vehicle.id)} not heard of yet", GREY))
+                continue
+            age_s = now - heard.at
+            payloads = [self._heard[p].state for p in vehicle.payloads if p in self._heard]
+            if age_s > silent_s or heard.state.link is LinkState.LOST:
+                lines += _silent(heard.state, age_s)
+            else:
+                lines += _vehicle(heard.state, payloads, width, named)
+        return Text("\n").join(lines)
+
+
+def _name(resource: str) -> str:
+    return shortened(resource, NAME_CELLS).ljust(NAME_CELLS)
+
+
+def _silent(state: VehicleState, age_s: float) -> list[Text]:
+    lines = [Text(f"✗ {_name(state.resource)} silent for {int(age_s)} s", GREY)]
+    if state.position is not None:
+        lines.append(Text(f"  last at {_position(state)}", GREY))
+    return lines
+
+
+def _vehicle(
+    state: VehicleState,
+    payloads: list[VehicleState | PayloadState],
+    width: int,
+    named: Callable[[str], str],
+) -> list[Text]:
+    symbol, colour = LINKS[state.link]
+    first = Text.assemble((symbol, colour), " ", (_name(state.resource), "bold #e3e8ee"))
+    if state.battery_fraction is not None:
+        low = state.battery_fraction < LOW_BATTERY
+        first.append(f" {state.battery_fraction:4.0%}", "bold #e07a6a" if low else DETAIL)
+    if state.velocity_enu_m_s is not None:
+        speed = math.dist(state.velocity_enu_m_s, (0.0, 0.0, 0.0))
+        first.append(f" {speed:4.1f} m/s", DETAIL)
+    room = width - first.cell_len - 1
+    if state.mode and room > 2:
+        first.append(f" {shortened(state.mode, room)}", DETAIL)
+    lines = [first]
+    if state.position is not None:
+        lines.append(Text(f"  {_position(state)}", DETAIL))
+    doing = [named(state.behavior)] if state.behavior else []
+    for payload in payloads:
+        if payload.behavior:
+            doing.append(f"{payload.resource.rpartition('/')[2]}: {named(payload.behavior)}")
+    if doing:
+        lines.append(Text(shortened(f"{', '.join(doing)}", width - 2), "#7fc8a9"))
+        lines[-1] = Text("  ").append_text(lines[-1])
+    elif state.not_ready_reasons:
+        text = shortened("; ".join(state.not_ready_reasons), width - 2)
+        lines.append(Text(f"  {text}", "#e8c468"))
+    return lines
+
+
+def _position(state: VehicleState) -> str:
+    position = state.position
+    assert position is not None
+    text = f"{position.latitude_deg:.5f} {position.longitude_deg:.5f}"
+    above = state.altitude_above_home_m
+    return f"{text} {above:+.0f} m" if above is not None and abs(above) >= 1 else text

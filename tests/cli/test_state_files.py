@@ -1,0 +1,93 @@
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from m2pem.cli.state_files import tidy_up, with_own_state, with_shared_state
+from m2pem.engine.state import RunStatus
+from m2pem.executive.executive import Executive
+from m2pem.resources.fleet import Fleet
+from m2pem.resources.fleet_file import load_fleet
+from tests.command_line import FLEET
+
+
+@pytest.fixture
+def fleet() -> Fleet:
+    """All of it simulated, but evsg2, which is real."""
+    read = load_fleet(FLEET)
+    vehicles = dict(read.vehicles)
+    evsg2 = next(each for each in vehicles.values() if each.id == "evsg2")
+    vehicles[evsg2.id] = replace(evsg2, arbiter="ros")
+    return replace(read, vehicles=vehicles)
+
+
+def states(fleet: Fleet) -> dict[str, Any]:
+    everything = [*fleet.vehicles.values(), *fleet.payloads.values()]
+    return {each.id: each.settings["state"] for each in everything if "state" in each.settings}
+
+
+def test_simulated_resources_share_one_file_beside_the_journal(
+    fleet: Fleet, tmp_path: Path
+) -> None:
+    kept = states(with_own_state(fleet, tmp_path / "journal.db", simulated=False))
+    assert set(kept) == {"evsg1", "evsg1/gpr", "evsg2/ptz", "evsg3", "lead"}
+    (path,) = set(kept.values())
+    assert path.startswith(f"{tmp_path}/journal.db-sim-")
+
+
+def test_all_are_simulated_if_that_is_asked(fleet: Fleet, tmp_path: Path) -> None:
+    kept = states(with_own_state(fleet, tmp_path / "journal.db", simulated=True))
+    assert len(kept) == len(fleet.vehicles) + len(fleet.payloads)
+
+
+def test_each_run_has_a_file_of_its_own(fleet: Fleet, tmp_path: Path) -> None:
+    journal = tmp_path / "journal.db"
+    assert with_own_state(fleet, journal, simulated=True) != with_own_state(
+        fleet, journal, simulated=True
+    )
+
+
+def test_a_service_has_the_same_file_again(fleet: Fleet, tmp_path: Path) -> None:
+    journal = tmp_path / "journal.db"
+    first = with_shared_state(fleet, journal, simulated=True)
+    assert first == with_shared_state(fleet, journal, simulated=True)
+    other = replace(fleet, name="other")
+    assert states(first) != states(with_shared_state(other, journal, simulated=True))
+
+
+def test_a_journal_in_memory_has_no_file(fleet: Fleet) -> None:
+    assert with_own_state(fleet, None, simulated=True) == fleet
+
+
+def test_what_the_fleet_says_itself_is_kept(fleet: Fleet, tmp_path: Path) -> None:
+    lead = next(each for each in fleet.vehicles.values() if each.id == "lead")
+    own = replace(lead, settings={**lead.settings, "state": "/srv/lead"})
+    fleet = replace(fleet, vehicles={**fleet.vehicles, own.id: own})
+    kept = with_own_state(fleet, tmp_path / "journal.db", simulated=True)
+    assert states(kept)["lead"] == "/srv/lead"
+
+
+@pytest.mark.parametrize(
+    ("status", "failure", "kept"),
+    [
+        (RunStatus.ENDED, None, False),
+        (RunStatus.RUNNING, None, True),
+        (RunStatus.ENDED, ValueError(), True),
+    ],
+)
+def test_the_file_goes_when_no_run_needs_it(
+    fleet: Fleet, tmp_path: Path, status: RunStatus, failure: Exception | None, kept: bool
+) -> None:
+    journal = tmp_path / "journal.db"
+    fleet = with_own_state(fleet, journal, simulated=True)
+    (state,) = set(states(fleet).values())
+    for name in (journal, Path(state), Path(f"{state}-wal")):
+        name.touch()
+    run = SimpleNamespace(state=SimpleNamespace(status=status))
+    runners = {"r1": SimpleNamespace(run=run, failure=failure)}
+    tidy_up(cast("Executive", SimpleNamespace(fleet=fleet, runners=runners)), journal)
+    assert Path(state).exists() is kept
+    assert Path(f"{state}-wal").exists() is kept
+    assert journal.exists()

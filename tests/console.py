@@ -1,0 +1,130 @@
+"""Console blocks of Markdown pages: their commands are run, their output is compared.
+
+In a `console` block, a line that starts with `$ ` is a command and what follows it is its output,
+in which `...` stands for anything (alone on a line: for any lines). A block without `$ ` has only
+commands. A comment says what is special: `# exit 1`, or `# interactive` for a command that needs a
+person or never ends; of that one only the options are checked.
+"""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+REPOSITORY = Path(__file__).parents[1]
+WHAT_COMMANDS_READ = ("missions", "fleet_configs", "examples")
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One command of a console block, with what the page says that it prints and ends with."""
+
+    text: str
+    output: tuple[str, ...] = ()
+
+    @property
+    def program(self) -> str:
+        return self.text.split()[0]
+
+    @property
+    def status(self) -> int:
+        said = re.search(r"# exit (\d+)$", self.text)
+        return int(said[1]) if said else 0
+
+    @property
+    def interactive(self) -> bool:
+        return self.text.endswith("# interactive")
+
+
+def read_block(block: str) -> tuple[Command, ...]:
+    lines = block.replace("\\\n", " ").splitlines()
+    if not any(line.startswith("$ ") for line in lines):
+        lines = [f"$ {line}" for line in lines if line.strip()]
+    commands: list[Command] = []
+    for line in lines:
+        if line.startswith("$ "):
+            commands.append(Command(" ".join(line[2:].split())))
+        else:
+            commands[-1] = Command(commands[-1].text, (*commands[-1].output, line))
+    return tuple(commands)
+
+
+def blocks(page: Path) -> Iterator[tuple[int, tuple[Command, ...]]]:
+    """The console blocks of a page, each with its line."""
+    text = page.read_text(encoding="utf-8")
+    for fence in re.finditer(r"^```console\n(.*?)^```$", text, re.M | re.S):
+        yield text.count("\n", 0, fence.start()) + 1, read_block(fence[1])
+
+
+def first_unprinted(expected: tuple[str, ...], printed: str) -> str | None:
+    """The first expected line that is not where it should be, or None if all are there."""
+    lines = iter(printed.rstrip().splitlines())
+    skipping = False
+    for line in expected:
+        if line.strip() == "...":
+            skipping = True
+            continue
+        pattern = re.compile(".*".join(re.escape(part) for part in line.rstrip().split("...")))
+        found = (pattern.fullmatch(actual.rstrip()) for actual in lines)
+        if not (any(found) if skipping else next(found, None)):
+            return line
+        skipping = False
+    return None if skipping or next(lines, None) is None else "(the end of the output)"
+
+
+def environment(home: Path) -> dict[str, str]:
+    """An empty home, and the m2pem of the environment that runs the tests first on the path."""
+    home.mkdir()
+    here = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    return {**here, "HOME": str(home), "PATH": path, "PYTHONPATH": str(REPOSITORY)}
+
+
+def make_workspace(folder: Path) -> Path:
+    """A copy of what the commands read, in which they may write."""
+    folder.mkdir()
+    for name in WHAT_COMMANDS_READ:
+        if (REPOSITORY / name).is_dir():
+            shutil.copytree(
+                REPOSITORY / name, folder / name, ignore=shutil.ignore_patterns("__pycache__")
+            )
+    return folder
+
+
+def run(
+    text: str, folder: Path, environment: Mapping[str, str]
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["bash", "-o", "pipefail", "-c", text],
+        cwd=folder,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def assert_does_what_is_shown(
+    command: Command, workspace: Path, environment: Mapping[str, str]
+) -> None:
+    """Run a command and compare status and output; of an interactive one, look at the options."""
+    if command.interactive:
+        words = shlex.split(command.text, comments=True)
+        usage = run(shlex.join([*words[:2], "--help"]), workspace, environment)
+        assert usage.returncode == 0, usage.stdout
+        options = [word.split("=")[0] for word in words if word.startswith("--")]
+        assert [option for option in options if option not in usage.stdout] == []
+        return
+    done = run(command.text, workspace, environment)
+    assert done.returncode == command.status, f"{command.text}\n{done.stdout}"
+    if command.output:
+        missing = first_unprinted(command.output, done.stdout)
+        assert missing is None, f"{command.text}\n{done.stdout}\nnot as shown: {missing}"

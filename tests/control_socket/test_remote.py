@@ -1,0 +1,86 @@
+"""MissionControl through the socket is the same as in the executive."""
+
+import asyncio
+
+import pytest
+
+from m2pem.api.control import OpenPrompt, PromptClosed, StampedRecord
+from m2pem.api.telemetry import GeoPosition, VehicleState
+from m2pem.control_socket.place import ControlSocketError
+from m2pem.control_socket.remote import RemoteControl
+from m2pem.errors import NotDrivenError, OperatorError
+from m2pem.model.catalogue import ResourceId
+from tests.control_socket.conftest import Served
+
+
+async def test_everything_that_is_asked_for_comes_as_it_is(served: Served) -> None:
+    run, _ = await served.asked()
+    async with RemoteControl(served.path) as remote:
+        assert remote.fleet() == served.control.fleet()
+        assert remote.catalogue() == served.control.catalogue()
+        assert await remote.runs() == await served.control.runs()
+        assert await remote.records(run) == await served.control.records(run)
+        assert await remote.mission_time_s(run) <= await served.control.mission_time_s(run)
+        mission = await remote.mission(run)
+        assert mission.source == (await served.control.mission(run)).source
+        assert mission.elements["Ask"].label == "Ask"
+
+
+async def test_it_follows_a_run_to_its_end(served: Served) -> None:
+    run, prompt = await served.asked()
+    async with RemoteControl(served.path) as remote:
+        notices = remote.subscribe(run)
+        first = await anext(notices)
+        assert isinstance(first, OpenPrompt)
+        assert first.prompt == prompt
+        await remote.answer(run, prompt, "no", by="bob@gcs2")
+        following = [await anext(notices)]
+        while not isinstance(following[-1], PromptClosed):
+            following.append(await anext(notices))
+        assert following[-1] == PromptClosed(run, prompt, "no", "bob@gcs2")
+        assert isinstance(following[0], StampedRecord)
+        assert (await remote.wait(run)).status == "completed"
+
+
+async def test_the_second_answer_is_refused_through_it_too(served: Served) -> None:
+    run, prompt = await served.asked()
+    async with RemoteControl(served.path) as remote:
+        answers = await asyncio.gather(
+            remote.answer(run, prompt, "no", by="bob@gcs2"),
+            served.control.answer(run, prompt, "yes", by="anna@gcs1"),
+            return_exceptions=True,
+        )
+    assert sorted(type(answer).__name__ for answer in answers) == ["NoneType", "OperatorError"]
+
+
+async def test_telemetry_passes(served: Served) -> None:
+    state = VehicleState(ResourceId("v1"), 5, GeoPosition(1.0, 2.0, 3.0), battery_fraction=0.5)
+    async with RemoteControl(served.path) as remote:
+        stream = remote.telemetry()
+        next_state = asyncio.ensure_future(anext(stream))
+        while not next_state.done():
+            served.control._executive.bus.publish(state)
+            await asyncio.wait([next_state], timeout=0.01)
+        assert next_state.result() == state
+
+
+async def test_a_call_that_was_given_up_does_not_confuse_the_next(served: Served) -> None:
+    run, _ = await served.asked()
+    async with RemoteControl(served.path) as remote:
+        given_up = asyncio.create_task(remote.records(run))
+        await asyncio.sleep(0)
+        given_up.cancel()
+        assert [each.run for each in await remote.runs()] == [run]
+
+
+async def test_refusals_are_the_same_errors(served: Served) -> None:
+    async with RemoteControl(served.path) as remote:
+        with pytest.raises(NotDrivenError):
+            await remote.pause("r9")
+        with pytest.raises(OperatorError, match="m2pem run"):
+            await remote.start(b"")
+
+
+async def test_an_executive_that_has_gone_is_told(served: Served) -> None:
+    with pytest.raises(ControlSocketError, match="gone"):
+        await RemoteControl(served.path.with_name("1.sock")).__aenter__()
