@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from m2pem.testing import ArbiterContract, JournalContract, OcuContract, ServiceContract
 from tests.authoring.author import Author, free_port
 from tests.console import Command, first_unprinted, read_block
 
@@ -59,3 +60,13 @@ def with_ports(text: str, ports: dict[str, str]) -> str:
     for said, other in ports.items():
         text = text.replace(said, other)
     return text
+
+
+def test_the_page_lists_what_each_contract_may_find_unsupported() -> None:
+    contracts = (ArbiterContract, OcuContract, ServiceContract, JournalContract)
+    listed = [
+        f"| {contract.__name__} | `{subject}` | {meaning} |"
+        for contract in contracts
+        for subject, meaning in contract.subjects.items()
+    ]
+    assert re.findall(r"^\| \w+Contract \| .*$", TEXT, re.M) == listed
