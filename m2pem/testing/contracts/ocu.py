@@ -102,7 +102,7 @@ class OcuContract(Contract):
             answered = await bench.answered(prompt)
             assert answered.decision == "abort"
             assert answered.by, "an answer says who gave it: answer(..., by=...)"
-            assert (await bench.control.wait(prompt.run)).status is RunStatus.COMPLETED
+            assert await bench.ended(prompt.run) is RunStatus.COMPLETED
 
         sit(main)
 
@@ -145,7 +145,7 @@ class OcuContract(Contract):
             await bench.control.answer(prompt.run, prompt.prompt, "continue", by=OTHER)
             await bench.shows(OTHER)
             await bench.operator.answer(prompt, "abort")
-            await bench.goes_on()
+            await bench.answers()
             assert (await bench.answered(prompt)).by == OTHER
 
         sit(main)
@@ -176,8 +176,8 @@ class OcuContract(Contract):
                 await other.operator.answer(prompt, "no")
                 assert (await bench.answered(prompt)).decision == "no"
                 await bench.operator.answer(prompt, "yes")
-                await bench.goes_on()
-                await other.goes_on()
+                await bench.answers()
+                await other.answers()
 
         sit(main)
 
@@ -192,7 +192,7 @@ class OcuContract(Contract):
         async def main(bench: OcuBench) -> None:
             run = await bench.moving()
             await bench.operator.stop(run)
-            assert (await bench.control.wait(run)).status is RunStatus.STOPPED
+            assert await bench.ended(run) is RunStatus.STOPPED
 
         sit(main)
 
@@ -204,7 +204,7 @@ class OcuContract(Contract):
             (prompt,) = await bench.asked(scenarios.question("Road?"))
             await bench.shows("Road?")
             await bench.operator.stop(prompt.run)
-            assert (await bench.control.wait(prompt.run)).status is RunStatus.STOPPED
+            assert await bench.ended(prompt.run) is RunStatus.STOPPED
             assert bench.control.prompts() == []
             await bench.goes_on()
 
@@ -219,7 +219,7 @@ class OcuContract(Contract):
             (prompt,) = await bench.asked(scenarios.question("Road?"))
             await bench.shows("Road?")
             await bench.control.stop(prompt.run, by=OTHER)
-            await bench.control.wait(prompt.run)
+            await bench.ended(prompt.run)
             await bench.goes_on()
 
         sit(main)
@@ -266,7 +266,7 @@ class OcuContract(Contract):
             await bench.operator.answer(prompt, "continue")
             await bench.faults.called("answer")
             await bench.operator.stop(run)
-            assert (await bench.control.wait(run)).status is RunStatus.STOPPED
+            assert await bench.ended(run) is RunStatus.STOPPED
 
         sit(main)
 

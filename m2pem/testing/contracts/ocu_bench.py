@@ -6,7 +6,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from contextvars import ContextVar, copy_context
 from typing import Any, Protocol
 
-from m2pem.api.control import MissionControl, OpenPrompt, RunId
+from m2pem.api.control import MissionControl, OpenPrompt, RunId, RunStatus
 from m2pem.api.ocu import Ocu
 from m2pem.engine.records import BehaviorProgressed, PromptAnswered
 from m2pem.model.catalogue import BehaviorState
@@ -171,6 +171,15 @@ class OcuBench:
         (answer,) = found
         return answer  # type: ignore[no-any-return]
 
+    async def ended(self, run: RunId) -> RunStatus:
+        """Wait until a run has ended and its vehicles are released; how it ended."""
+        waiting = asyncio.create_task(self.control.wait(run))
+        await asyncio.wait([waiting], timeout=WITHIN_S)
+        if not waiting.done():
+            waiting.cancel()
+            raise AssertionError(f"{run} had not ended after {WITHIN_S:g} s")
+        return waiting.result().status
+
     # --- the unit -------------------------------------------------------------------------------
 
     async def shows(self, text: str) -> None:
@@ -190,6 +199,15 @@ class OcuBench:
         (prompt,) = await self.asked(scenarios.question(text))
         await self.shows(text)
         await self.control.answer(prompt.run, prompt.prompt, "continue", by="test")
+
+    async def answers(self) -> None:
+        """Ask something new, and have it answered at the unit."""
+        self._questions += 1
+        text = f"And now, {self._questions}?"
+        (prompt,) = await self.asked(scenarios.question(text))
+        await self.shows(text)
+        await self.operator.answer(prompt, "continue")
+        await self.answered(prompt)
 
     def _open(self, run: RunId) -> list[OpenPrompt]:
         return [prompt for prompt in self.control.prompts() if prompt.run == run]
@@ -220,12 +238,12 @@ def _watch_tasks() -> set[asyncio.Task[Any]]:
     return set()
 
 
-async def until(true: Callable[[], bool], within_s: float = WITHIN_S) -> bool:
-    """Wait for something to become true; False if it is not within so many seconds.
+async def until(true: Callable[[], bool]) -> bool:
+    """Wait for something to become true; False if it is not within `WITHIN_S`.
 
     A unit tells nobody that its screen has changed, so that it is looked at again and again.
     """
-    deadline = asyncio.get_running_loop().time() + within_s
+    deadline = asyncio.get_running_loop().time() + WITHIN_S
     while not true():
         if asyncio.get_running_loop().time() > deadline:
             return False
