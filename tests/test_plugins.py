@@ -80,7 +80,8 @@ def only_failure(plugins: PluginManager) -> PluginFailure:
 def test_built_ins_load_through_the_same_hooks() -> None:
     plugins = PluginManager(block=("all",))
     assert plugins.service("Detector") is Detector
-    assert [info.name for info in plugins.listing()] == list(DEFAULT_PLUGINS)
+    loaded = [info.name for info in plugins.listing() if not info.failure]
+    assert loaded == list(DEFAULT_PLUGINS)
     assert plugins.failures == []
 
 

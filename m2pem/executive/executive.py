@@ -333,7 +333,8 @@ class Executive:
         run = report.id.partition(".")[0]
         runner = self.runners.get(run)
         if runner is None:
-            log.warning("a report for %s, which no run here asked for", report.id)
+            # After a restart an arbiter may report before its run is taken up, which then asks it.
+            log.info("a report for %s, which no run here asked for", report.id)
             return
         runner.post(
             BehaviorReported(

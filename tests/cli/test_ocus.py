@@ -93,7 +93,7 @@ async def test_a_unit_that_breaks_is_told_of_and_stops_nothing(
     Unit.became = {}
     operators = Operators(["good", "bad"], plugins(good=Unit, bad=Broken))
     with caplog.at_level(logging.ERROR, "m2pem"):
-        operators.begin(cast("MissionControl", None))
+        operators.begin(cast("MissionControl", None), lambda: None)
         await asyncio.sleep(0)
         assert "the operator control unit bad broke" in caplog.text
         assert Unit.became == {}

@@ -57,6 +57,8 @@ async def test_a_line_comes_when_it_is_typed(pipe: Pipe) -> None:
     assert not waiting.done()
     pipe.type(b"now\n")
     assert await waiting == "now"
+    pipe.hang_up()
+    assert [line async for line in lines] == []  # its thread is done with the descriptor
 
 
 async def test_bytes_that_are_no_utf_8_are_replaced(pipe: Pipe) -> None:
@@ -84,6 +86,8 @@ async def test_a_descriptor_that_does_not_block_is_waited_for(pipe: Pipe) -> Non
     await asyncio.sleep(0)
     pipe.type(b"late\n")
     assert await waiting == "late"
+    pipe.hang_up()
+    assert [line async for line in lines] == []
 
 
 def test_a_program_that_reads_can_end(pipe: Pipe) -> None:

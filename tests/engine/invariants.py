@@ -16,6 +16,8 @@ def check_state(state: RunState) -> None:
         assert not state.services
         assert not state.yielded
         assert all(b.phase is BehaviorPhase.CANCELLING for b in state.behaviors.values())
+        assert not state.mailbox
+        assert not state.deferred
         assert not state.timers
         assert not state.dates
 

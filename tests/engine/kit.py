@@ -203,6 +203,10 @@ class Play:
         assert snapshot(replayed.state) == snapshot(state)
         assert replayed.outstanding() == self.run.outstanding()
         assert replayed.next_due_us == self.run.next_due_us
+        kinds = [type(record) for record in self.records()]
+        after_end = kinds[kinds.index(r.RunEnded) + 1 :] if r.RunEnded in kinds else []
+        allowed = {r.BehaviorProgressed, r.BehaviorEnded, r.InputIgnored, r.RunClaimed}
+        assert set(after_end) <= allowed
         if state.status is RunStatus.RUNNING and not self.run.wants_continue:
             assert self.awaits(), "the run goes on and waits for nothing"
 

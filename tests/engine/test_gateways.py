@@ -126,7 +126,10 @@ def test_a_second_token_on_the_same_flow_waits_for_the_next_round() -> None:
     """).start()
     play.message("m").message("m")
     assert play.at == "right right join join"
+    first, second = [t for t in play.run.state.tokens.values() if t.node.id == "join"]
     assert play.message("n").at == "right join after"
+    assert first.id not in play.run.state.tokens
+    assert second.id in play.run.state.tokens
     assert play.message("n").at == "after after"
 
 

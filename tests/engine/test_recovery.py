@@ -2,6 +2,7 @@
 
 import pytest
 
+from m2pem.engine import records as r
 from m2pem.engine.commands import CancelBehavior, StartBehavior
 from m2pem.engine.inputs import BehaviorMissing, ClaimRun, ResourceFault
 from m2pem.engine.state import BehaviorPhase
@@ -70,7 +71,7 @@ def test_policy_restart_requests_the_behavior_again_under_its_id() -> None:
     play.trace()
     play.orders()
     play.give(missing(ResumePolicy.RESTART))
-    assert play.trace() == ["restart b1"]
+    assert play.steps[-1].records == [r.BehaviorRestarted("r1.b1", 2)]
     assert play.orders() == ["start b1 drive_stop evsg1"]
     behavior = play.behavior("b1")
     assert (behavior.state, behavior.number, behavior.native_ref) == (None, 0, None)

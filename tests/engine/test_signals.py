@@ -1,5 +1,7 @@
 """Signals reach every catcher of the run, once, and are not kept."""
 
+import pytest
+
 from m2pem.engine.inputs import SignalReceived
 from tests.engine.kit import Play
 from tests.engine.trace import table
@@ -159,3 +161,25 @@ def test_a_signal_with_an_id_is_taken_once() -> None:
     play.give(SignalReceived("go", id="7")).give(SignalReceived("go", id="8"))
     assert play.entered().split().count("n") == 2
     assert play.give(SignalReceived("go", id="7")).ignored() == "SignalReceived 7 was taken before"
+
+
+@pytest.mark.parametrize("steps", range(8))
+def test_a_subprocess_completes_or_is_interrupted_never_both(steps: int) -> None:
+    # The signal comes before, between and after the last token's end and the subprocess's.
+    names = [f"t{number}" for number in range(steps)]
+    chain = " -> ".join(["s", *names, "throw"])
+    tasks = "".join(f'<task id="{name}"/>' for name in names)
+    play = Play(f"""
+        <startEvent id="s"/> {tasks} <endEvent id="throw">signal go</endEvent>
+        <subProcess id="sub"> <startEvent id="in"/> <task id="t"/>
+          in -> t
+        </subProcess>
+        <boundaryEvent id="catch" attachedToRef="sub">signal go</boundaryEvent>
+        <task id="completed"/> <task id="interrupted"/>
+        s -> sub -> completed
+        catch -> interrupted
+        {chain}
+    """).start()
+    assert play.ended == "completed"
+    entered = set(play.entered().split()) & {"completed", "interrupted"}
+    assert entered == ({"interrupted"} if steps < 3 else {"completed"})

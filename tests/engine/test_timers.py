@@ -160,7 +160,11 @@ def test_timers_that_are_over_do_not_pile_up() -> None:
         <startEvent id="start"/> <userTask id="u"/>
         <boundaryEvent id="late" attachedToRef="u">timer PT1H</boundaryEvent>
         <boundaryEvent id="then" attachedToRef="u">date 2030-01-01</boundaryEvent>
+        <intermediateCatchEvent id="soon">timer PT1M</intermediateCatchEvent>
+        <intermediateCatchEvent id="later">date 2029-01-01</intermediateCatchEvent>
         <endEvent id="end"/>
+        start -> soon
+        start -> later
         start -> merge -> u -> merge
         <exclusiveGateway id="merge"/>
         late -> end
