@@ -1,4 +1,4 @@
-"""What the contract of arbiters, which the template's arbiter keeps, cannot see of `GoalArbiter`."""
+"""What the contract of arbiters, kept by the template, cannot see of `GoalArbiter`."""
 
 import pytest
 
