@@ -19,7 +19,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages demo test test-long lint format pictures clean
+.PHONY: help setup python-packages npm-packages demo test test-long lint format docs pictures clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 12
@@ -35,7 +35,7 @@ $(INSTALLED): pyproject.toml constraints.txt $(PLUGINS:%=%/pyproject.toml)
 	@$(PYTHON) -m venv --clear $(VENV) || { \
 	  echo "$(PYTHON) cannot make virtual environments; on Debian: apt-get install python3-venv" >&2; exit 1; }
 	@PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt $(BIN)/python -m pip install \
-	  --quiet --disable-pip-version-check --editable '.[dev]' $(PLUGINS:%=--editable %)
+	  --quiet --disable-pip-version-check --editable '.[dev,docs]' $(PLUGINS:%=--editable %)
 	@echo '$(IDENTITY)' > $@
 
 # The tests of what BPMN editors see need Node.js, and those of the terminal unit tmux; nothing else
@@ -81,11 +81,14 @@ test: lint ## check all but the long tests
 test-long: lint ## check everything: fuzzing, large random counts, foreign corpora too
 	@$(BIN)/pytest -n 2 --timeout 1800
 
+docs: python-packages ## build the documentation into site/
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+
 pictures: npm-packages ## draw the missions and examples for the docs (needs Chromium)
 	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn && \
 	for example in ../../examples/*/; do node draw_bpmn.mjs "$$example" "$$example"*.bpmn; done
 
 clean: ## remove all that can be made again
-	@rm -rf $(VENV) $(JS)/node_modules build dist
+	@rm -rf $(VENV) $(JS)/node_modules build dist site
 	@rm -rf .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache .coverage
 	@find . -name __pycache__ -prune -exec rm -rf {} +

@@ -1,1 +1,156 @@
-"""What plugin authors import. Everything here is an interface."""
+"""What plugin authors import: `from m2pem.api import Arbiter, BehaviorSpec, ...`.
+
+Everything here is an interface, kept from release to release; what is not here may change.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from m2pem.api.arbiter import (
+        Arbiter,
+        ArbiterContext,
+        BehaviorId,
+        BehaviorReport,
+        BehaviorRequest,
+        Connection,
+        Limits,
+        ResolvedValue,
+    )
+    from m2pem.api.bus import FleetBus
+    from m2pem.api.clock import Clock
+    from m2pem.api.control import (
+        MissionControl,
+        Notice,
+        OpenPrompt,
+        PromptClosed,
+        RunId,
+        RunStatus,
+        RunSummary,
+        SimulationResult,
+        StampedRecord,
+    )
+    from m2pem.api.goals import GoalArbiter
+    from m2pem.api.ledger import Ledger
+    from m2pem.api.mailbox import Mailbox
+    from m2pem.api.ocu import Ocu
+    from m2pem.api.service import Service, ServiceContext, ServiceError
+    from m2pem.api.telemetry import (
+        Detection,
+        GeoPosition,
+        LinkState,
+        PayloadState,
+        VehicleState,
+    )
+    from m2pem.engine.records import Record
+    from m2pem.findings import Finding, Severity
+    from m2pem.model.behavior import BehaviorType, Decision
+    from m2pem.model.bpmn import parse_mission
+    from m2pem.model.catalogue import (
+        BehaviorSpec,
+        BehaviorState,
+        ParameterKind,
+        ParameterSpec,
+        ResourceId,
+        ResumePolicy,
+    )
+    from m2pem.model.elements import Mission
+    from m2pem.model.geometry import Area, Point, Route, VehiclePosition
+    from m2pem.model.values import Value
+    from m2pem.resources.behaviors import SHARED
+    from m2pem.resources.fleet import Fleet
+
+# Loaded when asked for: an arbiter's module need not pay for what an OCU imports.
+_MODULES = {
+    "m2pem.api.arbiter": (
+        "Arbiter ArbiterContext BehaviorId BehaviorReport BehaviorRequest Connection Limits"
+        " ResolvedValue"
+    ),
+    "m2pem.api.bus": "FleetBus",
+    "m2pem.api.clock": "Clock",
+    "m2pem.api.control": (
+        "MissionControl Notice OpenPrompt PromptClosed RunId RunStatus RunSummary"
+        " SimulationResult StampedRecord"
+    ),
+    "m2pem.api.goals": "GoalArbiter",
+    "m2pem.api.ledger": "Ledger",
+    "m2pem.api.mailbox": "Mailbox",
+    "m2pem.api.ocu": "Ocu",
+    "m2pem.api.service": "Service ServiceContext ServiceError",
+    "m2pem.api.telemetry": "Detection GeoPosition LinkState PayloadState VehicleState",
+    "m2pem.engine.records": "Record",
+    "m2pem.findings": "Finding Severity",
+    "m2pem.model.behavior": "BehaviorType Decision",
+    "m2pem.model.bpmn": "parse_mission",
+    "m2pem.model.catalogue": (
+        "BehaviorSpec BehaviorState ParameterKind ParameterSpec ResourceId ResumePolicy"
+    ),
+    "m2pem.model.elements": "Mission",
+    "m2pem.model.geometry": "Area Point Route VehiclePosition",
+    "m2pem.model.values": "Value",
+    "m2pem.resources.behaviors": "SHARED",
+    "m2pem.resources.fleet": "Fleet",
+}
+_LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
+
+__all__ = [
+    "SHARED",
+    "Arbiter",
+    "ArbiterContext",
+    "Area",
+    "BehaviorId",
+    "BehaviorReport",
+    "BehaviorRequest",
+    "BehaviorSpec",
+    "BehaviorState",
+    "BehaviorType",
+    "Clock",
+    "Connection",
+    "Decision",
+    "Detection",
+    "Finding",
+    "Fleet",
+    "FleetBus",
+    "GeoPosition",
+    "GoalArbiter",
+    "Ledger",
+    "Limits",
+    "LinkState",
+    "Mailbox",
+    "Mission",
+    "MissionControl",
+    "Notice",
+    "Ocu",
+    "OpenPrompt",
+    "ParameterKind",
+    "ParameterSpec",
+    "PayloadState",
+    "Point",
+    "PromptClosed",
+    "Record",
+    "ResolvedValue",
+    "ResourceId",
+    "ResumePolicy",
+    "Route",
+    "RunId",
+    "RunStatus",
+    "RunSummary",
+    "Service",
+    "ServiceContext",
+    "ServiceError",
+    "Severity",
+    "SimulationResult",
+    "StampedRecord",
+    "Value",
+    "VehiclePosition",
+    "VehicleState",
+    "parse_mission",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_LAZY[name]), name)
+    globals()[name] = value
+    return value

@@ -3,6 +3,7 @@
 import asyncio
 import sys
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 
 from m2pem.api.control import (
     MissionControl,
@@ -21,6 +22,7 @@ from m2pem.model.behavior import Decision
 
 NAME = "plain"
 BACKLOG = 1_000_000
+STOP_WAITS_S = 1.0
 
 HELP = """\
   2, or abort        answer the open prompt, by number or by decision
@@ -50,6 +52,7 @@ class PlainOcu:
         self._prompts: dict[tuple[RunId, str], OpenPrompt] = {}
         self._active: dict[RunId, None] = {}
         """Runs that have not ended, in the order in which they were heard of."""
+        self._lines: asyncio.Queue[str] = asyncio.Queue()
         self._listening = True
         self._end_noted = False
         self._commands: dict[str, Callable[[list[str]], Awaitable[None]]] = {
@@ -68,16 +71,26 @@ class PlainOcu:
     async def serve(self) -> None:
         """Show and obey until the operator quits."""
         watching = asyncio.create_task(self._watch())
+        obeying = asyncio.create_task(self._obey_in_turn())
         try:
             async for line in Lines():
                 if line.strip() == "quit":
+                    await self._lines.join()
                     return
-                await self._obey(line)
+                if line.split()[:1] == ["stop"]:
+                    # It comes in its turn, too, unless what was typed before it hangs.
+                    with suppress(TimeoutError):
+                        await asyncio.wait_for(self._lines.join(), STOP_WAITS_S)
+                    await self._obey(line)
+                else:
+                    self._lines.put_nowait(line)
+            await self._lines.join()
             self._listening = False
             self._note_the_end()
             await watching
         finally:
             watching.cancel()
+            obeying.cancel()
 
     # --- showing --------------------------------------------------------------------------------
 
@@ -135,6 +148,14 @@ class PlainOcu:
         return prompt if len(self._active) <= 1 else f"{run} {prompt}"
 
     # --- obeying --------------------------------------------------------------------------------
+
+    async def _obey_in_turn(self) -> None:
+        while True:
+            line = await self._lines.get()
+            try:
+                await self._obey(line)
+            finally:
+                self._lines.task_done()
 
     async def _obey(self, line: str) -> None:
         words = line.split()

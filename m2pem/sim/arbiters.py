@@ -13,6 +13,7 @@ from m2pem.api.arbiter import (
     Connection,
     Limits,
 )
+from m2pem.api.epochs import Epochs
 from m2pem.api.telemetry import Detection, PayloadState, VehicleState
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.sim.agenda import Agenda
@@ -20,7 +21,6 @@ from m2pem.sim.broadcast import DEFAULT_HZ, Broadcast
 from m2pem.sim.conductor import Conductor
 from m2pem.sim.detectors import Detectors
 from m2pem.sim.effects import Effect
-from m2pem.sim.epochs import Epochs
 from m2pem.sim.executions import Body, Execution, Strike
 from m2pem.sim.faults import Fault, FaultList
 from m2pem.sim.frame import Frame

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Mapping
 
+from m2pem.api.mailbox import Mailbox
 from m2pem.api.telemetry import Detection, PayloadState, VehicleState
 from m2pem.model.catalogue import ResourceId
 from m2pem.sim.agenda import Agenda, Entry
 from m2pem.sim.executions import Body
 from m2pem.sim.frame import Frame
-from m2pem.sim.mailbox import Mailbox
 from m2pem.sim.payloads import SimPayload
 from m2pem.sim.track import US_PER_S
 from m2pem.sim.vehicles import SimVehicle

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from m2pem.api.arbiter import ArbiterContext, BehaviorRequest, Connection
+from m2pem.api.refusal import refusal
 from m2pem.api.telemetry import VehicleState
 from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
@@ -14,7 +15,6 @@ from m2pem.sim.executions import Aim, Body, Chase
 from m2pem.sim.frame import Frame
 from m2pem.sim.gimbals import GAZES
 from m2pem.sim.manoeuvres import MANOEUVRES, Manoeuvre
-from m2pem.sim.parameters import refusal
 from m2pem.sim.payloads import SimPayload
 from m2pem.sim.phases import Pose
 from m2pem.sim.teams import TEAM_MANOEUVRES

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from m2pem.api.arbiter import BehaviorReport
+from m2pem.api.mailbox import Mailbox
 from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.sim.executions import Execution
-from m2pem.sim.mailbox import Mailbox
 
 
 @dataclass(slots=True)

@@ -6,13 +6,11 @@ from m2pem.testing.contracts.journal import HEADER, JournalContract, entry, line
 
 
 class TestMemoryJournal(JournalContract):
+    unsupported = {"durability": "it ends with its process"}  # noqa: RUF012
+
     @pytest.fixture
     def open_journal(self):
         return MemoryJournal
-
-    @pytest.fixture
-    def durable(self):
-        return False
 
 
 async def filled(keep):

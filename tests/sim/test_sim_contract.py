@@ -8,7 +8,13 @@ from m2pem.api.arbiter import Arbiter, ArbiterContext, Connection
 from m2pem.model.catalogue import ResourceId
 from m2pem.model.geometry import Point, Route
 from m2pem.sim.arbiters import SimArbiter
-from m2pem.testing.contracts.arbiter import ArbiterCase, ArbiterContract, CutLink, MakeArbiter
+from m2pem.testing.contracts.arbiter import (
+    ArbiterCase,
+    ArbiterContract,
+    CutLink,
+    Effects,
+    MakeArbiter,
+)
 
 UGV1, UGV2 = ResourceId("ugv1"), ResourceId("ugv2")
 
@@ -43,3 +49,11 @@ class TestSimArbiter(ArbiterContract):
             arbiter.lose_link(vehicle)
 
         return cut
+
+    @pytest.fixture
+    def effects(self) -> Effects:
+        def count(arbiter: Arbiter, vehicle: ResourceId) -> int:
+            assert isinstance(arbiter, SimArbiter)
+            return sum(e.kind == "start" and e.resource == vehicle for e in arbiter.effects)
+
+        return count

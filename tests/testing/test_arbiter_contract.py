@@ -2,6 +2,9 @@
 
 import asyncio
 import dataclasses
+import os
+import threading
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 
@@ -170,6 +173,42 @@ class Leaky(SimArbiter):
         self.task = asyncio.create_task(asyncio.sleep(3600))
 
 
+class LeavesThread(SimArbiter):
+    async def connect(self) -> None:
+        await super().connect()
+        threading.Thread(target=time.sleep, args=(1,), daemon=True).start()
+
+
+class LeavesFile(SimArbiter):
+    async def connect(self) -> None:
+        await super().connect()
+        self.pipe = os.pipe()
+
+    def __del__(self) -> None:
+        for end in self.pipe:
+            os.close(end)
+
+
+class HoldsAll(SimArbiter):
+    async def hold(self, resource: ResourceId) -> None:
+        for vehicle in (UGV1, UGV2):
+            await super().hold(vehicle)
+
+
+class Instant(SimArbiter):
+    async def start(self, request: BehaviorRequest) -> None:
+        self.script(request.id, 0.0, "succeeded")
+        await super().start(request)
+
+
+class BeginsAnew(SimArbiter):
+    """Takes a start that comes again as a new one, under another name."""
+
+    async def start(self, request: BehaviorRequest) -> None:
+        again = sum(effect.behavior.startswith(request.id) for effect in self.effects)
+        await super().start(dataclasses.replace(request, id=request.id + "x" * again))
+
+
 class ClosesOnce(SimArbiter):
     closed = False
 
@@ -185,6 +224,7 @@ FINDS = [
     (NeverAccepted, "accepted_comes_before_running_and_one_terminal_report_last"),
     (Unnumbered, "report_numbers_rise_from_one"),
     (StartsAnew, "a_second_start_of_the_same_behavior_has_no_effect"),
+    (BeginsAnew, "a_second_start_has_one_physical_effect"),
     (Reasonless, "an_unknown_behavior_is_rejected_by_name"),
     (Codeless, "an_unknown_behavior_is_rejected_by_name"),
     (Careless, "a_bad_parameter_is_rejected_by_name"),
@@ -211,6 +251,10 @@ FINDS = [
     (Anonymous, "telemetry_names_the_resource_and_rises_in_time"),
     (OwnTime, "states_are_stamped_by_the_clock_that_was_lent"),
     (Leaky, "nothing_leaks_after_close"),
+    (LeavesThread, "nothing_leaks_after_close"),
+    (LeavesFile, "nothing_leaks_after_close"),
+    (HoldsAll, "a_held_vehicle_does_not_hold_up_the_other"),
+    (Instant, "a_behavior_takes_its_time_of_the_clock_that_was_lent"),
     (ClosesOnce, "close_is_quiet_when_it_was_never_connected_or_is_closed_already"),
 ]
 
@@ -229,6 +273,9 @@ def test_the_contract_finds_what_is_wrong(
     def cut(arbiter: SimArbiter, vehicle: ResourceId) -> None:
         arbiter.lose_link(vehicle)
 
+    def count_starts(arbiter: SimArbiter, vehicle: ResourceId) -> int:
+        return sum(e.kind == "start" and e.resource == vehicle for e in arbiter.effects)
+
     def run(main: Callable[[Clock], Awaitable[None]]) -> None:
         run_virtual(main, 0)
 
@@ -237,7 +284,7 @@ def test_the_contract_finds_what_is_wrong(
         "case": CASE,
         "run": run,
         "cut_link": cut,
-        "reconnects": True,
+        "effects": count_starts,
     }
     check = getattr(ArbiterContract, f"test_{test}")
     wanted = check.__code__.co_varnames[1 : check.__code__.co_argcount]

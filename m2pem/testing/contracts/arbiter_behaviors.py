@@ -7,6 +7,7 @@ from m2pem.model.catalogue import BehaviorState
 from m2pem.testing.contracts.arbiter_case import (
     ArbiterCase,
     ArbiterFixtures,
+    Effects,
     Main,
     MakeArbiter,
     on_bench,
@@ -14,6 +15,7 @@ from m2pem.testing.contracts.arbiter_case import (
     terminal,
 )
 from m2pem.testing.contracts.bench import ArbiterBench
+from m2pem.testing.contracts.contract import needs, skip_unsupported
 
 
 class ArbiterBehaviors(ArbiterFixtures):
@@ -28,7 +30,7 @@ class ArbiterBehaviors(ArbiterFixtures):
             await start(bench, "r1.b1", case.short, case.vehicle)
             end = await bench.ended("r1.b1", case.short_s)
             assert end.state is BehaviorState.SUCCEEDED, end
-            await bench.clock.sleep(5)
+            await bench.clock.sleep(case.watch_s)
             assert bench.states_of("r1.b1") == [
                 BehaviorState.ACCEPTED,
                 BehaviorState.RUNNING,
@@ -63,6 +65,31 @@ class ArbiterBehaviors(ArbiterFixtures):
             await start(bench, "r1.b1", case.short, case.vehicle)
             await bench.clock.sleep(case.short_s)
             assert len(bench.of("r1.b1")) == 3, bench.of("r1.b1")
+
+        on_bench(make_arbiter, run, main)
+
+    @needs("effects")
+    def test_a_second_start_has_one_physical_effect(
+        self,
+        make_arbiter: MakeArbiter,
+        case: ArbiterCase,
+        effects: Effects | None,
+        run: Callable[[Main], None],
+    ) -> None:
+        """Whether it comes at once, meanwhile or afterwards, the vehicle begins once."""
+        if effects is None:
+            skip_unsupported("effects", "the fixture `effects` is not overridden")
+
+        async def main(bench: ArbiterBench) -> None:
+            before = effects(bench.arbiter, case.vehicle)
+            await start(bench, "r1.b1", case.short, case.vehicle)
+            await start(bench, "r1.b1", case.short, case.vehicle)
+            await bench.running("r1.b1")
+            await start(bench, "r1.b1", case.short, case.vehicle)
+            await bench.ended("r1.b1", case.short_s)
+            await start(bench, "r1.b1", case.short, case.vehicle)
+            await bench.clock.sleep(case.watch_s)
+            assert effects(bench.arbiter, case.vehicle) - before == 1
 
         on_bench(make_arbiter, run, main)
 
@@ -125,6 +152,7 @@ class ArbiterBehaviors(ArbiterFixtures):
 
         on_bench(make_arbiter, run, main)
 
+    @needs("preempt")
     def test_a_behavior_that_preempts_takes_the_vehicle_over(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
@@ -147,7 +175,7 @@ class ArbiterBehaviors(ArbiterFixtures):
         async def main(bench: ArbiterBench) -> None:
             await start(bench, "r1.b1", case.long, case.vehicle)
             await bench.running("r1.b1")
-            await bench.clock.sleep(5)
+            await bench.clock.sleep(case.watch_s / 2)
             await bench.arbiter.cancel("r1.b1", 1)
             bound_s = bench.arbiter.limits(case.vehicle).cancel_timeout_s
             assert (await bench.ended("r1.b1", bound_s)).state is BehaviorState.CANCELLED
@@ -166,19 +194,19 @@ class ArbiterBehaviors(ArbiterFixtures):
             await bench.arbiter.cancel("r1.b1", 1)
             await bench.ended("r1.b1", 60)
             await bench.arbiter.cancel("r1.b1", 1)
-            await bench.clock.sleep(10)
+            await bench.clock.sleep(case.watch_s)
             assert len(terminal(bench, "r1.b1")) == 1, bench.of("r1.b1")
 
         on_bench(make_arbiter, run, main)
 
     def test_cancel_of_an_unknown_behavior_is_quiet(
-        self, make_arbiter: MakeArbiter, run: Callable[[Main], None]
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
         """No report and no exception."""
 
         async def main(bench: ArbiterBench) -> None:
             await bench.arbiter.cancel("r9.b9", 1)
-            await bench.clock.sleep(5)
+            await bench.clock.sleep(case.watch_s)
             assert bench.reports == []
 
         on_bench(make_arbiter, run, main)

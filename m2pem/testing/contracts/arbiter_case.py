@@ -1,24 +1,27 @@
 """What the tests of arbiters are given, and how they run on a bench."""
 
+import asyncio
 import math
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
 from m2pem.api.arbiter import Arbiter, ArbiterContext, ResolvedValue
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import VehicleState
-from m2pem.executive.clock import run_virtual
+from m2pem.executive.clock import SystemClock, run_virtual
 from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing.contracts.contract import Contract
 
 START_US = 1_767_225_600_000_000  # 2026-01-01T00:00:00Z
 STANDING_M_S = 0.1
 
 MakeArbiter = Callable[[ArbiterContext], Arbiter]
 CutLink = Callable[[Arbiter, ResourceId], None]
+Effects = Callable[[Arbiter, ResourceId], int]
 Main = Callable[[Clock], Awaitable[None]]
 
 
@@ -26,9 +29,11 @@ Main = Callable[[Clock], Awaitable[None]]
 class ArbiterCase:
     """What the tests command.
 
-    `vehicle`, `other`: two vehicles that stand, ready to move. `long`: a behavior of both that
-    moves for at least 30 s. `short`: one that ends well within `short_s`. `bad`: a parameter of
-    `long` with a value that it cannot have.
+    `vehicle`, `other`: two vehicles that stand, ready to move (the same one, if a second vehicle is
+    not supported). `watch_s`: for how long a test watches that nothing happens that must not.
+    `long`: a behavior of both that moves for at least five times as long. `short`: one that ends
+    well within `short_s`. `bad`: a parameter of `long` with a value that it cannot have. Seconds
+    are those of the clock that the arbiter is lent.
     """
 
     vehicle: ResourceId
@@ -37,10 +42,26 @@ class ArbiterCase:
     short: tuple[str, Mapping[str, ResolvedValue]]
     bad: tuple[str, ResolvedValue]
     short_s: float = 60.0
+    watch_s: float = 6.0
 
 
-class ArbiterFixtures:
+class ArbiterFixtures(Contract):
     """What authors override; see `ArbiterContract`."""
+
+    m2pem_contract: ClassVar[str] = "ArbiterContract"
+    subjects: ClassVar[Mapping[str, str]] = {
+        "effects": "the fixture `effects` counts what a vehicle physically began",
+        "hold": "`hold` brings a vehicle to a stand and `resume` lets it go on",
+        "link": "the fixture `cut_link` makes a vehicle unheard, and its behavior is LOST",
+        "preempt": "a behavior takes a vehicle over from one that is being cancelled",
+        "reconnect": "a behavior outlives the arbiter, and another one finds it again",
+        "second vehicle": "there are two vehicles",
+        "telemetry": "vehicles say where they are and how fast",
+        "virtual clock": "all that takes time takes it of the clock that was lent",
+    }
+    speed: ClassVar[float] = 1.0
+    """Where a virtual clock is not supported: seconds of the clock in a real second. The vehicles,
+    or what simulates them, must be as fast."""
 
     @pytest.fixture
     def make_arbiter(self) -> MakeArbiter:
@@ -58,14 +79,21 @@ class ArbiterFixtures:
         return None
 
     @pytest.fixture
-    def reconnects(self) -> bool:
-        """Whether another arbiter finds the behaviors of one that was closed still running."""
-        return True
+    def effects(self) -> Effects | None:
+        """How many motions a vehicle has begun, by its own count, not the arbiter's; None: not
+        supported."""
+        return None
 
     @pytest.fixture
     def run(self) -> Callable[[Main], None]:
-        """Runs a test: in virtual time, unless overridden."""
+        """Runs a test: in virtual time, or else on a real clock of `speed`."""
+        if "virtual clock" in self.unsupported:
+            return lambda main: asyncio.run(_real(main, self.speed))
         return lambda main: run_virtual(main, START_US)
+
+
+async def _real(main: Main, speed: float) -> None:
+    await main(SystemClock(speed))
 
 
 def on_bench(

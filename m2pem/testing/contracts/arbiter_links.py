@@ -1,9 +1,10 @@
 """What every arbiter must keep to in asking, holding, losing and closing."""
 
 import asyncio
+import os
+import threading
 from collections.abc import Callable
-
-import pytest
+from contextlib import suppress
 
 from m2pem.api.clock import Clock
 from m2pem.model.catalogue import BehaviorState
@@ -20,6 +21,10 @@ from m2pem.testing.contracts.arbiter_case import (
     terminal,
 )
 from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing.contracts.contract import needs, skip_unsupported
+
+SETTLING_STEPS = 10
+"""A socket is closed some turns of the event loop after its owner said so."""
 
 
 class ArbiterLinks(ArbiterFixtures):
@@ -54,16 +59,11 @@ class ArbiterLinks(ArbiterFixtures):
 
         on_bench(make_arbiter, run, main)
 
+    @needs("reconnect")
     def test_another_arbiter_finds_the_behavior_again(
-        self,
-        make_arbiter: MakeArbiter,
-        case: ArbiterCase,
-        reconnects: bool,
-        run: Callable[[Main], None],
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
-        """After a restart the behavior still runs, or ended well meanwhile."""
-        if not reconnects:
-            pytest.skip("behaviors don't outlive this arbiter")
+        """After a restart the same behavior still runs, or ended well meanwhile."""
 
         async def main(clock: Clock) -> None:
             async with ArbiterBench(make_arbiter(context(clock)), clock) as bench:
@@ -72,6 +72,7 @@ class ArbiterLinks(ArbiterFixtures):
                 reference = bench.of("r1.b1")[-1].native_ref
             async with ArbiterBench(make_arbiter(context(clock)), clock) as bench:
                 found = await bench.arbiter.query("r1.b1", reference)
+                assert found.id == "r1.b1", found
                 assert found.state in (BehaviorState.RUNNING, BehaviorState.SUCCEEDED), found
                 if found.state is BehaviorState.RUNNING:
                     end = await bench.ended("r1.b1", case.short_s)
@@ -79,6 +80,7 @@ class ArbiterLinks(ArbiterFixtures):
 
         run(main)
 
+    @needs("second vehicle")
     def test_a_start_of_a_past_epoch_is_refused(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
@@ -88,7 +90,7 @@ class ArbiterLinks(ArbiterFixtures):
             await start(bench, "r1.b1", case.long, case.vehicle, epoch=2)
             await bench.running("r1.b1")
             await start(bench, "r1.b2", case.long, case.other, epoch=1)
-            await bench.clock.sleep(10)
+            await bench.clock.sleep(case.watch_s)
             assert BehaviorState.RUNNING not in bench.states_of("r1.b2")
             await start(bench, "r2.b1", case.long, case.other, epoch=1)
             await bench.running("r2.b1", 10)
@@ -104,11 +106,12 @@ class ArbiterLinks(ArbiterFixtures):
             await start(bench, "r1.b1", case.long, case.vehicle, epoch=2)
             await bench.running("r1.b1")
             await bench.arbiter.cancel("r1.b1", 1)
-            await bench.clock.sleep(10)
+            await bench.clock.sleep(case.watch_s)
             assert not terminal(bench, "r1.b1"), bench.of("r1.b1")
 
         on_bench(make_arbiter, run, main)
 
+    @needs("hold", "telemetry")
     def test_hold_brings_the_vehicle_to_a_stand_within_the_declared_bound(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
@@ -122,12 +125,13 @@ class ArbiterLinks(ArbiterFixtures):
             bound_s = bench.arbiter.limits(case.vehicle).hold_within_s
             stands = await bench.until(lambda: speed(bench, case.vehicle) < STANDING_M_S, bound_s)
             assert stands, f"still at {speed(bench, case.vehicle):.1f} m/s after {bound_s:g} s"
-            await bench.clock.sleep(60)
+            await bench.clock.sleep(case.watch_s)
             assert speed(bench, case.vehicle) < STANDING_M_S, "it does not move by itself"
             assert not terminal(bench, "r1.b1"), "it keeps its behavior"
 
         on_bench(make_arbiter, run, main)
 
+    @needs("hold")
     def test_resume_goes_on_with_the_behavior(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
@@ -145,6 +149,7 @@ class ArbiterLinks(ArbiterFixtures):
 
         on_bench(make_arbiter, run, main)
 
+    @needs("hold")
     def test_hold_and_resume_of_an_idle_vehicle_are_quiet(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
@@ -155,11 +160,12 @@ class ArbiterLinks(ArbiterFixtures):
             await bench.arbiter.hold(case.vehicle)
             await bench.arbiter.resume(case.vehicle)
             await bench.arbiter.resume(case.vehicle)
-            await bench.clock.sleep(5)
+            await bench.clock.sleep(case.watch_s)
             assert bench.reports == []
 
         on_bench(make_arbiter, run, main)
 
+    @needs("link", "second vehicle")
     def test_a_cut_link_is_lost_within_the_declared_bound(
         self,
         make_arbiter: MakeArbiter,
@@ -169,7 +175,7 @@ class ArbiterLinks(ArbiterFixtures):
     ) -> None:
         """LOST within `limits().lost_after_s`, and only what that link carries."""
         if cut_link is None:
-            pytest.skip("this arbiter has no link to cut")
+            skip_unsupported("link", "the fixture `cut_link` is not overridden")
 
         async def main(bench: ArbiterBench) -> None:
             await start(bench, "r1.b1", case.long, case.vehicle)
@@ -184,6 +190,7 @@ class ArbiterLinks(ArbiterFixtures):
 
         on_bench(make_arbiter, run, main)
 
+    @needs("second vehicle")
     def test_two_vehicles_do_not_mix(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
@@ -200,6 +207,25 @@ class ArbiterLinks(ArbiterFixtures):
 
         on_bench(make_arbiter, run, main)
 
+    @needs("hold", "second vehicle", "telemetry")
+    def test_a_held_vehicle_does_not_hold_up_the_other(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """One stands, the other goes on."""
+
+        async def main(bench: ArbiterBench) -> None:
+            await start(bench, "r1.b1", case.long, case.vehicle)
+            await start(bench, "r1.b2", case.long, case.other)
+            await bench.running("r1.b1")
+            await bench.running("r1.b2")
+            await bench.arbiter.hold(case.vehicle)
+            await bench.clock.sleep(case.watch_s)
+            assert speed(bench, case.vehicle) < STANDING_M_S
+            assert speed(bench, case.other) > STANDING_M_S, "the other was not held"
+
+        on_bench(make_arbiter, run, main)
+
+    @needs("telemetry")
     def test_telemetry_names_the_resource_and_rises_in_time(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
@@ -207,7 +233,7 @@ class ArbiterLinks(ArbiterFixtures):
 
         async def main(bench: ArbiterBench) -> None:
             await start(bench, "r1.b1", case.long, case.vehicle)
-            await bench.clock.sleep(10)
+            await bench.clock.sleep(case.watch_s)
             states = [state for state in bench.states if state.resource == case.vehicle]
             assert states, "a vehicle that moves says where it is"
             times = [state.time_us for state in states]
@@ -215,6 +241,7 @@ class ArbiterLinks(ArbiterFixtures):
 
         on_bench(make_arbiter, run, main)
 
+    @needs("telemetry")
     def test_states_are_stamped_by_the_clock_that_was_lent(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
@@ -223,26 +250,49 @@ class ArbiterLinks(ArbiterFixtures):
         async def main(bench: ArbiterBench) -> None:
             began_us = bench.clock.now_us()
             await start(bench, "r1.b1", case.long, case.vehicle)
-            await bench.clock.sleep(10)
+            await bench.clock.sleep(case.watch_s)
             state = bench.latest(case.vehicle)
             assert state is not None, "a vehicle that moves says where it is"
             assert began_us < state.time_us <= bench.clock.now_us() + 1_000_000
 
         on_bench(make_arbiter, run, main)
 
+    @needs("virtual clock")
+    def test_a_behavior_takes_its_time_of_the_clock_that_was_lent(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """In virtual time a rehearsal of hours takes seconds, and nothing real is waited for."""
+
+        async def main(bench: ArbiterBench) -> None:
+            await start(bench, "r1.b1", case.long, case.vehicle)
+            await bench.running("r1.b1")
+            running_us = bench.clock.now_us()
+            await bench.until(lambda: bool(terminal(bench, "r1.b1")), 5 * case.watch_s)
+            took_s = (bench.clock.now_us() - running_us) / 1_000_000
+            assert took_s >= 5 * case.watch_s, f"the long behavior took {took_s:g} s of the clock"
+
+        on_bench(make_arbiter, run, main)
+
     def test_nothing_leaks_after_close(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
-        """No task is left behind."""
+        """No task, thread or file is left behind."""
 
         async def main(clock: Clock) -> None:
             before = asyncio.all_tasks()
+            threads, files = _threads(), _open_files()
             async with ArbiterBench(make_arbiter(context(clock)), clock) as bench:
                 await start(bench, "r1.b1", case.long, case.vehicle)
                 await bench.running("r1.b1")
             await asyncio.sleep(0)
             leaked = asyncio.all_tasks() - before
             assert not leaked, f"tasks go on after close: {leaked}"
+            assert _threads() <= threads, f"threads go on: {_threads() - threads}"
+            for _ in range(SETTLING_STEPS):
+                if _open_files() <= files:
+                    break
+                await clock.sleep(case.watch_s / SETTLING_STEPS)
+            assert _open_files() <= files, f"{_open_files() - files} files or sockets stay open"
 
         run(main)
 
@@ -272,3 +322,15 @@ class ArbiterLinks(ArbiterFixtures):
             await arbiter.close()
 
         run(main)
+
+
+def _threads() -> set[threading.Thread]:
+    """Threads that go on, but for those in which the event loop itself runs blocking calls."""
+    return {each for each in threading.enumerate() if not each.name.startswith("asyncio_")}
+
+
+def _open_files() -> int:
+    """How many files and sockets this process has open; 0 where nobody can tell."""
+    with suppress(OSError):
+        return len(os.listdir("/dev/fd"))  # noqa: PTH208  # a Path would be made of each
+    return 0

@@ -10,9 +10,9 @@ Needs pytest-asyncio.
 
 import asyncio
 import os
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 import pytest
 
@@ -33,6 +33,7 @@ from m2pem.errors import InternalError, JournalError, StaleEpochError
 from m2pem.journal.base import Entry, Journal, RunHeader, RunLine
 from m2pem.model.catalogue import BehaviorState
 from m2pem.model.values import Value
+from m2pem.testing.contracts.contract import Contract, needs
 
 HEADER = RunHeader(
     mission_name="vignette1.bpmn",
@@ -83,18 +84,18 @@ async def outcomes(*calls: Awaitable[None]) -> Sequence[BaseException | None]:
 
 
 @pytest.mark.asyncio
-class JournalContract:
-    """Override `open_journal`, and `durable` for a journal that ends with its process."""
+class JournalContract(Contract):
+    """Override `open_journal`."""
+
+    m2pem_contract: ClassVar[str] = "JournalContract"
+    subjects: ClassVar[Mapping[str, str]] = {
+        "durability": "a journal that is opened again, or twice, has what was written"
+    }
 
     @pytest.fixture
     def open_journal(self) -> OpenJournal:
         """Opens a journal; each call on the same storage, which is empty at first."""
         raise NotImplementedError("override this fixture")
-
-    @pytest.fixture
-    def durable(self) -> bool:
-        """Whether a journal that is opened again, or twice, has what was written."""
-        return True
 
     # --- runs -----------------------------------------------------------------------------------
 
@@ -335,9 +336,7 @@ class JournalContract:
             with pytest.raises(JournalError, match="closed"):
                 await asked
 
-    async def test_closing_finishes_what_is_being_written(
-        self, open_journal: OpenJournal, durable: bool
-    ) -> None:
+    async def test_closing_finishes_what_is_being_written(self, open_journal: OpenJournal) -> None:
         """Calls made before are answered, and durable."""
         journal = open_journal()
         run = await journal.create(HEADER)
@@ -345,18 +344,17 @@ class JournalContract:
         await asyncio.sleep(0)
         await journal.close()
         assert await outcomes(*calls) == [None] * 50
-        if durable:
+        if "durability" not in self.unsupported:
             async with opened(open_journal) as again:
                 assert len(await written(again, run)) == 50
 
     # --- opening again --------------------------------------------------------------------------
 
+    @needs("durability")
     async def test_what_was_written_is_there_when_opened_again(
-        self, open_journal: OpenJournal, durable: bool
+        self, open_journal: OpenJournal
     ) -> None:
         """Not driven; claimed with the next epoch; names go on."""
-        if not durable:
-            pytest.skip("this journal ends with its process")
         async with opened(open_journal) as journal:
             run = await journal.create(HEADER)
             await journal.append([entry(run, 1, RunStarted("PATROL", 5), RunPaused(6))])
@@ -372,12 +370,9 @@ class JournalContract:
             await journal.append([entry(run, 3, epoch=2)])
             assert await journal.create(HEADER) == "r2"
 
-    async def test_two_journals_on_one_storage_share_it(
-        self, open_journal: OpenJournal, durable: bool
-    ) -> None:
+    @needs("durability")
+    async def test_two_journals_on_one_storage_share_it(self, open_journal: OpenJournal) -> None:
         """One sees what the other wrote; only one drives a run; a stale one is shut out."""
-        if not durable:
-            pytest.skip("this journal ends with its process")
         async with opened(open_journal) as one, opened(open_journal) as two:
             run = await one.create(HEADER)
             assert await two.create(HEADER) == "r2"

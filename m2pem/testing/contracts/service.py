@@ -5,6 +5,7 @@ import logging
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import msgspec
 import pytest
@@ -15,6 +16,7 @@ from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.gateway.bus import Bus
 from m2pem.model.catalogue import ResourceId
 from m2pem.model.values import Value
+from m2pem.testing.contracts.contract import Contract
 
 START_US = 1_767_225_600_000_000  # 2026-01-01T00:00:00Z
 KEY = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
@@ -35,8 +37,10 @@ class ServiceCase:
     within_s: float = 3600.0
 
 
-class ServiceContract:
+class ServiceContract(Contract):
     """Override `service` and `case`; more tests of your own may use `run_case`."""
+
+    m2pem_contract: ClassVar[str] = "ServiceContract"
 
     @pytest.fixture
     def service(self) -> Service:

@@ -3,10 +3,10 @@ import math
 import pytest
 
 from m2pem.api.arbiter import ResolvedValue
+from m2pem.api.refusal import refusal
 from m2pem.model.behavior import BehaviorType
 from m2pem.model.geometry import Point, Route
 from m2pem.resources.behaviors import SHARED
-from m2pem.sim.parameters import refusal
 
 ROUTE = Route(((0.0, 0.0, None), (0.0, 1.0, None)))
 PLACE = Point((0.0, 0.0, None))

@@ -1,6 +1,6 @@
 import pytest
 
-from m2pem.sim.epochs import Epochs
+from m2pem.api.epochs import Epochs
 
 
 def test_an_epoch_below_the_highest_of_its_run_is_past() -> None:
@@ -12,7 +12,7 @@ def test_an_epoch_below_the_highest_of_its_run_is_past() -> None:
 
 
 def test_the_run_seen_longest_ago_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("m2pem.sim.epochs.REMEMBERED", 2)
+    monkeypatch.setattr("m2pem.api.epochs.REMEMBERED", 2)
     epochs = Epochs()
     for run in ("r1", "r2", "r1", "r3"):
         epochs.admit(f"{run}.b1", 5)

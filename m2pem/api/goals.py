@@ -1,0 +1,196 @@
+"""An arbiter for vehicles that take a goal each, and tell over a link how they stand."""
+
+import asyncio
+import uuid
+from collections.abc import AsyncIterator, Mapping, Sequence
+from typing import ClassVar
+
+from m2pem.api.arbiter import (
+    ArbiterContext,
+    BehaviorId,
+    BehaviorReport,
+    BehaviorRequest,
+    Connection,
+    Limits,
+)
+from m2pem.api.ledger import Ledger
+from m2pem.api.mailbox import Mailbox
+from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
+
+STATES_WAITING = 1000
+CONNECT_WITHIN_S = 2.0
+RETRY_AFTER_S = 0.5
+SILENT_SHARE = 0.8
+"""Of `lost_after_s`: after so much of it a resource is lost, as it takes a while to notice."""
+
+
+class GoalArbiter:
+    """Keeps every promise of `Arbiter` for subclasses that only speak to their vehicles.
+
+    A subclass has `behaviors` and `bounds`, and writes `listen`, `begin`, `end`, `hold` and
+    `resume`. What a vehicle says goes to `heard`. A goal is a text, unique for ever, that stands
+    for a behavior on the vehicle: after a restart the behavior is found again by it. Silence of
+    a vehicle ends its behavior as LOST. All seconds are those of the clock that was lent.
+    """
+
+    behaviors: ClassVar[Sequence[BehaviorSpec]] = ()
+    bounds: ClassVar[Limits] = Limits()
+
+    def __init__(
+        self, connections: Mapping[ResourceId, Connection], context: ArbiterContext
+    ) -> None:
+        self.connections = connections
+        self.context = context
+        self._ledger = Ledger(self.catalogue, context.logger)
+        self._states: Mailbox[VehicleState | PayloadState] = Mailbox(STATES_WAITING)
+        self._behaviors: dict[str, BehaviorId] = {}
+        self._goals: dict[ResourceId, str] = {}
+        self._heard_us: dict[ResourceId, int] = {}
+        self._all_heard = asyncio.Event()
+        self._tasks: list[asyncio.Task[None]] = []
+
+    # --- what a subclass writes -----------------------------------------------------------------
+
+    async def listen(self, resource: ResourceId) -> None:
+        """Connect to a resource and hand what it says to `heard`, as long as the link lasts.
+
+        It is called again a while after it returns or raises OSError.
+        """
+        raise NotImplementedError
+
+    def refusal(self, request: BehaviorRequest) -> str:
+        """Why a request that fits the catalogue cannot be done; "" if it can."""
+        return ""
+
+    async def begin(self, request: BehaviorRequest, goal: str) -> None:
+        """Give the resources a goal, in place of the one that they may have."""
+        raise NotImplementedError
+
+    async def end(self, resource: ResourceId, goal: str) -> None:
+        """Have a resource give a goal up, if it still has it."""
+        raise NotImplementedError
+
+    async def hold(self, resource: ResourceId) -> None:
+        """Bring the resource to a stand, keeping its goal."""
+        raise NotImplementedError
+
+    async def resume(self, resource: ResourceId) -> None:
+        """Let the resource go on to its goal."""
+        raise NotImplementedError
+
+    # --- what a subclass calls ------------------------------------------------------------------
+
+    def heard(
+        self,
+        state: VehicleState | PayloadState,
+        goal: str = "",
+        became: BehaviorState | None = None,
+        code: str = "",
+        reason: str = "",
+    ) -> None:
+        """A resource has spoken: where it is, and the goal that it has or had last.
+
+        `became`: how the goal ended (SUCCEEDED, FAILED with a `code`, CANCELLED); None while it is
+        pursued. The same may be said again and again.
+        """
+        self._states.put(state)
+        self._heard_us[state.resource] = self.context.clock.now_us()
+        if len(self._heard_us) == len(self.connections):
+            self._all_heard.set()
+        self._goals[state.resource] = goal
+        if behavior := self._behaviors.get(goal):
+            self._ledger.progress(behavior)
+            if became is not None:
+                self._ledger.end(behavior, became, code, reason)
+
+    # --- the protocol ---------------------------------------------------------------------------
+
+    def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+        """`behaviors`, on every resource."""
+        return self.behaviors
+
+    def limits(self, resource: ResourceId) -> Limits:
+        """`bounds`, for every resource."""
+        return self.bounds
+
+    async def connect(self) -> None:
+        """Listen to all resources; returns when all were heard, or soon."""
+        create = asyncio.get_running_loop().create_task
+        self._tasks = [create(self._listen_on(resource)) for resource in self.connections]
+        self._tasks += [create(self._watch(resource)) for resource in self.connections]
+        heard, late = create(self._wait_for_all()), create(self._sleep(CONNECT_WITHIN_S))
+        await asyncio.wait([heard, late], return_when=asyncio.FIRST_COMPLETED)
+        for task in (heard, late):
+            task.cancel()
+        await asyncio.gather(heard, late, return_exceptions=True)
+
+    async def start(self, request: BehaviorRequest) -> None:
+        """`begin`, unless the request is known, past, refused, or for a busy resource."""
+        goal = uuid.uuid4().hex
+        if self._ledger.admit(request, goal, self.refusal):
+            self._behaviors[goal] = request.id
+            await self.begin(request, goal)
+
+    async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
+        """`end` on each resource that the behavior holds."""
+        if self._ledger.may_cancel(behavior, epoch):
+            goal = self._ledger.last(behavior).native_ref or ""
+            for resource in self.connections:
+                if self._ledger.holder(resource) == behavior:
+                    await self.end(resource, goal)
+
+    async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
+        """What is known, or after a restart: what a resource that has the goal says."""
+        holders = [resource for resource, goal in self._goals.items() if goal == native_ref]
+        if native_ref and holders and native_ref not in self._behaviors:
+            self._behaviors[native_ref] = behavior
+            self._ledger.adopt(behavior, holders, native_ref)
+        return self._ledger.last(behavior)
+
+    def reports(self) -> AsyncIterator[BehaviorReport]:
+        """Reports as they come, for one reader, until `close`."""
+        return self._ledger.reports()
+
+    def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
+        """States as they come; a reader who is slow misses old ones."""
+        return self._states.read()
+
+    async def close(self) -> None:
+        """Stop listening. Vehicles keep doing what they do."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._tasks = []
+        self._states.close()
+        self._ledger.close()
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    async def _listen_on(self, resource: ResourceId) -> None:
+        while True:
+            try:
+                await self.listen(resource)
+            except OSError as error:
+                self.context.logger.info("%s: %s", resource, error)
+            except Exception:  # what one vehicle says must not deafen us to the others
+                self.context.logger.exception("%s: cannot be understood", resource)
+            await self._sleep(RETRY_AFTER_S)
+
+    async def _watch(self, resource: ResourceId) -> None:
+        # A whole number: of less than a microsecond no clock would wait to the end.
+        bound_us = round(self.limits(resource).lost_after_s * SILENT_SHARE * 1_000_000)
+        heard_us = self.context.clock.now_us()
+        while True:
+            heard_us = self._heard_us.get(resource, heard_us)
+            silent_us = self.context.clock.now_us() - heard_us
+            if silent_us >= bound_us:
+                self._ledger.lose(resource, f"not heard for {silent_us / 1_000_000:.1f} s")
+            wait_us = bound_us - silent_us if silent_us < bound_us else bound_us
+            await self._sleep(wait_us / 1_000_000)
+
+    async def _wait_for_all(self) -> None:
+        await self._all_heard.wait()
+
+    async def _sleep(self, seconds: float) -> None:
+        await self.context.clock.sleep(seconds)

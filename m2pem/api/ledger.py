@@ -1,0 +1,197 @@
+"""The bookkeeping of an arbiter: which behaviors it was given, and what it has reported of them."""
+
+import logging
+from collections.abc import AsyncIterator, Callable, Sequence
+from dataclasses import dataclass
+
+from m2pem.api import refusal as parameters
+from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
+from m2pem.api.epochs import Epochs
+from m2pem.api.mailbox import Mailbox
+from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.resources.nearmiss import suggest
+
+REMEMBERED = 10_000
+
+_DEFAULT_CODES = {
+    BehaviorState.FAILED: "FAILED",
+    BehaviorState.REJECTED: "REJECTED",
+    BehaviorState.LOST: "LINK_LOST",
+}
+
+
+@dataclass(slots=True)
+class _Entry:
+    resources: tuple[ResourceId, ...]
+    epoch: int
+    last: BehaviorReport
+
+
+class Ledger:
+    """Keeps what every arbiter promises of ids, numbers, epochs and refusals.
+
+    An arbiter asks `admit` before it commands anything, and says what became of it with `progress`
+    and `end`; the ledger makes the reports, each once and in order, and drops what comes too late.
+    `catalogue` is the arbiter's own. No arbiter must use it.
+
+    The number of a report follows from its state (ACCEPTED 1, RUNNING 2, an end 3; a rejection is
+    1), so that it rises even for an arbiter that forgot everything in a restart.
+    """
+
+    def __init__(
+        self, catalogue: Callable[[ResourceId], Sequence[BehaviorSpec]], logger: logging.Logger
+    ) -> None:
+        self._catalogue = catalogue
+        self._logger = logger
+        self._epochs = Epochs()
+        self._entries: dict[BehaviorId, _Entry] = {}
+        self._holders: dict[ResourceId, BehaviorId] = {}
+        self._reports: Mailbox[BehaviorReport] = Mailbox()
+
+    # --- what the executive asks for ------------------------------------------------------------
+
+    def admit(
+        self,
+        request: BehaviorRequest,
+        native_ref: str | None = None,
+        refusal: Callable[[BehaviorRequest], str] = lambda _: "",
+    ) -> bool:
+        """Whether to do what `Arbiter.start` was asked. If so, it is reported ACCEPTED.
+
+        False: it is known already, or of a past epoch; or it was reported REJECTED, because the
+        behavior or a parameter does not fit the catalogue, or a resource is busy. Behaviors that it
+        preempts are reported CANCELLED: the new command must end them on the vehicle. `refusal`
+        tells why a request that fits the catalogue cannot be done; "" if it can.
+        """
+        if not self._is_new(request):
+            return False
+        if reason := self._misfit(request) or refusal(request):
+            self._reject(request, "REJECTED", reason)
+            return False
+        holders = {resource: self.holder(resource) for resource in request.resources}
+        for resource, holder in holders.items():
+            if holder and holder not in request.preempts:
+                self._reject(request, "RESOURCE_UNAVAILABLE", f"{resource} is busy with {holder}")
+                return False
+        for holder in holders.values():
+            self.end(holder, BehaviorState.CANCELLED, reason=f"{request.id} took over")
+        self._holders.update(dict.fromkeys(request.resources, request.id))
+        self._enter(request, BehaviorState.ACCEPTED, native_ref=native_ref)
+        return True
+
+    def may_cancel(self, behavior: BehaviorId, epoch: int) -> bool:
+        """Whether to do what `Arbiter.cancel` was asked: it goes on, and the epoch is not past."""
+        entry = self._entries.get(behavior)
+        if not self._epochs.admit(behavior, epoch):
+            self._logger.warning("cancel of %s ignored: epoch %d is past", behavior, epoch)
+            return False
+        return entry is not None and not entry.last.state.terminal
+
+    def last(self, behavior: BehaviorId) -> BehaviorReport:
+        """What `Arbiter.query` answers: the last report; UNKNOWN, with number 0, without one."""
+        entry = self._entries.get(behavior)
+        if entry is None:
+            reason = "this arbiter knows no such behavior"
+            return BehaviorReport(behavior, 0, BehaviorState.UNKNOWN, reason=reason)
+        return entry.last
+
+    def reports(self) -> AsyncIterator[BehaviorReport]:
+        """What `Arbiter.reports` returns."""
+        return self._reports.read()
+
+    def close(self) -> None:
+        """End the reports. What goes on goes on, unreported."""
+        self._reports.close()
+
+    # --- what the vehicle says ------------------------------------------------------------------
+
+    def progress(self, behavior: BehaviorId) -> None:
+        """The vehicle does it: reported RUNNING, the first time."""
+        entry = self._entries.get(behavior)
+        if entry is not None and entry.last.state is BehaviorState.ACCEPTED:
+            self._report(entry, BehaviorState.RUNNING)
+
+    def end(
+        self, behavior: BehaviorId | None, state: BehaviorState, code: str = "", reason: str = ""
+    ) -> None:
+        """It has ended, and its resources are free; nothing happens if it is unknown or over.
+
+        A `code` that is left out is FAILED, REJECTED or LINK_LOST, as the state says.
+        """
+        entry = self._entries.get(behavior) if behavior is not None else None
+        if behavior is None or entry is None or entry.last.state.terminal:
+            return
+        for resource in entry.resources:
+            if self._holders.get(resource) == behavior:
+                del self._holders[resource]
+        self._report(entry, state, code or _DEFAULT_CODES.get(state, ""), reason)
+
+    def lose(self, resource: ResourceId, reason: str) -> None:
+        """The resource is not heard any more: what it does is reported LOST."""
+        self.end(self.holder(resource), BehaviorState.LOST, reason=reason)
+
+    def adopt(
+        self, behavior: BehaviorId, resources: Sequence[ResourceId], native_ref: str | None
+    ) -> None:
+        """After a restart: the vehicle was found doing it. It is RUNNING; that is not reported."""
+        if behavior not in self._entries:
+            report = BehaviorReport(behavior, 2, BehaviorState.RUNNING, native_ref=native_ref)
+            self._entries[behavior] = _Entry(tuple(resources), 0, report)
+            self._holders.update(dict.fromkeys(resources, behavior))
+
+    def holder(self, resource: ResourceId) -> BehaviorId | None:
+        """The behavior that a resource is held by now."""
+        return self._holders.get(resource)
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _is_new(self, request: BehaviorRequest) -> bool:
+        if not self._epochs.admit(request.id, request.epoch):
+            self._logger.warning("start of %s ignored: epoch %d is past", request.id, request.epoch)
+            return False
+        known = self._entries.get(request.id)
+        # A higher epoch that starts an ended behavior again means it: it is another executive.
+        return known is None or (known.last.state.terminal and request.epoch > known.epoch > 0)
+
+    def _misfit(self, request: BehaviorRequest) -> str:
+        for resource in request.resources:
+            offered = {spec.name: spec for spec in self._catalogue(resource)}
+            if request.behavior not in offered:
+                known = suggest(request.behavior, offered, "behaviors")
+                return f"{resource} has no behavior '{request.behavior}'; {known}"
+            spec = offered[request.behavior]
+            if reason := parameters.refusal(spec, request.parameters):
+                return reason
+        return ""
+
+    def _reject(self, request: BehaviorRequest, code: str, reason: str) -> None:
+        self._enter(request, BehaviorState.REJECTED, code, reason)
+
+    def _enter(
+        self,
+        request: BehaviorRequest,
+        state: BehaviorState,
+        code: str = "",
+        reason: str = "",
+        native_ref: str | None = None,
+    ) -> None:
+        report = BehaviorReport(request.id, 1, state, code, reason, native_ref)
+        self._entries.pop(request.id, None)
+        self._entries[request.id] = _Entry(request.resources, request.epoch, report)
+        self._forget()
+        self._reports.put(report)
+
+    def _report(
+        self, entry: _Entry, state: BehaviorState, code: str = "", reason: str = ""
+    ) -> None:
+        last = entry.last
+        number = 3 if state.terminal else 2
+        entry.last = BehaviorReport(last.id, number, state, code, reason, last.native_ref)
+        self._reports.put(entry.last)
+
+    def _forget(self) -> None:
+        """Let go of the oldest that has ended."""
+        if len(self._entries) > REMEMBERED:
+            over = (id_ for id_, entry in self._entries.items() if entry.last.state.terminal)
+            if (oldest := next(over, None)) is not None:
+                del self._entries[oldest]

@@ -1,0 +1,134 @@
+"""An executive for the tests of plugins, and `play`, which runs one mission on it."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from m2pem.api.clock import Clock
+from m2pem.api.control import MissionControl, OpenPrompt, RunSummary, StampedRecord
+from m2pem.engine.records import Record, TokenEntered
+from m2pem.executive.clock import SystemClock
+from m2pem.executive.executive import Executive
+from m2pem.journal import MemoryJournal
+from m2pem.plugins import PluginManager
+from m2pem.resources.fleet import Fleet
+
+Factories = Mapping[str, Callable[..., Any]]
+
+
+class _WithMore(PluginManager):
+    """The installed plugins, and what a test adds under names of its own."""
+
+    def __init__(self, arbiters: Factories, services: Factories) -> None:
+        super().__init__()
+        self._arbiters = dict(arbiters)
+        self._services = dict(services)
+
+    def arbiter(self, name: str) -> Callable[..., Any]:
+        return self._arbiters.get(name) or super().arbiter(name)
+
+    def service(self, name: str) -> Callable[[], Any]:
+        return self._services.get(name) or super().service(name)
+
+
+@asynccontextmanager
+async def stage(
+    fleet: Fleet,
+    *,
+    clock: Clock | None = None,
+    speed: float = 1.0,
+    simulated: bool = False,
+    arbiters: Factories | None = None,
+    services: Factories | None = None,
+) -> AsyncIterator[MissionControl]:
+    """A whole executive with a journal in memory; at the end all runs are stopped.
+
+    `clock`: a wall clock of `speed`, unless one is given. `simulated`: the simulated arbiter is in
+    every arbiter's place. `arbiters`, `services`: factories by name, beside those of the installed
+    plugins, so that what is tested need not be installed.
+
+    Raises:
+        PluginError: the fleet names an arbiter that nobody offers, or one cannot connect.
+    """
+    executive = Executive(
+        fleet,
+        MemoryJournal(),
+        _WithMore(arbiters or {}, services or {}),
+        clock or SystemClock(speed),
+        simulated=simulated,
+        speed=speed,
+    )
+    async with executive:
+        yield executive.control
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """What a mission did."""
+
+    summary: RunSummary
+    stamped: Sequence[StampedRecord]
+
+    @property
+    def records(self) -> list[Record]:
+        """The records, without their stamps."""
+        return [each.record for each in self.stamped]
+
+    @property
+    def visited(self) -> list[str]:
+        """The ids of the elements that were entered, in order."""
+        return [record.element for record in self.records if isinstance(record, TokenEntered)]
+
+    def of(self, name: str) -> list[Any]:
+        """The records of a name: "BehaviorEnded"."""
+        return [record for record in self.records if type(record).__name__ == name]
+
+
+async def play_on(
+    control: MissionControl, mission: bytes, answers: Mapping[str, str] | None = None
+) -> Played:
+    """Run a mission to its end. `answers`: decisions by the id of the user task."""
+    notices = control.subscribe()
+    run = await control.start(mission, by="test")
+    answering = asyncio.create_task(_answer(control, notices, answers or {}))
+    try:
+        summary = await control.wait(run)
+    finally:
+        answering.cancel()
+    return Played(summary, await control.records(run, limit=1_000_000))
+
+
+def play(
+    mission: bytes,
+    fleet: Fleet,
+    *,
+    answers: Mapping[str, str] | None = None,
+    within_s: float = 60.0,
+    **options: Any,
+) -> Played:
+    """Run a mission to its end on a stage of its own, within so many real seconds.
+
+    `answers`: decisions by the id of the user task; the first one of all others. `options` are
+    those of `stage`.
+
+    Raises:
+        MissionError: the mission does not fit the fleet, with every finding.
+        TimeoutError: it did not end.
+    """
+
+    async def main() -> Played:
+        async with asyncio.timeout(within_s), stage(fleet, **options) as control:
+            return await play_on(control, mission, answers)
+
+    return asyncio.run(main())
+
+
+async def _answer(
+    control: MissionControl, notices: AsyncIterator[Any], answers: Mapping[str, str]
+) -> None:
+    async for notice in notices:
+        if isinstance(notice, OpenPrompt):
+            decision = answers.get(notice.element, notice.decisions[0].value)
+            await control.answer(notice.run, notice.prompt, decision, by="test")

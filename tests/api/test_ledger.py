@@ -1,0 +1,81 @@
+"""What the contract of arbiters cannot see of a ledger."""
+
+import logging
+
+from m2pem.api import (
+    BehaviorReport,
+    BehaviorRequest,
+    BehaviorSpec,
+    BehaviorState,
+    BehaviorType,
+    Ledger,
+    ParameterKind,
+    ParameterSpec,
+    ResourceId,
+)
+
+UGV1 = ResourceId("ugv1")
+SPEED = ParameterSpec("speed", ParameterKind.SPEED, minimum=0.0)
+GO = BehaviorSpec("go", BehaviorType.VEHICLE, (SPEED,))
+
+
+def ledger() -> Ledger:
+    return Ledger(lambda _: (GO,), logging.getLogger("test"))
+
+
+def request(id_: str, epoch: int = 1, **options: object) -> BehaviorRequest:
+    return BehaviorRequest(id_, epoch, "go", {}, (UGV1,), **options)  # type: ignore[arg-type]
+
+
+def reported(book: Ledger, virtual) -> list[BehaviorReport]:
+    book.close()
+
+    async def main(_):
+        return [report async for report in book.reports()]
+
+    return virtual(main)
+
+
+def test_a_failure_without_a_code_has_the_code_of_its_state(virtual) -> None:
+    book = ledger()
+    for id_, state in (("r1.b1", BehaviorState.FAILED), ("r1.b2", BehaviorState.LOST)):
+        assert book.admit(request(id_))
+        book.end(id_, state)
+    ends = [report.code for report in reported(book, virtual) if report.state.terminal]
+    assert ends == ["FAILED", "LINK_LOST"]
+
+
+def test_a_refusal_of_the_arbiters_own_is_reported(virtual) -> None:
+    book = ledger()
+    assert not book.admit(request("r1.b1"), None, lambda _: "it rains")
+    (report,) = reported(book, virtual)
+    assert (report.state, report.reason) == (BehaviorState.REJECTED, "it rains")
+
+
+def test_what_is_adopted_goes_on_with_higher_numbers_than_any_before(virtual) -> None:
+    book = ledger()
+    book.adopt("r1.b1", [UGV1], "native")
+    assert book.last("r1.b1").number == 2
+    assert book.holder(UGV1) == "r1.b1"
+    book.end("r1.b1", BehaviorState.SUCCEEDED)
+    assert [report.number for report in reported(book, virtual)] == [3]
+
+
+def test_a_higher_epoch_starts_an_ended_behavior_again(virtual) -> None:
+    book = ledger()
+    assert book.admit(request("r1.b1"))
+    book.end("r1.b1", BehaviorState.FAILED)
+    assert not book.admit(request("r1.b1"))
+    assert book.admit(request("r1.b1", epoch=2))
+    assert [r.state for r in reported(book, virtual)][-1] is BehaviorState.ACCEPTED
+
+
+def test_old_behaviors_are_forgotten_and_running_ones_are_not(monkeypatch) -> None:
+    monkeypatch.setattr("m2pem.api.ledger.REMEMBERED", 2)
+    book = ledger()
+    assert book.admit(request("r1.b1"))
+    for number in range(2, 5):
+        book.admit(request(f"r1.b{number}"))
+    assert book.last("r1.b1").state is BehaviorState.ACCEPTED
+    assert book.last("r1.b2").state is BehaviorState.UNKNOWN
+    assert book.last("r1.b4").state is BehaviorState.REJECTED

@@ -1,0 +1,64 @@
+"""The documentation builds without a warning, and its reference has all that plugins import."""
+
+import importlib
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import m2pem.api
+import m2pem.testing
+
+REPOSITORY = Path(__file__).parents[1]
+FIXTURES = ("virtual", "executive")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet"]
+    built = subprocess.run(
+        [*command, "--site-dir", str(folder)],
+        cwd=REPOSITORY,
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    assert built.returncode == 0, built.stdout
+    return folder
+
+
+@pytest.mark.parametrize("package", ["m2pem.api", "m2pem.testing"])
+def test_every_public_name_is_in_the_reference(package: str, site: Path) -> None:
+    page = "".join(page.read_text() for page in (site / "reference").glob("*.html"))
+    documented = {anchor.rpartition(".")[2] for anchor in re.findall(r'id="(m2pem\.[\w.]+)"', page)}
+    assert sorted(set(importlib.import_module(package).__all__) - documented) == []
+
+
+def test_hooks_and_fixtures_are_in_the_reference(site: Path) -> None:
+    hooks = (site / "reference" / "hooks.html").read_text(encoding="utf-8")
+    names = [name for name in vars(importlib.import_module("m2pem.hookspecs")) if "m2pem_" in name]
+    assert [name for name in names if f'id="m2pem.hookspecs.{name}"' not in hooks] == []
+    fixtures = (site / "reference" / "testing.html").read_text(encoding="utf-8")
+    assert all(f'id="m2pem.testing.plugin.{name}"' in fixtures for name in FIXTURES)
+
+
+def test_pages_load_nothing_from_other_hosts(site: Path) -> None:
+    loads = re.compile(
+        r"""<(?:script|img|iframe)[^>]+src="https?:|<link[^>]+stylesheet[^>]+https?:"""
+    )
+    assert [page.name for page in site.rglob("*.html") if loads.search(page.read_text())] == []
+
+
+def test_names_that_are_loaded_when_asked_for_are_all_there() -> None:
+    for package in (m2pem.api, m2pem.testing):
+        assert set(package._LAZY) == set(package.__all__)
+        for name in package.__all__:
+            assert getattr(package, name) is not None
+        with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+            _ = package.nothing
