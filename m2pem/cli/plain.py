@@ -4,6 +4,8 @@ import asyncio
 import sys
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
+from functools import partial
+from pathlib import Path
 
 from m2pem.api.control import (
     MissionControl,
@@ -30,6 +32,8 @@ HELP = """\
   signal NAME        send a signal, by its name or its id
   pause, resume      hold the vehicles and the clock; go on
   stop               end the mission: every vehicle is told to stop
+  route NAME FILE    hand over a route, under the name that the mission uses
+  area NAME FILE     hand over an area; point NAME FILE: a point
   start FILE         start another mission
   takeover evsg1     take a vehicle or payload from the missions, to steer it by hand
   handback evsg1     give it back
@@ -60,6 +64,9 @@ class PlainOcu:
             "pause": self._pause,
             "resume": self._resume,
             "signal": self._signal,
+            "route": partial(self._hand_over, "route"),
+            "area": partial(self._hand_over, "area"),
+            "point": partial(self._hand_over, "point"),
             "start": self._start,
             "takeover": self._take,
             "handback": self._give,
@@ -226,6 +233,18 @@ class PlainOcu:
             raise OperatorError("say which: signal NAME")
         run = words.pop(0) if len(words) > 1 and words[0] in self._active else None
         await self._control.signal(" ".join(words), run=run, by=NAME)
+
+    async def _hand_over(self, kind: str, words: list[str]) -> None:
+        """To every run, now and later (paper, section 4.3)."""
+        from m2pem.resources.geofiles import read_geometry
+        from m2pem.resources.geojson import as_geojson
+
+        if len(words) < 2:
+            raise OperatorError(f"say which, and from where: {kind} NAME FILE")
+        name, file = words[0], " ".join(words[1:])
+        geometry = await asyncio.to_thread(read_geometry, Path(file), kind)
+        await self._control.set_geometry(name, as_geojson(geometry), by=NAME)
+        self._say(f"{name} is handed over")
 
     async def _start(self, words: list[str]) -> None:
         if not words:

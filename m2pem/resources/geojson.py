@@ -34,6 +34,29 @@ def parse_geojson(value: Mapping[str, Any]) -> Point | Route | Area:
     return _parse(value, "relative", depth=0)
 
 
+def as_geojson(geometry: Point | Route | Area) -> dict[str, Any]:
+    """The GeoJSON Feature that `parse_geojson` reads back as the same geometry."""
+    if isinstance(geometry, Point):
+        kind, coordinates = "Point", _written(geometry.position)
+    elif isinstance(geometry, Route):
+        kind = "LineString" if len(geometry.waypoints) > 1 else "MultiPoint"
+        coordinates = [_written(each) for each in geometry.waypoints]
+    else:
+        kind = "Polygon"
+        coordinates = [[_written(each) for each in ring] for ring in geometry.rings]
+    return {
+        "type": "Feature",
+        "properties": {"altitude_frame": geometry.altitude_frame},
+        "geometry": {"type": kind, "coordinates": coordinates},
+    }
+
+
+def _written(place: Coordinate) -> list[Any]:
+    latitude_deg, longitude_deg, altitude_m = place
+    level = [longitude_deg, latitude_deg]
+    return level if altitude_m is None else [*level, altitude_m]
+
+
 def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Area:
     if not isinstance(value, Mapping):
         raise GeometryError("is not GeoJSON: an object with 'type' is expected")

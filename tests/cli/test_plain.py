@@ -23,6 +23,9 @@ from m2pem.cli.writer import writer_for
 from m2pem.engine.records import Record, RunEnded, RunOutcome, RunStarted
 from m2pem.errors import OperatorError
 from m2pem.model.behavior import Decision
+from m2pem.resources.geofiles import read_geometry
+from m2pem.resources.geojson import parse_geojson
+from tests.command_line import REPOSITORY
 
 ROUTE = (Decision("continue", "Continue"), Decision("abort", "Give up"))
 RECOVERY = (Decision("resume", "Resume"), Decision("abort", "Abort the mission"))
@@ -206,6 +209,28 @@ async def test_stop_always_stops_whatever_is_asked(operator: Operator) -> None:
     await operator.hear(RunStarted("P", 0), prompt(decisions=(Decision("stop", "Stop"),)))
     await operator.type("stop", "1")
     assert operator.control.calls == [("stop", "r1"), ("answer", "r1", "p1", "stop")]
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    """Files are read in a thread; the next turns of the loop see what came of it."""
+    async with asyncio.timeout(10):
+        while not condition():
+            await asyncio.sleep(0)
+
+
+async def test_a_route_is_handed_over_from_a_file(operator: Operator) -> None:
+    file = REPOSITORY / "fleet_configs" / "routes" / "alpha.geojson"
+    await operator.type(f"route route_alpha {file}")
+    await until(lambda: "handed over" in operator.screen)
+    ((called, name, geometry),) = operator.control.calls
+    assert (called, name) == ("set_geometry", "route_alpha")
+    assert parse_geojson(geometry) == read_geometry(file, "route")
+
+
+async def test_a_file_that_is_no_route_is_refused(operator: Operator) -> None:
+    await operator.type("route route_alpha none.geojson")
+    await until(lambda: "none.geojson: cannot be read" in operator.screen)
+    assert operator.control.calls == []
 
 
 async def test_resume_answers_what_is_asked_after_a_restart(operator: Operator) -> None:

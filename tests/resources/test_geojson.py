@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from m2pem.model.geometry import Area, Point, Route, VehiclePosition
-from m2pem.resources.geojson import GeometryError, kind_of, parse_geojson
+from m2pem.resources.geojson import GeometryError, as_geojson, kind_of, parse_geojson
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
 
@@ -131,3 +131,18 @@ def test_kinds_have_the_names_that_people_use() -> None:
     assert kind_of(Route((place,))) == "route"
     assert kind_of(Area(((place,),))) == "area"
     assert kind_of(VehiclePosition("evsg1")) == "vehicle"
+
+
+@pytest.mark.parametrize(
+    "geometry",
+    [
+        Point((38.1, -77.3, None), "amsl"),
+        Route(((38.1, -77.3, 1.0), (38.2, -77.4, None)), "relative"),
+        Route(((38.1, -77.3, None),), "relative"),
+        Area(
+            (tuple((38.0 + x, -77.0 - y, None) for x, y in ((0, 0), (0.1, 0), (0.1, 0.1), (0, 0))),)
+        ),
+    ],
+)
+def test_a_geometry_is_read_back_as_it_was_written(geometry: Point | Route | Area) -> None:
+    assert parse_geojson(as_geojson(geometry)) == geometry
