@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 
+from m2pem.api import ResourceId
 from m2pem.api.control import MissionControl, RunId, RunStatus
 from m2pem.api.operator import operator_name
 from m2pem.errors import M2pemError, OperatorError
-from m2pem.model.catalogue import ResourceId
 from m2pem_plugin_terminal.board import Board
 from m2pem_plugin_terminal.dialogs import Choice, Choose, Read, help_text
 from m2pem_plugin_terminal.display import Display

@@ -7,9 +7,9 @@ from textual.app import App, ComposeResult
 from textual.containers import Horizontal, VerticalScroll
 from textual.widgets import Static
 
+from m2pem.api import ResourceId
 from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId, RunStatus
 from m2pem.errors import M2pemError
-from m2pem.model.catalogue import ResourceId
 from m2pem_plugin_terminal.board import Board
 from m2pem_plugin_terminal.feed import Feed
 from m2pem_plugin_terminal.handover import taken
@@ -115,7 +115,7 @@ class Display(App[None], inherit_bindings=False):
         )
         if not self._asking_holders:
             self._asking_holders = True
-            self.run_worker(self._ask_holders(), exit_on_error=False)
+            self.run_worker(self._ask_holders, exit_on_error=False)
         active = [b for b in self.feed.boards.values() if not b.status.ended]
         others = sum(1 for each in active if each is not board)
         self._header.update(header(board, others, time_s, self.size.width))

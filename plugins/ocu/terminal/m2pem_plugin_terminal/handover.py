@@ -8,7 +8,7 @@ from m2pem_plugin_terminal.dialogs import Choice
 from m2pem_plugin_terminal.words import shortened
 
 if TYPE_CHECKING:
-    from m2pem.model.catalogue import ResourceId
+    from m2pem.api import ResourceId
     from m2pem.resources.fleet import Fleet
 
 TITLE = "Take, or give back"
