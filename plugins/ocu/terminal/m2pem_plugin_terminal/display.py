@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Mapping
 
+from textual import work
 from textual.app import App, ComposeResult
 from textual.containers import Horizontal, VerticalScroll
 from textual.widgets import Static
@@ -115,7 +116,7 @@ class Display(App[None], inherit_bindings=False):
         )
         if not self._asking_holders:
             self._asking_holders = True
-            self.run_worker(self._ask_holders, exit_on_error=False)
+            self._ask_holders()
         active = [b for b in self.feed.boards.values() if not b.status.ended]
         others = sum(1 for each in active if each is not board)
         self._header.update(header(board, others, time_s, self.size.width))
@@ -141,6 +142,7 @@ class Display(App[None], inherit_bindings=False):
         finally:
             self._asking_time = False
 
+    @work(exit_on_error=False)
     async def _ask_holders(self) -> None:
         # Not folded from records: what is taken or given back while no run is active leaves none.
         try:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from m2pem.resources.fleet import Fleet
 
 TITLE = "Take, or give back"
-TEXT = "Takes what is free or with a mission; gives back what you have."
+TEXT = "Takes what is free or with a mission; gives back yours."
 REMARK_CELLS = 34
 BEHAVIOR = re.compile(r"r\d+\.b\d+")
 """An id of a behavior, as MissionControl.holders has it in place of an operator's name."""
