@@ -7,12 +7,14 @@ from typing import Any, ClassVar
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 
+from m2pem.api import ResourceId
 from m2pem.api.control import MissionControl, RunId, RunStatus
 from m2pem.api.operator import operator_name
-from m2pem.errors import M2pemError
+from m2pem.errors import M2pemError, OperatorError
 from m2pem_plugin_terminal.board import Board
 from m2pem_plugin_terminal.dialogs import Choice, Choose, Read, help_text
 from m2pem_plugin_terminal.display import Display
+from m2pem_plugin_terminal.handover import TEXT, TITLE, choices, with_operator
 
 
 class TerminalApp(Display):
@@ -27,6 +29,7 @@ class TerminalApp(Display):
         Binding("tab", "next_question", priority=True),
         Binding("p", "pause"),
         Binding("s", "signals"),
+        Binding("t", "take"),
         Binding("r", "runs"),
         Binding("slash", "filter"),
         Binding("question_mark", "help"),
@@ -161,6 +164,40 @@ class TerminalApp(Display):
 
         await self.push_screen(Choose("Send a signal", choices), send)
         self.show()
+
+    async def action_take(self) -> None:
+        """Choose a vehicle or payload to take from the missions, or to give back."""
+        try:
+            holders = await self.control.holders()
+        except M2pemError as error:
+            self.say(str(error), alarm=True)
+            return
+
+        def chosen(resource: str | None) -> None:
+            if resource is None:
+                return
+            holder = holders[ResourceId(resource)]
+            if holder == self.by:
+                self._carry_out("Give back", self._give_back(resource))
+            elif with_operator(holder):
+                self.say(f"{resource} is with {holder}", alarm=True)
+            else:
+                self._carry_out("Take", self.control.take(resource, by=self.by))
+
+        listed = choices(self.control.fleet(), holders, self.by, self._task_label)
+        await self.push_screen(Choose(TITLE, listed, TEXT), chosen)
+        self.show()
+
+    async def _give_back(self, resource: str) -> None:
+        """Not what has become another's since the list was shown: anybody may give back."""
+        holder = (await self.control.holders()).get(ResourceId(resource), "")
+        if with_operator(holder) and holder != self.by:
+            raise OperatorError(f"{resource} is with {holder}")
+        await self.control.give_back(resource, by=self.by)
+
+    def _task_label(self, behavior: str) -> str:
+        tasks = (board.task(behavior) for board in self.feed.boards.values())
+        return next((task for task in tasks if task), behavior)
 
     async def action_runs(self) -> None:
         """Choose the run to look at."""

@@ -127,6 +127,11 @@ class Board:
         doing = active.doing.get(behavior) if active is not None else None
         return doing.what if doing is not None else None
 
+    def task(self, behavior: str) -> str | None:
+        """The label of the task of a behavior that has not ended, by its id."""
+        active = self.active.get(self._of_behavior.get(behavior, 0))
+        return self.label(active.element) if active is not None else None
+
     def signals(self) -> Mapping[str, tuple[str, bool]]:
         """Signals of the mission by id: name, and whether one is awaited now."""
         awaited = {wait.ref for active in self.active.values() for wait in active.waits.values()}

@@ -94,6 +94,7 @@ KEYS = (
     ("^X ^X", "STOP the mission and release its vehicles"),
     ("^C ^C", "the same; when nothing runs, quit"),
     ("s", "send a signal"),
+    ("t", "take a vehicle to steer by hand, or give it back"),
     ("r", "look at another run"),
     ("/", "log: only lines with some text; Esc: all"),
     ("Up Down", "move through the mission"),

@@ -1,16 +1,19 @@
 """The screen of the operator control unit: its panes, and how they are kept up to date."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
+from textual import work
 from textual.app import App, ComposeResult
 from textual.containers import Horizontal, VerticalScroll
 from textual.widgets import Static
 
+from m2pem.api import ResourceId
 from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId, RunStatus
 from m2pem.errors import M2pemError
 from m2pem_plugin_terminal.board import Board
 from m2pem_plugin_terminal.feed import Feed
+from m2pem_plugin_terminal.handover import taken
 from m2pem_plugin_terminal.header import header
 from m2pem_plugin_terminal.log_pane import LogPane
 from m2pem_plugin_terminal.notice import NoticeLine
@@ -47,6 +50,8 @@ class Display(App[None], inherit_bindings=False):
         self._vehicles = Vehicles(control.fleet())
         self._time_s = 0.0
         self._asking_time = False
+        self._holders: Mapping[ResourceId, str] = {}
+        self._asking_holders = False
         self.own_answers: set[tuple[RunId, str]] = set()
         # Held, not looked up: while the screen is being taken down they can no longer be found.
         self._header = Static(id="header")
@@ -109,6 +114,9 @@ class Display(App[None], inherit_bindings=False):
         time_s = (
             self._time_s if board and not board.status.ended else board.time_s if board else 0.0
         )
+        if not self._asking_holders:
+            self._asking_holders = True
+            self._ask_holders()
         active = [b for b in self.feed.boards.values() if not b.status.ended]
         others = sum(1 for each in active if each is not board)
         self._header.update(header(board, others, time_s, self.size.width))
@@ -116,7 +124,9 @@ class Display(App[None], inherit_bindings=False):
             width = self._mission.scrollable_content_region.width
             self._tree.update(mission_tree(board, now, time_s, width))
         width = self._around.scrollable_content_region.width
-        self._fleet.update(self._vehicles.table(now, width, self._behavior_name))
+        self._fleet.update(
+            self._vehicles.table(now, width, self._behavior_name, taken(self._holders))
+        )
         self.questions.show(self.feed.prompts, self._label, self.run_shown)
         self._notice.show()
         paused = board is not None and board.status is RunStatus.PAUSED
@@ -131,6 +141,16 @@ class Display(App[None], inherit_bindings=False):
             self._time_s = board.time_s
         finally:
             self._asking_time = False
+
+    @work(exit_on_error=False)
+    async def _ask_holders(self) -> None:
+        # Not folded from records: what is taken or given back while no run is active leaves none.
+        try:
+            self._holders = await self.control.holders()
+        except M2pemError:
+            self._holders = {}
+        finally:
+            self._asking_holders = False
 
     def _behavior_name(self, behavior: str) -> str:
         names = (board.behavior_name(behavior) for board in self.feed.boards.values())

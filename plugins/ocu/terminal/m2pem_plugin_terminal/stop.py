@@ -10,6 +10,7 @@ ARMED_FOR_S = 4.0
 HINTS = (
     ("p", "Pause"),
     ("s", "Signals"),
+    ("t", "Take"),
     ("r", "Runs"),
     ("/", "Filter"),
     ("?", "Help"),

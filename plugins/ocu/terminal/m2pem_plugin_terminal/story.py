@@ -54,6 +54,10 @@ def _run(record: r.Record) -> tuple[str, Weight] | None:
             good = outcome in (r.RunOutcome.COMPLETED, r.RunOutcome.TERMINATED)
             text = f"mission {outcome.value}" + (f": {detail}" if detail else "")
             return text, Weight.GOOD if good else Weight.ALARM
+        case r.OperatorTookControl(resource=resource, by=by):
+            return f"{resource} taken{_by(by)}", Weight.ALARM
+        case r.OperatorGaveControlBack(resource=resource, by=by):
+            return f"{resource} given back{_by(by)}", Weight.PLAIN
         case r.GeometryReceived(name=name, by=by):
             return f"{name} received{_by(by)}", Weight.PLAIN
     return None

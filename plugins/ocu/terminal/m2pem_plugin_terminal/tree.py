@@ -38,7 +38,8 @@ def mission_tree(board: Board, now: float, time_s: float, width: int) -> Text:
         if board.status.ended:
             detail = f": {board.outcome_detail}" if board.outcome_detail else ""
             text = f"{board.status.value} after {clock_time(board.time_s)}{detail}"
-            lines += [Text(line, "#c8d0d9") for line in wrap(text, width)]
+            # A screen that is being set up or taken down has no width yet, or no longer.
+            lines += [Text(line, "#c8d0d9") for line in wrap(text, max(1, width))]
         gone = [done for done in board.done if now - done.at < FADES_FOR_S]
         lines += [_done_line(board, done, now, width) for done in gone]
     return Text("\n").join(lines)

@@ -1,7 +1,7 @@
 """The vehicles pane: the latest of every vehicle, greyed when nothing is heard of it any more."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -44,17 +44,21 @@ class Vehicles:
         """Take telemetry in; `now` is the operator's clock, in seconds."""
         self._heard[state.resource] = _Heard(state, now)
 
-    def table(self, now: float, width: int, named: Callable[[str], str]) -> Text:
-        """All vehicles, each on two or three lines of `width` cells.
+    def table(
+        self, now: float, width: int, named: Callable[[str], str], taken: Mapping[str, str]
+    ) -> Text:
+        """All vehicles, each on two or three lines of `width` cells, and who took them.
 
-        `named` gives the name of a behavior by its id.
+        `named` gives the name of a behavior by its id; `taken`, by resource, the operators who
+        have something.
         """
         lines: list[Text] = []
         for vehicle in self._fleet.vehicles.values():
             silent_s = vehicle.lost_after_s or SILENT_AFTER_S
             heard = self._heard.get(vehicle.id)
+            holders = _taken((vehicle.id, *vehicle.payloads), taken, width)
             if heard is None or not isinstance(heard.state, VehicleState):
-                lines.append(Text(f"○ {_name(vehicle.id)} not heard of yet", GREY))
+                lines += [Text(f"○ {_name(vehicle.id)} not heard of yet", GREY), *holders]
                 continue
             age_s = now - heard.at
             payloads = [self._heard[p].state for p in vehicle.payloads if p in self._heard]
@@ -62,11 +66,22 @@ class Vehicles:
                 lines += _silent(heard.state, age_s)
             else:
                 lines += _vehicle(heard.state, payloads, width, named)
+            lines += holders
         return Text("\n").join(lines)
 
 
 def _name(resource: str) -> str:
     return shortened(resource, NAME_CELLS).ljust(NAME_CELLS)
+
+
+def _taken(resources: Iterable[str], taken: Mapping[str, str], width: int) -> list[Text]:
+    lines = []
+    for resource in resources:
+        if holder := taken.get(resource):
+            payload = resource.partition("/")[2]
+            what = f"{payload}: with {holder}" if payload else f"with {holder}"
+            lines.append(Text(f"  {shortened(what, width - 2)}", "bold #e8c468"))
+    return lines
 
 
 def _silent(state: VehicleState, age_s: float) -> list[Text]:

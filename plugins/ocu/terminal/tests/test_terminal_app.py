@@ -1,5 +1,6 @@
 """What the other keys do, and what the screen shows of missions."""
 
+from m2pem_plugin_terminal.tree import mission_tree
 from terminal_world import MISSION, World, scout
 
 from m2pem.api.telemetry import GeoPosition, LinkState, PayloadState, VehicleState
@@ -149,6 +150,16 @@ async def test_the_end_is_told_and_the_screen_stays(world: World) -> None:
         await terminal.until_shown("RUNNING", second)
 
 
+async def test_the_end_can_be_drawn_on_a_screen_without_width(world: World) -> None:
+    async with world.terminal() as terminal:
+        run = await world.start()
+        await terminal.until_shown("RUNNING")
+        await world.control.stop(run)
+        await terminal.until_shown("STOPPED")
+        assert terminal.app.board is not None
+        assert mission_tree(terminal.app.board, 0.0, 0.0, 0).plain.startswith("s\nt\no")
+
+
 async def test_quitting_while_a_mission_runs_is_asked_about(world: World) -> None:
     async with world.terminal() as terminal:
         await world.start()
@@ -172,7 +183,7 @@ async def test_nothing_is_cut_off_in_80_columns(world: World) -> None:
         assert len(lines) == 24
         assert not terminal.shows("…")
         keys = " ".join(lines[-1].split())
-        assert keys == "^X STOP p Pause s Signals r Runs / Filter ? Help q Quit"
+        assert keys == "^X STOP p Pause s Signals t Take r Runs / Filter ? Help q Quit"
         await terminal.press("question_mark")
         await terminal.until_shown("answer the question", "done, given up, failed", "Esc: close")
 

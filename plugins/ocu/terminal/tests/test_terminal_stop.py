@@ -22,7 +22,7 @@ async def test_the_second_press_stops_the_mission(world: World) -> None:
         assert (await world.control.runs())[0].detail == "by anna@gcs1"
 
 
-@pytest.mark.parametrize("keys", [["s"], ["r"], ["question_mark"], ["q"], ["slash", "x"]])
+@pytest.mark.parametrize("keys", [["s"], ["t"], ["r"], ["question_mark"], ["q"], ["slash", "x"]])
 async def test_stop_works_over_everything(world: World, keys: list[str]) -> None:
     async with world.terminal() as terminal:
         await world.start()

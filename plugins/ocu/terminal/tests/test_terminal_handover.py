@@ -1,0 +1,105 @@
+"""Taking vehicles from the missions, and giving them back."""
+
+from m2pem_plugin_terminal.handover import choices, taken
+from terminal_world import World, fleet, scout
+
+from m2pem.model.catalogue import BehaviorState, ResourceId
+
+
+async def holder(world: World, resource: str = "scout") -> str:
+    return {str(each): who for each, who in (await world.control.holders()).items()}[resource]
+
+
+async def test_taking_a_vehicle_ends_what_it_did_and_says_who_has_it(world: World) -> None:
+    async with world.terminal() as terminal:
+        await world.start()
+        world.fake.say(scout(0.75))
+        await terminal.until_shown("● DRIVE", "● scout")
+        await world.fake.until_called("start", "r1.b1")
+        await terminal.press("t")
+        await terminal.until_shown("1 scout  DRIVE", "2 uav  free", "3 uav/eye  free")
+        await terminal.press("enter")
+        await world.fake.until_called("cancel", "r1.b1")
+        assert await holder(world) == "anna@gcs1"
+        await terminal.until_shown("  with anna@gcs1", "DRIVE: error TAKEN_OVER", "FAILED")
+        world.fake.report("r1.b1", BehaviorState.CANCELLED)
+        await world.control.give_back(
+            "scout", by="bob@gcs2"
+        )  # of which the ended run has no record
+        await terminal.until_gone("  with anna@gcs1")
+
+
+async def test_choosing_what_one_has_gives_it_back(world: World) -> None:
+    async with world.terminal() as terminal:
+        await world.start()
+        await terminal.until_shown("RUNNING")
+        await terminal.press("t")
+        await terminal.until_shown("3 uav/eye  free")
+        await terminal.press("3")
+        await terminal.until_shown("eye: with anna@gcs1")
+        await terminal.press("t")
+        await terminal.until_shown("3 uav/eye  anna@gcs1 (you)")
+        await terminal.press("3")
+        await terminal.until_shown("uav/eye given back by anna@gcs1")
+        await terminal.until_gone("with anna@gcs1")
+        assert await holder(world, "uav/eye") == ""
+
+
+async def test_what_another_operator_has_is_refused_with_the_name(world: World) -> None:
+    async with world.terminal() as terminal:
+        await world.start()
+        await terminal.until_shown("RUNNING")
+        await world.control.take("uav", by="bob@gcs2")
+        await terminal.until_shown("with bob@gcs2", "uav taken by bob@gcs2")
+        await terminal.press("t")
+        await terminal.until_shown("2 uav  bob@gcs2")
+        await terminal.press("2")
+        await terminal.until_shown("uav is with bob@gcs2")
+        assert await holder(world, "uav") == "bob@gcs2"
+
+
+async def test_what_became_anothers_while_the_list_was_shown_is_left(world: World) -> None:
+    async with world.terminal() as terminal:
+        await world.control.take("scout", by="anna@gcs1")
+        await terminal.press("t")
+        await terminal.until_shown("1 scout  anna@gcs1 (you)", "2 uav  free")
+        await world.control.give_back("scout", by="bob@gcs2")
+        await world.control.take("scout", by="bob@gcs2")
+        await world.control.take("uav", by="bob@gcs2")
+        await terminal.press("1")
+        await terminal.until_shown("Give back: scout is with bob@gcs2")
+        assert await holder(world) == "bob@gcs2"
+
+
+async def test_taking_what_another_took_meanwhile_is_refused(world: World) -> None:
+    async with world.terminal() as terminal:
+        await terminal.press("t")
+        await terminal.until_shown("1 scout  free")
+        await world.control.take("scout", by="bob@gcs2")
+        await terminal.press("1")
+        await terminal.until_shown("Take: scout is with bob@gcs2")
+
+
+async def test_who_attaches_late_sees_what_is_taken(world: World) -> None:
+    await world.control.take("scout", by="bob@gcs2")
+    async with world.terminal() as terminal:
+        await terminal.until_shown("○ scout     not heard of yet", "with bob@gcs2")
+        await world.control.give_back("scout", by="bob@gcs2")
+        await terminal.until_gone("with bob@gcs2")
+
+
+async def test_escape_takes_nothing(world: World) -> None:
+    async with world.terminal() as terminal:
+        await terminal.press("t")
+        await terminal.until_shown("1 scout  free")
+        await terminal.press("escape")
+        await terminal.until_gone("1 scout  free")
+        assert taken(await world.control.holders()) == {}
+
+
+def test_a_behavior_of_a_run_not_known_here_is_listed_by_its_id() -> None:
+    who = {"scout": "r7.b2", "uav": "x" * 90, "uav/eye": ""}
+    holders = {ResourceId(resource): holder for resource, holder in who.items()}
+    listed = choices(fleet(), holders, "anna", lambda behavior: behavior)
+    assert [each.remark for each in listed] == ["r7.b2", "x" * 33 + "…", "free"]
+    assert taken(holders) == {"uav": "x" * 90}
