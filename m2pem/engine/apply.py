@@ -137,8 +137,17 @@ def _scope_opened(state: RunState, record: r.ScopeOpened) -> None:
 
 def _scope_closed(state: RunState, record: r.ScopeClosed) -> None:
     scope = state.scopes.pop(record.scope)
+    for wait in list(scope.waits.values()) if scope.waits is not None else ():
+        _end_wait(state, wait)
     if scope.owner is not None:
         scope.owner.inner = None
+
+
+def _scope_interrupted(state: RunState, record: r.ScopeInterrupted) -> None:
+    scope = state.scopes[record.scope]
+    scope.interrupted = True
+    for wait in list(scope.waits.values()) if scope.waits is not None else ():
+        _end_wait(state, wait)
 
 
 def _token_entered(state: RunState, record: r.TokenEntered) -> None:
@@ -149,7 +158,7 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         element = state.mission.elements[record.flow]
         assert isinstance(element, SequenceFlow)
         flow = element
-    token = Token(record.token, node, scope, flow)
+    token = Token(record.token, node, scope, flow, instance=record.instance)
     state.tokens[record.token] = token
     scope.tokens[record.token] = token
     state.last_token = max(state.last_token, record.token)
@@ -278,14 +287,26 @@ def _service_ended(state: RunState, record: r.ServiceEnded | r.ServiceWithdrawn)
 
 
 def _data_written(state: RunState, record: r.DataWritten) -> None:
-    state.scopes[record.store].data[record.key] = record.value
+    if not record.own:
+        state.scopes[record.store].data[record.key] = record.value
+        return
+    token = state.tokens[record.own]
+    if token.own is None:
+        token.own = {}
+    token.own[record.key] = record.value
 
 
 def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
-    token = state.tokens[record.token]
+    holder: Token | Scope
+    if record.token:
+        holder = token = state.tokens[record.token]
+        scope = token.scope
+    else:
+        holder, token, scope = state.scopes[record.scope], None, state.scopes[record.scope]
     wait = Wait(
         record.wait,
         token,
+        scope,
         _node(state, record.element),
         record.trigger,
         record.ref,
@@ -296,9 +317,9 @@ def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
     )
     state.last_wait = record.wait
     state.waits[wait.id] = wait
-    if token.waits is None:
-        token.waits = {}
-    token.waits[wait.id] = wait
+    if holder.waits is None:
+        holder.waits = {}
+    holder.waits[wait.id] = wait
     if wait.trigger is r.Trigger.TIMER:
         heappush(state.dates if wait.calendar else state.timers, (wait.due_us, wait.id))
     else:
@@ -307,8 +328,9 @@ def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
 
 def _end_wait(state: RunState, wait: Wait) -> None:
     del state.waits[wait.id]
-    assert wait.token.waits is not None
-    del wait.token.waits[wait.id]
+    waits = wait.token.waits if wait.token is not None else wait.scope.waits
+    assert waits is not None
+    del waits[wait.id]
     if wait.trigger is r.Trigger.TIMER:
         heap = state.dates if wait.calendar else state.timers
         while heap and heap[0][1] not in state.waits:
@@ -354,6 +376,7 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.GeometryReceived: _geometry_received,
     r.ScopeOpened: _scope_opened,
     r.ScopeClosed: _scope_closed,
+    r.ScopeInterrupted: _scope_interrupted,
     r.TokenEntered: _token_entered,
     r.TokenLeft: _token_left,
     r.FlowTaken: _nothing,

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 
 from m2pem.engine import records as r
 from m2pem.engine.apply import apply
-from m2pem.engine.data import flatten, store_for
+from m2pem.engine.data import Place, flatten, store_for
 from m2pem.engine.records import Record, TokenOutcome
 from m2pem.engine.state import RunState, Scope, Token
 from m2pem.model.elements import (
@@ -114,7 +114,12 @@ class Execution:
     # --- tokens ---------------------------------------------------------------------------------
 
     def enter(
-        self, token: int, node: FlowNode, scope: Scope, flow: SequenceFlow | None = None
+        self,
+        token: int,
+        node: FlowNode,
+        scope: Scope,
+        flow: SequenceFlow | None = None,
+        instance: int | None = None,
     ) -> Token:
         """Put a token on a node, and have it executed in its turn."""
         self.emit(
@@ -124,6 +129,7 @@ class Execution:
                 node.id,
                 scope.id,
                 flow.id if flow is not None else "",
+                instance,
             )
         )
         entered = self.state.tokens[token]
@@ -139,7 +145,14 @@ class Execution:
         """Take a token off its node. It is consumed unless it is entered elsewhere next."""
         node = token.node
         self.emit(
-            r.TokenLeft(token.id, self.process_ids[node.index], node.id, token.scope.id, outcome)
+            r.TokenLeft(
+                token.id,
+                self.process_ids[node.index],
+                node.id,
+                token.scope.id,
+                outcome,
+                token.instance,
+            )
         )
         self.moved.add(token.scope.id)
 
@@ -167,12 +180,15 @@ class Execution:
     def write(self, token: Token, key: str, value: Value) -> None:
         """Write a value as the element that the token is on."""
         for name, item in flatten(key, value):
-            store = store_for(token.scope, name)
-            self.write_into(store, token, name, item)
+            self.write_into(store_for(token, name), token, name, item)
 
-    def write_into(self, store: Scope, token: Token, key: str, value: Value) -> None:
-        """Write one value into a given scope's store."""
+    def write_into(self, place: Place, token: Token, key: str, value: Value) -> None:
+        """Write one value into the store of a given scope, or of a token's activity."""
         node = token.node
+        if type(place) is Token:
+            store, own = place.scope.id, place.id
+        else:
+            store, own = place.id, 0
         self.emit(
             r.DataWritten(
                 token.id,
@@ -181,7 +197,8 @@ class Execution:
                 token.scope.id,
                 key,
                 value,
-                store.id,
+                store,
+                own,
             )
         )
 

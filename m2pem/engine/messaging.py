@@ -7,7 +7,7 @@ long as something in the mission can receive it at all.
 from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
 from m2pem.engine.state import Token
-from m2pem.engine.waiting import deliver, message_receiver
+from m2pem.engine.triggering import deliver, message_receiver
 from m2pem.model.values import Value
 
 

@@ -29,7 +29,9 @@ class Scope:
     """An instance of a container: a process or a subprocess.
 
     `owner` is the token on the activity in `parent`; both None for a process that nobody called.
-    `joins` are the tokens waiting at each join, by the flow that they came by.
+    `joins` are the tokens waiting at each join, by the flow that they came by. `waits` are the
+    start events of its event subprocesses. `loop`: it holds the instances of a loop or
+    multi-instance activity, which is the owner's; its container is then the activity's own.
     """
 
     id: int
@@ -40,6 +42,25 @@ class Scope:
     tokens: "dict[int, Token]" = field(default_factory=dict)
     data: dict[str, Value] = field(default_factory=dict)
     joins: "dict[FlowNode, Join]" = field(default_factory=dict)
+    waits: "dict[int, Wait] | None" = None
+    loop: "Loop | None" = None
+    interrupted: bool = False
+    """An interrupting event subprocess of it has begun: no other one can."""
+
+
+@dataclass(slots=True, eq=False)
+class Loop:
+    """How far the instances of an activity have come (BPMN 2.0.2, table 10.31).
+
+    `total`: instances there will be, -1 while nobody knows (a standard loop). `items`: what each
+    reads, when they come from a collection. `outputs`: what each gave, by instance.
+    """
+
+    total: int
+    items: tuple[Value, ...] | None
+    started: int = 0
+    completed: int = 0
+    outputs: dict[int, Value] = field(default_factory=dict)
 
 
 @dataclass(slots=True, eq=False)
@@ -54,6 +75,8 @@ class Token:
     """A token on a flow node. `flow`: how it came. A move makes a new object with the same id.
 
     At most one of `behavior`, `prompt`, `service` and `inner` is set: what its activity does.
+    `instance`: which instance of a loop or multi-instance activity it is, from 0; None: none.
+    `own`: data of the activity itself (item variable, data inputs and outputs); None: nothing.
     """
 
     id: int
@@ -65,17 +88,22 @@ class Token:
     prompt: str = ""
     service: str = ""
     inner: Scope | None = None
+    instance: int | None = None
+    own: dict[str, Value] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wait:
-    """A catch event armed for a token: at its own node, or at a boundary event of it.
+    """A catch event that is armed.
 
-    Fields as in record `EventAwaited`.
+    `token` waits: at its own node, at a boundary event of it, or at an event behind the
+    event-based gateway that it is on. None: the start event of an event subprocess of `scope`.
+    Other fields as in record `EventAwaited`.
     """
 
     id: int
-    token: Token
+    token: Token | None
+    scope: Scope
     node: FlowNode
     trigger: Trigger
     ref: str

@@ -97,3 +97,34 @@ class TimerEventDefinition(EventDefinition):
 @dataclass(frozen=True, slots=True)
 class TerminateEventDefinition(EventDefinition):
     """Ends its own scope at once (clause 13.5.6)."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionalEventDefinition(EventDefinition):
+    """Triggered when the condition becomes true (table 10.95)."""
+
+    condition: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class LinkEventDefinition(EventDefinition):
+    """Joins a source to the target of the same name in one container (table 10.98)."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class CancelEventDefinition(EventDefinition):
+    """Cancels a transaction, or catches that it was cancelled (clause 10.5.6)."""
+
+
+@dataclass(frozen=True, slots=True)
+class CompensateEventDefinition(EventDefinition):
+    """Undoes completed activities (table 10.94, clause 13.5.5).
+
+    `activity`: the id of the one to undo, "" for all of the scope. `wait`: the throwing event
+    waits until that is done.
+    """
+
+    activity: str = ""
+    wait: bool = True

@@ -2,14 +2,17 @@
 
 from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
-from m2pem.engine.interruption import empty, end_run, throw_error, throw_escalation
+from m2pem.engine.interruption import end_run
 from m2pem.engine.messaging import send
 from m2pem.engine.nodes.containers import finish
 from m2pem.engine.nodes.flows import true_flows
 from m2pem.engine.records import RunOutcome, TokenOutcome
+from m2pem.engine.scopes import empty
 from m2pem.engine.state import Token
-from m2pem.engine.waiting import arm, collect_letters, throw_signal
-from m2pem.model.elements import Event, StartEvent
+from m2pem.engine.throwing import throw_error, throw_escalation
+from m2pem.engine.triggering import collect_letters, throw_signal
+from m2pem.engine.waiting import arm
+from m2pem.model.elements import Event, StartEvent, SubProcess
 from m2pem.model.events import (
     ErrorEventDefinition,
     EscalationEventDefinition,
@@ -30,13 +33,16 @@ def complete(x: Execution, token: Token) -> None:
 def start(x: Execution, token: Token) -> None:
     """A plain start goes on at once; a typed one waits for its trigger (paper, section 4.1).
 
-    The start event of an instance that its trigger has made has happened already.
+    That of an instance, or of an event subprocess, which its trigger has made has happened already.
     """
     node = token.node
     assert isinstance(node, StartEvent)
     root = x.state.root
     assert root is not None
     triggered = token.scope.parent is None and token.scope is not root
+    container = node.container
+    if isinstance(container, SubProcess) and container.triggered_by_event:
+        triggered = True
     if node.definitions and not triggered:
         catch(x, token)
     else:

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from m2pem.engine.data import reader
 from m2pem.engine.execution import Execution
-from m2pem.engine.interruption import throw_error
 from m2pem.engine.state import Token
+from m2pem.engine.throwing import throw_error
 from m2pem.errors import ExpressionError
 from m2pem.model.elements import SequenceFlow
 
@@ -19,7 +19,7 @@ def true_flows(
     nothing was true and there is no default (NO_FLOW).
     """
     node = token.node
-    read = reader(token.scope)
+    read = reader(token)
     chosen: list[SequenceFlow] = []
     for flow in node.outgoing:
         if flow is default:

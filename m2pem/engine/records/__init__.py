@@ -34,7 +34,14 @@ from m2pem.engine.records.run import (
     RunStarted,
     RunYielded,
 )
-from m2pem.engine.records.tokens import FlowTaken, ScopeClosed, ScopeOpened, TokenEntered, TokenLeft
+from m2pem.engine.records.tokens import (
+    FlowTaken,
+    ScopeClosed,
+    ScopeInterrupted,
+    ScopeOpened,
+    TokenEntered,
+    TokenLeft,
+)
 from m2pem.engine.records.work import (
     BehaviorCancelRequested,
     BehaviorContinued,
@@ -84,6 +91,7 @@ __all__ = [
     "RunStarted",
     "RunYielded",
     "ScopeClosed",
+    "ScopeInterrupted",
     "ScopeOpened",
     "ServiceEnded",
     "ServiceRequested",
@@ -110,6 +118,7 @@ Record: TypeAlias = Union[
     GeometryReceived,
     ScopeOpened,
     ScopeClosed,
+    ScopeInterrupted,
     TokenEntered,
     TokenLeft,
     FlowTaken,

@@ -7,7 +7,10 @@ from m2pem.model.values import Value
 
 
 class DataWritten(BaseRecord, frozen=True):
-    """`store` is the scope that holds the key; `scope`, `element` say who wrote it."""
+    """`store` is the scope that holds the key; `scope`, `element` say who wrote it.
+
+    `own`: the token whose activity holds it instead (an item variable, a data input); 0: none.
+    """
 
     token: int
     process: str
@@ -16,10 +19,13 @@ class DataWritten(BaseRecord, frozen=True):
     key: str
     value: Value
     store: int
+    own: int = 0
 
 
 class EventAwaited(BaseRecord, frozen=True):
     """A catch event is armed: `ref` is a signal's or message's id; `due_us` a timer's time.
+
+    `token` 0: it is the start event of an event subprocess, and `scope` waits.
 
     A duration or cycle is due at a mission time (microseconds from the start, which stands during
     a pause); a date (`calendar`) at a time since the Unix epoch. `left`: how often a cycle still

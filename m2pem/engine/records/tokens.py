@@ -23,23 +23,28 @@ class ScopeClosed(BaseRecord, frozen=True):
 
 
 class TokenEntered(BaseRecord, frozen=True):
-    """A token is on an element. `flow`: the sequence flow that it came by."""
+    """A token is on an element. `flow`: the sequence flow that it came by.
+
+    `instance`: which instance of a loop or multi-instance activity it is, from 0; absent: none.
+    """
 
     token: int
     process: str
     element: str
     scope: int
     flow: str = ""
+    instance: int | None = None
 
 
 class TokenLeft(BaseRecord, frozen=True):
-    """It is there no more. Without a later `TokenEntered` it was consumed."""
+    """It is there no more. Without a later `TokenEntered` it was consumed. `instance` likewise."""
 
     token: int
     process: str
     element: str
     scope: int
     outcome: TokenOutcome
+    instance: int | None = None
 
 
 class FlowTaken(BaseRecord, frozen=True):
@@ -50,3 +55,11 @@ class FlowTaken(BaseRecord, frozen=True):
     element: str
     scope: int
     flow: str
+
+
+class ScopeInterrupted(BaseRecord, frozen=True):
+    """An event subprocess (`element`) has ended all else in the scope; no other can begin."""
+
+    scope: int
+    process: str
+    element: str

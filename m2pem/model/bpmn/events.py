@@ -65,7 +65,11 @@ def _boundary(
 ) -> BoundaryEvent:
     interrupting = reading.boolean(element, "cancelActivity", True, identifier)
     event = BoundaryEvent(
-        identifier, element.get("name", ""), reading.report.line(element), definitions, interrupting
+        identifier,
+        element.get("name", ""),
+        reading.report.line(element),
+        definitions,
+        interrupting=interrupting,
     )
     reading.attachments.append((event, reference(element.get("attachedToRef", ""))))
     if not interrupting and any(isinstance(d, ErrorEventDefinition) for d in definitions):

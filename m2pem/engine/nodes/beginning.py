@@ -1,0 +1,32 @@
+"""The beginning of an activity's work (BPMN 2.0.2, clause 13.3.2)."""
+
+from collections.abc import Callable
+
+from m2pem.engine.execution import Execution
+from m2pem.engine.nodes import activities, containers
+from m2pem.engine.state import Token
+from m2pem.engine.triggering import arm_boundary
+from m2pem.model import elements as e
+from m2pem.model.elements import Activity, FlowNode
+
+WORK: dict[type[FlowNode], Callable[[Execution, Token], None]] = {
+    e.Task: activities.pass_through,
+    e.ManualTask: activities.pass_through,
+    e.UserTask: activities.user_task,
+    e.ScriptTask: activities.script_task,
+    e.ServiceTask: activities.service_task,
+    e.SendTask: activities.send_task,
+    e.ReceiveTask: activities.receive_task,
+    e.SubProcess: containers.subprocess,
+    e.CallActivity: containers.call_activity,
+}
+"""What each kind of activity does once it has begun."""
+
+
+def begin_activity(x: Execution, token: Token) -> None:
+    """A token has come to an activity: arm its boundary events, then do its work."""
+    node = token.node
+    assert isinstance(node, Activity)
+    if node.boundary and not arm_boundary(x, token, node):
+        return
+    WORK[type(node)](x, token)

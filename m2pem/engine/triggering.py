@@ -1,0 +1,147 @@
+"""What happens when the trigger of a catch event comes."""
+
+from collections.abc import Callable
+
+from m2pem.engine import records as r
+from m2pem.engine.execution import Execution
+from m2pem.engine.interruption import begin_event_subprocess, divert
+from m2pem.engine.records import TokenOutcome, Trigger
+from m2pem.engine.state import Scope, Token, Wait
+from m2pem.engine.waiting import arm, arm_again
+from m2pem.model.elements import Activity, BoundaryEvent, FlowNode, StartEvent
+from m2pem.model.events import MessageEventDefinition, SignalEventDefinition
+from m2pem.model.values import Value
+
+WHEN_TRIGGERED: dict[type[FlowNode], Callable[[Execution, Token], None]] = {}
+"""What a wait at a token's own node leads to, by kind of node; filled by the handlers."""
+
+
+def arm_boundary(x: Execution, token: Token, activity: Activity) -> bool:
+    """Arm the boundary events of the activity that a token has entered.
+
+    Errors and escalations are not armed: they look for their catcher. False: the token has left
+    already, because a timer was wrong or a message had been kept.
+    """
+    for boundary in activity.boundary:
+        for definition in boundary.definitions:
+            if not arm(x, token, boundary, definition):
+                return False
+    return collect_letters(x, token)
+
+
+def arm_event_subprocesses(x: Execution, scope: Scope) -> bool:
+    """Arm the start events of a scope's event subprocesses (clause 13.5.4).
+
+    False: a timer was wrong, and its error has been thrown.
+    """
+    for container in scope.container.event_subprocesses:
+        for start in container.starts:
+            for definition in start.definitions:
+                if not arm(x, scope, start, definition):
+                    return False
+    return True
+
+
+def collect_letters(x: Execution, token: Token) -> bool:
+    """Let a token that waits for messages have those kept for it. False: it has left with one."""
+    found = bool(x.state.mailbox)
+    while found and token.waits is not None:
+        found = False
+        for wait in list(token.waits.values()):
+            letters = x.state.mailbox.get(wait.ref) if wait.trigger is Trigger.MESSAGE else None
+            if letters:
+                found = True
+                trigger(x, wait, letters[0], kept=True)
+                if x.state.tokens.get(token.id) is not token:
+                    return False
+    return True
+
+
+# --- triggering ---------------------------------------------------------------------------------
+
+
+def trigger(x: Execution, wait: Wait, data: dict[str, Value], *, kept: bool = False) -> None:
+    """What a token waited for has come: a catch event goes on, a boundary event is entered."""
+    x.emit(r.EventTriggered(wait.id, kept))
+    token, node = wait.token, wait.node
+    if token is None:
+        _in_scope(x, wait, data)
+    elif node is token.node:
+        x.write_all(token, data)
+        WHEN_TRIGGERED[type(node)](x, token)
+    elif isinstance(node, BoundaryEvent):
+        _at_boundary(x, wait, token, node, data)
+    else:
+        _behind_gateway(x, token, node, data)
+
+
+def _at_boundary(
+    x: Execution, wait: Wait, token: Token, node: BoundaryEvent, data: dict[str, Value]
+) -> None:
+    if node.interrupting:
+        x.write_all(divert(x, token, node, TokenOutcome.INTERRUPTED), data)
+        return
+    arm_again(x, wait)
+    x.write_all(x.spawn(node, token.scope), data)
+
+
+def _in_scope(x: Execution, wait: Wait, data: dict[str, Value]) -> None:
+    """The start event of an event subprocess; it goes on as one that has happened."""
+    node = wait.node
+    assert isinstance(node, StartEvent)
+    if not node.interrupting:
+        arm_again(x, wait)
+    x.write_all(begin_event_subprocess(x, wait.scope, node), data)
+
+
+def _behind_gateway(x: Execution, token: Token, node: FlowNode, data: dict[str, Value]) -> None:
+    """The first of the events behind an event-based gateway: the token goes there (13.4.4)."""
+    [flow] = [flow for flow in token.node.outgoing if flow.target is node]
+    x.proceed(token, [flow])
+    moved = x.state.tokens[token.id]
+    x.write_all(moved, data)
+    WHEN_TRIGGERED[type(node)](x, moved)
+
+
+def throw_signal(x: Execution, signal: str, data: dict[str, Value]) -> bool:
+    """Reach every catcher in the run, in the order they were armed. True: there was one."""
+    waits = list(x.state.catchers.get((Trigger.SIGNAL, signal), {}).values())
+    for wait in waits:
+        if wait.id in x.state.waits:
+            trigger(x, wait, data)
+    started = False
+    for start in x.triggered_starts:
+        for definition in start.definitions:
+            if isinstance(definition, SignalEventDefinition) and definition.signal.id == signal:
+                _instance(x, start, data)
+                started = True
+    return bool(waits) or started
+
+
+def message_receiver(x: Execution, message: str) -> Wait | StartEvent | None:
+    """Who gets a message: the one that has waited longest, else a process that it starts."""
+    waits = x.state.catchers.get((Trigger.MESSAGE, message))
+    if waits:
+        return next(iter(waits.values()))
+    for start in x.triggered_starts:
+        for definition in start.definitions:
+            if isinstance(definition, MessageEventDefinition) and definition.message.id == message:
+                return start
+    return None
+
+
+def deliver(x: Execution, receiver: Wait | StartEvent, data: dict[str, Value]) -> None:
+    """Hand a message over."""
+    if isinstance(receiver, Wait):
+        trigger(x, receiver, data)
+    else:
+        _instance(x, receiver, data)
+
+
+def _instance(x: Execution, start: StartEvent, data: dict[str, Value]) -> None:
+    """One instance of a process, from the start event that was triggered."""
+    process = start.container
+    number = x.state.last_scope + 1
+    x.emit(r.ScopeOpened(number, process.id, process.id))
+    scope = x.state.scopes[number]
+    x.write_all(x.spawn(start, scope), data)
