@@ -23,6 +23,7 @@ from m2pem.engine.state import (
 )
 from m2pem.model.elements import (
     CallActivity,
+    ComplexGateway,
     Container,
     FlowNode,
     InclusiveGateway,
@@ -49,6 +50,8 @@ def _node(state: RunState, element: str) -> FlowNode:
 
 
 def _is_join(node: FlowNode) -> bool:
+    if isinstance(node, ComplexGateway):
+        return True
     return isinstance(node, (ParallelGateway, InclusiveGateway)) and len(node.incoming) > 1
 
 
@@ -167,6 +170,16 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         if join is None:
             join = scope.joins[node] = Join()
         join.by_flow.setdefault(flow, []).append(token)
+
+
+def _gateway_activated(state: RunState, record: r.GatewayActivated) -> None:
+    node = _node(state, record.element)
+    used = tuple(flow for flow in node.incoming if flow.id in record.flows)
+    state.scopes[record.scope].activated[node] = used
+
+
+def _gateway_reset(state: RunState, record: r.GatewayReset) -> None:
+    del state.scopes[record.scope].activated[_node(state, record.element)]
 
 
 def _token_left(state: RunState, record: r.TokenLeft) -> None:
@@ -380,6 +393,8 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.TokenEntered: _token_entered,
     r.TokenLeft: _token_left,
     r.FlowTaken: _nothing,
+    r.GatewayActivated: _gateway_activated,
+    r.GatewayReset: _gateway_reset,
     r.BehaviorRequested: _behavior_requested,
     r.BehaviorProgressed: _behavior_progressed,
     r.BehaviorCancelRequested: _behavior_cancel_requested,

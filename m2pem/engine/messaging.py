@@ -20,7 +20,7 @@ def send(x: Execution, token: Token, message: str) -> None:
         r.MessageThrown(message, token.id, x.process_of(node), node.id, token.scope.id, kept=kept)
     )
     if receiver is not None:
-        deliver(x, receiver, {})
+        deliver(x, receiver, message, {})
 
 
 def receive(x: Execution, message: str, data: dict[str, Value], by: str) -> None:
@@ -29,4 +29,4 @@ def receive(x: Execution, message: str, data: dict[str, Value], by: str) -> None
     kept = receiver is None
     x.emit(r.MessageThrown(message, by=by, kept=kept, data=data if kept else {}))
     if receiver is not None:
-        deliver(x, receiver, data)
+        deliver(x, receiver, message, data)

@@ -44,6 +44,8 @@ class Scope:
     joins: "dict[FlowNode, Join]" = field(default_factory=dict)
     waits: "dict[int, Wait] | None" = None
     loop: "Loop | None" = None
+    activated: "dict[FlowNode, tuple[SequenceFlow, ...]]" = field(default_factory=dict)
+    """Complex gateways that wait to reset, and the flows whose tokens activated them."""
     interrupted: bool = False
     """An interrupting event subprocess of it has begun: no other one can."""
 

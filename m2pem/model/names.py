@@ -7,6 +7,7 @@ from m2pem.findings import Finding, Severity
 from m2pem.model.behavior import Assignment, Parameter
 from m2pem.model.elements import (
     CallActivity,
+    ComplexGateway,
     Event,
     FlowNode,
     Mission,
@@ -85,6 +86,8 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
 
 
 def _reads(node: FlowNode) -> Iterator[Read]:
+    if isinstance(node, ComplexGateway) and node.activation is not None:
+        yield Read(node.activation, node.id, node.line)
     for flow in node.outgoing:
         if flow.condition is not None:
             yield Read(flow.condition, flow.id, flow.line)
@@ -119,6 +122,9 @@ def _note_writes(
                 store.written.add(statement.key)
     elif isinstance(node, UserTask) and node.prompt is not None:
         store.written.add(node.prompt.store)
+    elif isinstance(node, ComplexGateway):
+        store.written |= {"activationCount", "waitingForStart"}
+        store.written.update(flow.id for flow in node.incoming)
     elif isinstance(node, ServiceTask) and node.call is not None:
         writes = service_writes.get(node.call.service)
         if writes is None:

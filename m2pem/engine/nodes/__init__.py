@@ -7,7 +7,7 @@ that wait at their own node to what follows.
 from collections.abc import Callable
 
 from m2pem.engine.execution import Execution
-from m2pem.engine.nodes import activities, events, gateways
+from m2pem.engine.nodes import activities, complex_gateway, event_gateway, events, gateways
 from m2pem.engine.nodes.beginning import WORK, begin_activity
 from m2pem.engine.nodes.completion import complete
 from m2pem.engine.state import Token
@@ -20,6 +20,8 @@ EXECUTE: dict[type[FlowNode], Callable[[Execution, Token], None]] = {
     e.ExclusiveGateway: gateways.exclusive,
     e.ParallelGateway: gateways.parallel,
     e.InclusiveGateway: gateways.inclusive,
+    e.ComplexGateway: complex_gateway.complex_gateway,
+    e.EventBasedGateway: event_gateway.event_based,
     e.StartEvent: events.start,
     e.EndEvent: events.end,
     e.IntermediateCatchEvent: events.catch,

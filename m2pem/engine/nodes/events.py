@@ -45,7 +45,7 @@ def start(x: Execution, token: Token) -> None:
         triggered = True
     if node.definitions and not triggered:
         catch(x, token)
-    else:
+    elif not token.waits:  # else others of its triggers must still come
         complete(x, token)
 
 
@@ -98,7 +98,7 @@ def end(x: Execution, token: Token) -> None:
     """The token ends here, perhaps throwing something."""
     node = token.node
     assert isinstance(node, Event)
-    for definition in node.definitions:
+    for definition in sorted(node.definitions, key=_ends_the_scope):
         match definition:
             case TerminateEventDefinition():
                 _terminate(x, token)
@@ -107,7 +107,7 @@ def end(x: Execution, token: Token) -> None:
                 assert error is not None
                 throw_error(x, token, error.code, f"thrown by {node.label}", leaving=True)
                 return
-            case EscalationEventDefinition(escalation=escalation):
+            case EscalationEventDefinition(escalation=escalation) if len(node.definitions) == 1:
                 assert escalation is not None
                 goes_on = throw_escalation(x, token, escalation, leaving=True)
                 if goes_on and not token.scope.tokens:
@@ -118,6 +118,13 @@ def end(x: Execution, token: Token) -> None:
                 if x.state.tokens.get(token.id) is not token:
                     return
     x.consume(token)
+
+
+def _ends_the_scope(definition: EventDefinition) -> int:
+    """Of several results, those that end the scope come last, so that all are thrown."""
+    if isinstance(definition, TerminateEventDefinition):
+        return 2
+    return 1 if isinstance(definition, ErrorEventDefinition) else 0
 
 
 def _terminate(x: Execution, token: Token) -> None:

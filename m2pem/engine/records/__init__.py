@@ -36,6 +36,8 @@ from m2pem.engine.records.run import (
 )
 from m2pem.engine.records.tokens import (
     FlowTaken,
+    GatewayActivated,
+    GatewayReset,
     ScopeClosed,
     ScopeInterrupted,
     ScopeOpened,
@@ -72,6 +74,8 @@ __all__ = [
     "EventAwaited",
     "EventTriggered",
     "FlowTaken",
+    "GatewayActivated",
+    "GatewayReset",
     "GeometryReceived",
     "InputDeferred",
     "InputIgnored",
@@ -122,6 +126,8 @@ Record: TypeAlias = Union[
     TokenEntered,
     TokenLeft,
     FlowTaken,
+    GatewayActivated,
+    GatewayReset,
     BehaviorRequested,
     BehaviorProgressed,
     BehaviorCancelRequested,

@@ -63,3 +63,20 @@ class ScopeInterrupted(BaseRecord, frozen=True):
     scope: int
     process: str
     element: str
+
+
+class GatewayActivated(BaseRecord, frozen=True):
+    """A complex gateway has used the tokens of `flows`, and waits for the others to reset."""
+
+    process: str
+    element: str
+    scope: int
+    flows: tuple[str, ...]
+
+
+class GatewayReset(BaseRecord, frozen=True):
+    """A complex gateway can be activated again."""
+
+    process: str
+    element: str
+    scope: int

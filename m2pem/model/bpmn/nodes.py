@@ -6,10 +6,11 @@ from lxml import etree
 
 from m2pem.model.bpmn.calls import read_call_activity
 from m2pem.model.bpmn.events import read_event
+from m2pem.model.bpmn.gateways import GATEWAYS, read_gateway
 from m2pem.model.bpmn.names import BPMN, a, kind, local
 from m2pem.model.bpmn.prompts import read_user_task
 from m2pem.model.bpmn.reading import Reading, reference
-from m2pem.model.bpmn.scan import Scan, own_extensions, scan
+from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.bpmn.scripts import read_script_task
 from m2pem.model.bpmn.tasks import (
     read_manual_task,
@@ -21,15 +22,10 @@ from m2pem.model.bpmn.tasks import (
 from m2pem.model.elements import (
     Activity,
     Container,
-    ExclusiveGateway,
     FlowNode,
-    Gateway,
-    InclusiveGateway,
-    ParallelGateway,
     SubProcess,
 )
 
-_NONE: frozenset[str] = frozenset()
 _LOOPS = ("loopCharacteristics", "standardLoopCharacteristics", "multiInstanceLoopCharacteristics")
 LOOPS = frozenset(BPMN + name for name in _LOOPS)
 SUBPROCESSES = frozenset(BPMN + name for name in ("subProcess", "transaction", "adHocSubProcess"))
@@ -45,13 +41,6 @@ _TASKS: dict[str, Callable[[Reading, Scan], Activity]] = {
     BPMN + "callActivity": read_call_activity,
     BPMN + "businessRuleTask": read_plain_task,
 }
-_GATEWAYS: dict[str, type[Gateway]] = {
-    BPMN + "exclusiveGateway": ExclusiveGateway,
-    BPMN + "inclusiveGateway": InclusiveGateway,
-    BPMN + "parallelGateway": ParallelGateway,
-    BPMN + "complexGateway": Gateway,
-    BPMN + "eventBasedGateway": Gateway,
-}
 _EVENTS = frozenset(
     BPMN + name
     for name in (
@@ -64,8 +53,6 @@ _EVENTS = frozenset(
 )
 _REFUSED = {
     "businessRuleTask": "use a service task",
-    "complexGateway": "use an exclusive, inclusive or parallel gateway",
-    "eventBasedGateway": "wait with boundary events on one task, or with parallel branches",
     "transaction": "use a subprocess with boundary events",
     "adHocSubProcess": "join its activities by sequence flows, in a plain subprocess",
     "choreographyTask": "draw the mission as processes",
@@ -81,22 +68,16 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
     tag = element.tag
     if tag in _EVENTS:
         return read_event(reading, element, container)
+    if tag in GATEWAYS:
+        return read_gateway(reading, element)
     task = _TASKS.get(tag)
-    gateway = _GATEWAYS.get(tag)
     name = local(tag)
-    if task is None and gateway is None and tag not in SUBPROCESSES and name not in _REFUSED:
+    if task is None and tag not in SUBPROCESSES and name not in _REFUSED:
         return None
     if name in _REFUSED:
         not_executed(reading, element, element.get("id", ""), kind(tag), _REFUSED[name])
     identifier = reading.claim(element)
     node: FlowNode
-    if gateway is not None:
-        own_extensions(reading, scan(reading, element, identifier), _NONE)
-        node = gateway(identifier, element.get("name", ""), reading.report.line(element))
-        _note_default(reading, element, node)
-        if reading.boolean(element, "instantiate", False, identifier):
-            reading.self_starting.add(node)
-        return node
     if tag in SUBPROCESSES:
         # Its children are read with its content, by containers.py.
         node = SubProcess(identifier, element.get("name", ""), reading.report.line(element))

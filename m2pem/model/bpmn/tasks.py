@@ -123,17 +123,9 @@ def read_receive_task(reading: Reading, found: Scan) -> ReceiveTask:
     message = _message(reading, found)
     name = found.element.get("name", "")
     line = reading.report.line(found.element)
-    task = ReceiveTask(found.id, name, line, message)
+    instantiate = reading.boolean(found.element, "instantiate", False, found.id)
+    task = ReceiveTask(found.id, name, line, message, instantiate)
     reading.message_uses.append(MessageUse(task, found.id, name, line, True, message))
-    if reading.boolean(found.element, "instantiate", False, found.id):
-        reading.self_starting.add(task)
-        reading.report.error(
-            found.element,
-            found.id,
-            "not-executed",
-            "m2pem does not execute a receive task that starts its process yet",
-            "put a message start event before it, and delete instantiate",
-        )
     return task
 
 
