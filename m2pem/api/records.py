@@ -44,6 +44,7 @@ from m2pem.engine.records import (
     TokenEntered,
     TokenLeft,
     TokenOutcome,
+    TokensGathered,
     Trigger,
 )
 
@@ -91,5 +92,6 @@ __all__ = [
     "TokenEntered",
     "TokenLeft",
     "TokenOutcome",
+    "TokensGathered",
     "Trigger",
 ]

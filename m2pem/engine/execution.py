@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from m2pem.engine import records as r
 from m2pem.engine.apply import apply
-from m2pem.engine.data import Place, flatten, store_for
+from m2pem.engine.data import Store, flatten, store_for
 from m2pem.engine.records import Record, TokenOutcome
 from m2pem.engine.state import RunState, Scope, Token
 from m2pem.model.elements import (
@@ -184,13 +184,14 @@ class Execution:
         for name, item in flatten(key, value):
             self.write_into(store_for(token, name), token, name, item)
 
-    def write_into(self, place: Place, token: Token, key: str, value: Value) -> None:
+    def write_into(self, place: Store, token: Token, key: str, value: Value) -> None:
         """Write one value into the store of a given scope, or of a token's activity."""
         node = token.node
+        own = 0
         if type(place) is Token:
             store, own = place.scope.id, place.id
         else:
-            store, own = place.id, 0
+            store = place.id if isinstance(place, Scope) else 0
         self.emit(
             r.DataWritten(
                 token.id,

@@ -43,6 +43,7 @@ from m2pem.engine.records.tokens import (
     ScopeOpened,
     TokenEntered,
     TokenLeft,
+    TokensGathered,
 )
 from m2pem.engine.records.work import (
     BehaviorCancelRequested,
@@ -104,6 +105,7 @@ __all__ = [
     "TokenEntered",
     "TokenLeft",
     "TokenOutcome",
+    "TokensGathered",
     "Trigger",
 ]
 
@@ -125,6 +127,7 @@ Record: TypeAlias = Union[
     ScopeInterrupted,
     TokenEntered,
     TokenLeft,
+    TokensGathered,
     FlowTaken,
     GatewayActivated,
     GatewayReset,
