@@ -5,8 +5,8 @@
     start -> fast -> go -> end if speed > 3
     no: fast -> end
 
-* A line with `->` is a chain of sequence flows, named f1, f2, ... or as said before a colon; what
-  follows `if` is the condition of its last flow.
+* A line with `->` is a chain of sequence flows, named f1, f2, ...; what is said before a colon names
+  the first of them, and what follows `if` is the condition of the last.
 * A line `a ~> b` is an association (from a compensation boundary event to its handler); a line
   `a => b` a message flow between the processes, which then are pools of a collaboration.
 * An event's text says its definition: `signal S`, `message M`, `error E`, `error`, `escalation X`,
@@ -126,7 +126,7 @@ def _flows(text: str) -> str:
             inside = ""
             if condition and place == len(nodes):
                 inside = f"<conditionExpression>{escape(condition)}</conditionExpression>"
-            identifier = name if name and len(nodes) == 2 else f"{name or 'f'}{number}"
+            identifier = name if name and place == 2 else f"f{number}"
             found.append(
                 f'<sequenceFlow id="{identifier}" sourceRef="{source}" targetRef="{target}">'
                 f"{inside}</sequenceFlow>"
