@@ -93,11 +93,11 @@ def _step(step: object, case: CommentedMap) -> Step:
         wrong = f"step {step!r} is not of the form `- start: a b c`"
         raise _WrongError(wrong, _line(case, "steps"))
     line = step.lc.line + 1
-    whens = [key for key in step if key not in _AFTER_A_STEP]
+    whens = [key for key in step if key not in ("with", *_AFTER_A_STEP)]
     if len(whens) != 1:
         raise _WrongError(f"a step has one input, and this one {whens}", line)
     try:
-        when = read_when(str(whens[0]))
+        when = read_when(str(whens[0]), _mapping(step.get("with"), "with", step))
     except ValueError as error:
         raise _WrongError(str(error), line) from error
     return Step(when, _words(step[whens[0]], line), _expected(step, line))
@@ -132,8 +132,8 @@ def _expected(item: Mapping[Any, Any], line: int) -> Expected:
 
 
 def _words(value: object, line: int) -> tuple[str, ...]:
-    """Words of a string or a list; nothing and `-` are none."""
-    if value is None or value == "-":
+    """Words of a string or a list; `nothing` is none."""
+    if value is None or value == "nothing":
         return ()
     if isinstance(value, str):
         return tuple(value.split())

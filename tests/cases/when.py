@@ -1,11 +1,8 @@
-"""The notation of what happens from outside: `answer u yes`, `message M {x: 1}`, `advance 5 s`."""
+"""The notation of what happens from outside: `answer u yes`, `message M`, `advance 5 s`."""
 
 import re
 from dataclasses import dataclass, field
 from typing import Literal, get_args
-
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from m2pem.model.values import Value
 
@@ -15,7 +12,6 @@ Verb = Literal[
 ]  # fmt: skip
 VERBS: tuple[str, ...] = get_args(Verb)
 
-_WHEN = re.compile(r"(?P<verb>\w+)(?:\s+(?P<words>[^{]*?))?\s*(?P<data>\{.*\})?\s*", re.S)
 _UNITS_S = {"ms": 0.001, "s": 1, "min": 60, "h": 3600, "d": 86400}
 _WORDS = {
     "start": (0, 0),
@@ -46,20 +42,18 @@ class When:
     data: dict[str, Value] = field(default_factory=dict)
 
 
-def read_when(text: str) -> When:
-    """The input that `text` says.
+def read_when(text: str, data: dict[str, Value]) -> When:
+    """The input that `text` says, with its data.
 
     Raises:
         ValueError: it says none; the message tells why.
     """
-    match = _WHEN.fullmatch(text)
-    if match is None or match["verb"] not in VERBS:
+    verb, *words = text.split() or [""]
+    if verb not in VERBS:
         raise ValueError(f"{text!r} begins with none of {', '.join(VERBS)}")
-    verb, words = match["verb"], (match["words"] or "").split()
     least, most = _WORDS[verb]
     if not least <= len(words) <= most:
         raise ValueError(f"{text!r}: {verb} takes {least} to {most} words")
-    data = _data(match["data"], text)
     if data and verb not in ("complete", "signal", "message"):
         raise ValueError(f"{text!r}: {verb} takes no data")
     if verb == "advance":
@@ -74,13 +68,3 @@ def _seconds(amount: str, text: str) -> float:
     if match is None or match[2] not in _UNITS_S:
         raise ValueError(f"{text!r}: say how long as in `advance 5 s` ({', '.join(_UNITS_S)})")
     return float(match[1]) * _UNITS_S[match[2]]
-
-
-def _data(source: str | None, text: str) -> dict[str, Value]:
-    if not source:
-        return {}
-    try:
-        data: dict[str, Value] = YAML(typ="safe").load(source)
-    except YAMLError as error:
-        raise ValueError(f"{text!r}: the data are no YAML mapping: {error}") from error
-    return data
