@@ -23,6 +23,7 @@ from m2pem.engine.state import (
 )
 from m2pem.model.elements import (
     Activity,
+    AdHocSubProcess,
     CallActivity,
     ComplexGateway,
     Container,
@@ -171,6 +172,10 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         if join is None:
             join = scope.joins[node] = Join()
         join.by_flow.setdefault(flow, []).append(token)
+    elif flow is None and isinstance(scope.container, AdHocSubProcess) and scope.loop is None:
+        scope.begun[node] = None
+        if scope.chosen and scope.chosen[0] is node:
+            scope.chosen.pop(0)
     elif isinstance(node, Activity) and node.start_quantity > 1 and record.instance is None:
         scope.gathered.setdefault(node, []).append(token)
 
@@ -183,6 +188,10 @@ def _gateway_activated(state: RunState, record: r.GatewayActivated) -> None:
 
 def _gateway_reset(state: RunState, record: r.GatewayReset) -> None:
     del state.scopes[record.scope].activated[_node(state, record.element)]
+
+
+def _activities_chosen(state: RunState, record: r.ActivitiesChosen) -> None:
+    state.scopes[record.scope].chosen = [_node(state, element) for element in record.elements]
 
 
 def _tokens_gathered(state: RunState, record: r.TokensGathered) -> None:
@@ -412,6 +421,7 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.TokenEntered: _token_entered,
     r.TokenLeft: _token_left,
     r.FlowTaken: _nothing,
+    r.ActivitiesChosen: _activities_chosen,
     r.TokensGathered: _tokens_gathered,
     r.GatewayActivated: _gateway_activated,
     r.GatewayReset: _gateway_reset,

@@ -35,6 +35,7 @@ from m2pem.engine.records.run import (
     RunYielded,
 )
 from m2pem.engine.records.tokens import (
+    ActivitiesChosen,
     FlowTaken,
     GatewayActivated,
     GatewayReset,
@@ -62,6 +63,7 @@ from m2pem.engine.records.work import (
 )
 
 __all__ = [
+    "ActivitiesChosen",
     "BehaviorCancelRequested",
     "BehaviorContinued",
     "BehaviorEnded",
@@ -127,6 +129,7 @@ Record: TypeAlias = Union[
     ScopeInterrupted,
     TokenEntered,
     TokenLeft,
+    ActivitiesChosen,
     TokensGathered,
     FlowTaken,
     GatewayActivated,

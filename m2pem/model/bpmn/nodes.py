@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from lxml import etree
 
+from m2pem.model.bpmn.ad_hoc import read_ad_hoc
 from m2pem.model.bpmn.calls import read_call_activity
 from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.events import read_event
@@ -60,7 +61,6 @@ _EVENTS = frozenset(
 )
 _REFUSED = {
     "transaction": "use a subprocess with boundary events",
-    "adHocSubProcess": "join its activities by sequence flows, in a plain subprocess",
     "choreographyTask": "draw the mission as processes",
     "callChoreography": "draw the mission as processes",
     "subChoreography": "draw the mission as processes",
@@ -86,7 +86,10 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
     node: FlowNode
     if tag in SUBPROCESSES:
         # Its children are read with its content, by containers.py.
-        node = SubProcess(identifier, element.get("name", ""), reading.report.line(element))
+        if tag == BPMN + "adHocSubProcess":
+            node = read_ad_hoc(reading, element, identifier)
+        else:
+            node = SubProcess(identifier, element.get("name", ""), reading.report.line(element))
         _event_subprocess(reading, element, node)
         _check_activity(reading, element, node)
     elif task is not None:
