@@ -1,6 +1,7 @@
 """Records, as OCUs and observers read them (docs/records.md)."""
 
 from m2pem.engine.records import (
+    ActivitiesChosen,
     BehaviorCancelRequested,
     BehaviorContinued,
     BehaviorEnded,
@@ -14,6 +15,8 @@ from m2pem.engine.records import (
     EventAwaited,
     EventTriggered,
     FlowTaken,
+    GatewayActivated,
+    GatewayReset,
     GeometryReceived,
     InputDeferred,
     InputIgnored,
@@ -42,10 +45,12 @@ from m2pem.engine.records import (
     TokenEntered,
     TokenLeft,
     TokenOutcome,
+    TokensGathered,
     Trigger,
 )
 
 __all__ = [
+    "ActivitiesChosen",
     "BehaviorCancelRequested",
     "BehaviorContinued",
     "BehaviorEnded",
@@ -59,6 +64,8 @@ __all__ = [
     "EventAwaited",
     "EventTriggered",
     "FlowTaken",
+    "GatewayActivated",
+    "GatewayReset",
     "GeometryReceived",
     "InputDeferred",
     "InputIgnored",
@@ -87,5 +94,6 @@ __all__ = [
     "TokenEntered",
     "TokenLeft",
     "TokenOutcome",
+    "TokensGathered",
     "Trigger",
 ]

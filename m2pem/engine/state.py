@@ -25,6 +25,14 @@ class RunStatus(StrEnum):
 
 
 @dataclass(slots=True, eq=False)
+class Shared:
+    """The data stores of a run, which all its processes share (BPMN 2.0.2, clause 10.4.1)."""
+
+    keys: frozenset[str]
+    data: dict[str, Value] = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
 class Scope:
     """An instance of a container: a process or a subprocess.
 
@@ -39,11 +47,20 @@ class Scope:
     parent: "Scope | None"
     owner: "Token | None"
     depth: int
+    shared: Shared
     tokens: "dict[int, Token]" = field(default_factory=dict)
     data: dict[str, Value] = field(default_factory=dict)
     joins: "dict[FlowNode, Join]" = field(default_factory=dict)
     waits: "dict[int, Wait] | None" = None
     loop: "Loop | None" = None
+    gathered: "dict[FlowNode, list[Token]]" = field(default_factory=dict)
+    """Tokens at activities that several must begin, and that have not begun."""
+    activated: "dict[FlowNode, tuple[SequenceFlow, ...]]" = field(default_factory=dict)
+    """Complex gateways that wait to reset, and the flows whose tokens activated them."""
+    chosen: "list[FlowNode]" = field(default_factory=list)
+    """Of an ad-hoc subprocess: what is to begin, and has not."""
+    begun: "dict[FlowNode, None]" = field(default_factory=dict)
+    """Of an ad-hoc subprocess: what was begun by choice."""
     interrupted: bool = False
     """An interrupting event subprocess of it has begun: no other one can."""
 
@@ -165,6 +182,14 @@ class Service:
     properties: dict[str, Value]
 
 
+@dataclass(frozen=True, slots=True)
+class Letter:
+    """A message that nobody took yet: what it carries, and its correlation keys."""
+
+    data: dict[str, Value]
+    keys: dict[str, Value]
+
+
 @dataclass(slots=True, eq=False)
 class RunState:
     """A whole run. Times are microseconds: `_us` since the Unix epoch unless said otherwise."""
@@ -187,6 +212,7 @@ class RunState:
     last_prompt: int = 0
     last_service: int = 0
 
+    shared: Shared = field(init=False)
     root: Scope | None = None
     scopes: dict[int, Scope] = field(default_factory=dict)
     tokens: dict[int, Token] = field(default_factory=dict)
@@ -205,7 +231,7 @@ class RunState:
     """Heap of (due mission time, wait); waits that are over may still be in it, but not first."""
     dates: list[tuple[int, int]] = field(default_factory=list)
     """Heap of (due time since the Unix epoch, wait); likewise."""
-    mailbox: dict[str, list[dict[str, Value]]] = field(default_factory=dict)
+    mailbox: dict[str, list[Letter]] = field(default_factory=dict)
     """Messages that nobody was waiting for yet, by message id; first come first."""
 
     geometries: dict[str, dict[str, Value]] = field(default_factory=dict)
@@ -213,6 +239,9 @@ class RunState:
     yielded: tuple[int, ...] = ()
     seen: dict[str, None] = field(default_factory=dict)
     """Ids of inputs that carried one."""
+
+    def __post_init__(self) -> None:
+        self.shared = Shared(self.mission.data_stores)
 
     def mission_time_us(self, now_us: int) -> int:
         """Microseconds from the start of the run, not counting pauses."""

@@ -15,6 +15,7 @@ from typing import TypeAlias, Union
 from m2pem.findings import Finding
 from m2pem.model.behavior import Behavior, Mappings, Prompt, Script, ServiceCall
 from m2pem.model.events import (
+    CorrelationProperty,
     Error,
     Escalation,
     EventDefinition,
@@ -85,6 +86,8 @@ class Process(Element):
     entries: tuple[FlowNode, ...] = field(init=False, repr=False, default=())
     """What gets a token when the container begins (clause 13.2): the start events; without any,
     every node without an incoming flow, boundary events excepted. Empty: nothing to do."""
+    subscription: Mapping[str, Expression] = field(init=False, repr=False, default_factory=dict)
+    """By correlation property, what its instances take messages for (clause 8.4.2)."""
     event_subprocesses: "tuple[SubProcess, ...]" = field(init=False, repr=False, default=())
     """Those directly in it, in the order of the XML (clause 13.5.4); they have no token of their
     own until their start event is triggered."""
@@ -117,6 +120,8 @@ class Activity(FlowNode):
     boundary: "tuple[BoundaryEvent, ...]" = field(init=False, repr=False, default=())
     loop: StandardLoop | MultiInstance | None = field(init=False, repr=False, default=None)
     data_flow: Mappings = field(init=False, repr=False, default=Mappings())
+    own_data: frozenset[str] = field(init=False, repr=False, default=frozenset())
+    """Keys of its data inputs, data outputs and properties: what only it sees."""
     start_quantity: int = field(init=False, repr=False, default=1)
     completion_quantity: int = field(init=False, repr=False, default=1)
     for_compensation: bool = field(init=False, repr=False, default=False)
@@ -165,11 +170,8 @@ class SendTask(Activity):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BusinessRuleTask(Activity):
-    """Runs a registered service that decides by business rules (clause 10.3.3)."""
-
-    call: ServiceCall | None = None
-    behavior: Behavior | None = None
+class BusinessRuleTask(ServiceTask):
+    """A service task whose service decides by business rules (clause 10.3.3)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -404,6 +406,9 @@ class Mission:
     """Processes, flow nodes and sequence flows by id."""
     associated: frozenset[str] = frozenset()
     """Keys that data output associations name as written; without an effect on execution."""
+    data_stores: frozenset[str] = frozenset()
+    """Keys of the data stores, which all processes of a run share (clause 10.4.1)."""
+    correlation_properties: tuple[CorrelationProperty, ...] = ()
 
     def process(self, process_id: str | None = None) -> Process:
         """The process a run begins with: the one named, else the file's main one.

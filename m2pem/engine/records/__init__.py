@@ -35,12 +35,16 @@ from m2pem.engine.records.run import (
     RunYielded,
 )
 from m2pem.engine.records.tokens import (
+    ActivitiesChosen,
     FlowTaken,
+    GatewayActivated,
+    GatewayReset,
     ScopeClosed,
     ScopeInterrupted,
     ScopeOpened,
     TokenEntered,
     TokenLeft,
+    TokensGathered,
 )
 from m2pem.engine.records.work import (
     BehaviorCancelRequested,
@@ -59,6 +63,7 @@ from m2pem.engine.records.work import (
 )
 
 __all__ = [
+    "ActivitiesChosen",
     "BehaviorCancelRequested",
     "BehaviorContinued",
     "BehaviorEnded",
@@ -72,6 +77,8 @@ __all__ = [
     "EventAwaited",
     "EventTriggered",
     "FlowTaken",
+    "GatewayActivated",
+    "GatewayReset",
     "GeometryReceived",
     "InputDeferred",
     "InputIgnored",
@@ -100,6 +107,7 @@ __all__ = [
     "TokenEntered",
     "TokenLeft",
     "TokenOutcome",
+    "TokensGathered",
     "Trigger",
 ]
 
@@ -121,7 +129,11 @@ Record: TypeAlias = Union[
     ScopeInterrupted,
     TokenEntered,
     TokenLeft,
+    ActivitiesChosen,
+    TokensGathered,
     FlowTaken,
+    GatewayActivated,
+    GatewayReset,
     BehaviorRequested,
     BehaviorProgressed,
     BehaviorCancelRequested,

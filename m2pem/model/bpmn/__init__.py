@@ -10,7 +10,9 @@ from m2pem.findings import Finding, Severity, has_errors
 from m2pem.model.bpmn.calls import resolve_calls
 from m2pem.model.bpmn.collaboration import check_collaborations
 from m2pem.model.bpmn.containers import MAX_DEPTH, read_process
+from m2pem.model.bpmn.correlation import resolve_correlation
 from m2pem.model.bpmn.data import resolve_data
+from m2pem.model.bpmn.data_flow import resolve_data_flows
 from m2pem.model.bpmn.graph import add_unreachable, check_graph
 from m2pem.model.bpmn.link import link
 from m2pem.model.bpmn.messages import resolve_messages
@@ -117,10 +119,12 @@ def _read(report: Report, document: Document, data: bytes) -> Mission | None:
             "draw a process with a start event",
         )
     resolve_data(reading)
+    resolve_data_flows(reading)
     resolve_prompts(reading)
     resolve_calls(reading)
     elements = link(reading)
     resolve_messages(reading)
+    correlation_properties = resolve_correlation(reading)
     check_collaborations(reading, elements)
     check_graph(reading)
     check_rules(document.root, report, data)
@@ -143,4 +147,6 @@ def _read(report: Report, document: Document, data: bytes) -> Mission | None:
         warnings=report.sorted(),
         elements=elements,
         associated=frozenset(reading.written_keys),
+        correlation_properties=correlation_properties,
+        data_stores=frozenset(reading.data_key(store) for store in reading.data_stores),
     )

@@ -116,6 +116,8 @@ _TABLE: dict[str, tuple[str, str]] = {
     "escalationEventDefinition": ("id escalationRef", _BASE),
     "timerEventDefinition": ("id", f"{_BASE} timeDate|timeDuration|timeCycle"),
     "terminateEventDefinition": ("id", _BASE),
+    "activationCondition": ("id language evaluatesToTypeRef", _BASE),
+    "completionCondition": ("id language evaluatesToTypeRef", _BASE),
     "conditionExpression": ("id language evaluatesToTypeRef", _BASE),
     "timeDate": ("id language evaluatesToTypeRef", _BASE),
     "timeDuration": ("id language evaluatesToTypeRef", _BASE),

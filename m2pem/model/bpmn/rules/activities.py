@@ -1,28 +1,10 @@
-"""Activities: quantities, data of tasks, receive tasks that begin a process (10.3, 10.3.3)."""
+"""Tasks: their data, and receive tasks that begin a process (BPMN 2.0.2, 10.3.3)."""
 
 from lxml import etree
 
 from m2pem.model.bpmn.rules.rule import E, Rule, Topic, W, declared
-from m2pem.model.bpmn.rules.tree import ACTIVITIES, Tree, children, is_true
+from m2pem.model.bpmn.rules.tree import Tree, children, is_true
 
-START_QUANTITY = Rule(
-    10301,
-    "start-quantity",
-    "10.3",
-    W,
-    "startQuantity must be a whole number from 1",
-    "write how many tokens begin the activity, or delete it",
-    same_as=("bad-value",),
-)
-COMPLETION_QUANTITY = Rule(
-    10302,
-    "completion-quantity",
-    "10.3",
-    W,
-    "completionQuantity must be a whole number from 1",
-    "write how many tokens leave the activity, or delete it",
-    same_as=("bad-value",),
-)
 SERVICE_DATA = Rule(
     10312,
     "service-data",
@@ -55,17 +37,6 @@ RECEIVE_BEGINS = Rule(
     "a receive task that begins a process must not have an incoming flow",
     'delete the flow, or instantiate="true"',
 )
-_QUANTITIES = {"startQuantity": START_QUANTITY, "completionQuantity": COMPLETION_QUANTITY}
-
-
-def _quantities(tree: Tree) -> None:
-    for name, rule in _QUANTITIES.items():
-        if not tree.mentions(name):
-            continue
-        for element in tree.root.iter(*ACTIVITIES):
-            text = element.get(name, "1").strip()
-            if not text.isascii() or not text.isdigit() or int(text) < 1:
-                tree.say(rule, element, f"'{text}' is none")
 
 
 def _service(tree: Tree, element: etree._Element) -> None:
@@ -94,5 +65,4 @@ def _receive(tree: Tree, element: etree._Element) -> None:
 TOPIC = Topic(
     declared(globals()),
     {"serviceTask": _service, "sendTask": _send, "receiveTask": _receive},
-    (_quantities,),
 )

@@ -13,22 +13,6 @@ RETRIEVAL = Rule(
     "the correlation property does not say where messages have its value",
     "add a correlationPropertyRetrievalExpression for each message",
 )
-RETRIEVAL_MESSAGE = Rule(
-    8412,
-    "retrieval-message",
-    "8.4.2",
-    W,
-    "the retrieval expression's messageRef names no message",
-    "name the message from which the value is read",
-)
-RETRIEVAL_PATH = Rule(
-    8413,
-    "retrieval-path",
-    "8.4.2",
-    W,
-    "the retrieval expression has no messagePath",
-    "write the expression that gives the value",
-)
 KEY_PROPERTIES = Rule(
     8414,
     "correlation-key-properties",
@@ -53,36 +37,12 @@ SUBSCRIPTION_KEY = Rule(
     "the correlation subscription's correlationKeyRef names no correlation key",
     "name a correlationKey of a collaboration or conversation",
 )
-BINDING_PROPERTY = Rule(
-    8417,
-    "binding-property",
-    "8.4.2",
-    W,
-    "the correlation binding's correlationPropertyRef names no correlation property",
-    "name a correlationProperty that stands in definitions",
-)
-BINDING_PATH = Rule(
-    8418,
-    "binding-path",
-    "8.4.2",
-    W,
-    "the correlation binding has no dataPath",
-    "write the expression that gives the value in the process",
-)
 _PROPERTY = names("correlationProperty")
 
 
 def _property(tree: Tree, element: etree._Element) -> None:
     if not has(element, "correlationPropertyRetrievalExpression"):
         tree.say(RETRIEVAL, element)
-
-
-def _retrieval(tree: Tree, element: etree._Element) -> None:
-    message = element.get("messageRef", "")
-    if tree.leads_nowhere(element, message, names("message")):
-        tree.say(RETRIEVAL_MESSAGE, element, f"'{message}'")
-    if not any(texts(element, "messagePath")):
-        tree.say(RETRIEVAL_PATH, element)
 
 
 def _key(tree: Tree, element: etree._Element) -> None:
@@ -100,21 +60,11 @@ def _subscription(tree: Tree, element: etree._Element) -> None:
         tree.say(SUBSCRIPTION_KEY, element, f"'{key}'")
 
 
-def _binding(tree: Tree, element: etree._Element) -> None:
-    name = element.get("correlationPropertyRef", "")
-    if tree.leads_nowhere(element, name, _PROPERTY):
-        tree.say(BINDING_PROPERTY, element, f"'{name}'")
-    if not any(texts(element, "dataPath")):
-        tree.say(BINDING_PATH, element)
-
-
 TOPIC = Topic(
     declared(globals()),
     {
         "correlationProperty": _property,
-        "correlationPropertyRetrievalExpression": _retrieval,
         "correlationKey": _key,
         "correlationSubscription": _subscription,
-        "correlationPropertyBinding": _binding,
     },
 )

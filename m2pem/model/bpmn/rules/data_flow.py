@@ -31,14 +31,6 @@ SOURCES = Rule(
     "a data association with several sources must have a transformation",
     "keep one sourceRef, or add a transformation",
 )
-ASSIGNMENT = Rule(
-    10424,
-    "assignment-ends",
-    "10.4.1",
-    W,
-    "the assignment lacks from or to",
-    "write both",
-)
 PROCESS_INPUT = Rule(
     10425,
     "process-input-written",
@@ -91,11 +83,6 @@ def _of_process(data: etree._Element) -> bool:
     )
 
 
-def _assignment(tree: Tree, element: etree._Element) -> None:
-    if not has(element, "from") or not has(element, "to"):
-        tree.say(ASSIGNMENT, element)
-
-
 def _binding(tree: Tree, element: etree._Element) -> None:
     for attribute, tag in (
         ("operationRef", "operation"),
@@ -112,7 +99,6 @@ TOPIC = Topic(
     {
         "dataInputAssociation": _association,
         "dataOutputAssociation": _association,
-        "assignment": _assignment,
         "ioBinding": _binding,
     },
 )

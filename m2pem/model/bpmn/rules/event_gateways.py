@@ -75,14 +75,6 @@ CONDITION = Rule(
     "delete the condition",
     same_as=("condition-ignored", "condition-not-allowed"),
 )
-PARALLEL = Rule(
-    10618,
-    "event-gateway-parallel",
-    "10.6.6",
-    E,
-    "an event-based gateway that does not begin a process cannot be parallel",
-    'use a parallel gateway before the events, or add instantiate="true"',
-)
 BEGINS = Rule(
     10619,
     "event-gateway-begins",
@@ -117,8 +109,6 @@ def _gateway(tree: Tree, element: etree._Element) -> None:
     kind_of = element.get("eventGatewayType", "Exclusive").strip()
     if kind_of not in ("Exclusive", "Parallel"):
         tree.say(TYPE, element, f"'{kind_of}'")
-    if kind_of == "Parallel" and not begins:
-        tree.say(PARALLEL, element)
     if begins and tree.into(element):
         tree.say(BEGINS, element)
 

@@ -2,7 +2,7 @@
 
 from lxml import etree
 
-from m2pem.model.bpmn.names import a, kind
+from m2pem.model.bpmn.names import BPMN, a, kind
 from m2pem.model.bpmn.rules.rule import E, Rule, Topic, W, declared
 from m2pem.model.bpmn.rules.tree import (
     SUBPROCESSES,
@@ -23,7 +23,6 @@ START = Rule(
     E,
     "a process can begin only plainly, or by a message, timer, condition or signal",
     "give the start event one of these triggers, or none",
-    same_as=("event-not-allowed",),
 )
 EVENT_SUBPROCESS_START = Rule(
     10502,
@@ -33,7 +32,6 @@ EVENT_SUBPROCESS_START = Rule(
     "an event subprocess can begin only by a message, timer, escalation, error, compensation, "
     "condition or signal",
     "give its start event one of these triggers",
-    same_as=("event-not-allowed",),
 )
 END = Rule(
     10503,
@@ -43,7 +41,6 @@ END = Rule(
     "an end event can result only in a message, error, escalation, cancellation, compensation, "
     "signal or termination, or in nothing",
     "give it one of these results, or none",
-    same_as=("event-not-allowed",),
 )
 CATCH = Rule(
     10504,
@@ -53,7 +50,6 @@ CATCH = Rule(
     "an intermediate event in the flow can wait only for a message, timer, condition, link or "
     "signal",
     "give it one of these triggers, or attach it to an activity",
-    same_as=("event-not-allowed",),
 )
 THROW = Rule(
     10505,
@@ -62,7 +58,6 @@ THROW = Rule(
     E,
     "an intermediate event can throw only a message, escalation, link, compensation or signal",
     "give it one of these results, or none; or make it an end event",
-    same_as=("event-not-allowed",),
 )
 BOUNDARY = Rule(
     10506,
@@ -72,7 +67,6 @@ BOUNDARY = Rule(
     "a boundary event can wait only for a message, timer, escalation, error, cancellation, "
     "compensation, condition or signal",
     "give it one of these triggers",
-    same_as=("event-not-allowed",),
 )
 ERROR_GOES_ON = Rule(
     10509,
@@ -154,11 +148,33 @@ _ALLOWED: dict[Rule, frozenset[str]] = {
 }
 
 
-def _allow(tree: Tree, event: etree._Element, rule: Rule) -> None:
+_RULES = {
+    BPMN + "startEvent": START,
+    BPMN + "endEvent": END,
+    BPMN + "intermediateCatchEvent": CATCH,
+    BPMN + "intermediateThrowEvent": THROW,
+    BPMN + "boundaryEvent": BOUNDARY,
+}
+
+
+def allowed_triggers(event: etree._Element) -> frozenset[str]:
+    """What may trigger an event where it stands, or result from it (tables 10.84 to 10.93)."""
+    return _ALLOWED[_rule(event)]
+
+
+def _rule(event: etree._Element) -> Rule:
+    rule = _RULES[event.tag]
+    if rule is START and is_true(parent(event), "triggeredByEvent"):
+        return EVENT_SUBPROCESS_START
+    return rule
+
+
+def _allow(tree: Tree, event: etree._Element) -> None:
     found = triggers(tree, event)
+    allowed = allowed_triggers(event)
     for each in found:
-        if trigger_name(each) not in _ALLOWED[rule]:
-            tree.say(rule, event, f"this one has {a(kind(each.tag))}")
+        if trigger_name(each) not in allowed:
+            tree.say(_rule(event), event, f"this one has {a(kind(each.tag))}")
     if len(found) < 2 and is_true(event, "parallelMultiple"):
         tree.say(PARALLEL_MULTIPLE, event, f"this one has {len(found)}")
 
@@ -166,12 +182,12 @@ def _allow(tree: Tree, event: etree._Element, rule: Rule) -> None:
 def _start(tree: Tree, event: etree._Element) -> None:
     outer = parent(event)
     if is_true(outer, "triggeredByEvent"):
-        _allow(tree, event, EVENT_SUBPROCESS_START)
+        _allow(tree, event)
         if is_false(event, "isInterrupting") and has_trigger(tree, event, "error"):
             tree.say(ERROR_GOES_ON, event)
     else:
         if outer.tag not in SUBPROCESSES:
-            _allow(tree, event, START)
+            _allow(tree, event)
         if is_false(event, "isInterrupting"):
             tree.say(OUTSIDE, event)
     if not tree.out(event):
@@ -179,23 +195,23 @@ def _start(tree: Tree, event: etree._Element) -> None:
 
 
 def _end(tree: Tree, event: etree._Element) -> None:
-    _allow(tree, event, END)
+    _allow(tree, event)
 
 
 def _catch(tree: Tree, event: etree._Element) -> None:
-    _allow(tree, event, CATCH)
+    _allow(tree, event)
     if not tree.out(event):
         tree.say(INTERMEDIATE_FLOW, event)
 
 
 def _throw(tree: Tree, event: etree._Element) -> None:
-    _allow(tree, event, THROW)
+    _allow(tree, event)
     if not tree.out(event) and not has_trigger(tree, event, "link"):
         tree.say(INTERMEDIATE_FLOW, event)
 
 
 def _boundary(tree: Tree, event: etree._Element) -> None:
-    _allow(tree, event, BOUNDARY)
+    _allow(tree, event)
     if not tree.out(event) and not has_trigger(tree, event, "compensate"):
         tree.say(BOUNDARY_FLOW, event)
 

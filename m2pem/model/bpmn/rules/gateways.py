@@ -3,7 +3,7 @@
 from lxml import etree
 
 from m2pem.model.bpmn.rules.rule import Rule, Topic, W, declared
-from m2pem.model.bpmn.rules.tree import Tree, has, name_of
+from m2pem.model.bpmn.rules.tree import Tree, name_of
 
 DIRECTION = Rule(
     8491,
@@ -45,14 +45,6 @@ MIXED = Rule(
     "a mixed gateway must have several incoming and several outgoing flows",
     "correct its gatewayDirection; the flows count",
 )
-ACTIVATION = Rule(
-    10605,
-    "complex-activation",
-    "10.6.5",
-    W,
-    "the complex gateway merges flows, but does not say when it is activated",
-    "add an activationCondition",
-)
 
 
 def _gateway(tree: Tree, element: etree._Element) -> None:
@@ -74,12 +66,6 @@ def _gateway(tree: Tree, element: etree._Element) -> None:
         tree.say(MIXED, element, detail)
 
 
-def _complex(tree: Tree, element: etree._Element) -> None:
-    if len(tree.into(element)) > 1 and not has(element, "activationCondition"):
-        tree.say(ACTIVATION, element)
-    _gateway(tree, element)
-
-
 TOPIC = Topic(
     declared(globals()),
     {
@@ -87,6 +73,6 @@ TOPIC = Topic(
         "inclusiveGateway": _gateway,
         "parallelGateway": _gateway,
         "eventBasedGateway": _gateway,
-        "complexGateway": _complex,
+        "complexGateway": _gateway,
     },
 )

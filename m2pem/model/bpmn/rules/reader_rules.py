@@ -149,6 +149,86 @@ MISSING_REFERENCE = Rule(
     "an event or task names no message, signal, error or escalation",
     "add messageRef, signalRef, errorRef or escalationRef",
 )
+RETRIEVAL_MESSAGE = Rule(
+    8412,
+    "retrieval-message",
+    "8.4.2",
+    E,
+    "the retrieval expression's messageRef names no message",
+    "name the message from which the value is read",
+)
+RETRIEVAL_PATH = Rule(
+    8413,
+    "retrieval-path",
+    "8.4.2",
+    E,
+    "the retrieval expression has no messagePath",
+    "write the expression that gives the value",
+)
+BINDING_PROPERTY = Rule(
+    8417,
+    "binding-property",
+    "8.4.2",
+    E,
+    "the correlation binding's correlationPropertyRef names no correlation property",
+    "name a correlationProperty that stands in definitions",
+)
+BINDING_PATH = Rule(
+    8418,
+    "binding-path",
+    "8.4.2",
+    E,
+    "the correlation binding has no dataPath",
+    "write the expression that gives the value in the process",
+)
+START_QUANTITY = Rule(
+    10301,
+    "start-quantity",
+    "10.3",
+    E,
+    "startQuantity is no whole number from 1 (a warning for 0, which counts as 1)",
+    "write how many tokens begin the activity, or delete it",
+)
+COMPLETION_QUANTITY = Rule(
+    10302,
+    "completion-quantity",
+    "10.3",
+    E,
+    "completionQuantity is no whole number from 1 (a warning for 0, which counts as 1)",
+    "write how many tokens leave the activity, or delete it",
+)
+AD_HOC_ORDERING = Rule(
+    10355,
+    "ad-hoc-ordering",
+    "10.3.5",
+    E,
+    "the ad-hoc subprocess's ordering is none that BPMN has",
+    "write Parallel or Sequential",
+)
+ASSIGNMENT = Rule(
+    10424,
+    "bad-assignment",
+    "10.4.1",
+    E,
+    "an assignment of a data association lacks from or to",
+    "write both",
+)
+ACTIVATION = Rule(
+    10605,
+    "no-activation-condition",
+    "10.6.5",
+    W,
+    "a complex gateway does not say when it is activated",
+    "add an activationCondition",
+)
+PARALLEL_EVENTS = Rule(
+    10618,
+    "parallel-event-gateway",
+    "10.6.6",
+    E,
+    "an event-based gateway that does not begin a process cannot be parallel",
+    "use a parallel gateway before the events",
+)
 NO_START = Rule(
     13201,
     "no-start",

@@ -91,15 +91,6 @@ AD_HOC_CANCEL = Rule(
     "cancelRemainingInstances has no meaning in an ad-hoc subprocess of ordering Sequential",
     "delete it; only one activity runs at a time",
 )
-AD_HOC_ORDERING = Rule(
-    10355,
-    "ad-hoc-ordering",
-    "10.3.5",
-    E,
-    "the ad-hoc subprocess's ordering is none that BPMN has",
-    "write Parallel or Sequential",
-    same_as=("bad-value",),
-)
 SAME_EVENT = Rule(
     10555,
     "event-subprocess-twice",
@@ -167,10 +158,8 @@ def _ad_hoc(tree: Tree, element: etree._Element) -> None:
         tree.say(AD_HOC_START, start)
     for end in children(element, "endEvent"):
         tree.say(AD_HOC_END, end)
-    ordering = element.get("ordering", "Parallel").strip()
-    if ordering not in ("Parallel", "Sequential"):
-        tree.say(AD_HOC_ORDERING, element, f"'{ordering}'")
-    elif ordering == "Sequential" and element.get("cancelRemainingInstances") is not None:
+    sequential = element.get("ordering", "").strip() == "Sequential"
+    if sequential and element.get("cancelRemainingInstances") is not None:
         tree.say(AD_HOC_CANCEL, element)
     _subprocess(tree, element)
 
