@@ -42,7 +42,7 @@ _EACH = re.compile(r"<each\b([^<>]*)>(.*?)</each>", re.S)
 _LINES = re.compile(r"^\s*(?:([\w-]+):)?\s*([\w-]+)\s*([~=]>)\s*([\w-]+)\s*$", re.M)
 _FLOWS = re.compile(r"^\s*(?:([\w-]+):)?\s*([\w-]+(?:\s*->\s*[\w-]+)+)(?:\s+if\s+(.+))?\s*$", re.M)
 _SHORT = re.compile(
-    r"<(\w+)\b([^<>]*)(?<!/)>([^<]*\S[^<]*?)(<(\w+)Characteristics\b.*?</\5Characteristics>\s*)?</\1>"
+    r"<(\w+)\b([^<>]*)(?<!/)>([^<]*[^\s<][^<]*?)(<(\w+)Characteristics\b.*?</\5Characteristics>\s*)?</\1>"
 )
 _PARTS = re.compile(r"(?<!&lt)(?<!&gt)(?<!&amp);")
 _TIMES = {"timer": "timeDuration", "date": "timeDate", "cycle": "timeCycle"}
