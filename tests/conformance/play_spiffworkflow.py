@@ -19,7 +19,6 @@ from SpiffWorkflow.bpmn.specs.event_definitions.item_aware_event import SignalEv
 from SpiffWorkflow.bpmn.specs.event_definitions.message import MessageEventDefinition
 from SpiffWorkflow.bpmn.specs.mixins import ServiceTaskMixin, StartEventMixin, UserTaskMixin
 from SpiffWorkflow.bpmn.specs.mixins.events.intermediate_event import BoundaryEvent
-from SpiffWorkflow.bpmn.specs.mixins.multiinstance_task import LoopTask
 from SpiffWorkflow.bpmn.util import BpmnEvent
 from SpiffWorkflow.bpmn.workflow import BpmnWorkflow
 from SpiffWorkflow.task import Task
@@ -43,24 +42,53 @@ class Clock(datetime):
         return cls.fromtimestamp(Clock.at.timestamp(), tz)
 
 
-class Missing(dict[str, Any]):
-    """Data in which a name that nobody wrote is None."""
+class Null:
+    """A name that nobody wrote, as in m2pem: None, and neither more nor less than anything."""
 
-    def __missing__(self, name: str) -> None:
+    def __eq__(self, other: object) -> bool:
+        return other is None or isinstance(other, Null)
+
+    def __hash__(self) -> int:
+        return 0
+
+    def __bool__(self) -> bool:
+        return False
+
+    def _no(self, other: object) -> bool:
+        return False
+
+    def _null(self, other: object) -> "Null":
+        return self
+
+    __lt__ = __le__ = __gt__ = __ge__ = _no
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = _null
+
+
+class Names(dict[str, Any]):
+    """Data as expressions see them."""
+
+    def __missing__(self, name: str) -> Null:
         if name.startswith("__"):
             raise KeyError(name)
+        return Null()
+
+    @classmethod
+    def of(cls, *contexts: Data | None) -> "Names":
+        known = {name: value for context in contexts for name, value in (context or {}).items()}
+        return cls({name: value for name, value in known.items() if value is not None})
 
 
 class Environment(TaskDataEnvironment):
     def evaluate(self, expression: str, context: Data, external_context: Data | None = None) -> Any:
-        return eval(expression, {}, Missing({**(external_context or {}), **context}))
+        found = eval(expression, {}, Names.of(external_context, context))
+        return None if isinstance(found, Null) else found
 
     def execute(self, script: str, context: Data, external_context: Data | None = None) -> bool:
-        names = Missing({**(external_context or {}), **context})
+        names = Names.of(external_context, context)
         try:
             exec(script, {}, names)
         finally:
-            context.update(names)
+            context |= {n: None if isinstance(v, Null) else v for n, v in names.items()}
         return True
 
 
@@ -139,7 +167,7 @@ class Application:
         for workflow in self.instances:
             for task in workflow.get_tasks(state=ENTERED):
                 spec = task.task_spec
-                if spec.bpmn_id is None or isinstance(spec, LoopTask):
+                if spec.bpmn_id is None:
                     continue
                 if isinstance(spec, (BoundaryEvent, StartEventMixin)):
                     self.note_event(task)

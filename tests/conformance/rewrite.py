@@ -11,9 +11,6 @@ from pathlib import Path
 
 from lxml import etree
 
-from m2pem import load_mission
-from m2pem.model.elements import CallActivity
-
 _BPMN = "{http://www.omg.org/spec/BPMN/20100524/MODEL}"
 _CONDITIONS = ("conditionExpression", "condition", "activationCondition")
 _LOOPS = ("loopCondition", "loopCardinality", "completionCondition")
@@ -22,15 +19,25 @@ _NOT_BEFORE = ("documentation", "extensionElements")
 
 
 def main_process(file: Path, asked: str) -> str:
-    """The process that a run begins with."""
-    return asked or load_mission(file).process(None).id
+    """The process that a run begins with: the one asked for, else the first that is executable
+    and that nothing calls."""
+    processes, called = _processes(file)
+    candidates = [name for name, executable in processes.items() if executable] or [*processes]
+    return asked or next((name for name in candidates if name not in called), candidates[0])
 
 
 def startable_processes(file: Path, main: str) -> list[str]:
     """Processes that events start: neither the main one nor called ones."""
-    mission = load_mission(file)
-    called = {node.called_id for node in mission.nodes if isinstance(node, CallActivity)}
-    return [p.id for p in mission.processes if p.id != main and p.id not in called]
+    processes, called = _processes(file)
+    return [name for name in processes if name != main and name not in called]
+
+
+def _processes(file: Path) -> tuple[dict[str, bool], set[str]]:
+    """The processes, each with whether it is executable, and those that are called."""
+    root = etree.parse(file).getroot()
+    found = root.iter(f"{_BPMN}process")
+    called = {c.get("calledElement", "") for c in root.iter(f"{_BPMN}callActivity")}
+    return {p.get("id", ""): p.get("isExecutable") == "true" for p in found}, called
 
 
 def for_spiffworkflow(file: Path, main: str) -> str:

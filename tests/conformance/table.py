@@ -88,9 +88,9 @@ def _variant(case: Case) -> str:
 
 
 def _cell(verdict: Verdict) -> str:
-    if verdict.kind == "n.a." and not verdict.words:
-        return "-"
     word = _WORDS.get(verdict.kind, verdict.kind)
+    if verdict.kind == "n.a." and verdict.words:
+        return _plain(f"{word} ({verdict.words})")
     return _plain(f"{word}: {verdict.words}" if verdict.words else word)
 
 

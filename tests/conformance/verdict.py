@@ -95,9 +95,9 @@ def uncounted(file: Path) -> frozenset[str]:
 
 def _difference(when: str, expected: Counter[str], got: Counter[str], played: Played) -> str:
     parts = []
-    if missing := sorted((expected - got).elements()):
+    if missing := list((expected - got).elements()):
         parts.append(f"does not enter {' '.join(missing)}")
-    if more := sorted((got - expected).elements()):
+    if more := list((got - expected).elements()):
         parts.append(f"enters {' '.join(more)} besides" if expected else f"enters {' '.join(more)}")
     if played.ended == "failed":
         parts.append(f"fails ({played.problem})")

@@ -55,11 +55,6 @@ function advance(seconds) {
 // --- scripts, conditions and expressions ------------------------------------------------------
 
 const data = { ...order.given };
-const names = new Proxy(data, {
-  has: (_, name) => typeof name === 'string',
-  get: (_, name) => (typeof name === 'string' ? data[name] ?? null : undefined),
-});
-
 function javascript(expression) {
   return expression
     .replace(/\band\b/g, '&&')
@@ -77,7 +72,8 @@ function evaluate(expression) {
   return new Function('__names', '__divide', `with (__names) { return (${javascript(expression)}); }`)(
     new Proxy(data, {
       has: (_, name) => typeof name === 'string' && !name.startsWith('__'),
-      get: (_, name) => names[name],
+      // As in m2pem, what nobody wrote is equal to null, and neither more nor less than anything.
+      get: (_, name) => (typeof name === 'string' ? data[name] ?? undefined : undefined),
     }),
     divide,
   );
@@ -146,9 +142,17 @@ async function load() {
   const types = serializer.TypeResolver(elements);
   const context = serializer.Serializer({ rootElement, references, elementsById }, types);
   const environment = new elements.Environment({
-    scripts, expressions, timers, extensions: { sending }, settings: { enableDummyService: true },
+    scripts, expressions, timers, extensions: { sending, looping }, settings: { enableDummyService: true },
   });
   return new elements.Definition(new elements.Context(context, environment));
+}
+
+// The rounds of a loop and the instances of a multi-instance activity are events of its own broker.
+function looping(activity) {
+  if (!activity.behaviour.loopCharacteristics) return;
+  activity.broker.subscribeTmp('execution', 'execute.start', (_, { content }) => {
+    if (!content.isRootScope) entered.push(activity.id);
+  }, { noAck: true, consumerTag: `rounds-of-${activity.id}` });
 }
 
 function watch(definition) {
@@ -189,6 +193,7 @@ function step({ verb, name, number, seconds, data: payload }) {
     case 'answer': {
       const tasks = waiting.filter(({ id }) => id === name);
       if (tasks.length < number) throw new RangeError(`${name} does not wait`);
+      waiting = waiting.filter((each) => each !== tasks[number - 1]);
       tasks[number - 1].signal();
       break;
     }
