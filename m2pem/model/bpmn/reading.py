@@ -8,6 +8,7 @@ from lxml import etree
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.bpmn.names import M2PEM, M2PEM_ATTRIBUTES, a, attribute_names, kind, local
 from m2pem.model.bpmn.report import Report, Where
+from m2pem.model.bpmn.rewriting import expression_remedy
 from m2pem.model.bpmn.schema import Shape
 from m2pem.model.elements import (
     BoundaryEvent,
@@ -272,7 +273,7 @@ class Reading:
             identifier,
             "bad-expression",
             f"not an expression: {error}",
-            "write for example user.decision == 'continue' (docs/conditions.md)",
+            expression_remedy(error.text),
         )
 
 

@@ -5,15 +5,29 @@ from lxml import etree
 from m2pem.model.behavior import Behavior, Parameter, ServiceCall
 from m2pem.model.bpmn.behavior_xml import BehaviorReader
 from m2pem.model.bpmn.definitions import look_up
-from m2pem.model.bpmn.names import CAMUNDA, M2PEM, local
+from m2pem.model.bpmn.names import (
+    ACTIVITI,
+    CAMUNDA,
+    FLOWABLE,
+    M2PEM,
+    ZEEBE,
+    attribute_names,
+    local,
+)
 from m2pem.model.bpmn.reading import MessageUse, Reading
 from m2pem.model.bpmn.scan import Scan, own_extensions
 from m2pem.model.bpmn.scripts import BEHAVIOR, read_carried
 from m2pem.model.elements import ManualTask, ReceiveTask, SendTask, ServiceTask, Task
 from m2pem.model.events import Message
+from m2pem.model.expression.literals import shorten
 
 _NONE: frozenset[str] = frozenset()
 _SERVICE = frozenset({"behavior", "service", "property", "role"})
+_ENGINES = (CAMUNDA, FLOWABLE, ACTIVITI)
+_CLASSES = tuple(engine + name for engine in _ENGINES for name in ("class", "topic"))
+"""What other engines call the name of who does the work."""
+
+_JOB = ZEEBE + "taskDefinition"
 
 
 def read_plain_task(reading: Reading, found: Scan) -> Task:
@@ -47,7 +61,7 @@ def read_service_task(reading: Reading, found: Scan) -> ServiceTask:
             found.element,
             found.id,
             "no-service",
-            "the service task names no service; it does nothing",
+            f"the service task names no service{_bound_elsewhere(found)}; it does nothing",
             'add <m2pem:service class="Detector"/> to its extension elements, or make it a plain '
             "task",
         )
@@ -63,10 +77,10 @@ def _service_call(
     calls = [reader.service(each) for each in extensions.get("service", [])]
     named = [call for call in calls if call is not None]
     line = reading.report.line(element)
-    for key in ("class", M2PEM + "class", M2PEM + "service", CAMUNDA + "class"):
-        name = (element.get(key) or "").strip()
-        if name:
-            named.append(ServiceCall(name, line))
+    keys = ("class", M2PEM + "class", M2PEM + "service", *_CLASSES)
+    names = [element.get(key) or "" for key in keys]
+    names += [each.get("type") or "" for each in found.extensions() if each.tag == _JOB]
+    named += [ServiceCall(name.strip(), line) for name in names if name.strip()]
     classes = {call.service for call in named}
     if len(classes) > 1:
         reading.report.error(
@@ -83,6 +97,15 @@ def _service_call(
     roles = [*first.roles, *reader.roles(extensions.get("role", []))]
     reader.refuse_repeated(properties, "property")
     return ServiceCall(first.service, first.line, tuple(roles), tuple(properties))
+
+
+def _bound_elsewhere(found: Scan) -> str:
+    """What another engine would do here, for the message."""
+    for key in attribute_names(found.element):
+        if key.startswith(_ENGINES) and local(key) in ("expression", "delegateExpression", "type"):
+            value = found.element.get(key) or ""
+            return f" (its {local(key)} '{shorten(value)}' is another engine's)"
+    return ""
 
 
 def _loose_properties(
