@@ -8,11 +8,14 @@
 * A line with `->` is a chain of sequence flows, named f1, f2, ... or as said before a colon; what
   follows `if` is the condition of its last flow.
 * An event's text says its definition: `signal S`, `message M`, `error E`, `error`, `escalation X`,
-  `escalation`, `timer PT5S`, `date 2026-...`, `cycle R3/PT5S`, `terminate`.
+  `escalation`, `timer PT5S`, `date 2026-...`, `cycle R3/PT5S`, `terminate`, `cancel`, and
+  `compensate A`, `compensate`, `compensate A nowait`.
 * A script task's text is `do BEHAVIOR ROLES PARAMETERS` (roles: `uav1`, `evsg1/ptz`, `team:alpha`,
   with `?` optional), or statements separated by `;`.
 * A service task's is `call SERVICE ROLES PARAMETERS`, a user task's `ask DECISIONS`, a call
   activity's `in a as b, out c as d`.
+
+* `A undo B`, on a line of its own, attaches a compensation event (`A_undo`) to A that leads to B.
 
 What signals, messages, errors and escalations are referred to is declared by itself.
 """
@@ -30,6 +33,7 @@ _OWN = "https://m2pem.org/schema/1"
 _HEAD = f'<definitions xmlns="{_BPMN}" xmlns:m2pem="{_OWN}" id="defs" targetNamespace="test">'
 
 _FLOWS = re.compile(r"^\s*(?:([\w-]+):)?\s*([\w-]+(?:\s*->\s*[\w-]+)+)(?:\s+if\s+(.+))?\s*$", re.M)
+_UNDO = re.compile(r"^\s*([\w-]+) undo ([\w-]+)\s*$", re.M)
 _SHORT = re.compile(r"<(\w+)\b([^<>]*)(?<!/)>([^<>]*\S[^<>]*)</\1>")
 _TIMES = {"timer": "timeDuration", "date": "timeDate", "cycle": "timeCycle"}
 
@@ -43,7 +47,7 @@ def xml(text: str) -> str:
     """The BPMN 2.0 XML of it."""
     if "<process" not in text:
         text = f'<process id="MAIN" isExecutable="true">\n{text}\n</process>'
-    body = _SHORT.sub(_long, _flows(text))
+    body = _SHORT.sub(_long, _UNDO.sub(_undo, _flows(text)))
     return f"{_HEAD}{_roots(body)}{body}</definitions>"
 
 
@@ -97,8 +101,23 @@ def _definition(text: str) -> str:
     if word in _TIMES:
         time = _TIMES[word]
         return f"<timerEventDefinition><{time}>{rest}</{time}></timerEventDefinition>"
+    if word == "compensate":
+        activity, _, wait = rest.rpartition(" ") if rest.endswith("nowait") else (rest, "", "")
+        attributes = f' activityRef="{activity}"' if activity else ""
+        attributes += ' waitForCompletion="false"' if wait else ""
+        return f"<compensateEventDefinition{attributes}/>"
     reference = f' {word}Ref="{rest}"' if rest else ""
     return f"<{word}EventDefinition{reference}/>"
+
+
+def _undo(match: re.Match[str]) -> str:
+    activity, handler = match[1], match[2]
+    event = f"{activity}_undo"
+    return (
+        f'<boundaryEvent id="{event}" attachedToRef="{activity}"><compensateEventDefinition/>'
+        f'</boundaryEvent><association sourceRef="{event}" targetRef="{handler}" '
+        'associationDirection="One"/>'
+    )
 
 
 def _script(text: str) -> str:

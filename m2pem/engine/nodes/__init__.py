@@ -36,5 +36,7 @@ WHEN_TRIGGERED.update(
         e.ReceiveTask: complete,
         e.StartEvent: events.complete,
         e.IntermediateCatchEvent: events.complete,
+        e.IntermediateThrowEvent: events.complete,
+        e.EndEvent: Execution.consume,
     }
 )

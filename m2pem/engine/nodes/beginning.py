@@ -18,6 +18,7 @@ WORK: dict[type[FlowNode], Callable[[Execution, Token], None]] = {
     e.SendTask: activities.send_task,
     e.ReceiveTask: activities.receive_task,
     e.SubProcess: containers.subprocess,
+    e.Transaction: containers.subprocess,
     e.CallActivity: containers.call_activity,
 }
 """What each kind of activity does once it has begun."""

@@ -1,5 +1,6 @@
 """Subprocesses and call activities (BPMN 2.0.2, clauses 10.3.5, 10.3.6 and 13.3.4)."""
 
+from m2pem.engine.compensation import advance, close_undone
 from m2pem.engine.data import Place, flatten, reader, store_for
 from m2pem.engine.execution import Execution
 from m2pem.engine.interruption import end_run
@@ -8,6 +9,7 @@ from m2pem.engine.records import RunOutcome, TokenOutcome
 from m2pem.engine.scopes import close, open_scope
 from m2pem.engine.state import Scope, Token
 from m2pem.engine.throwing import throw_error
+from m2pem.engine.transactions import leave_cancelled
 from m2pem.engine.triggering import arm_event_subprocesses
 from m2pem.errors import ExpressionError
 from m2pem.model.behavior import Mapping
@@ -61,16 +63,27 @@ def begin(x: Execution, scope: Scope) -> None:
 
 
 def look_at(x: Execution, scope: Scope) -> None:
-    """A scope in which a token was consumed: if it was the last one, the scope has completed."""
-    if not scope.tokens:
+    """A scope in which a token was consumed: if it was the last one, the scope has completed.
+
+    Unless something is still to be undone in it.
+    """
+    if scope.compensations:
+        advance(x, scope)
+    elif scope.tokens:
+        return
+    elif scope.cancelled:
+        leave_cancelled(x, scope)
+    elif scope.reopened:
+        close_undone(x, scope)
+    else:
         finish(x, scope)
 
 
-def finish(x: Execution, scope: Scope) -> None:
-    """A scope has ended well: its activity goes on, or, without one, perhaps the run is over."""
+def finish(x: Execution, scope: Scope, outcome: TokenOutcome = TokenOutcome.COMPLETED) -> None:
+    """A scope has ended: its activity goes on, or, without one, perhaps the run is over."""
     token = scope.owner
     if token is None:
-        close(x, scope, TokenOutcome.COMPLETED)
+        close(x, scope, outcome)
         if not x.state.scopes:
             end_run(x, RunOutcome.COMPLETED)
         return
@@ -80,7 +93,7 @@ def finish(x: Execution, scope: Scope) -> None:
         values = _evaluate(x, token, node.mappings.outputs, scope)
         if values is None:
             return
-    close(x, scope, TokenOutcome.COMPLETED)
+    close(x, scope, outcome)
     for mapping, value in values or ():
         for key, item in flatten(mapping.target, value):
             x.write_into(store_for(token, key), token, key, item)

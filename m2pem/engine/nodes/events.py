@@ -1,6 +1,7 @@
 """Events (BPMN 2.0.2, clauses 10.5 and 13.5)."""
 
 from m2pem.engine import records as r
+from m2pem.engine.compensation import throw_compensation
 from m2pem.engine.execution import Execution
 from m2pem.engine.interruption import end_run
 from m2pem.engine.messaging import send
@@ -10,10 +11,13 @@ from m2pem.engine.records import RunOutcome, TokenOutcome
 from m2pem.engine.scopes import empty
 from m2pem.engine.state import Token
 from m2pem.engine.throwing import throw_error, throw_escalation
+from m2pem.engine.transactions import cancel
 from m2pem.engine.triggering import collect_letters, throw_signal
 from m2pem.engine.waiting import arm
 from m2pem.model.elements import Event, StartEvent, SubProcess
 from m2pem.model.events import (
+    CancelEventDefinition,
+    CompensateEventDefinition,
     ErrorEventDefinition,
     EscalationEventDefinition,
     EventDefinition,
@@ -68,7 +72,8 @@ def throw(x: Execution, token: Token) -> None:
         _throw(x, token, definition)
         if x.state.tokens.get(token.id) is not token:
             return
-    complete(x, token)
+    if not token.compensations:
+        complete(x, token)
 
 
 def _throw(x: Execution, token: Token, definition: EventDefinition) -> None:
@@ -80,6 +85,8 @@ def _throw(x: Execution, token: Token, definition: EventDefinition) -> None:
         case EscalationEventDefinition(escalation=escalation):
             assert escalation is not None
             throw_escalation(x, token, escalation)
+        case CompensateEventDefinition():
+            throw_compensation(x, token, definition)
 
 
 def signal(x: Execution, token: Token, signal_id: str) -> None:
@@ -103,6 +110,9 @@ def end(x: Execution, token: Token) -> None:
             case TerminateEventDefinition():
                 _terminate(x, token)
                 return
+            case CancelEventDefinition():
+                cancel(x, token)
+                return
             case ErrorEventDefinition(error=error):
                 assert error is not None
                 throw_error(x, token, error.code, f"thrown by {node.label}", leaving=True)
@@ -117,7 +127,8 @@ def end(x: Execution, token: Token) -> None:
                 _throw(x, token, definition)
                 if x.state.tokens.get(token.id) is not token:
                     return
-    x.consume(token)
+    if not token.compensations:
+        x.consume(token)
 
 
 def _terminate(x: Execution, token: Token) -> None:
@@ -128,4 +139,4 @@ def _terminate(x: Execution, token: Token) -> None:
         end_run(x, RunOutcome.TERMINATED, f"terminated by {token.node.label}")
         return
     empty(x, scope, TokenOutcome.TERMINATED)
-    finish(x, scope)
+    finish(x, scope, TokenOutcome.TERMINATED)

@@ -85,7 +85,8 @@ def _is_complete(x: Execution, scope: Scope, node: InclusiveGateway, join: Join)
 
     A token elsewhere in the scope keeps the join waiting when it can reach a flow that nobody
     came by yet, along a path that does not pass the join, unless it can also reach one that is
-    taken already. Those that wait at the join itself reach nothing.
+    taken already. Those that wait at the join itself reach nothing, nor does one whose activity
+    is being undone.
     """
     reach = x.upstream(node)
     taken = 0
@@ -93,6 +94,8 @@ def _is_complete(x: Execution, scope: Scope, node: InclusiveGateway, join: Join)
         if flow in join.by_flow:
             taken |= 1 << place
     for token in scope.tokens.values():
+        if token.is_reopened:
+            continue
         reachable = reach.get(token.node, 0)
         if reachable & ~taken and not reachable & taken:
             return False

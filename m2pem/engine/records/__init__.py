@@ -11,6 +11,14 @@ that contains `element`.
 from typing import TypeAlias, Union
 
 from m2pem.engine.records.base import RunOutcome, TokenOutcome, Trigger
+from m2pem.engine.records.compensation import (
+    CompensationBegan,
+    CompensationEnabled,
+    CompensationEnded,
+    CompensationTriggered,
+    ScopeReopened,
+    TransactionCancelled,
+)
 from m2pem.engine.records.events import (
     DataWritten,
     ErrorThrown,
@@ -66,6 +74,10 @@ __all__ = [
     "BehaviorRequested",
     "BehaviorRestarted",
     "BehaviorUnsettled",
+    "CompensationBegan",
+    "CompensationEnabled",
+    "CompensationEnded",
+    "CompensationTriggered",
     "DataWritten",
     "ErrorThrown",
     "EscalationThrown",
@@ -93,6 +105,7 @@ __all__ = [
     "ScopeClosed",
     "ScopeInterrupted",
     "ScopeOpened",
+    "ScopeReopened",
     "ServiceEnded",
     "ServiceRequested",
     "ServiceWithdrawn",
@@ -100,6 +113,7 @@ __all__ = [
     "TokenEntered",
     "TokenLeft",
     "TokenOutcome",
+    "TransactionCancelled",
     "Trigger",
 ]
 
@@ -142,4 +156,10 @@ Record: TypeAlias = Union[
     MessageThrown,
     EscalationThrown,
     ErrorThrown,
+    CompensationEnabled,
+    CompensationTriggered,
+    CompensationBegan,
+    CompensationEnded,
+    ScopeReopened,
+    TransactionCancelled,
 ]

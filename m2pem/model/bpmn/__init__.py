@@ -9,6 +9,7 @@ from m2pem.errors import MissionError
 from m2pem.findings import Finding, Severity, has_errors
 from m2pem.model.bpmn.calls import resolve_calls
 from m2pem.model.bpmn.collaboration import check_collaborations
+from m2pem.model.bpmn.compensation import link_compensation
 from m2pem.model.bpmn.containers import MAX_DEPTH, read_process
 from m2pem.model.bpmn.data import resolve_data
 from m2pem.model.bpmn.graph import add_unreachable, check_graph
@@ -110,6 +111,7 @@ def _read(report: Report, document: Document, data: bytes) -> Mission | None:
     resolve_prompts(reading)
     resolve_calls(reading)
     elements = link(reading)
+    link_compensation(reading, elements)
     resolve_messages(reading)
     check_collaborations(reading, elements)
     check_graph(reading)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
+from m2pem.model.bpmn.compensation import ASSOCIATION, read_association
 from m2pem.model.bpmn.data import read_data
 from m2pem.model.bpmn.flows import SEQUENCE_FLOW, read_flow
 from m2pem.model.bpmn.lanes import read_lanes
@@ -96,6 +97,9 @@ def _read_child(
         return None
     if tag in _DATA:
         read_data(reading, child, container)
+        return None
+    if tag == ASSOCIATION:
+        read_association(reading, child)
         return None
     if tag == _LANES:
         read_lanes(reading, child, process)

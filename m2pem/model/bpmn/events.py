@@ -15,6 +15,7 @@ from m2pem.model.elements import (
     IntermediateThrowEvent,
     Process,
     StartEvent,
+    Transaction,
 )
 from m2pem.model.events import ErrorEventDefinition, EventDefinition
 from m2pem.model.near import did_you_mean
@@ -27,7 +28,9 @@ _ALLOWED = {
     "boundaryEvent": "message timer escalation error cancel compensate conditional signal",
 }
 _ALLOWED_IN_EVENT_SUBPROCESS = "message timer escalation error compensate conditional signal"
-_EXECUTED = frozenset({"message", "timer", "signal", "escalation", "error", "terminate"})
+_EXECUTED = frozenset(
+    {"message", "timer", "signal", "escalation", "error", "terminate", "cancel", "compensate"}
+)
 _CATCHING = frozenset({"startEvent", "intermediateCatchEvent", "boundaryEvent"})
 _NEEDS_TRIGGER = frozenset({"intermediateCatchEvent", "boundaryEvent"})
 
@@ -112,7 +115,9 @@ def _definitions(
         return ()
     definition = elements[0]
     name = local(definition.tag).removesuffix("EventDefinition")
-    inside_event_subprocess = container in reading.self_starting
+    inside_event_subprocess = (
+        container in reading.self_starting and container not in reading.undoing
+    )
     allowed = _ALLOWED[place].split()
     if place == "startEvent" and inside_event_subprocess:
         allowed = _ALLOWED_IN_EVENT_SUBPROCESS.split()
@@ -127,6 +132,15 @@ def _definitions(
         return ()
     if name not in allowed:
         _not_allowed(reading, found, definition, allowed)
+        return ()
+    if name == "cancel" and place == "endEvent" and not isinstance(container, Transaction):
+        reading.report.error(
+            found.element,
+            found.id,
+            "cancel-outside-transaction",
+            "a cancel end event stands directly in a transaction, and nowhere else",
+            "make the subprocess a transaction, or throw an error",
+        )
         return ()
     if name not in _EXECUTED:
         reading.report.error(
@@ -144,8 +158,6 @@ def _definitions(
 _INSTEAD = {
     "conditional": "check the condition at a gateway, or throw a signal where it becomes true",
     "link": "join the two ends by a sequence flow",
-    "cancel": "throw and catch an error",
-    "compensate": "draw what undoes the activity after a boundary event",
 }
 
 

@@ -27,6 +27,7 @@ from m2pem.model.elements import (
     InclusiveGateway,
     ParallelGateway,
     SubProcess,
+    Transaction,
 )
 
 _NONE: frozenset[str] = frozenset()
@@ -66,7 +67,6 @@ _REFUSED = {
     "businessRuleTask": "use a service task",
     "complexGateway": "use an exclusive, inclusive or parallel gateway",
     "eventBasedGateway": "wait with boundary events on one task, or with parallel branches",
-    "transaction": "use a subprocess with boundary events",
     "adHocSubProcess": "join its activities by sequence flows, in a plain subprocess",
     "choreographyTask": "draw the mission as processes",
     "callChoreography": "draw the mission as processes",
@@ -99,7 +99,8 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
         return node
     if tag in SUBPROCESSES:
         # Its children are read with its content, by containers.py.
-        node = SubProcess(identifier, element.get("name", ""), reading.report.line(element))
+        sort = Transaction if tag == BPMN + "transaction" else SubProcess
+        node = sort(identifier, element.get("name", ""), reading.report.line(element))
         _event_subprocess(reading, element, node)
         _check_activity(reading, element, node)
     elif task is not None:
@@ -148,13 +149,7 @@ def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -
     _note_default(reading, element, node)
     if reading.boolean(element, "isForCompensation", False, node.id):
         reading.self_starting.add(node)
-        not_executed(
-            reading,
-            element,
-            node.id,
-            "compensation activity",
-            "draw what undoes the activity after a boundary event",
-        )
+        reading.undoing.add(node)
     for name in ("startQuantity", "completionQuantity"):
         quantity = element.get(name, "1").strip()
         if quantity != "1":

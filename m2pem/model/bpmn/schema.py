@@ -116,10 +116,13 @@ _TABLE: dict[str, tuple[str, str]] = {
     "escalationEventDefinition": ("id escalationRef", _BASE),
     "timerEventDefinition": ("id", f"{_BASE} timeDate|timeDuration|timeCycle"),
     "terminateEventDefinition": ("id", _BASE),
+    "cancelEventDefinition": ("id", _BASE),
+    "compensateEventDefinition": ("id activityRef waitForCompletion", _BASE),
     "conditionExpression": ("id language evaluatesToTypeRef", _BASE),
     "timeDate": ("id language evaluatesToTypeRef", _BASE),
     "timeDuration": ("id language evaluatesToTypeRef", _BASE),
     "timeCycle": ("id language evaluatesToTypeRef", _BASE),
+    "association": ("id sourceRef targetRef associationDirection", _BASE),
     "participant": (
         "id name processRef",
         f"{_BASE} interfaceRef endPointRef participantMultiplicity",
