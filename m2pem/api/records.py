@@ -1,6 +1,7 @@
 """Records, as OCUs and observers read them (docs/records.md)."""
 
 from m2pem.engine.records import (
+    ActivitiesChosen,
     BehaviorCancelRequested,
     BehaviorContinued,
     BehaviorEnded,
@@ -18,6 +19,8 @@ from m2pem.engine.records import (
     EventAwaited,
     EventTriggered,
     FlowTaken,
+    GatewayActivated,
+    GatewayReset,
     GeometryReceived,
     InputDeferred,
     InputIgnored,
@@ -47,11 +50,13 @@ from m2pem.engine.records import (
     TokenEntered,
     TokenLeft,
     TokenOutcome,
+    TokensGathered,
     TransactionCancelled,
     Trigger,
 )
 
 __all__ = [
+    "ActivitiesChosen",
     "BehaviorCancelRequested",
     "BehaviorContinued",
     "BehaviorEnded",
@@ -69,6 +74,8 @@ __all__ = [
     "EventAwaited",
     "EventTriggered",
     "FlowTaken",
+    "GatewayActivated",
+    "GatewayReset",
     "GeometryReceived",
     "InputDeferred",
     "InputIgnored",
@@ -98,6 +105,7 @@ __all__ = [
     "TokenEntered",
     "TokenLeft",
     "TokenOutcome",
+    "TokensGathered",
     "TransactionCancelled",
     "Trigger",
 ]

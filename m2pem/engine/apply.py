@@ -23,7 +23,10 @@ from m2pem.engine.state import (
     Wait,
 )
 from m2pem.model.elements import (
+    Activity,
+    AdHocSubProcess,
     CallActivity,
+    ComplexGateway,
     Container,
     FlowNode,
     InclusiveGateway,
@@ -50,6 +53,8 @@ def _node(state: RunState, element: str) -> FlowNode:
 
 
 def _is_join(node: FlowNode) -> bool:
+    if isinstance(node, ComplexGateway):
+        return True
     return isinstance(node, (ParallelGateway, InclusiveGateway)) and len(node.incoming) > 1
 
 
@@ -127,7 +132,7 @@ def _scope_opened(state: RunState, record: r.ScopeOpened) -> None:
         assert isinstance(element, (Process, SubProcess))
         container = element
     depth = parent.depth + 1 if parent is not None else 0
-    scope = Scope(record.scope, container, parent, owner, depth)
+    scope = Scope(record.scope, container, parent, owner, depth, state.shared)
     state.scopes[record.scope] = scope
     state.last_scope = record.scope
     if owner is not None:
@@ -174,11 +179,46 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
     state.tokens[record.token] = token
     scope.tokens[record.token] = token
     state.last_token = max(state.last_token, record.token)
+    if scope.compensations and undoing.enter_to_undo(scope, token):
+        return
     if flow is not None and _is_join(node):
         join = scope.joins.get(node)
         if join is None:
             join = scope.joins[node] = Join()
         join.by_flow.setdefault(flow, []).append(token)
+    elif flow is None and isinstance(scope.container, AdHocSubProcess) and scope.loop is None:
+        scope.begun[node] = None
+        if scope.chosen and scope.chosen[0] is node:
+            scope.chosen.pop(0)
+    elif isinstance(node, Activity) and node.start_quantity > 1 and record.instance is None:
+        scope.gathered.setdefault(node, []).append(token)
+
+
+def _gateway_activated(state: RunState, record: r.GatewayActivated) -> None:
+    node = _node(state, record.element)
+    used = tuple(flow for flow in node.incoming if flow.id in record.flows)
+    state.scopes[record.scope].activated[node] = used
+
+
+def _gateway_reset(state: RunState, record: r.GatewayReset) -> None:
+    del state.scopes[record.scope].activated[_node(state, record.element)]
+
+
+def _activities_chosen(state: RunState, record: r.ActivitiesChosen) -> None:
+    state.scopes[record.scope].chosen = [_node(state, element) for element in record.elements]
+
+
+def _tokens_gathered(state: RunState, record: r.TokensGathered) -> None:
+    _no_longer_gathered(state.tokens[record.token])
+
+
+def _no_longer_gathered(token: Token) -> None:
+    gathered = token.scope.gathered
+    waiting = gathered.get(token.node)
+    if waiting is not None and token in waiting:
+        waiting.remove(token)
+        if not waiting:
+            del gathered[token.node]
 
 
 def _token_left(state: RunState, record: r.TokenLeft) -> None:
@@ -197,6 +237,8 @@ def _token_left(state: RunState, record: r.TokenLeft) -> None:
             del join.by_flow[token.flow]
             if not join.by_flow:
                 del scope.joins[token.node]
+    elif scope.gathered:
+        _no_longer_gathered(token)
 
 
 # --- behaviors, prompts, services ---------------------------------------------------------------
@@ -301,7 +343,8 @@ def _service_ended(state: RunState, record: r.ServiceEnded | r.ServiceWithdrawn)
 
 def _data_written(state: RunState, record: r.DataWritten) -> None:
     if not record.own:
-        state.scopes[record.store].data[record.key] = record.value
+        store = state.scopes[record.store].data if record.store else state.shared.data
+        store[record.key] = record.value
         return
     token = state.tokens[record.own]
     if token.own is None:
@@ -393,6 +436,10 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.TokenEntered: _token_entered,
     r.TokenLeft: _token_left,
     r.FlowTaken: _nothing,
+    r.ActivitiesChosen: _activities_chosen,
+    r.TokensGathered: _tokens_gathered,
+    r.GatewayActivated: _gateway_activated,
+    r.GatewayReset: _gateway_reset,
     r.BehaviorRequested: _behavior_requested,
     r.BehaviorProgressed: _behavior_progressed,
     r.BehaviorCancelRequested: _behavior_cancel_requested,

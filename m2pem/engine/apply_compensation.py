@@ -42,18 +42,28 @@ def compensation_triggered(state: RunState, record: r.CompensationTriggered) -> 
 
 def compensation_began(state: RunState, record: r.CompensationBegan) -> None:
     """One of them is being undone: it cannot be undone again."""
-    token = state.tokens[record.token]
-    scope = token.scope
+    scope = state.scopes[record.scope]
     assert scope.done is not None
     assert scope.compensations is not None
     completion = scope.done.pop(record.completion)
     compensation = scope.compensations[record.compensation]
     compensation.left.remove(completion)
-    compensation.token = token
-    token.undoes = compensation
-    if completion.kept is not None:
-        token.kept = completion.kept
-        token.own = completion.own
+    compensation.begins = record.token, completion
+
+
+def enter_to_undo(scope: Scope, token: Token) -> bool:
+    """Whether a token that enters does so to undo something; then note what."""
+    for compensation in scope.compensations.values() if scope.compensations is not None else ():
+        if compensation.begins is not None and compensation.begins[0] == token.id:
+            completion = compensation.begins[1]
+            compensation.begins = None
+            compensation.token = token
+            token.undoes = compensation
+            if completion.kept is not None:
+                token.kept = completion.kept
+                token.own = completion.own
+            return True
+    return False
 
 
 def compensation_ended(state: RunState, record: r.CompensationEnded) -> None:

@@ -127,13 +127,6 @@ def _begin(x: Execution, scope: Scope, compensation: Compensation) -> None:
     if completion.kept is None:
         assert activity.compensation is not None
         node = activity.compensation
-        x.enter(number, node, scope)
-    else:  # the activity does not begin again: its scope is reopened below
-        x.emit(
-            r.TokenEntered(
-                number, x.process_of(node), node.id, scope.id, instance=completion.instance
-            )
-        )
     x.emit(
         r.CompensationBegan(
             number,
@@ -145,7 +138,11 @@ def _begin(x: Execution, scope: Scope, compensation: Compensation) -> None:
             activity.id,
         )
     )
-    if completion.kept is not None:
+    if completion.kept is None:
+        x.enter(number, node, scope)
+    else:  # it does not begin again, but has its scope reopened
+        process = x.process_of(node)
+        x.emit(r.TokenEntered(number, process, node.id, scope.id, instance=completion.instance))
         _reopen(x, x.state.tokens[number], completion.kept)
 
 

@@ -25,6 +25,14 @@ class RunStatus(StrEnum):
 
 
 @dataclass(slots=True, eq=False)
+class Shared:
+    """The data stores of a run, which all its processes share (BPMN 2.0.2, clause 10.4.1)."""
+
+    keys: frozenset[str]
+    data: dict[str, Value] = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
 class Scope:
     """An instance of a container: a process or a subprocess.
 
@@ -42,11 +50,20 @@ class Scope:
     parent: "Scope | None"
     owner: "Token | None"
     depth: int
+    shared: Shared
     tokens: "dict[int, Token]" = field(default_factory=dict)
     data: dict[str, Value] = field(default_factory=dict)
     joins: "dict[FlowNode, Join]" = field(default_factory=dict)
     waits: "dict[int, Wait] | None" = None
     loop: "Loop | None" = None
+    gathered: "dict[FlowNode, list[Token]]" = field(default_factory=dict)
+    """Tokens at activities that several must begin, and that have not begun."""
+    activated: "dict[FlowNode, tuple[SequenceFlow, ...]]" = field(default_factory=dict)
+    """Complex gateways that wait to reset, and the flows whose tokens activated them."""
+    chosen: "list[FlowNode]" = field(default_factory=list)
+    """Of an ad-hoc subprocess: what is to begin, and has not."""
+    begun: "dict[FlowNode, None]" = field(default_factory=dict)
+    """Of an ad-hoc subprocess: what was begun by choice."""
     interrupted: bool = False
     """An interrupting event subprocess of it has begun: no other one can."""
     done: "dict[int, Completion] | None" = None
@@ -94,14 +111,16 @@ class Completion:
 class Compensation:
     """Completed activities of `scope` that are being undone, one after the other.
 
-    `left`: those that are still to be undone, in this order. `token`: on what undoes one now.
-    `waiter`: on the event that threw it and waits for its end; None: nobody waits.
+    `left`: those that are still to be undone, in this order. `begins`: the one whose turn it is,
+    and the id of the token that will undo it. `token`: on what undoes it now. `waiter`: on the
+    event that threw it and waits for its end; None: nobody waits.
     """
 
     id: int
     scope: Scope
     left: list[Completion]
     waiter: "Token | None" = None
+    begins: tuple[int, Completion] | None = None
     token: "Token | None" = None
 
 
@@ -245,6 +264,7 @@ class RunState:
     last_prompt: int = 0
     last_service: int = 0
 
+    shared: Shared = field(init=False)
     root: Scope | None = None
     scopes: dict[int, Scope] = field(default_factory=dict)
     tokens: dict[int, Token] = field(default_factory=dict)
@@ -271,6 +291,9 @@ class RunState:
     yielded: tuple[int, ...] = ()
     seen: dict[str, None] = field(default_factory=dict)
     """Ids of inputs that carried one."""
+
+    def __post_init__(self) -> None:
+        self.shared = Shared(self.mission.data_stores)
 
     def mission_time_us(self, now_us: int) -> int:
         """Microseconds from the start of the run, not counting pauses."""

@@ -36,10 +36,15 @@ def preceding(node: FlowNode) -> list[FlowNode]:
     return found
 
 
+def instantiates(node: FlowNode) -> bool:
+    """Whether it begins its process, though it is no start event (clauses 10.3.3 and 10.6.6)."""
+    return isinstance(node, EventBasedGateway | ReceiveTask) and node.instantiate
+
+
 def begins_by_itself(node: FlowNode) -> bool:
     """Whether something else than a token before it can begin a node that is no start event."""
-    if isinstance(node, EventBasedGateway | ReceiveTask):
-        return node.instantiate
+    if instantiates(node):
+        return True
     if isinstance(node, SubProcess) and node.triggered_by_event:
         return True
     return isinstance(node, Activity) and node.for_compensation

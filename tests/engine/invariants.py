@@ -49,6 +49,7 @@ def _check_done(scope: Scope) -> None:
     for number, compensation in (scope.compensations or {}).items():
         assert compensation.id == number
         assert compensation.scope is scope
+        assert compensation.begins is None, "it has begun"
         assert compensation.left or compensation.token, "it has ended"
         claims |= {completion.id: number for completion in compensation.left}
         waiter, token = compensation.waiter, compensation.token

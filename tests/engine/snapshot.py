@@ -13,6 +13,7 @@ from m2pem.engine.state import (
     RunState,
     Scope,
     Service,
+    Shared,
     Token,
     Wait,
 )
@@ -49,7 +50,7 @@ def _plain(value: object) -> object:
         return value.id
     if isinstance(value, _OBJECTS):
         return f"{type(value).__name__} {value.id}"
-    if isinstance(value, Loop):
+    if isinstance(value, (Loop, Shared)):
         return [(each.name, _plain(getattr(value, each.name))) for each in fields(value)]
     if isinstance(value, Join):
         return _plain(value.by_flow)

@@ -33,9 +33,9 @@ def test_the_records_of_a_compensation() -> None:
     assert play.trace() == table(
         """
         answer p2 done; write user.decision = done; enable b; leave b; take f3; enter back
-        undo back 2 1; enter unB; undoing b; ask p3 unB
+        undo back 2 1; undoing b; enter unB; ask p3 unB
         answer p3 done; write user.decision = done; leave unB
-        enter unA; undoing a; ask p4 unA
+        undoing a; enter unA; ask p4 unA
         answer p4 done; write user.decision = done; leave unA; undone 1
         leave back; take f4; enter after; leave after; take f5; enter end; leave end
         close MAIN; end completed

@@ -56,8 +56,8 @@ def test_the_records_of_a_cancelled_transaction() -> None:
         """
         leave ok; enter which; leave which; enter no; leave no
         cancelled no; undo no 2 1
-        enter unHotel; undoing hotel; ask p2 unHotel; leave unHotel
-        enter unFlight; undoing flight; ask p3 unFlight; leave unFlight; undone 1
+        undoing hotel; enter unHotel; ask p2 unHotel; leave unHotel
+        undoing flight; enter unFlight; ask p3 unFlight; leave unFlight; undone 1
         close trip terminated; leave trip terminated; enter cancelled
         leave cancelled; enter sorry; leave sorry; enter end2; leave end2
         close MAIN; end completed

@@ -1,7 +1,7 @@
 """Subprocesses and call activities (BPMN 2.0.2, clauses 10.3.5, 10.3.6 and 13.3.4)."""
 
-from m2pem.engine.compensation import advance, close_undone
-from m2pem.engine.data import Place, flatten, reader, store_for
+from m2pem.engine.data import flatten, reader
+from m2pem.engine.data_flow import evaluate, write_values
 from m2pem.engine.execution import Execution
 from m2pem.engine.interruption import end_run
 from m2pem.engine.nodes.completion import complete
@@ -9,12 +9,8 @@ from m2pem.engine.records import RunOutcome, TokenOutcome
 from m2pem.engine.scopes import close, open_scope
 from m2pem.engine.state import Scope, Token
 from m2pem.engine.throwing import throw_error
-from m2pem.engine.transactions import leave_cancelled
 from m2pem.engine.triggering import arm_event_subprocesses
-from m2pem.errors import ExpressionError
-from m2pem.model.behavior import Mapping
 from m2pem.model.elements import CallActivity
-from m2pem.model.values import Value
 
 MAX_DEPTH = 1000
 """Scopes within scopes; more is a process that calls itself without end."""
@@ -24,7 +20,7 @@ def subprocess(x: Execution, token: Token) -> None:
     """Open its scope and start what is in it."""
     if token.inner is not None:
         return  # an event subprocess, which its trigger has begun
-    scope = _open(x, token)
+    scope = open_inside(x, token)
     if scope is not None:
         begin(x, scope)
 
@@ -33,10 +29,10 @@ def call_activity(x: Execution, token: Token) -> None:
     """Open an instance of the called process; only what the mappings say passes in and out."""
     node = token.node
     assert isinstance(node, CallActivity)
-    values = _evaluate(x, token, node.mappings.inputs, token)
+    values = evaluate(x, token, node.mappings.inputs, reader(token))
     if values is None:
         return
-    scope = _open(x, token)
+    scope = open_inside(x, token)
     if scope is None:
         return
     for mapping, value in values:
@@ -45,7 +41,8 @@ def call_activity(x: Execution, token: Token) -> None:
     begin(x, scope)
 
 
-def _open(x: Execution, token: Token) -> Scope | None:
+def open_inside(x: Execution, token: Token) -> Scope | None:
+    """Open the scope of an activity. None: it is too deep, and that error was thrown."""
     if token.scope.depth >= MAX_DEPTH:
         throw_error(x, token, "RECURSION", f"{MAX_DEPTH} scopes within scopes at {token.node.id}")
         return None
@@ -63,19 +60,8 @@ def begin(x: Execution, scope: Scope) -> None:
 
 
 def look_at(x: Execution, scope: Scope) -> None:
-    """A scope in which a token was consumed: if it was the last one, the scope has completed.
-
-    Unless something is still to be undone in it.
-    """
-    if scope.compensations:
-        advance(x, scope)
-    elif scope.tokens:
-        return
-    elif scope.cancelled:
-        leave_cancelled(x, scope)
-    elif scope.reopened:
-        close_undone(x, scope)
-    else:
+    """A scope in which a token was consumed: if it was the last one, the scope has completed."""
+    if not scope.tokens:
         finish(x, scope)
 
 
@@ -90,25 +76,9 @@ def finish(x: Execution, scope: Scope, outcome: TokenOutcome = TokenOutcome.COMP
     node = token.node
     values = None
     if isinstance(node, CallActivity):
-        values = _evaluate(x, token, node.mappings.outputs, scope)
+        values = evaluate(x, token, node.mappings.outputs, reader(scope))
         if values is None:
             return
     close(x, scope, outcome)
-    for mapping, value in values or ():
-        for key, item in flatten(mapping.target, value):
-            x.write_into(store_for(token, key), token, key, item)
+    write_values(x, token, token, values or [])
     complete(x, token)
-
-
-def _evaluate(
-    x: Execution, token: Token, mappings: tuple[Mapping, ...], place: Place
-) -> list[tuple[Mapping, Value]] | None:
-    read = reader(place)
-    values = []
-    for mapping in mappings:
-        try:
-            values.append((mapping, mapping.source.evaluate(read)))
-        except ExpressionError as error:
-            throw_error(x, token, "EXPRESSION", f"mapping to {mapping.target}: {error}")
-            return None
-    return values

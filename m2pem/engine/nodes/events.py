@@ -2,6 +2,7 @@
 
 from m2pem.engine import records as r
 from m2pem.engine.compensation import throw_compensation
+from m2pem.engine.data_flow import payload
 from m2pem.engine.execution import Execution
 from m2pem.engine.interruption import end_run
 from m2pem.engine.messaging import send
@@ -49,7 +50,7 @@ def start(x: Execution, token: Token) -> None:
         triggered = True
     if node.definitions and not triggered:
         catch(x, token)
-    else:
+    elif not token.waits:  # else others of its triggers must still come
         complete(x, token)
 
 
@@ -90,10 +91,13 @@ def _throw(x: Execution, token: Token, definition: EventDefinition) -> None:
 
 
 def signal(x: Execution, token: Token, signal_id: str) -> None:
-    """Broadcast a signal in the run."""
+    """Broadcast a signal, with its data inputs, in the run."""
     node = token.node
+    data = payload(x, token)
+    if data is None:
+        return
     x.emit(r.SignalThrown(signal_id, token.id, x.process_of(node), node.id, token.scope.id))
-    throw_signal(x, signal_id, {})
+    throw_signal(x, signal_id, data)
 
 
 def boundary(x: Execution, token: Token) -> None:
@@ -105,7 +109,7 @@ def end(x: Execution, token: Token) -> None:
     """The token ends here, perhaps throwing something."""
     node = token.node
     assert isinstance(node, Event)
-    for definition in node.definitions:
+    for definition in sorted(node.definitions, key=_ends_the_scope):
         match definition:
             case TerminateEventDefinition():
                 _terminate(x, token)
@@ -117,7 +121,7 @@ def end(x: Execution, token: Token) -> None:
                 assert error is not None
                 throw_error(x, token, error.code, f"thrown by {node.label}", leaving=True)
                 return
-            case EscalationEventDefinition(escalation=escalation):
+            case EscalationEventDefinition(escalation=escalation) if len(node.definitions) == 1:
                 assert escalation is not None
                 goes_on = throw_escalation(x, token, escalation, leaving=True)
                 if goes_on and not token.scope.tokens:
@@ -129,6 +133,13 @@ def end(x: Execution, token: Token) -> None:
                     return
     if not token.compensations:
         x.consume(token)
+
+
+def _ends_the_scope(definition: EventDefinition) -> int:
+    """Of several results, those that end the scope come last, so that all are thrown."""
+    if isinstance(definition, TerminateEventDefinition | CancelEventDefinition):
+        return 2
+    return 1 if isinstance(definition, ErrorEventDefinition) else 0
 
 
 def _terminate(x: Execution, token: Token) -> None:

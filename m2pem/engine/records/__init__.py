@@ -43,12 +43,16 @@ from m2pem.engine.records.run import (
     RunYielded,
 )
 from m2pem.engine.records.tokens import (
+    ActivitiesChosen,
     FlowTaken,
+    GatewayActivated,
+    GatewayReset,
     ScopeClosed,
     ScopeInterrupted,
     ScopeOpened,
     TokenEntered,
     TokenLeft,
+    TokensGathered,
 )
 from m2pem.engine.records.work import (
     BehaviorCancelRequested,
@@ -67,6 +71,7 @@ from m2pem.engine.records.work import (
 )
 
 __all__ = [
+    "ActivitiesChosen",
     "BehaviorCancelRequested",
     "BehaviorContinued",
     "BehaviorEnded",
@@ -84,6 +89,8 @@ __all__ = [
     "EventAwaited",
     "EventTriggered",
     "FlowTaken",
+    "GatewayActivated",
+    "GatewayReset",
     "GeometryReceived",
     "InputDeferred",
     "InputIgnored",
@@ -113,6 +120,7 @@ __all__ = [
     "TokenEntered",
     "TokenLeft",
     "TokenOutcome",
+    "TokensGathered",
     "TransactionCancelled",
     "Trigger",
 ]
@@ -135,7 +143,11 @@ Record: TypeAlias = Union[
     ScopeInterrupted,
     TokenEntered,
     TokenLeft,
+    ActivitiesChosen,
+    TokensGathered,
     FlowTaken,
+    GatewayActivated,
+    GatewayReset,
     BehaviorRequested,
     BehaviorProgressed,
     BehaviorCancelRequested,

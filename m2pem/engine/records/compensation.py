@@ -32,7 +32,7 @@ class CompensationTriggered(BaseRecord, frozen=True):
 
 
 class CompensationBegan(BaseRecord, frozen=True):
-    """A token has entered what undoes `activity`: its compensation activity, or itself again."""
+    """`activity` is being undone: a token enters its compensation activity, or itself again."""
 
     token: int
     process: str

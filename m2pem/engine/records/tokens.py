@@ -67,3 +67,39 @@ class ScopeInterrupted(BaseRecord, frozen=True):
     scope: int
     process: str
     element: str
+
+
+class ActivitiesChosen(BaseRecord, frozen=True):
+    """An ad-hoc subprocess has begun whose own expression chooses what is done in it, in order."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    elements: tuple[str, ...]
+
+
+class TokensGathered(BaseRecord, frozen=True):
+    """As many tokens have come to an activity as begin it; `token` does so, the others left."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+
+
+class GatewayActivated(BaseRecord, frozen=True):
+    """A complex gateway has used the tokens of `flows`, and waits for the others to reset."""
+
+    process: str
+    element: str
+    scope: int
+    flows: tuple[str, ...]
+
+
+class GatewayReset(BaseRecord, frozen=True):
+    """A complex gateway can be activated again."""
+
+    process: str
+    element: str
+    scope: int

@@ -2,6 +2,7 @@
 
 from lxml import etree
 
+from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.definitions import read_definition
 from m2pem.model.bpmn.names import BPMN, a, kind, local
 from m2pem.model.bpmn.reading import Reading, reference, text_of
@@ -43,20 +44,21 @@ def read_event(reading: Reading, element: etree._Element, container: Container) 
     definitions = _definitions(reading, found, place, container)
     name = element.get("name", "")
     line = reading.report.line(element)
-    reading.note_outputs(found.of("dataOutputAssociation"))
+    parallel = reading.boolean(element, "parallelMultiple", False, identifier)
     event: Event
     if place == "startEvent":
-        event = StartEvent(identifier, name, line, definitions)
+        event = StartEvent(identifier, name, line, definitions, parallel)
     elif place == "endEvent":
         event = EndEvent(identifier, name, line, definitions)
     elif place == "intermediateThrowEvent":
         event = IntermediateThrowEvent(identifier, name, line, definitions)
     elif place == "intermediateCatchEvent":
-        event = IntermediateCatchEvent(identifier, name, line, definitions)
+        event = IntermediateCatchEvent(identifier, name, line, definitions, parallel)
         if any(local(tag) == "linkEventDefinition" for tag in found.children):
             reading.self_starting.add(event)
     else:
-        event = _boundary(reading, element, identifier, definitions)
+        event = _boundary(reading, element, identifier, definitions, parallel)
+    read_data_flow(reading, found, event)
     return event
 
 
@@ -65,6 +67,7 @@ def _boundary(
     element: etree._Element,
     identifier: str,
     definitions: tuple[EventDefinition, ...],
+    parallel: bool,
 ) -> BoundaryEvent:
     interrupting = reading.boolean(element, "cancelActivity", True, identifier)
     event = BoundaryEvent(
@@ -72,7 +75,8 @@ def _boundary(
         element.get("name", ""),
         reading.report.line(element),
         definitions,
-        interrupting=interrupting,
+        parallel,
+        interrupting,
     )
     reading.attachments.append((event, reference(element.get("attachedToRef", ""))))
     if not interrupting and any(isinstance(d, ErrorEventDefinition) for d in definitions):
@@ -92,28 +96,23 @@ def _definitions(
 ) -> tuple[EventDefinition, ...]:
     elements = [
         each
-        for tag, group in found.children.items()
-        if tag.endswith("EventDefinition") and tag.startswith(BPMN)
-        for each in group
+        for each in found.element
+        if each.tag.startswith(BPMN) and each.tag.endswith("EventDefinition")
     ]
     for referring in found.of("eventDefinitionRef"):
         target = _referred_definition(reading, referring, found.id)
         if target is not None:
             elements.append(target)
-    if len(elements) > 1:
-        reading.report.error(
-            found.element,
-            found.id,
-            "not-executed",
-            "m2pem does not execute an event with several triggers or results yet",
-            "use one event for each",
-        )
-        return ()
-    if not elements:
-        if place in _NEEDS_TRIGGER and not found.of("eventDefinitionRef"):
-            _no_trigger(reading, found, place)
-        return ()
-    definition = elements[0]
+    if not elements and place in _NEEDS_TRIGGER and not found.of("eventDefinitionRef"):
+        _no_trigger(reading, found, place)
+    read = [_definition(reading, found, place, container, each) for each in elements]
+    return tuple(definition for definition in read if definition is not None)
+
+
+def _definition(
+    reading: Reading, found: Scan, place: str, container: Container, definition: etree._Element
+) -> EventDefinition | None:
+    """One of its definitions; None when a finding says what is wrong with it."""
     name = local(definition.tag).removesuffix("EventDefinition")
     inside_event_subprocess = (
         container in reading.self_starting and container not in reading.undoing
@@ -129,10 +128,10 @@ def _definitions(
             f"a start event in an embedded subprocess cannot wait for {a(kind(definition.tag))}",
             "use a plain start event, and a catching intermediate event after it",
         )
-        return ()
+        return None
     if name not in allowed:
         _not_allowed(reading, found, definition, allowed)
-        return ()
+        return None
     if name == "cancel" and place == "endEvent" and not isinstance(container, Transaction):
         reading.report.error(
             found.element,
@@ -141,7 +140,7 @@ def _definitions(
             "a cancel end event stands directly in a transaction, and nowhere else",
             "make the subprocess a transaction, or throw an error",
         )
-        return ()
+        return None
     if name not in _EXECUTED:
         reading.report.error(
             found.element,
@@ -150,9 +149,8 @@ def _definitions(
             f"m2pem does not execute {a(kind(definition.tag))} yet",
             _INSTEAD.get(name, "draw it with the elements that docs/missions.md lists"),
         )
-        return ()
-    read = read_definition(reading, definition, found, catches=place in _CATCHING)
-    return () if read is None else (read,)
+        return None
+    return read_definition(reading, definition, found, catches=place in _CATCHING)
 
 
 _INSTEAD = {

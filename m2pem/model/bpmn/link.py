@@ -8,6 +8,7 @@ from m2pem.model.bpmn.reading import FlowEnds, Reading
 from m2pem.model.elements import (
     Activity,
     BoundaryEvent,
+    ComplexGateway,
     Container,
     DataObject,
     Element,
@@ -21,6 +22,7 @@ from m2pem.model.elements import (
     StartEvent,
 )
 from m2pem.model.near import did_you_mean
+from m2pem.model.reach import instantiates
 
 _set = object.__setattr__
 
@@ -140,7 +142,11 @@ def _link_containers(reading: Reading) -> None:
         data.setdefault(container, []).append(declared)
     for container, inside in nodes.items():
         _set(container, "nodes", tuple(inside))
-        starts = [node for node in inside if isinstance(node, StartEvent)]
+        starts = [
+            node
+            for node in inside
+            if isinstance(node, StartEvent) or (instantiates(node) and not node.incoming)
+        ]
         _set(
             container,
             "entries",
@@ -164,7 +170,7 @@ def _link_defaults(reading: Reading, flows: dict[str, SequenceFlow]) -> None:
     for node, ref, line in reading.defaults:
         flow = next((flow for flow in node.outgoing if flow.id == ref), None)
         if flow is not None:
-            if isinstance(node, Activity | ExclusiveGateway | InclusiveGateway):
+            if isinstance(node, Activity | ComplexGateway | ExclusiveGateway | InclusiveGateway):
                 _set(node, "default", flow)
             if flow.condition is not None:
                 reading.report.warning(

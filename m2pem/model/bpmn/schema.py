@@ -118,6 +118,8 @@ _TABLE: dict[str, tuple[str, str]] = {
     "terminateEventDefinition": ("id", _BASE),
     "cancelEventDefinition": ("id", _BASE),
     "compensateEventDefinition": ("id activityRef waitForCompletion", _BASE),
+    "activationCondition": ("id language evaluatesToTypeRef", _BASE),
+    "completionCondition": ("id language evaluatesToTypeRef", _BASE),
     "conditionExpression": ("id language evaluatesToTypeRef", _BASE),
     "timeDate": ("id language evaluatesToTypeRef", _BASE),
     "timeDuration": ("id language evaluatesToTypeRef", _BASE),
