@@ -14,6 +14,7 @@ from m2pem.engine.state import (
     Behavior,
     BehaviorPhase,
     Join,
+    Letter,
     Prompt,
     RunState,
     RunStatus,
@@ -407,14 +408,14 @@ def _event_triggered(state: RunState, record: r.EventTriggered) -> None:
     _end_wait(state, wait)
     if record.kept:
         letters = state.mailbox[wait.ref]
-        letters.pop(0)
+        letters.pop(record.letter)
         if not letters:
             del state.mailbox[wait.ref]
 
 
 def _message_thrown(state: RunState, record: r.MessageThrown) -> None:
     if record.kept:
-        state.mailbox.setdefault(record.message, []).append(record.data)
+        state.mailbox.setdefault(record.message, []).append(Letter(record.data, record.keys))
 
 
 _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {

@@ -8,6 +8,7 @@ from m2pem.engine.state import (
     Compensation,
     Completion,
     Join,
+    Letter,
     Loop,
     Prompt,
     RunState,
@@ -50,7 +51,7 @@ def _plain(value: object) -> object:
         return value.id
     if isinstance(value, _OBJECTS):
         return f"{type(value).__name__} {value.id}"
-    if isinstance(value, (Loop, Shared)):
+    if isinstance(value, (Letter, Loop, Shared)):
         return [(each.name, _plain(getattr(value, each.name))) for each in fields(value)]
     if isinstance(value, Join):
         return _plain(value.by_flow)
