@@ -14,7 +14,7 @@ from m2pem.engine.records import TokenOutcome
 from m2pem.engine.scopes import close, compensates_around, compensator, open_scope
 from m2pem.engine.state import Compensation, Completion, Scope, Token
 from m2pem.engine.triggering import WHEN_TRIGGERED
-from m2pem.model.elements import Activity, SubProcess
+from m2pem.model.elements import Activity, Element, SubProcess
 from m2pem.model.events import CompensateEventDefinition
 
 # --- what can be undone -------------------------------------------------------------------------
@@ -47,32 +47,36 @@ def throw_compensation(x: Execution, token: Token, definition: CompensateEventDe
     """Undo the activity that an event names, or all that was done in its scope.
 
     Afterwards the token has `compensations` when it has to wait. Thrown in an event subprocess, it
-    is about the scope around that (tables 10.88 and 10.89).
+    is about the scope around that (tables 10.88 and 10.89). A named activity is looked for outwards
+    from there; the activity that the event itself is in stands for all that was done in it.
     """
-    scope = token.scope
-    container = scope.container
     named = x.mission.elements.get(definition.activity)
-    inside = isinstance(named, Activity) and named.container is container
-    if named is container:
-        named = None
-    elif isinstance(container, SubProcess) and container.triggered_by_event and not inside:
-        scope = _around(scope)
-        if named is scope.container:
-            named = None
+    scope = _target(token.scope, named)
     found = [
-        completion for completion in _undoable(scope) if named is None or completion.node is named
+        completion
+        for completion in _undoable(scope)
+        if named is None or named is scope.container or completion.node is named
     ]
     trigger_compensation(x, token, scope, found, waits=definition.wait and bool(found))
 
 
-def _around(scope: Scope) -> Scope:
-    """The scope that an event subprocess is in."""
-    assert scope.owner is not None
-    outer = scope.owner.scope
-    while outer.loop is not None:
-        assert outer.owner is not None
-        outer = outer.owner.scope
-    return outer
+def _target(thrown_in: Scope, named: Element | None) -> Scope:
+    """The scope in which something is to be undone."""
+    scope = thrown_in
+    if named is None:
+        container = scope.container
+        if isinstance(container, SubProcess) and container.triggered_by_event:
+            assert scope.owner is not None
+            scope = scope.owner.scope
+            while scope.loop is not None and scope.owner is not None:
+                scope = scope.owner.scope
+        return scope
+    home = named.container if isinstance(named, Activity) else None
+    while scope.loop is not None or scope.container not in (home, named):
+        if scope.owner is None:
+            return thrown_in
+        scope = scope.owner.scope
+    return scope
 
 
 def _undoable(scope: Scope) -> list[Completion]:

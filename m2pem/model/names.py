@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from m2pem.findings import Finding, Severity
 from m2pem.model.behavior import Assignment, Parameter
 from m2pem.model.behavior import Mapping as DataMapping
+from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.elements import (
     Activity,
     AdHocSubProcess,
@@ -95,6 +96,7 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
                 f"'{name}' is read, but nothing in process '{process.id}' writes it; unless "
                 "--data or an operator does, it is null",
                 did_you_mean(name, store.written, "write it in a task before, or pass it in"),
+                code("unwritten-name"),
             )
 
 

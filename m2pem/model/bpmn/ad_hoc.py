@@ -15,7 +15,7 @@ def read_ad_hoc(reading: Reading, element: etree._Element, identifier: str) -> A
         reading.report.error(
             element,
             identifier,
-            "bad-value",
+            "ad-hoc-ordering",
             f"ordering='{ordering}' is none that BPMN knows",
             'write ordering="Parallel" or ordering="Sequential"',
         )

@@ -78,7 +78,7 @@ def _path(
     reading.report.error(
         element,
         identifier,
-        "correlation-path",
+        "retrieval-path" if tag == "messagePath" else "binding-path",
         f"it has no {tag}, so nothing says by what messages are matched",
         f"write <{tag}>expression</{tag}>",
     )
@@ -88,11 +88,14 @@ def _path(
 def _dangling(
     reading: Reading, element: etree._Element, identifier: str, attribute: str, name: str
 ) -> None:
-    known = reading.messages if attribute == "messageRef" else reading.correlation_properties
+    if attribute == "messageRef":
+        rule, known = "retrieval-message", frozenset(reading.messages)
+    else:
+        rule, known = "binding-property", frozenset(reading.correlation_properties)
     reading.report.error(
         element,
         identifier,
-        "dangling-reference",
+        rule,
         f"{attribute} names '{name}', which does not exist" if name else f"it has no {attribute}",
         did_you_mean(name, known, "name one that stands in definitions"),
     )

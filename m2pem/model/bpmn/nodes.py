@@ -37,7 +37,10 @@ SUBPROCESSES = frozenset(BPMN + name for name in ("subProcess", "transaction", "
 MAX_QUANTITY = 1000
 """Of tokens that begin an activity, or leave it by one flow."""
 
-_QUANTITIES = {"start_quantity": "startQuantity", "completion_quantity": "completionQuantity"}
+_QUANTITIES = {
+    "start_quantity": ("startQuantity", "start-quantity"),
+    "completion_quantity": ("completionQuantity", "completion-quantity"),
+}
 
 _TASKS: dict[str, Callable[[Reading, Scan], Activity]] = {
     BPMN + "task": read_plain_task,
@@ -138,22 +141,24 @@ def _event_subprocess(reading: Reading, element: etree._Element, node: SubProces
 def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -> None:
     _note_default(reading, element, node)
     if reading.boolean(element, "isForCompensation", False, node.id):
-        reading.self_starting.add(node)
         reading.undoing.add(node)
-    for field, name in _QUANTITIES.items():
-        object.__setattr__(node, field, _quantity(reading, element, name))
+    for field, (name, rule) in _QUANTITIES.items():
+        object.__setattr__(node, field, _quantity(reading, element, name, rule))
 
 
-def _quantity(reading: Reading, element: etree._Element, name: str) -> int:
+def _quantity(reading: Reading, element: etree._Element, name: str, rule: str) -> int:
     """How many tokens begin, or leave, an activity (table 10.3)."""
     text = element.get(name, "1").strip()
     if text.isascii() and text.isdecimal() and 1 <= int(text) <= MAX_QUANTITY:
         return int(text)
-    reading.report.error(
+    # Some editors write 0 for what was not set.
+    say = reading.report.warning if text == "0" else reading.report.error
+    say(
         element,
         element.get("id", ""),
-        "bad-value",
-        f"{name}='{text}' is no number of tokens from 1 to {MAX_QUANTITY}",
+        rule,
+        f"{name}='{text}' is no number of tokens from 1 to {MAX_QUANTITY}"
+        + ("; it counts as 1" if text == "0" else ""),
         f'write for example {name}="2", or delete it',
     )
     return 1

@@ -116,8 +116,6 @@ class MessageUse:
 class Drawn:
     """An association between two elements, by ids (BPMN 2.0.2, clause 8.4.1)."""
 
-    line: int
-    id: str
     source_ref: str
     target_ref: str
     direction: str
