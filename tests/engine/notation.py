@@ -5,8 +5,8 @@
     start -> fast -> go -> end if speed > 3
     no: fast -> end
 
-* A line with `->` is a chain of sequence flows, named f1, f2, ...; what is said before a colon
-  names the first of them, and what follows `if` is the condition of the last.
+* A line with `->` is a chain of sequence flows, named f1, f2, ...; a name before a colon is that of
+  the first of them, and what follows `if` is the condition of the last.
 * A line `a ~> b` is an association (from a compensation boundary event to its handler); a line
   `a => b` a message flow between the processes, which then are pools of a collaboration.
 * An event's text says its definition: `signal S`, `message M`, `error E`, `error`, `escalation X`,
@@ -23,6 +23,7 @@
 * A service task's is `call SERVICE ROLES PARAMETERS`, a user task's `ask DECISIONS`, a call
   activity's `in a as b, out c as d`.
 * `A undo B`, on a line of its own, attaches a compensation event (`A_undo`) to A that leads to B.
+  Such lines come last in a process or subprocess.
 
 What signals, messages, errors and escalations are referred to is declared by itself.
 """
@@ -43,9 +44,9 @@ _LOOP = re.compile(r"<loop\b([^<>]*)>(.*?)</loop>", re.S)
 _EACH = re.compile(r"<each\b([^<>]*)>(.*?)</each>", re.S)
 _LINES = re.compile(r"^\s*(?:([\w-]+):)?\s*([\w-]+)\s*([~=]>)\s*([\w-]+)\s*$", re.M)
 _FLOWS = re.compile(r"^\s*(?:([\w-]+):)?\s*([\w-]+(?:\s*->\s*[\w-]+)+)(?:\s+if\s+(.+))?\s*$", re.M)
-_UNDO = re.compile(r"^\s*([\w-]+) undo ([\w-]+)\s*$", re.M)
+_UNDO = re.compile(r"(?:^[ \t]*[\w-]+ undo [\w-]+[ \t]*(?:\n|\Z))+", re.M)
 _SHORT = re.compile(
-    r"<(\w+)\b([^<>]*)(?<!/)>([^<]*\S[^<]*?)(<(\w+)Characteristics\b.*?</\5Characteristics>\s*)?</\1>"
+    r"<(\w+)\b([^<>]*)(?<!/)>([^<]*[^\s<][^<]*?)(<(\w+)Characteristics\b.*?</\5Characteristics>\s*)?</\1>"
 )
 _PARTS = re.compile(r"(?<!&lt)(?<!&gt)(?<!&amp);")
 _TIMES = {"timer": "timeDuration", "date": "timeDate", "cycle": "timeCycle"}
@@ -183,13 +184,17 @@ def _definition(text: str) -> str:
 
 
 def _undo(match: re.Match[str]) -> str:
-    activity, handler = match[1], match[2]
-    event = f"{activity}_undo"
-    return (
-        f'<boundaryEvent id="{event}" attachedToRef="{activity}">compensate</boundaryEvent>'
-        f'<association id="{event}s" sourceRef="{event}" targetRef="{handler}" '
-        'associationDirection="One"/>'
-    )
+    events, associations = "", ""
+    for line in match[0].splitlines():
+        activity, _, handler = line.split()
+        event = f"{activity}_undo"
+        events += f'<boundaryEvent id="{event}" attachedToRef="{activity}">compensate'
+        events += "</boundaryEvent>"
+        associations += (
+            f'<association id="{event}s" sourceRef="{event}" targetRef="{handler}" '
+            'associationDirection="One"/>'
+        )
+    return f"{events}{associations}\n"
 
 
 def _script(text: str) -> str:
