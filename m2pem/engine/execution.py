@@ -204,6 +204,15 @@ class Execution:
             )
         )
 
+    def write_in(self, scope: Scope, node: FlowNode, data: dict[str, Value]) -> None:
+        """Write values for a node that no token is on, as seen from a scope."""
+        process = self.process_ids[node.index]
+        for key, value in data.items():
+            for name, item in flatten(key, value):
+                place = store_for(scope, name)
+                store, own = (place.scope.id, place.id) if type(place) is Token else (place.id, 0)
+                self.emit(r.DataWritten(0, process, node.id, scope.id, name, item, store, own))
+
     def write_all(self, token: Token, data: dict[str, Value]) -> None:
         """Write several values."""
         for key, value in data.items():

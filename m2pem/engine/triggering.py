@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from m2pem.engine import records as r
+from m2pem.engine.data import Place
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.interruption import begin_event_subprocess, divert
 from m2pem.engine.records import TokenOutcome, Trigger
@@ -50,17 +51,20 @@ def arm_event_subprocesses(x: Execution, scope: Scope) -> bool:
     return True
 
 
-def collect_letters(x: Execution, token: Token) -> bool:
-    """Let a token that waits for messages have those kept for it. False: it has left with one."""
+def collect_letters(x: Execution, holder: Place) -> bool:
+    """Let a token or scope that waits for messages have those kept for it.
+
+    False: the token has left with one.
+    """
     found = bool(x.state.mailbox)
-    while found and token.waits is not None:
+    while found and holder.waits is not None:
         found = False
-        for wait in list(token.waits.values()):
+        for wait in list(holder.waits.values()):
             letters = x.state.mailbox.get(wait.ref) if wait.trigger is Trigger.MESSAGE else None
-            if letters:
+            if letters and wait.id in x.state.waits:
                 found = True
                 trigger(x, wait, letters[0], kept=True)
-                if x.state.tokens.get(token.id) is not token:
+                if isinstance(holder, Token) and x.state.tokens.get(holder.id) is not holder:
                     return False
     return True
 
@@ -119,6 +123,7 @@ def _in_scope(x: Execution, wait: Wait, data: dict[str, Value]) -> None:
     node = wait.node
     assert isinstance(node, StartEvent)
     if _is_one_of_several(node, wait.scope.waits):
+        x.write_in(wait.scope, node, data)
         return
     if not node.interrupting:
         _arm_again(x, wait)
@@ -217,8 +222,16 @@ def _instance(x: Execution, start: FlowNode, came: EventDefinition, data: dict[s
     number = x.state.last_scope + 1
     x.emit(r.ScopeOpened(number, process.id, process.id))
     scope = x.state.scopes[number]
-    if process.event_subprocesses and not arm_event_subprocesses(x, scope):
-        return
+    _begin_with(x, scope, start, came, data)
+    # Last: what its event subprocesses wait for may be read from the data that came.
+    gone = x.state.scopes.get(number) is not scope
+    if not gone and not scope.interrupted and arm_event_subprocesses(x, scope):
+        collect_letters(x, scope)
+
+
+def _begin_with(
+    x: Execution, scope: Scope, start: FlowNode, came: EventDefinition, data: dict[str, Value]
+) -> None:
     if isinstance(start, StartEvent):
         token = x.spawn(start, scope)
         x.write_all(token, data)

@@ -24,15 +24,6 @@ ERRORS = {
         around('<adHocSubProcess id="T"><task id="x"/></adHocSubProcess>'),
         [("not-executed", 3, "T")],
     ),
-    "event subprocess": (
-        process(
-            f'{TASK}\n<subProcess id="X" triggeredByEvent="true">'
-            '<startEvent id="xs"><errorEventDefinition/></startEvent>'
-            '<endEvent id="xe"/><sequenceFlow id="xf" sourceRef="xs" targetRef="xe"/>'
-            f"</subProcess>\n{line_of('T')}"
-        ),
-        [("not-executed", 4, "X")],
-    ),
     "loop": (
         around('<task id="T">\n<standardLoopCharacteristics/></task>'),
         [("not-executed", 4, "T")],

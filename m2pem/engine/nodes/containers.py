@@ -8,7 +8,7 @@ from m2pem.engine.records import RunOutcome, TokenOutcome
 from m2pem.engine.scopes import close, open_scope
 from m2pem.engine.state import Scope, Token
 from m2pem.engine.throwing import throw_error
-from m2pem.engine.triggering import arm_event_subprocesses
+from m2pem.engine.triggering import arm_event_subprocesses, collect_letters
 from m2pem.errors import ExpressionError
 from m2pem.model.behavior import Mapping
 from m2pem.model.elements import CallActivity
@@ -21,7 +21,10 @@ MAX_DEPTH = 1000
 def subprocess(x: Execution, token: Token) -> None:
     """Open its scope and start what is in it."""
     if token.inner is not None:
-        return  # an event subprocess, which its trigger has begun
+        # An event subprocess, which its trigger has begun.
+        if arm_event_subprocesses(x, token.inner):
+            collect_letters(x, token.inner)
+        return
     scope = _open(x, token)
     if scope is not None:
         begin(x, scope)
@@ -58,6 +61,7 @@ def begin(x: Execution, scope: Scope) -> None:
         x.spawn(entry, scope)
     if not scope.tokens:
         x.queue.append(scope)
+    collect_letters(x, scope)
 
 
 def look_at(x: Execution, scope: Scope) -> None:

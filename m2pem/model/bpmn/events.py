@@ -15,6 +15,7 @@ from m2pem.model.elements import (
     IntermediateThrowEvent,
     Process,
     StartEvent,
+    SubProcess,
 )
 from m2pem.model.events import ErrorEventDefinition, EventDefinition
 from m2pem.model.near import did_you_mean
@@ -44,7 +45,10 @@ def read_event(reading: Reading, element: etree._Element, container: Container) 
     parallel = reading.boolean(element, "parallelMultiple", False, identifier)
     event: Event
     if place == "startEvent":
-        event = StartEvent(identifier, name, line, definitions, parallel)
+        interrupting = reading.boolean(element, "isInterrupting", True, identifier)
+        event = StartEvent(identifier, name, line, definitions, parallel, interrupting)
+        if not interrupting:
+            _no_error(reading, element, event)
     elif place == "endEvent":
         event = EndEvent(identifier, name, line, definitions)
     elif place == "intermediateThrowEvent":
@@ -75,16 +79,26 @@ def _boundary(
         interrupting,
     )
     reading.attachments.append((event, reference(element.get("attachedToRef", ""))))
-    if not interrupting and any(isinstance(d, ErrorEventDefinition) for d in definitions):
-        reading.report.error(
-            element,
-            identifier,
-            "error-not-interrupting",
-            'a boundary event that catches an error cannot have cancelActivity="false": the '
-            "activity has already failed",
-            "make it interrupting, or throw and catch an escalation",
-        )
+    if not interrupting:
+        _no_error(reading, element, event)
     return event
+
+
+def _no_error(reading: Reading, element: etree._Element, event: Event) -> None:
+    """What catches an error cannot leave running what failed (clause 10.5.6)."""
+    if not any(isinstance(each, ErrorEventDefinition) for each in event.definitions):
+        return
+    word, attribute, what = "boundary", "cancelActivity", "activity"
+    if isinstance(event, StartEvent):
+        word, attribute, what = "start", "isInterrupting", "scope"
+    reading.report.error(
+        element,
+        event.id,
+        "error-not-interrupting",
+        f'a {word} event that catches an error cannot have {attribute}="false": the {what} has '
+        "already failed",
+        "make it interrupting, or throw and catch an escalation",
+    )
 
 
 def _definitions(
@@ -99,10 +113,15 @@ def _definitions(
         target = _referred_definition(reading, referring, found.id)
         if target is not None:
             elements.append(target)
-    if not elements and place in _NEEDS_TRIGGER and not found.of("eventDefinitionRef"):
+    awaited = place in _NEEDS_TRIGGER or (place == "startEvent" and _is_handler(container))
+    if awaited and not elements and not found.of("eventDefinitionRef"):
         _no_trigger(reading, found, place)
     read = [_definition(reading, found, place, container, each) for each in elements]
     return tuple(definition for definition in read if definition is not None)
+
+
+def _is_handler(container: Container) -> bool:
+    return isinstance(container, SubProcess) and container.triggered_by_event
 
 
 def _definition(
@@ -110,9 +129,8 @@ def _definition(
 ) -> EventDefinition | None:
     """One of its definitions; None when a finding says what is wrong with it."""
     name = local(definition.tag).removesuffix("EventDefinition")
-    inside_event_subprocess = container in reading.self_starting
     allowed = _ALLOWED[place].split()
-    if place == "startEvent" and inside_event_subprocess:
+    if place == "startEvent" and _is_handler(container):
         allowed = _ALLOWED_IN_EVENT_SUBPROCESS.split()
     elif place == "startEvent" and not isinstance(container, Process):
         reading.report.error(

@@ -20,9 +20,10 @@ from m2pem.model.elements import (
     Process,
     SequenceFlow,
     StartEvent,
+    SubProcess,
 )
 from m2pem.model.near import did_you_mean
-from m2pem.model.reach import instantiates
+from m2pem.model.reach import begins_by_itself, instantiates
 
 _set = object.__setattr__
 
@@ -152,6 +153,8 @@ def _link_containers(reading: Reading) -> None:
             "entries",
             tuple(starts or [node for node in inside if _begins(reading, node)]),
         )
+        handlers = [n for n in inside if isinstance(n, SubProcess) and n.triggered_by_event]
+        _set(container, "event_subprocesses", tuple(handlers))
     for container, between in flows.items():
         _set(container, "flows", tuple(between))
     for container, objects in data.items():
@@ -162,6 +165,7 @@ def _begins(reading: Reading, node: FlowNode) -> bool:
     return (
         not node.incoming
         and not isinstance(node, BoundaryEvent)
+        and not begins_by_itself(node)
         and node not in reading.self_starting
     )
 

@@ -80,8 +80,12 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
     node: FlowNode
     if tag in SUBPROCESSES:
         # Its children are read with its content, by containers.py.
-        node = SubProcess(identifier, element.get("name", ""), reading.report.line(element))
-        _event_subprocess(reading, element, node)
+        node = SubProcess(
+            identifier,
+            element.get("name", ""),
+            reading.report.line(element),
+            reading.boolean(element, "triggeredByEvent", False, identifier),
+        )
         _check_activity(reading, element, node)
     elif task is not None:
         found = scan(reading, element, identifier)
@@ -111,18 +115,6 @@ def refuse_loop(reading: Reading, element: etree._Element, identifier: str) -> N
     not_executed(
         reading, element, identifier, kind(element.tag), "draw the loop with an exclusive gateway"
     )
-
-
-def _event_subprocess(reading: Reading, element: etree._Element, node: SubProcess) -> None:
-    if reading.boolean(element, "triggeredByEvent", False, node.id):
-        reading.self_starting.add(node)
-        not_executed(
-            reading,
-            element,
-            node.id,
-            "event subprocess",
-            "use a boundary event on a subprocess around the rest",
-        )
 
 
 def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -> None:
