@@ -150,7 +150,8 @@ def _scope_interrupted(state: RunState, record: r.ScopeInterrupted) -> None:
     scope = state.scopes[record.scope]
     scope.interrupted = True
     for wait in list(scope.waits.values()) if scope.waits is not None else ():
-        _end_wait(state, wait)
+        if isinstance(wait.node.container, SubProcess):
+            _end_wait(state, wait)
 
 
 def _token_entered(state: RunState, record: r.TokenEntered) -> None:
@@ -335,6 +336,8 @@ def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
     holder.waits[wait.id] = wait
     if wait.trigger is r.Trigger.TIMER:
         heappush(state.dates if wait.calendar else state.timers, (wait.due_us, wait.id))
+    elif wait.trigger is r.Trigger.CONDITION:
+        state.conditions[wait.id] = not record.spent
     else:
         state.catchers.setdefault((wait.trigger, wait.ref), {})[wait.id] = wait
 
@@ -352,6 +355,9 @@ def _end_wait(state: RunState, wait: Wait) -> None:
             heap[:] = [entry for entry in heap if entry[1] in state.waits]
             heapify(heap)
         return
+    if wait.trigger is r.Trigger.CONDITION:
+        del state.conditions[wait.id]
+        return
     key = (wait.trigger, wait.ref)
     catchers = state.catchers[key]
     del catchers[wait.id]
@@ -367,6 +373,10 @@ def _event_triggered(state: RunState, record: r.EventTriggered) -> None:
         letters.pop(0)
         if not letters:
             del state.mailbox[wait.ref]
+
+
+def _condition_reset(state: RunState, record: r.ConditionReset) -> None:
+    state.conditions[record.wait] = True
 
 
 def _message_thrown(state: RunState, record: r.MessageThrown) -> None:
@@ -411,6 +421,7 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.DataWritten: _data_written,
     r.EventAwaited: _event_awaited,
     r.EventTriggered: _event_triggered,
+    r.ConditionReset: _condition_reset,
     r.SignalThrown: _nothing,
     r.MessageThrown: _message_thrown,
     r.EscalationThrown: _nothing,

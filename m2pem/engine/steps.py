@@ -8,6 +8,7 @@ from m2pem.engine.nodes.containers import look_at
 from m2pem.engine.nodes.joins import fire_joins
 from m2pem.engine.records import Record, RunOutcome
 from m2pem.engine.state import RunState, RunStatus, Scope, Token
+from m2pem.engine.triggering import look_at_conditions
 from m2pem.resources.fleet import Fleet
 
 
@@ -33,7 +34,11 @@ class Steps(Execution):
         """Execute tokens until none can move, or the batch is used up."""
         state, queue = self.state, self.queue
         while state.status is RunStatus.RUNNING:
-            while queue:
+            while queue or self.changed:
+                if self.changed:
+                    self.changed = False
+                    look_at_conditions(self)
+                    continue
                 item = queue.popleft()
                 if not self._is_there(item):
                     continue
@@ -96,7 +101,8 @@ class Steps(Execution):
         state = self.state
         if state.status is not RunStatus.RUNNING:
             return
-        if state.waits or state.prompts or state.services:
+        # Nothing but a token could make a condition true.
+        if len(state.waits) > len(state.conditions) or state.prompts or state.services:
             return
         if any(token.behavior for token in state.tokens.values()):
             return

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from m2pem.engine import records as r
+from m2pem.engine.conditions import comes_true, definition_of
 from m2pem.engine.data import Place
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.interruption import begin_event_subprocess, divert
@@ -15,10 +16,16 @@ from m2pem.model.elements import (
     Event,
     EventBasedGateway,
     FlowNode,
+    Process,
     ReceiveTask,
     StartEvent,
 )
-from m2pem.model.events import EventDefinition, MessageEventDefinition, SignalEventDefinition
+from m2pem.model.events import (
+    ConditionalEventDefinition,
+    EventDefinition,
+    MessageEventDefinition,
+    SignalEventDefinition,
+)
 from m2pem.model.values import Value
 
 WHEN_TRIGGERED: dict[type[FlowNode], Callable[[Execution, Token], None]] = {}
@@ -29,13 +36,13 @@ def arm_boundary(x: Execution, token: Token, activity: Activity) -> bool:
     """Arm the boundary events of the activity that a token has entered.
 
     Errors and escalations are not armed: they look for their catcher. False: the token has left
-    already, because a timer was wrong or a message had been kept.
+    already, because a timer was wrong, a message had been kept or a condition was true.
     """
     for boundary in activity.boundary:
         for definition in boundary.definitions:
             if not arm(x, token, boundary, definition):
                 return False
-    return collect_letters(x, token)
+    return collect_letters(x, token) and look_at_conditions(x, token)
 
 
 def arm_event_subprocesses(x: Execution, scope: Scope) -> bool:
@@ -69,6 +76,29 @@ def collect_letters(x: Execution, holder: Place) -> bool:
     return True
 
 
+def arm_conditional_starts(x: Execution, root: Scope) -> None:
+    """Arm the conditions that begin the other processes of the file.
+
+    Those have no data before they begin: the conditions read that of the process that the run
+    began with, and are awaited as long as it lasts (docs/missions.md).
+    """
+    for start in x.triggered_starts:
+        for definition in definitions_of(start):
+            if isinstance(definition, ConditionalEventDefinition):
+                arm(x, root, start, definition)
+
+
+def look_at_conditions(x: Execution, only: Token | None = None) -> bool:
+    """Fire the conditions that have become true, in the order in which they were armed.
+
+    `only`: those that this token waits for. False: it has left with one.
+    """
+    for number in list(x.state.conditions if only is None else only.waits or ()):
+        if number in x.state.conditions and comes_true(x, x.state.waits[number]):
+            trigger(x, x.state.waits[number], {})
+    return only is None or x.state.tokens.get(only.id) is only
+
+
 # --- triggering ---------------------------------------------------------------------------------
 
 
@@ -100,7 +130,7 @@ def _arm_again(x: Execution, wait: Wait) -> None:
     node = wait.node
     if isinstance(node, Event) and node.parallel_multiple:
         for definition in node.definitions:
-            if not arm(x, wait.token or wait.scope, node, definition):
+            if not arm(x, wait.token or wait.scope, node, definition, spent=True):
                 return
     else:
         arm_again(x, wait)
@@ -121,6 +151,10 @@ def _at_boundary(
 def _in_scope(x: Execution, wait: Wait, data: dict[str, Value]) -> None:
     """The start event of an event subprocess; it goes on as one that has happened."""
     node = wait.node
+    if isinstance(node.container, Process):
+        arm_again(x, wait)
+        _instance(x, node, definition_of(wait), data)
+        return
     assert isinstance(node, StartEvent)
     if _is_one_of_several(node, wait.scope.waits):
         x.write_in(wait.scope, node, data)

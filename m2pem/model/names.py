@@ -17,7 +17,7 @@ from m2pem.model.elements import (
     ServiceTask,
     UserTask,
 )
-from m2pem.model.events import TimerEventDefinition
+from m2pem.model.events import ConditionalEventDefinition, TimerEventDefinition
 from m2pem.model.expression import Expression
 from m2pem.model.near import did_you_mean
 
@@ -105,6 +105,8 @@ def _reads(node: FlowNode) -> Iterator[Read]:
         for definition in node.definitions:
             if isinstance(definition, TimerEventDefinition):
                 yield Read(definition.expression, node.id, definition.line)
+            elif isinstance(definition, ConditionalEventDefinition):
+                yield Read(definition.condition, node.id, definition.line)
 
 
 def _parameters(node: FlowNode, parameters: Iterable[Parameter]) -> Iterator[Read]:

@@ -14,6 +14,7 @@ from m2pem.model.elements import (
     ReceiveTask,
     SubProcess,
 )
+from m2pem.model.events import LinkEventDefinition
 
 
 def following(node: FlowNode) -> list[FlowNode]:
@@ -66,6 +67,11 @@ def unreached(container: Container, also: Iterable[FlowNode] = ()) -> list[FlowN
 def unreachable(file: str, node: FlowNode) -> Finding:
     """The finding about one of them."""
     what = "no start event can reach it" if node.container.starts else "nothing can reach it"
+    remedy = "draw a sequence flow to it, or delete it"
+    if isinstance(node, IntermediateCatchEvent):
+        for definition in node.definitions:
+            if isinstance(definition, LinkEventDefinition):
+                remedy = f"add a link throw event of the name '{definition.name}', or delete it"
     return Finding(
         Severity.ERROR,
         file,
@@ -73,5 +79,5 @@ def unreachable(file: str, node: FlowNode) -> Finding:
         node.id,
         "unreachable",
         f"{what}, so it would never run",
-        "draw a sequence flow to it, or delete it",
+        remedy,
     )

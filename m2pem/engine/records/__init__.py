@@ -12,6 +12,7 @@ from typing import TypeAlias, Union
 
 from m2pem.engine.records.base import RunOutcome, TokenOutcome, Trigger
 from m2pem.engine.records.events import (
+    ConditionReset,
     DataWritten,
     ErrorThrown,
     EscalationThrown,
@@ -68,6 +69,7 @@ __all__ = [
     "BehaviorRequested",
     "BehaviorRestarted",
     "BehaviorUnsettled",
+    "ConditionReset",
     "DataWritten",
     "ErrorThrown",
     "EscalationThrown",
@@ -144,6 +146,7 @@ Record: TypeAlias = Union[
     DataWritten,
     EventAwaited,
     EventTriggered,
+    ConditionReset,
     SignalThrown,
     MessageThrown,
     EscalationThrown,

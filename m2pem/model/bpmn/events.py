@@ -28,7 +28,9 @@ _ALLOWED = {
     "boundaryEvent": "message timer escalation error cancel compensate conditional signal",
 }
 _ALLOWED_IN_EVENT_SUBPROCESS = "message timer escalation error compensate conditional signal"
-_EXECUTED = frozenset({"message", "timer", "signal", "escalation", "error", "terminate"})
+_EXECUTED = frozenset(
+    {"message", "timer", "signal", "escalation", "error", "conditional", "link", "terminate"}
+)
 _CATCHING = frozenset({"startEvent", "intermediateCatchEvent", "boundaryEvent"})
 _NEEDS_TRIGGER = frozenset({"intermediateCatchEvent", "boundaryEvent"})
 
@@ -55,8 +57,6 @@ def read_event(reading: Reading, element: etree._Element, container: Container) 
         event = IntermediateThrowEvent(identifier, name, line, definitions)
     elif place == "intermediateCatchEvent":
         event = IntermediateCatchEvent(identifier, name, line, definitions, parallel)
-        if any(local(tag) == "linkEventDefinition" for tag in found.children):
-            reading.self_starting.add(event)
     else:
         event = _boundary(reading, element, identifier, definitions, parallel)
     return event
@@ -157,8 +157,6 @@ def _definition(
 
 
 _INSTEAD = {
-    "conditional": "check the condition at a gateway, or throw a signal where it becomes true",
-    "link": "join the two ends by a sequence flow",
     "cancel": "throw and catch an error",
     "compensate": "draw what undoes the activity after a boundary event",
 }
@@ -188,7 +186,7 @@ def _no_trigger(reading: Reading, found: Scan, place: str) -> None:
         found.id,
         "no-trigger",
         f"{a(word)} must say what it waits for",
-        f"give it a signal, message or timer event definition{also}",
+        f"give it a signal, message, timer or conditional event definition{also}",
     )
 
 

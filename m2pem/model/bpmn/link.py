@@ -3,6 +3,7 @@
 The only place that sets the fields of elements after they were made.
 """
 
+from m2pem.model.bpmn.links import is_link_target, resolve_links
 from m2pem.model.bpmn.names import a
 from m2pem.model.bpmn.reading import FlowEnds, Reading
 from m2pem.model.elements import (
@@ -43,6 +44,7 @@ def link(reading: Reading) -> dict[str, Element]:
     flows = {ends.flow.id: ends.flow for ends in reversed(reading.flows) if ends.flow.id}
     _link_defaults(reading, flows)
     _link_boundary(reading, nodes)
+    resolve_links(reading)
     processes = {process.id: process for process in reversed(reading.processes) if process.id}
     _link_calls(reading, processes)
     return {**flows, **nodes, **processes}
@@ -166,6 +168,7 @@ def _begins(reading: Reading, node: FlowNode) -> bool:
         not node.incoming
         and not isinstance(node, BoundaryEvent)
         and not begins_by_itself(node)
+        and not is_link_target(node)
         and node not in reading.self_starting
     )
 
