@@ -45,6 +45,7 @@ from m2pem.engine.records import (
     TokenEntered,
     TokenLeft,
     TokenOutcome,
+    TokensGathered,
     Trigger,
 )
 
@@ -93,5 +94,6 @@ __all__ = [
     "TokenEntered",
     "TokenLeft",
     "TokenOutcome",
+    "TokensGathered",
     "Trigger",
 ]

@@ -22,6 +22,7 @@ from m2pem.engine.state import (
     Wait,
 )
 from m2pem.model.elements import (
+    Activity,
     CallActivity,
     ComplexGateway,
     Container,
@@ -129,7 +130,7 @@ def _scope_opened(state: RunState, record: r.ScopeOpened) -> None:
         assert isinstance(element, (Process, SubProcess))
         container = element
     depth = parent.depth + 1 if parent is not None else 0
-    scope = Scope(record.scope, container, parent, owner, depth)
+    scope = Scope(record.scope, container, parent, owner, depth, state.shared)
     state.scopes[record.scope] = scope
     state.last_scope = record.scope
     if owner is not None:
@@ -171,6 +172,8 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         if join is None:
             join = scope.joins[node] = Join()
         join.by_flow.setdefault(flow, []).append(token)
+    elif isinstance(node, Activity) and node.start_quantity > 1 and record.instance is None:
+        scope.gathered.setdefault(node, []).append(token)
 
 
 def _gateway_activated(state: RunState, record: r.GatewayActivated) -> None:
@@ -181,6 +184,19 @@ def _gateway_activated(state: RunState, record: r.GatewayActivated) -> None:
 
 def _gateway_reset(state: RunState, record: r.GatewayReset) -> None:
     del state.scopes[record.scope].activated[_node(state, record.element)]
+
+
+def _tokens_gathered(state: RunState, record: r.TokensGathered) -> None:
+    _no_longer_gathered(state.tokens[record.token])
+
+
+def _no_longer_gathered(token: Token) -> None:
+    gathered = token.scope.gathered
+    waiting = gathered.get(token.node)
+    if waiting is not None and token in waiting:
+        waiting.remove(token)
+        if not waiting:
+            del gathered[token.node]
 
 
 def _token_left(state: RunState, record: r.TokenLeft) -> None:
@@ -198,6 +214,8 @@ def _token_left(state: RunState, record: r.TokenLeft) -> None:
             del join.by_flow[token.flow]
             if not join.by_flow:
                 del scope.joins[token.node]
+    elif scope.gathered:
+        _no_longer_gathered(token)
 
 
 # --- behaviors, prompts, services ---------------------------------------------------------------
@@ -302,7 +320,8 @@ def _service_ended(state: RunState, record: r.ServiceEnded | r.ServiceWithdrawn)
 
 def _data_written(state: RunState, record: r.DataWritten) -> None:
     if not record.own:
-        state.scopes[record.store].data[record.key] = record.value
+        store = state.scopes[record.store].data if record.store else state.shared.data
+        store[record.key] = record.value
         return
     token = state.tokens[record.own]
     if token.own is None:
@@ -403,6 +422,7 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.TokenEntered: _token_entered,
     r.TokenLeft: _token_left,
     r.FlowTaken: _nothing,
+    r.TokensGathered: _tokens_gathered,
     r.GatewayActivated: _gateway_activated,
     r.GatewayReset: _gateway_reset,
     r.BehaviorRequested: _behavior_requested,

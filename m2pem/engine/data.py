@@ -3,18 +3,21 @@
 Every scope may hold values, and so may the activity that a token is on (its item variable, its
 data inputs and outputs). A name belongs to the nearest of them that declares it, outwards from
 where it is used, for reads as for writes, else to the process instance; no further: a called
-process has its own store.
+process has its own store. Only what a data store holds is shared by all processes of a run.
 """
 
 from collections.abc import Callable, Iterator
 from typing import TypeAlias
 
-from m2pem.engine.state import Loop, Scope, Token
-from m2pem.model.elements import Process
+from m2pem.engine.state import Loop, Scope, Shared, Token
+from m2pem.model.elements import Activity, Process
 from m2pem.model.values import ReadValue, Value
 
 Place: TypeAlias = Token | Scope
-"""Where a name is used, or held."""
+"""Where a name is used."""
+
+Store: TypeAlias = Place | Shared
+"""Where a name is held."""
 
 LOOP_COUNTER = "loopCounter"
 """Which instance this is, from 0 (BPMN 2.0.2, table 10.28)."""
@@ -32,7 +35,7 @@ INSTANCE_COUNTS: dict[str, Callable[[Loop], int]] = {
 """What the conditions of a multi-instance activity may read (table 10.31)."""
 
 
-def _outwards(place: Place) -> Iterator[Place]:
+def _outwards(place: Place) -> Iterator[Store]:
     """What encloses a place: its token, the scope, the token on the activity around it, ..."""
     current: Place | None = place
     while current is not None:
@@ -42,37 +45,49 @@ def _outwards(place: Place) -> Iterator[Place]:
             continue
         assert isinstance(current, Scope)
         if current.loop is None and isinstance(current.container, Process):
+            if current.shared.keys:
+                yield current.shared
             return
         current = current.owner
 
 
-def _holds(place: Place, name: str) -> bool:
+def _holds(place: Store, name: str) -> bool:
     """Whether a value is there under exactly this name."""
     if type(place) is Token:
         return (place.own is not None and name in place.own) or (
             place.instance is not None and name == LOOP_COUNTER
         )
+    if isinstance(place, Shared):
+        return name in place.data
     assert isinstance(place, Scope)
     return name in place.data or (place.loop is not None and name in INSTANCE_COUNTS)
 
 
-def _value(place: Place, name: str) -> Value:
+def _value(place: Store, name: str) -> Value:
     if type(place) is Token:
         if place.own is not None and name in place.own:
             return place.own[name]
         return place.instance
+    if isinstance(place, Shared):
+        return place.data[name]
     assert isinstance(place, Scope)
     if place.loop is not None and name in INSTANCE_COUNTS:
         return INSTANCE_COUNTS[name](place.loop)
     return place.data[name]
 
 
-def _declares(place: Place, name: str) -> bool:
+def _declares(place: Store, name: str) -> bool:
     """Whether the name, or the name that it begins with, is this place's own."""
     if type(place) is Token:
-        if place.own is None:
+        node = place.node
+        declared_here = node.own_data if isinstance(node, Activity) else ()
+        if place.own is None and not declared_here:
             return False
-        return name in place.own or name.partition(".")[0] in place.own
+        head = name.partition(".")[0]
+        own = place.own or ()
+        return name in own or head in own or name in declared_here or head in declared_here
+    if isinstance(place, Shared):
+        return name in place.keys or any(name.startswith(f"{key}.") for key in place.keys)
     assert isinstance(place, Scope)
     if place.loop is not None:
         return False
@@ -119,14 +134,15 @@ def _descend(value: Value, path: str) -> Value:
     return value
 
 
-def store_for(place: Place, key: str) -> Place:
+def store_for(place: Place, key: str) -> Store:
     """Where a write goes: the nearest place that declares the name, else the process instance."""
-    outermost: Place = place
+    process: Store = place
     for each in _outwards(place):
-        outermost = each
         if _declares(each, key):
             return each
-    return outermost
+        if isinstance(each, Scope):
+            process = each
+    return process
 
 
 def flatten(key: str, value: Value) -> Iterator[tuple[str, Value]]:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from m2pem.engine import records as r
 from m2pem.engine.apply import apply
-from m2pem.engine.data import Place, flatten, store_for
+from m2pem.engine.data import Store, flatten, store_for
 from m2pem.engine.records import Record, TokenOutcome
 from m2pem.engine.state import RunState, Scope, Token
 from m2pem.model.elements import (
@@ -186,14 +186,15 @@ class Execution:
         for name, item in flatten(key, value):
             self.write_into(store_for(token, name), token, name, item)
 
-    def write_into(self, place: Place, token: Token, key: str, value: Value) -> None:
+    def write_into(self, place: Store, token: Token, key: str, value: Value) -> None:
         """Write one value into the store of a given scope, or of a token's activity."""
         self.changed = True
         node = token.node
+        own = 0
         if type(place) is Token:
             store, own = place.scope.id, place.id
         else:
-            store, own = place.id, 0
+            store = place.id if isinstance(place, Scope) else 0
         self.emit(
             r.DataWritten(
                 token.id,
@@ -214,7 +215,11 @@ class Execution:
         for key, value in data.items():
             for name, item in flatten(key, value):
                 place = store_for(scope, name)
-                store, own = (place.scope.id, place.id) if type(place) is Token else (place.id, 0)
+                own, store = 0, 0
+                if isinstance(place, Token):
+                    own, store = place.id, place.scope.id
+                elif isinstance(place, Scope):
+                    store = place.id
                 self.emit(r.DataWritten(0, process, node.id, scope.id, name, item, store, own))
 
     def write_all(self, token: Token, data: dict[str, Value]) -> None:

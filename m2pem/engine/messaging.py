@@ -5,6 +5,7 @@ long as something in the mission can receive it at all.
 """
 
 from m2pem.engine import records as r
+from m2pem.engine.data_flow import payload
 from m2pem.engine.execution import Execution
 from m2pem.engine.state import Token
 from m2pem.engine.triggering import deliver, message_receiver
@@ -12,15 +13,26 @@ from m2pem.model.values import Value
 
 
 def send(x: Execution, token: Token, message: str) -> None:
-    """Throw a message from the element that a token is on."""
+    """Throw a message, with its data inputs, from the element that a token is on."""
     node = token.node
+    data = payload(x, token)
+    if data is None:
+        return
     receiver = message_receiver(x, message)
     kept = receiver is None and message in x.receivable
     x.emit(
-        r.MessageThrown(message, token.id, x.process_of(node), node.id, token.scope.id, kept=kept)
+        r.MessageThrown(
+            message,
+            token.id,
+            x.process_of(node),
+            node.id,
+            token.scope.id,
+            kept=kept,
+            data=data if kept else {},
+        )
     )
     if receiver is not None:
-        deliver(x, receiver, message, {})
+        deliver(x, receiver, message, data)
 
 
 def receive(x: Execution, message: str, data: dict[str, Value], by: str) -> None:

@@ -25,6 +25,14 @@ class RunStatus(StrEnum):
 
 
 @dataclass(slots=True, eq=False)
+class Shared:
+    """The data stores of a run, which all its processes share (BPMN 2.0.2, clause 10.4.1)."""
+
+    keys: frozenset[str]
+    data: dict[str, Value] = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
 class Scope:
     """An instance of a container: a process or a subprocess.
 
@@ -39,11 +47,14 @@ class Scope:
     parent: "Scope | None"
     owner: "Token | None"
     depth: int
+    shared: Shared
     tokens: "dict[int, Token]" = field(default_factory=dict)
     data: dict[str, Value] = field(default_factory=dict)
     joins: "dict[FlowNode, Join]" = field(default_factory=dict)
     waits: "dict[int, Wait] | None" = None
     loop: "Loop | None" = None
+    gathered: "dict[FlowNode, list[Token]]" = field(default_factory=dict)
+    """Tokens at activities that several must begin, and that have not begun."""
     activated: "dict[FlowNode, tuple[SequenceFlow, ...]]" = field(default_factory=dict)
     """Complex gateways that wait to reset, and the flows whose tokens activated them."""
     interrupted: bool = False
@@ -190,6 +201,7 @@ class RunState:
     last_prompt: int = 0
     last_service: int = 0
 
+    shared: Shared = field(init=False)
     root: Scope | None = None
     scopes: dict[int, Scope] = field(default_factory=dict)
     tokens: dict[int, Token] = field(default_factory=dict)
@@ -218,6 +230,9 @@ class RunState:
     yielded: tuple[int, ...] = ()
     seen: dict[str, None] = field(default_factory=dict)
     """Ids of inputs that carried one."""
+
+    def __post_init__(self) -> None:
+        self.shared = Shared(self.mission.data_stores)
 
     def mission_time_us(self, now_us: int) -> int:
         """Microseconds from the start of the run, not counting pauses."""

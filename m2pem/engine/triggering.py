@@ -5,6 +5,7 @@ from collections.abc import Callable
 from m2pem.engine import records as r
 from m2pem.engine.conditions import comes_true, definition_of
 from m2pem.engine.data import Place
+from m2pem.engine.data_flow import receive_payload
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.interruption import begin_event_subprocess, divert
 from m2pem.engine.records import TokenOutcome, Trigger
@@ -109,8 +110,7 @@ def trigger(x: Execution, wait: Wait, data: dict[str, Value], *, kept: bool = Fa
     if token is None:
         _in_scope(x, wait, data)
     elif node is token.node:
-        x.write_all(token, data)
-        if not _is_one_of_several(node, token.waits):
+        if receive_payload(x, token, data) and not _is_one_of_several(node, token.waits):
             WHEN_TRIGGERED[type(node)](x, token)
     elif isinstance(node, BoundaryEvent):
         _at_boundary(x, wait, token, node, data)
@@ -142,10 +142,10 @@ def _at_boundary(
     if _is_one_of_several(node, token.waits):
         x.write_all(token, data)
     elif node.interrupting:
-        x.write_all(divert(x, token, node, TokenOutcome.INTERRUPTED), data)
+        receive_payload(x, divert(x, token, node, TokenOutcome.INTERRUPTED), data)
     else:
         _arm_again(x, wait)
-        x.write_all(x.spawn(node, token.scope), data)
+        receive_payload(x, x.spawn(node, token.scope), data)
 
 
 def _in_scope(x: Execution, wait: Wait, data: dict[str, Value]) -> None:
@@ -161,7 +161,7 @@ def _in_scope(x: Execution, wait: Wait, data: dict[str, Value]) -> None:
         return
     if not node.interrupting:
         _arm_again(x, wait)
-    x.write_all(begin_event_subprocess(x, wait.scope, node), data)
+    receive_payload(x, begin_event_subprocess(x, wait.scope, node), data)
 
 
 # --- event-based gateways -----------------------------------------------------------------------
@@ -202,8 +202,8 @@ def _behind_gateway(x: Execution, token: Token, node: FlowNode, data: dict[str, 
     else:
         x.proceed(token, [flow])
         moved = x.state.tokens[token.id]
-    x.write_all(moved, data)
-    WHEN_TRIGGERED[type(node)](x, moved)
+    if receive_payload(x, moved, data):
+        WHEN_TRIGGERED[type(node)](x, moved)
 
 
 # --- signals and messages -----------------------------------------------------------------------
@@ -268,7 +268,7 @@ def _begin_with(
 ) -> None:
     if isinstance(start, StartEvent):
         token = x.spawn(start, scope)
-        x.write_all(token, data)
+        receive_payload(x, token, data)
         others = start.definitions if start.parallel_multiple else ()
         for definition in others:
             if definition is not came and not arm(x, token, start, definition):
@@ -276,8 +276,8 @@ def _begin_with(
         collect_letters(x, token)
     elif isinstance(start, ReceiveTask) and start.instantiate:
         token = x.spawn(start, scope)
-        x.write_all(token, data)
-        WHEN_TRIGGERED[type(start)](x, token)
+        if receive_payload(x, token, data):
+            WHEN_TRIGGERED[type(start)](x, token)
     else:
         gateway = start.incoming[0].source
         assert isinstance(gateway, EventBasedGateway)

@@ -117,6 +117,8 @@ class Activity(FlowNode):
     boundary: "tuple[BoundaryEvent, ...]" = field(init=False, repr=False, default=())
     loop: StandardLoop | MultiInstance | None = field(init=False, repr=False, default=None)
     data_flow: Mappings = field(init=False, repr=False, default=Mappings())
+    own_data: frozenset[str] = field(init=False, repr=False, default=frozenset())
+    """Keys of its data inputs, data outputs and properties: what only it sees."""
     start_quantity: int = field(init=False, repr=False, default=1)
     completion_quantity: int = field(init=False, repr=False, default=1)
     for_compensation: bool = field(init=False, repr=False, default=False)
@@ -165,11 +167,8 @@ class SendTask(Activity):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BusinessRuleTask(Activity):
-    """Runs a registered service that decides by business rules (clause 10.3.3)."""
-
-    call: ServiceCall | None = None
-    behavior: Behavior | None = None
+class BusinessRuleTask(ServiceTask):
+    """A service task whose service decides by business rules (clause 10.3.3)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -404,6 +403,8 @@ class Mission:
     """Processes, flow nodes and sequence flows by id."""
     associated: frozenset[str] = frozenset()
     """Keys that data output associations name as written; without an effect on execution."""
+    data_stores: frozenset[str] = frozenset()
+    """Keys of the data stores, which all processes of a run share (clause 10.4.1)."""
 
     def process(self, process_id: str | None = None) -> Process:
         """The process a run begins with: the one named, else the file's main one.

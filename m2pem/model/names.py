@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 
 from m2pem.findings import Finding, Severity
 from m2pem.model.behavior import Assignment, Parameter
+from m2pem.model.behavior import Mapping as DataMapping
 from m2pem.model.elements import (
+    Activity,
     CallActivity,
     ComplexGateway,
     Event,
@@ -15,6 +17,7 @@ from m2pem.model.elements import (
     ScriptTask,
     SendTask,
     ServiceTask,
+    StartEvent,
     UserTask,
 )
 from m2pem.model.events import ConditionalEventDefinition, TimerEventDefinition
@@ -59,9 +62,20 @@ def unwritten(
     for node in mission.nodes:
         store = stores[node.container.process]
         store.reads += _reads(node)
+        stores[_seen_from(mission, node)].reads += _conditions(node)
+        for mapping in _data_mappings(node):
+            store.written.add(mapping.target)
         _note_writes(node, store, service_writes)
         if isinstance(node, CallActivity):
             _note_mappings(node, store, stores[node.called])
+    shared = {
+        name
+        for store in stores.values()
+        for name in store.written
+        if name in mission.data_stores or name.partition(".")[0] in mission.data_stores
+    }
+    for store in stores.values():
+        store.written |= shared
     for process, store in stores.items():
         yield from _findings(mission, process, store)
 
@@ -85,7 +99,16 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
             )
 
 
+def _data_mappings(node: FlowNode) -> Iterator[DataMapping]:
+    if isinstance(node, Activity | Event):
+        yield from node.data_flow.inputs
+        yield from node.data_flow.outputs
+
+
 def _reads(node: FlowNode) -> Iterator[Read]:
+    for mapping in _data_mappings(node):
+        if mapping.source.text not in mapping.source.names:  # a copy may well copy nothing
+            yield Read(mapping.source, node.id, mapping.line)
     if isinstance(node, ComplexGateway) and node.activation is not None:
         yield Read(node.activation, node.id, node.line)
     for flow in node.outgoing:
@@ -105,8 +128,21 @@ def _reads(node: FlowNode) -> Iterator[Read]:
         for definition in node.definitions:
             if isinstance(definition, TimerEventDefinition):
                 yield Read(definition.expression, node.id, definition.line)
-            elif isinstance(definition, ConditionalEventDefinition):
-                yield Read(definition.condition, node.id, definition.line)
+
+
+def _conditions(node: FlowNode) -> Iterator[Read]:
+    for definition in node.definitions if isinstance(node, Event) else ():
+        if isinstance(definition, ConditionalEventDefinition):
+            yield Read(definition.condition, node.id, definition.line)
+
+
+def _seen_from(mission: Mission, node: FlowNode) -> Process:
+    """The process whose data a condition reads: one that begins a process, the main one's."""
+    process = node.container.process
+    if not isinstance(node, StartEvent) or not isinstance(node.container, Process):
+        return process
+    called = any(isinstance(n, CallActivity) and n.called is process for n in mission.nodes)
+    return process if called else mission.process()
 
 
 def _parameters(node: FlowNode, parameters: Iterable[Parameter]) -> Iterator[Read]:

@@ -12,10 +12,6 @@ TASK = '<task id="T"/>'
 
 ERRORS = {
     # --- not executed yet -----------------------------------------------------------------------
-    "business rule task": (
-        around('<businessRuleTask id="T"/>'),
-        [("not-executed", 3, "T")],
-    ),
     "transaction": (
         around('<transaction id="T"><task id="x"/></transaction>'),
         [("not-executed", 3, "T")],
@@ -44,22 +40,6 @@ ERRORS = {
         ),
         [("not-executed", 3, "T")],
     ),
-    "conditional event": (
-        around(
-            '<intermediateCatchEvent id="T"><conditionalEventDefinition><condition>x</condition>'
-            "</conditionalEventDefinition></intermediateCatchEvent>"
-        ),
-        [("not-executed", 3, "T")],
-    ),
-    "link events": (
-        process(
-            f'{S}<intermediateThrowEvent id="L1"><linkEventDefinition name="l"/>'
-            f"</intermediateThrowEvent>{flow('S', 'L1')}\n"
-            '<intermediateCatchEvent id="L2"><linkEventDefinition name="l"/>'
-            f"</intermediateCatchEvent>{E}{flow('L2', 'E')}"
-        ),
-        [("not-executed", 3, "L1"), ("not-executed", 4, "L2")],
-    ),
     "cancel event": (
         around(
             f'{TASK}<boundaryEvent id="B" attachedToRef="T"><cancelEventDefinition/>'
@@ -67,7 +47,19 @@ ERRORS = {
         ),
         [("not-executed", 3, "B")],
     ),
-    "start quantity": (around('<task id="T" startQuantity="2"/>'), [("not-executed", 3, "T")]),
+    "start quantity": (around('<task id="T" startQuantity="0"/>'), [("bad-value", 3, "T")]),
+    "completion quantity": (
+        around('<task id="T" completionQuantity="many"/>'),
+        [("bad-value", 3, "T")],
+    ),
+    "assignment that says nothing": (
+        around(
+            '<task id="T"><ioSpecification><dataInput id="i"/></ioSpecification>'
+            '<dataInputAssociation id="a"><targetRef>i</targetRef><assignment><to>i</to>'
+            "</assignment></dataInputAssociation></task>"
+        ),
+        [("bad-assignment", 3, "T")],
+    ),
     "parallel event-based gateway that begins nothing": (
         around('<eventBasedGateway id="T" eventGatewayType="Parallel"/>'),
         [("parallel-event-gateway", 3, "T")],
@@ -333,7 +325,7 @@ def test_refuses(data: bytes, expected: list[tuple[str, int, str]]) -> None:
 
 def test_finds_everything_at_once_sorted_by_line() -> None:
     data = process(
-        '<startEvent id="S"/>\n<businessRuleTask id="A"/>\n<task id="S"/>\n'
+        '<startEvent id="S"/>\n<choreographyTask id="A"/>\n<task id="S"/>\n'
         '<sequenceFlow id="f" sourceRef="S" targetRef="gone"/>\n<task id="T" wrong="1"/>\n'
         '<callActivity id="C" calledElement="Q"/>'
     )

@@ -34,6 +34,7 @@ WHEN_TRIGGERED.update(
         e.UserTask: activities.prompt_timed_out,
         e.ScriptTask: complete,
         e.ServiceTask: complete,
+        e.BusinessRuleTask: complete,
         e.SendTask: complete,
         e.ReceiveTask: complete,
         e.StartEvent: events.complete,

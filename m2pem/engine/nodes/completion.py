@@ -1,5 +1,6 @@
 """The end of an activity's work (BPMN 2.0.2, clause 13.3.2)."""
 
+from m2pem.engine.data_flow import give_out
 from m2pem.engine.execution import Execution
 from m2pem.engine.nodes.flows import true_flows
 from m2pem.engine.state import Token
@@ -15,6 +16,8 @@ def pass_on(x: Execution, token: Token) -> None:
     """The activity as a whole is done: leave by every flow that is true."""
     node = token.node
     assert isinstance(node, Activity)
+    if node.data_flow.outputs and not give_out(x, token):
+        return
     flows = true_flows(x, token, node.default)
     if flows is not None:
-        x.proceed(token, flows)
+        x.proceed(token, [*flows] * node.completion_quantity)

@@ -1,6 +1,7 @@
 """Subprocesses and call activities (BPMN 2.0.2, clauses 10.3.5, 10.3.6 and 13.3.4)."""
 
-from m2pem.engine.data import Place, flatten, reader, store_for
+from m2pem.engine.data import flatten, reader
+from m2pem.engine.data_flow import evaluate, write_values
 from m2pem.engine.execution import Execution
 from m2pem.engine.interruption import end_run
 from m2pem.engine.nodes.completion import complete
@@ -9,10 +10,7 @@ from m2pem.engine.scopes import close, open_scope
 from m2pem.engine.state import Scope, Token
 from m2pem.engine.throwing import throw_error
 from m2pem.engine.triggering import arm_event_subprocesses, collect_letters
-from m2pem.errors import ExpressionError
-from m2pem.model.behavior import Mapping
 from m2pem.model.elements import CallActivity
-from m2pem.model.values import Value
 
 MAX_DEPTH = 1000
 """Scopes within scopes; more is a process that calls itself without end."""
@@ -34,7 +32,7 @@ def call_activity(x: Execution, token: Token) -> None:
     """Open an instance of the called process; only what the mappings say passes in and out."""
     node = token.node
     assert isinstance(node, CallActivity)
-    values = _evaluate(x, token, node.mappings.inputs, token)
+    values = evaluate(x, token, node.mappings.inputs, reader(token))
     if values is None:
         return
     scope = _open(x, token)
@@ -81,25 +79,9 @@ def finish(x: Execution, scope: Scope) -> None:
     node = token.node
     values = None
     if isinstance(node, CallActivity):
-        values = _evaluate(x, token, node.mappings.outputs, scope)
+        values = evaluate(x, token, node.mappings.outputs, reader(scope))
         if values is None:
             return
     close(x, scope, TokenOutcome.COMPLETED)
-    for mapping, value in values or ():
-        for key, item in flatten(mapping.target, value):
-            x.write_into(store_for(token, key), token, key, item)
+    write_values(x, token, token, values or [])
     complete(x, token)
-
-
-def _evaluate(
-    x: Execution, token: Token, mappings: tuple[Mapping, ...], place: Place
-) -> list[tuple[Mapping, Value]] | None:
-    read = reader(place)
-    values = []
-    for mapping in mappings:
-        try:
-            values.append((mapping, mapping.source.evaluate(read)))
-        except ExpressionError as error:
-            throw_error(x, token, "EXPRESSION", f"mapping to {mapping.target}: {error}")
-            return None
-    return values

@@ -1,6 +1,7 @@
 """Events (BPMN 2.0.2, clauses 10.5 and 13.5)."""
 
 from m2pem.engine import records as r
+from m2pem.engine.data_flow import payload
 from m2pem.engine.execution import Execution
 from m2pem.engine.interruption import end_run
 from m2pem.engine.messaging import send
@@ -93,10 +94,13 @@ def _throw(x: Execution, token: Token, definition: EventDefinition) -> None:
 
 
 def signal(x: Execution, token: Token, signal_id: str) -> None:
-    """Broadcast a signal in the run."""
+    """Broadcast a signal, with its data inputs, in the run."""
     node = token.node
+    data = payload(x, token)
+    if data is None:
+        return
     x.emit(r.SignalThrown(signal_id, token.id, x.process_of(node), node.id, token.scope.id))
-    throw_signal(x, signal_id, {})
+    throw_signal(x, signal_id, data)
 
 
 def boundary(x: Execution, token: Token) -> None:

@@ -44,6 +44,7 @@ from m2pem.engine.records.tokens import (
     ScopeOpened,
     TokenEntered,
     TokenLeft,
+    TokensGathered,
 )
 from m2pem.engine.records.work import (
     BehaviorCancelRequested,
@@ -106,6 +107,7 @@ __all__ = [
     "TokenEntered",
     "TokenLeft",
     "TokenOutcome",
+    "TokensGathered",
     "Trigger",
 ]
 
@@ -127,6 +129,7 @@ Record: TypeAlias = Union[
     ScopeInterrupted,
     TokenEntered,
     TokenLeft,
+    TokensGathered,
     FlowTaken,
     GatewayActivated,
     GatewayReset,

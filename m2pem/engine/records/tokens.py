@@ -65,6 +65,15 @@ class ScopeInterrupted(BaseRecord, frozen=True):
     element: str
 
 
+class TokensGathered(BaseRecord, frozen=True):
+    """As many tokens have come to an activity as begin it; `token` does so, the others left."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+
+
 class GatewayActivated(BaseRecord, frozen=True):
     """A complex gateway has used the tokens of `flows`, and waits for the others to reset."""
 

@@ -11,6 +11,7 @@ from m2pem.model.bpmn.calls import resolve_calls
 from m2pem.model.bpmn.collaboration import check_collaborations
 from m2pem.model.bpmn.containers import MAX_DEPTH, read_process
 from m2pem.model.bpmn.data import resolve_data
+from m2pem.model.bpmn.data_flow import resolve_data_flows
 from m2pem.model.bpmn.graph import add_unreachable, check_graph
 from m2pem.model.bpmn.link import link
 from m2pem.model.bpmn.messages import resolve_messages
@@ -107,6 +108,7 @@ def _read(report: Report, document: Document, data: bytes) -> Mission | None:
             "draw a process with a start event",
         )
     resolve_data(reading)
+    resolve_data_flows(reading)
     resolve_prompts(reading)
     resolve_calls(reading)
     elements = link(reading)
@@ -132,4 +134,5 @@ def _read(report: Report, document: Document, data: bytes) -> Mission | None:
         warnings=report.sorted(),
         elements=elements,
         associated=frozenset(reading.written_keys),
+        data_stores=frozenset(reading.data_key(store) for store in reading.data_stores),
     )

@@ -2,6 +2,7 @@
 
 from lxml import etree
 
+from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.definitions import read_definition
 from m2pem.model.bpmn.names import BPMN, a, kind, local
 from m2pem.model.bpmn.reading import Reading, reference, text_of
@@ -43,7 +44,6 @@ def read_event(reading: Reading, element: etree._Element, container: Container) 
     definitions = _definitions(reading, found, place, container)
     name = element.get("name", "")
     line = reading.report.line(element)
-    reading.note_outputs(found.of("dataOutputAssociation"))
     parallel = reading.boolean(element, "parallelMultiple", False, identifier)
     event: Event
     if place == "startEvent":
@@ -59,6 +59,7 @@ def read_event(reading: Reading, element: etree._Element, container: Container) 
         event = IntermediateCatchEvent(identifier, name, line, definitions, parallel)
     else:
         event = _boundary(reading, element, identifier, definitions, parallel)
+    read_data_flow(reading, found, event)
     return event
 
 

@@ -73,16 +73,15 @@ def _link(node: FlowNode) -> LinkEventDefinition | None:
 
 def _check_flows(reading: Reading, node: FlowNode) -> None:
     catches = isinstance(node, IntermediateCatchEvent)
+    said = f"into the link target '{node.id}'" if catches else f"out of '{node.id}', a link"
+    follows = "what follows the link target"
     for flow in node.incoming if catches else node.outgoing:
-        said = f"into the link target '{node.id}'" if catches else f"out of '{node.id}', a link"
         reading.report.error(
             flow.line,
             flow.id,
             "flow-end",
             f"no sequence flow can lead {said}",
-            "lead it to what follows the link target"
-            if catches
-            else "lead it from before the link",
+            f"lead it to {follows}" if catches else f"let it begin at {follows}",
         )
 
 

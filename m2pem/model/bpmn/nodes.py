@@ -5,6 +5,7 @@ from collections.abc import Callable
 from lxml import etree
 
 from m2pem.model.bpmn.calls import read_call_activity
+from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.events import read_event
 from m2pem.model.bpmn.gateways import GATEWAYS, read_gateway
 from m2pem.model.bpmn.names import BPMN, a, kind, local
@@ -13,6 +14,7 @@ from m2pem.model.bpmn.reading import Reading, reference
 from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.bpmn.scripts import read_script_task
 from m2pem.model.bpmn.tasks import (
+    read_business_rule_task,
     read_manual_task,
     read_plain_task,
     read_receive_task,
@@ -30,6 +32,11 @@ _LOOPS = ("loopCharacteristics", "standardLoopCharacteristics", "multiInstanceLo
 LOOPS = frozenset(BPMN + name for name in _LOOPS)
 SUBPROCESSES = frozenset(BPMN + name for name in ("subProcess", "transaction", "adHocSubProcess"))
 
+MAX_QUANTITY = 1000
+"""Of tokens that begin an activity, or leave it by one flow."""
+
+_QUANTITIES = {"start_quantity": "startQuantity", "completion_quantity": "completionQuantity"}
+
 _TASKS: dict[str, Callable[[Reading, Scan], Activity]] = {
     BPMN + "task": read_plain_task,
     BPMN + "manualTask": read_manual_task,
@@ -39,7 +46,7 @@ _TASKS: dict[str, Callable[[Reading, Scan], Activity]] = {
     BPMN + "sendTask": read_send_task,
     BPMN + "receiveTask": read_receive_task,
     BPMN + "callActivity": read_call_activity,
-    BPMN + "businessRuleTask": read_plain_task,
+    BPMN + "businessRuleTask": read_business_rule_task,
 }
 _EVENTS = frozenset(
     BPMN + name
@@ -52,7 +59,6 @@ _EVENTS = frozenset(
     )
 )
 _REFUSED = {
-    "businessRuleTask": "use a service task",
     "transaction": "use a subprocess with boundary events",
     "adHocSubProcess": "join its activities by sequence flows, in a plain subprocess",
     "choreographyTask": "draw the mission as processes",
@@ -91,7 +97,7 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
         found = scan(reading, element, identifier)
         node = task(reading, found)
         if tag != BPMN + "callActivity":
-            reading.note_outputs(found.of("dataOutputAssociation"))
+            read_data_flow(reading, found, node)
         for loop in _LOOPS:
             for each in found.of(loop):
                 refuse_loop(reading, each, identifier)
@@ -128,16 +134,23 @@ def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -
             "compensation activity",
             "draw what undoes the activity after a boundary event",
         )
-    for name in ("startQuantity", "completionQuantity"):
-        quantity = element.get(name, "1").strip()
-        if quantity != "1":
-            reading.report.error(
-                element,
-                node.id,
-                "not-executed",
-                f"m2pem does not execute {name}='{quantity}' yet",
-                "use a parallel gateway for several tokens",
-            )
+    for field, name in _QUANTITIES.items():
+        object.__setattr__(node, field, _quantity(reading, element, name))
+
+
+def _quantity(reading: Reading, element: etree._Element, name: str) -> int:
+    """How many tokens begin, or leave, an activity (table 10.3)."""
+    text = element.get(name, "1").strip()
+    if text.isascii() and text.isdecimal() and 1 <= int(text) <= MAX_QUANTITY:
+        return int(text)
+    reading.report.error(
+        element,
+        element.get("id", ""),
+        "bad-value",
+        f"{name}='{text}' is no number of tokens from 1 to {MAX_QUANTITY}",
+        f'write for example {name}="2", or delete it',
+    )
+    return 1
 
 
 def _note_default(reading: Reading, element: etree._Element, node: FlowNode) -> None:

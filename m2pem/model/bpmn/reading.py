@@ -10,10 +10,12 @@ from m2pem.model.bpmn.names import M2PEM, M2PEM_ATTRIBUTES, a, attribute_names, 
 from m2pem.model.bpmn.report import Report, Where
 from m2pem.model.bpmn.schema import Shape
 from m2pem.model.elements import (
+    Activity,
     BoundaryEvent,
     CallActivity,
     Container,
     DataObject,
+    Event,
     FlowNode,
     Lane,
     MessageFlow,
@@ -88,6 +90,17 @@ class PendingCall:
 
 
 @dataclass(slots=True)
+class PendingDataFlow:
+    """An activity or event whose data associations wait until all data objects are known."""
+
+    node: Activity | Event
+    parameters: dict[str, str]
+    """Keys of its own data inputs, data outputs and properties, by id."""
+    inputs: list[Association]
+    outputs: list[Association]
+
+
+@dataclass(slots=True)
 class MessageUse:
     """A place that sends or receives a message, which message flows may have to name."""
 
@@ -126,6 +139,9 @@ class Reading:
     declared: list[tuple[Container, DataObject]] = field(default_factory=list)
     prompts: list[PendingPrompt] = field(default_factory=list)
     calls: list[PendingCall] = field(default_factory=list)
+    data_flows: list[PendingDataFlow] = field(default_factory=list)
+    data_stores: set[str] = field(default_factory=set)
+    """Ids of data stores, and of references to them."""
     written: list[Association] = field(default_factory=list)
     """Data output associations of all activities and events."""
     written_keys: set[str] = field(default_factory=set)

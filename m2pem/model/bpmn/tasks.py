@@ -1,15 +1,24 @@
 """Tasks other than script tasks and user tasks."""
 
+from typing import TypeVar
+
 from lxml import etree
 
 from m2pem.model.behavior import Behavior, Parameter, ServiceCall
 from m2pem.model.bpmn.behavior_xml import BehaviorReader
 from m2pem.model.bpmn.definitions import look_up
-from m2pem.model.bpmn.names import CAMUNDA, M2PEM, local
+from m2pem.model.bpmn.names import CAMUNDA, M2PEM, kind, local
 from m2pem.model.bpmn.reading import MessageUse, Reading
 from m2pem.model.bpmn.scan import Scan, own_extensions
 from m2pem.model.bpmn.scripts import BEHAVIOR, read_carried
-from m2pem.model.elements import ManualTask, ReceiveTask, SendTask, ServiceTask, Task
+from m2pem.model.elements import (
+    BusinessRuleTask,
+    ManualTask,
+    ReceiveTask,
+    SendTask,
+    ServiceTask,
+    Task,
+)
 from m2pem.model.events import Message
 
 _NONE: frozenset[str] = frozenset()
@@ -30,6 +39,18 @@ def read_manual_task(reading: Reading, found: Scan) -> ManualTask:
 
 def read_service_task(reading: Reading, found: Scan) -> ServiceTask:
     """A service task: a registered service, or a behavior."""
+    return _service_task(reading, found, ServiceTask)
+
+
+def read_business_rule_task(reading: Reading, found: Scan) -> BusinessRuleTask:
+    """A business rule task: likewise."""
+    return _service_task(reading, found, BusinessRuleTask)
+
+
+Serving = TypeVar("Serving", bound=ServiceTask)
+
+
+def _service_task(reading: Reading, found: Scan, task: type[Serving]) -> Serving:
     extensions = own_extensions(reading, found, _SERVICE)
     carried = extensions.get("behavior", [])
     behavior: Behavior | None = read_carried(reading, found, carried) if carried else None
@@ -47,12 +68,12 @@ def read_service_task(reading: Reading, found: Scan) -> ServiceTask:
             found.element,
             found.id,
             "no-service",
-            "the service task names no service; it does nothing",
+            f"the {kind(found.element.tag)} names no service; it does nothing",
             'add <m2pem:service class="Detector"/> to its extension elements, or make it a plain '
             "task",
         )
     line = reading.report.line(found.element)
-    return ServiceTask(found.id, found.element.get("name", ""), line, call, behavior)
+    return task(found.id, found.element.get("name", ""), line, call, behavior)
 
 
 def _service_call(
