@@ -23,6 +23,7 @@ from m2pem.engine.state import (
 )
 from m2pem.model.elements import (
     Activity,
+    AdHocSubProcess,
     CallActivity,
     ComplexGateway,
     Container,
@@ -147,6 +148,12 @@ def _scope_closed(state: RunState, record: r.ScopeClosed) -> None:
         scope.owner.inner = None
 
 
+def _is_choice(scope: Scope, node: FlowNode) -> bool:
+    if not isinstance(scope.container, AdHocSubProcess) or scope.loop is not None:
+        return False
+    return node in scope.container.entries
+
+
 def _scope_interrupted(state: RunState, record: r.ScopeInterrupted) -> None:
     scope = state.scopes[record.scope]
     scope.interrupted = True
@@ -172,6 +179,10 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         if join is None:
             join = scope.joins[node] = Join()
         join.by_flow.setdefault(flow, []).append(token)
+    elif _is_choice(scope, node) and flow is None:
+        scope.begun[node] = None
+        if scope.chosen and scope.chosen[0] is node:
+            scope.chosen.pop(0)
     elif isinstance(node, Activity) and node.start_quantity > 1 and record.instance is None:
         scope.gathered.setdefault(node, []).append(token)
 
@@ -184,6 +195,10 @@ def _gateway_activated(state: RunState, record: r.GatewayActivated) -> None:
 
 def _gateway_reset(state: RunState, record: r.GatewayReset) -> None:
     del state.scopes[record.scope].activated[_node(state, record.element)]
+
+
+def _activities_chosen(state: RunState, record: r.ActivitiesChosen) -> None:
+    state.scopes[record.scope].chosen = [_node(state, element) for element in record.elements]
 
 
 def _tokens_gathered(state: RunState, record: r.TokensGathered) -> None:
@@ -422,6 +437,7 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.TokenEntered: _token_entered,
     r.TokenLeft: _token_left,
     r.FlowTaken: _nothing,
+    r.ActivitiesChosen: _activities_chosen,
     r.TokensGathered: _tokens_gathered,
     r.GatewayActivated: _gateway_activated,
     r.GatewayReset: _gateway_reset,

@@ -36,6 +36,8 @@ def begin_event_subprocess(
     assert isinstance(container, SubProcess)
     if start.interrupting:
         empty(x, scope, outcome)
+        if scope.owner is not None and scope.owner.prompt:
+            x.emit(r.PromptWithdrawn(scope.owner.prompt))  # an ad-hoc subprocess: nothing to choose
         x.emit(r.ScopeInterrupted(scope.id, x.process_of(container), container.id))
     return x.spawn(start, open_scope(x, x.spawn(container, scope)))
 

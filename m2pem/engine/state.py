@@ -57,6 +57,10 @@ class Scope:
     """Tokens at activities that several must begin, and that have not begun."""
     activated: "dict[FlowNode, tuple[SequenceFlow, ...]]" = field(default_factory=dict)
     """Complex gateways that wait to reset, and the flows whose tokens activated them."""
+    chosen: "list[FlowNode]" = field(default_factory=list)
+    """Of an ad-hoc subprocess: what is to begin, and has not."""
+    begun: "dict[FlowNode, None]" = field(default_factory=dict)
+    """Of an ad-hoc subprocess: what was begun by choice."""
     interrupted: bool = False
     """An interrupting event subprocess of it has begun: no other one can."""
 

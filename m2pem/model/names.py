@@ -8,6 +8,7 @@ from m2pem.model.behavior import Assignment, Parameter
 from m2pem.model.behavior import Mapping as DataMapping
 from m2pem.model.elements import (
     Activity,
+    AdHocSubProcess,
     CallActivity,
     ComplexGateway,
     Event,
@@ -109,6 +110,10 @@ def _reads(node: FlowNode) -> Iterator[Read]:
     for mapping in _data_mappings(node):
         if mapping.source.text not in mapping.source.names:  # a copy may well copy nothing
             yield Read(mapping.source, node.id, mapping.line)
+    if isinstance(node, AdHocSubProcess):
+        for expression in (node.completion, node.active_elements):
+            if expression is not None:
+                yield Read(expression, node.id, node.line)
     if isinstance(node, ComplexGateway) and node.activation is not None:
         yield Read(node.activation, node.id, node.line)
     for flow in node.outgoing:

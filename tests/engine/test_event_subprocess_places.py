@@ -81,3 +81,29 @@ def test_a_boundary_event_of_it_ends_the_handler_only() -> None:
     """
     play = Play(around(WORK + handler("signal go", NOT) + boundary)).start()
     assert play.signal("go").advance(3).at == "a l"
+
+
+AD_HOC = """<startEvent id="start"/> <userTask id="wait"/>
+    <adHocSubProcess id="sub"> <userTask id="a"/> <userTask id="b"/> {handler} </adHocSubProcess>
+    <task id="done"/>
+    start -> wait -> sub -> done
+"""
+
+
+def test_one_in_an_ad_hoc_subprocess_is_no_choice_and_ends_the_choosing() -> None:
+    play = Play(AD_HOC.format(handler=handler("signal go"))).start().answer()
+    [prompt] = play.run.state.prompts.values()
+    assert [each["value"] for each in prompt.decisions] == ["a", "b", "complete"]
+    play.answer("a", prompt="sub").signal("go")
+    assert play.at == "hu"
+    assert [each.token.node.id for each in play.run.state.prompts.values()] == ["hu"]
+    assert play.answer().ended == "completed"
+
+
+def test_one_beside_the_choices_does_not_count_as_one() -> None:
+    inside = handler("message go", NOT) + "<completionCondition>true</completionCondition>"
+    play = Play(AD_HOC.format(handler=inside)).start()
+    play.message("go").answer(prompt="wait")
+    assert play.answer("a", prompt="sub").at == "hu a"
+    assert play.answer(prompt="hu").at == "a"
+    assert play.answer(prompt="a").ended == "completed"

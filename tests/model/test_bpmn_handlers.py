@@ -91,6 +91,13 @@ REFUSED = {
         with_handler('<startEvent id="hs"><terminateEventDefinition/></startEvent>'),
         [("event-not-allowed", 3, "hs")],
     ),
+    "an ad-hoc event subprocess": (
+        process(
+            '<adHocSubProcess id="H" triggeredByEvent="true"><task id="ht"/></adHocSubProcess>\n'
+            f"{TASK}{line_of('T')}"
+        ),
+        [("bad-value", 3, "H"), ("unreachable", 3, "H")],
+    ),
     "nothing but an event subprocess": (
         around(
             f'<subProcess id="T">{handler(on_signal())}</subProcess>',

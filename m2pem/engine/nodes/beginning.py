@@ -5,7 +5,7 @@ from collections.abc import Callable
 from m2pem.engine import records as r
 from m2pem.engine.data_flow import take_in
 from m2pem.engine.execution import Execution
-from m2pem.engine.nodes import activities, containers
+from m2pem.engine.nodes import activities, ad_hoc, containers
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.state import Token
 from m2pem.engine.triggering import arm_boundary
@@ -22,6 +22,7 @@ WORK: dict[type[FlowNode], Callable[[Execution, Token], None]] = {
     e.SendTask: activities.send_task,
     e.ReceiveTask: activities.receive_task,
     e.SubProcess: containers.subprocess,
+    e.AdHocSubProcess: ad_hoc.ad_hoc,
     e.CallActivity: containers.call_activity,
 }
 """What each kind of activity does once it has begun."""

@@ -4,7 +4,8 @@ from m2pem.engine.data_flow import give_out
 from m2pem.engine.execution import Execution
 from m2pem.engine.nodes.flows import true_flows
 from m2pem.engine.state import Token
-from m2pem.model.elements import Activity
+from m2pem.model.elements import Activity, AdHocSubProcess
+from m2pem.model.reach import begins_by_itself
 
 
 def complete(x: Execution, token: Token) -> None:
@@ -21,3 +22,5 @@ def pass_on(x: Execution, token: Token) -> None:
     flows = true_flows(x, token, node.default)
     if flows is not None:
         x.proceed(token, [*flows] * node.completion_quantity)
+        if isinstance(node.container, AdHocSubProcess) and not begins_by_itself(node):
+            x.queue.append(token.scope)

@@ -23,7 +23,7 @@ def subprocess(x: Execution, token: Token) -> None:
         if arm_event_subprocesses(x, token.inner):
             collect_letters(x, token.inner)
         return
-    scope = _open(x, token)
+    scope = open_inside(x, token)
     if scope is not None:
         begin(x, scope)
 
@@ -35,7 +35,7 @@ def call_activity(x: Execution, token: Token) -> None:
     values = evaluate(x, token, node.mappings.inputs, reader(token))
     if values is None:
         return
-    scope = _open(x, token)
+    scope = open_inside(x, token)
     if scope is None:
         return
     for mapping, value in values:
@@ -44,7 +44,8 @@ def call_activity(x: Execution, token: Token) -> None:
     begin(x, scope)
 
 
-def _open(x: Execution, token: Token) -> Scope | None:
+def open_inside(x: Execution, token: Token) -> Scope | None:
+    """Open the scope of an activity. None: it is too deep, and that error was thrown."""
     if token.scope.depth >= MAX_DEPTH:
         throw_error(x, token, "RECURSION", f"{MAX_DEPTH} scopes within scopes at {token.node.id}")
         return None

@@ -24,6 +24,7 @@ _DATA = frozenset(
     BPMN + name for name in ("dataObject", "dataObjectReference", "dataStoreReference", "property")
 )
 _LANES = BPMN + "laneSet"
+_COMPLETION = BPMN + "completionCondition"
 _DATA_FLOW = frozenset(
     BPMN + name for name in ("ioSpecification", "dataInputAssociation", "dataOutputAssociation")
 )
@@ -111,6 +112,8 @@ def _read_child(
         return None
     if tag in _DATA_FLOW:
         frame.data_flow.children.setdefault(tag, []).append(child)
+        return None
+    if tag == _COMPLETION:
         return None
     node = read_node(reading, child, container)
     if node is None:

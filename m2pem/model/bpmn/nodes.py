@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from lxml import etree
 
+from m2pem.model.bpmn.ad_hoc import read_ad_hoc
 from m2pem.model.bpmn.calls import read_call_activity
 from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.events import read_event
@@ -60,7 +61,6 @@ _EVENTS = frozenset(
 )
 _REFUSED = {
     "transaction": "use a subprocess with boundary events",
-    "adHocSubProcess": "join its activities by sequence flows, in a plain subprocess",
     "choreographyTask": "draw the mission as processes",
     "callChoreography": "draw the mission as processes",
     "subChoreography": "draw the mission as processes",
@@ -86,12 +86,7 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
     node: FlowNode
     if tag in SUBPROCESSES:
         # Its children are read with its content, by containers.py.
-        node = SubProcess(
-            identifier,
-            element.get("name", ""),
-            reading.report.line(element),
-            reading.boolean(element, "triggeredByEvent", False, identifier),
-        )
+        node = _subprocess(reading, element, identifier)
         _check_activity(reading, element, node)
     elif task is not None:
         found = scan(reading, element, identifier)
@@ -105,6 +100,22 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
     else:
         node = FlowNode(identifier, element.get("name", ""), reading.report.line(element))
     return node
+
+
+def _subprocess(reading: Reading, element: etree._Element, identifier: str) -> SubProcess:
+    triggered = reading.boolean(element, "triggeredByEvent", False, identifier)
+    if triggered and element.tag != BPMN + "subProcess":
+        reading.report.error(
+            element,
+            identifier,
+            "bad-value",
+            f"{a(kind(element.tag))} cannot be an event subprocess too",
+            'put it into a plain <subProcess triggeredByEvent="true">, behind a start event',
+        )
+    if element.tag == BPMN + "adHocSubProcess":
+        return read_ad_hoc(reading, element, identifier)
+    name, line = element.get("name", ""), reading.report.line(element)
+    return SubProcess(identifier, name, line, triggered)
 
 
 def not_executed(

@@ -120,6 +120,7 @@ _TABLE: dict[str, tuple[str, str]] = {
     "linkEventDefinition": ("id name", f"{_BASE} source target"),
     "condition": ("id language evaluatesToTypeRef", _BASE),
     "activationCondition": ("id language evaluatesToTypeRef", _BASE),
+    "completionCondition": ("id language evaluatesToTypeRef", _BASE),
     "conditionExpression": ("id language evaluatesToTypeRef", _BASE),
     "timeDate": ("id language evaluatesToTypeRef", _BASE),
     "timeDuration": ("id language evaluatesToTypeRef", _BASE),
