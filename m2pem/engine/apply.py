@@ -13,6 +13,7 @@ from m2pem.engine.state import (
     Behavior,
     BehaviorPhase,
     Join,
+    Letter,
     Prompt,
     RunState,
     RunStatus,
@@ -404,7 +405,7 @@ def _event_triggered(state: RunState, record: r.EventTriggered) -> None:
     _end_wait(state, wait)
     if record.kept:
         letters = state.mailbox[wait.ref]
-        letters.pop(0)
+        letters.pop(record.letter)
         if not letters:
             del state.mailbox[wait.ref]
 
@@ -415,7 +416,7 @@ def _condition_reset(state: RunState, record: r.ConditionReset) -> None:
 
 def _message_thrown(state: RunState, record: r.MessageThrown) -> None:
     if record.kept:
-        state.mailbox.setdefault(record.message, []).append(record.data)
+        state.mailbox.setdefault(record.message, []).append(Letter(record.data, record.keys))
 
 
 _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {

@@ -183,6 +183,14 @@ class Service:
     properties: dict[str, Value]
 
 
+@dataclass(frozen=True, slots=True)
+class Letter:
+    """A message that nobody took yet: what it carries, and its correlation keys."""
+
+    data: dict[str, Value]
+    keys: dict[str, Value]
+
+
 @dataclass(slots=True, eq=False)
 class RunState:
     """A whole run. Times are microseconds: `_us` since the Unix epoch unless said otherwise."""
@@ -226,7 +234,7 @@ class RunState:
     """Heap of (due mission time, wait); waits that are over may still be in it, but not first."""
     dates: list[tuple[int, int]] = field(default_factory=list)
     """Heap of (due time since the Unix epoch, wait); likewise."""
-    mailbox: dict[str, list[dict[str, Value]]] = field(default_factory=dict)
+    mailbox: dict[str, list[Letter]] = field(default_factory=dict)
     """Messages that nobody was waiting for yet, by message id; first come first."""
 
     geometries: dict[str, dict[str, Value]] = field(default_factory=dict)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from m2pem.engine import records as r
 from m2pem.engine.conditions import comes_true, definition_of
+from m2pem.engine.correlation import fits, remember
 from m2pem.engine.data import Place
 from m2pem.engine.data_flow import receive_payload
 from m2pem.engine.execution import Execution, definitions_of
@@ -68,13 +69,27 @@ def collect_letters(x: Execution, holder: Place) -> bool:
     while found and holder.waits is not None:
         found = False
         for wait in list(holder.waits.values()):
-            letters = x.state.mailbox.get(wait.ref) if wait.trigger is Trigger.MESSAGE else None
-            if letters and wait.id in x.state.waits:
+            number = _letter_for(x, wait) if wait.id in x.state.waits else None
+            if number is not None:
                 found = True
-                trigger(x, wait, letters[0], kept=True)
+                letter = x.state.mailbox[wait.ref][number]
+                trigger(x, wait, letter.data, letter.keys, letter=number)
                 if isinstance(holder, Token) and x.state.tokens.get(holder.id) is not holder:
                     return False
     return True
+
+
+def _letter_for(x: Execution, wait: Wait) -> int | None:
+    """Which of the messages that were kept is for somebody who waits."""
+    if wait.trigger is not Trigger.MESSAGE:
+        return None
+    for number, letter in enumerate(x.state.mailbox.get(wait.ref, ())):
+        if fits(x, wait.ref, letter.keys, wait.token or wait.scope):
+            return number
+    return None
+
+
+# --- conditions ---------------------------------------------------------------------------------
 
 
 def arm_conditional_starts(x: Execution, root: Scope) -> None:
@@ -103,12 +118,24 @@ def look_at_conditions(x: Execution, only: Token | None = None) -> bool:
 # --- triggering ---------------------------------------------------------------------------------
 
 
-def trigger(x: Execution, wait: Wait, data: dict[str, Value], *, kept: bool = False) -> None:
-    """What a token waited for has come: a catch event goes on, a boundary event is entered."""
-    x.emit(r.EventTriggered(wait.id, kept))
+def trigger(
+    x: Execution,
+    wait: Wait,
+    data: dict[str, Value],
+    keys: dict[str, Value] | None = None,
+    *,
+    letter: int | None = None,
+) -> None:
+    """What a token waited for has come: a catch event goes on, a boundary event is entered.
+
+    `keys`: of a message. `letter`: it is the one of that number that was kept.
+    """
+    x.emit(r.EventTriggered(wait.id, letter is not None, letter or 0))
     token, node = wait.token, wait.node
+    if keys and token is not None:
+        remember(x, token, keys)
     if token is None:
-        _in_scope(x, wait, data)
+        _in_scope(x, wait, data, keys or {})
     elif node is token.node:
         if receive_payload(x, token, data) and not _is_one_of_several(node, token.waits):
             WHEN_TRIGGERED[type(node)](x, token)
@@ -148,12 +175,12 @@ def _at_boundary(
         receive_payload(x, x.spawn(node, token.scope), data)
 
 
-def _in_scope(x: Execution, wait: Wait, data: dict[str, Value]) -> None:
+def _in_scope(x: Execution, wait: Wait, data: dict[str, Value], keys: dict[str, Value]) -> None:
     """The start event of an event subprocess; it goes on as one that has happened."""
     node = wait.node
     if isinstance(node.container, Process):
         arm_again(x, wait)
-        _instance(x, node, definition_of(wait), data)
+        _instance(x, node, definition_of(wait), data, keys)
         return
     assert isinstance(node, StartEvent)
     if _is_one_of_several(node, wait.scope.waits):
@@ -161,7 +188,9 @@ def _in_scope(x: Execution, wait: Wait, data: dict[str, Value]) -> None:
         return
     if not node.interrupting:
         _arm_again(x, wait)
-    receive_payload(x, begin_event_subprocess(x, wait.scope, node), data)
+    begun = begin_event_subprocess(x, wait.scope, node)
+    remember(x, begun, keys)
+    receive_payload(x, begun, data)
 
 
 # --- event-based gateways -----------------------------------------------------------------------
@@ -219,16 +248,16 @@ def throw_signal(x: Execution, signal: str, data: dict[str, Value]) -> bool:
     for start in x.triggered_starts:
         for definition in definitions_of(start):
             if isinstance(definition, SignalEventDefinition) and definition.signal.id == signal:
-                _instance(x, start, definition, data)
+                _instance(x, start, definition, data, {})
                 started = True
     return bool(waits) or started
 
 
-def message_receiver(x: Execution, message: str) -> Wait | FlowNode | None:
+def message_receiver(x: Execution, message: str, keys: dict[str, Value]) -> Wait | FlowNode | None:
     """Who gets a message: the one that has waited longest, else a process that it starts."""
-    waits = x.state.catchers.get((Trigger.MESSAGE, message))
-    if waits:
-        return next(iter(waits.values()))
+    for wait in x.state.catchers.get((Trigger.MESSAGE, message), {}).values():
+        if not keys or fits(x, message, keys, wait.token or wait.scope):
+            return wait
     for start in x.triggered_starts:
         for definition in definitions_of(start):
             if isinstance(definition, MessageEventDefinition) and definition.message.id == message:
@@ -236,18 +265,30 @@ def message_receiver(x: Execution, message: str) -> Wait | FlowNode | None:
     return None
 
 
-def deliver(x: Execution, receiver: Wait | FlowNode, message: str, data: dict[str, Value]) -> None:
+def deliver(
+    x: Execution,
+    receiver: Wait | FlowNode,
+    message: str,
+    data: dict[str, Value],
+    keys: dict[str, Value],
+) -> None:
     """Hand a message over."""
     if isinstance(receiver, Wait):
-        trigger(x, receiver, data)
+        trigger(x, receiver, data, keys)
         return
     for definition in definitions_of(receiver):
         if isinstance(definition, MessageEventDefinition) and definition.message.id == message:
-            _instance(x, receiver, definition, data)
+            _instance(x, receiver, definition, data, keys)
             return
 
 
-def _instance(x: Execution, start: FlowNode, came: EventDefinition, data: dict[str, Value]) -> None:
+def _instance(
+    x: Execution,
+    start: FlowNode,
+    came: EventDefinition,
+    data: dict[str, Value],
+    keys: dict[str, Value],
+) -> None:
     """One instance of a process, from the element whose trigger came (clause 13.2).
 
     Of several triggers that must all come, the others are awaited in the instance.
@@ -256,7 +297,7 @@ def _instance(x: Execution, start: FlowNode, came: EventDefinition, data: dict[s
     number = x.state.last_scope + 1
     x.emit(r.ScopeOpened(number, process.id, process.id))
     scope = x.state.scopes[number]
-    _begin_with(x, scope, start, came, data)
+    _begin_with(x, scope, start, came, data, keys)
     # Last: what its event subprocesses wait for may be read from the data that came.
     gone = x.state.scopes.get(number) is not scope
     if not gone and not scope.interrupted and arm_event_subprocesses(x, scope):
@@ -264,10 +305,16 @@ def _instance(x: Execution, start: FlowNode, came: EventDefinition, data: dict[s
 
 
 def _begin_with(
-    x: Execution, scope: Scope, start: FlowNode, came: EventDefinition, data: dict[str, Value]
+    x: Execution,
+    scope: Scope,
+    start: FlowNode,
+    came: EventDefinition,
+    data: dict[str, Value],
+    keys: dict[str, Value],
 ) -> None:
     if isinstance(start, StartEvent):
         token = x.spawn(start, scope)
+        remember(x, token, keys)
         receive_payload(x, token, data)
         others = start.definitions if start.parallel_multiple else ()
         for definition in others:
@@ -276,12 +323,14 @@ def _begin_with(
         collect_letters(x, token)
     elif isinstance(start, ReceiveTask) and start.instantiate:
         token = x.spawn(start, scope)
+        remember(x, token, keys)
         if receive_payload(x, token, data):
             WHEN_TRIGGERED[type(start)](x, token)
     else:
         gateway = start.incoming[0].source
         assert isinstance(gateway, EventBasedGateway)
         token = x.spawn(gateway, scope)
+        remember(x, token, keys)
         if not gateway.parallel or await_behind(x, token, start):
             _behind_gateway(x, token, start, data)
             if x.state.tokens.get(token.id) is token:

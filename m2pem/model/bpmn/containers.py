@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
+from m2pem.model.bpmn.correlation import read_subscription
 from m2pem.model.bpmn.data import read_data
 from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.flows import SEQUENCE_FLOW, read_flow
@@ -24,6 +25,7 @@ _DATA = frozenset(
     BPMN + name for name in ("dataObject", "dataObjectReference", "dataStoreReference", "property")
 )
 _LANES = BPMN + "laneSet"
+_SUBSCRIPTION = BPMN + "correlationSubscription"
 _COMPLETION = BPMN + "completionCondition"
 _DATA_FLOW = frozenset(
     BPMN + name for name in ("ioSpecification", "dataInputAssociation", "dataOutputAssociation")
@@ -112,6 +114,9 @@ def _read_child(
         return None
     if tag in _DATA_FLOW:
         frame.data_flow.children.setdefault(tag, []).append(child)
+        return None
+    if tag == _SUBSCRIPTION:
+        read_subscription(reading, child, process)
         return None
     if tag == _COMPLETION:
         return None
