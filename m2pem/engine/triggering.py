@@ -89,6 +89,9 @@ def _letter_for(x: Execution, wait: Wait) -> int | None:
     return None
 
 
+# --- conditions ---------------------------------------------------------------------------------
+
+
 def arm_conditional_starts(x: Execution, root: Scope) -> None:
     """Arm the conditions that begin the other processes of the file.
 
@@ -177,7 +180,7 @@ def _in_scope(x: Execution, wait: Wait, data: dict[str, Value], keys: dict[str, 
     node = wait.node
     if isinstance(node.container, Process):
         arm_again(x, wait)
-        _instance(x, node, definition_of(wait), data, {})
+        _instance(x, node, definition_of(wait), data, keys)
         return
     assert isinstance(node, StartEvent)
     if _is_one_of_several(node, wait.scope.waits):
