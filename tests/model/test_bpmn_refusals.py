@@ -89,10 +89,6 @@ ERRORS = {
         around(TASK, '\n<signal id="T"/>'),
         [("duplicate-id", 3, "T")],
     ),
-    "missing ids": (
-        process(f'{TASK}<task/>\n<sequenceFlow sourceRef="S" targetRef="E"/>\n{line_of("T")}'),
-        [("missing-id", 3, ""), ("missing-id", 4, "")],
-    ),
     "dangling flow ends": (
         process(
             f"{TASK}{line_of('T')}\n"
@@ -210,8 +206,8 @@ ERRORS = {
         [("empty-process", 6, "Q")],
     ),
     "unreachable, beside another error": (
-        process(f'{TASK}{line_of("T")}\n<task id="U"/>', '<process id="Q"><task/></process>'),
-        [("unreachable", 4, "U"), ("missing-id", 5, "")],
+        process(f'{TASK}{line_of("T")}\n<task id="U"/>', '<process id="Q"><event/></process>'),
+        [("unreachable", 4, "U"), ("not-executed", 5, "")],
     ),
     # --- events ---------------------------------------------------------------------------------
     "typed start in a subprocess": (

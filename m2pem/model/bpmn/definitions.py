@@ -6,8 +6,9 @@ from typing import TypeVar
 from lxml import etree
 
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.model.bpmn.names import a, local
+from m2pem.model.bpmn.names import local
 from m2pem.model.bpmn.reading import MessageUse, Reading, reference, text_of
+from m2pem.model.bpmn.rewriting import time_remedy
 from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.duration import cycle, date_us, duration_us
 from m2pem.model.events import (
@@ -94,7 +95,7 @@ def look_up(
         stand_in.id,
         "dangling-reference",
         f"{what}Ref names '{name}', but {because}",
-        did_you_mean(name, table, f"name {a(what)} element that stands in definitions"),
+        did_you_mean(name, table, f'put <{what} id="{name}"/> into definitions, or name another'),
     )
     return stand_in
 
@@ -155,7 +156,7 @@ def _timer(
             _CHECKS[kind](expression.evaluate(lambda _: None))
         except (ExpressionSyntaxError, ExpressionError) as error:
             reading.report.error(
-                times[0], identifier, "timer-time", f"{name}: {error}", "write it as ISO 8601"
+                times[0], identifier, "timer-time", f"{name}: {error}", time_remedy(name, text)
             )
             return None
     return TimerEventDefinition(reading.report.line(element), kind, expression)

@@ -33,16 +33,16 @@ def link(reading: Reading) -> dict[str, Element]:
     for index, (node, container) in enumerate(zip(reading.nodes, reading.containers, strict=True)):
         _set(node, "index", index)
         _set(node, "container", container)
-        if node.id and node.id not in nodes:
+        if node.id not in nodes:
             nodes[node.id] = node
         else:
             reading.broken.add(container)
     _link_flows(reading, nodes)
     _link_containers(reading)
-    flows = {ends.flow.id: ends.flow for ends in reversed(reading.flows) if ends.flow.id}
+    flows = {ends.flow.id: ends.flow for ends in reversed(reading.flows)}
     _link_defaults(reading, flows)
     _link_boundary(reading, nodes)
-    processes = {process.id: process for process in reversed(reading.processes) if process.id}
+    processes = {process.id: process for process in reversed(reading.processes)}
     _link_calls(reading, processes)
     return {**flows, **nodes, **processes}
 
