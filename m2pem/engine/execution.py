@@ -41,6 +41,7 @@ class Execution:
         "_reach",
         "_receivable",
         "_triggered_starts",
+        "ended_instances",
         "fleet",
         "mission",
         "moved",
@@ -58,6 +59,7 @@ class Execution:
         self.now_us = 0
         self.records: list[Record] = []
         self.queue: deque[Token | Scope] = deque()
+        self.ended_instances: deque[tuple[Token, TokenOutcome]] | None = None
         self.moved: set[int] = set()  # scopes whose inclusive joins must be looked at
         self.process_ids = [node.container.process.id for node in self.mission.nodes]
         self._reach: dict[FlowNode, dict[FlowNode, int]] = {}

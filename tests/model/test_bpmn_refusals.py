@@ -29,16 +29,6 @@ ERRORS = {
         ),
         [("not-executed", 4, "X")],
     ),
-    "loop": (
-        around('<task id="T">\n<standardLoopCharacteristics/></task>'),
-        [("not-executed", 4, "T")],
-    ),
-    "multi-instance subprocess": (
-        around(
-            '<subProcess id="T">\n<multiInstanceLoopCharacteristics/><task id="x"/></subProcess>'
-        ),
-        [("not-executed", 4, "T")],
-    ),
     "compensation activity": (
         process(f'{TASK}\n<task id="C" isForCompensation="true"/>\n{line_of("T")}'),
         [("not-executed", 4, "C")],

@@ -139,4 +139,4 @@ def _terminate(x: Execution, token: Token) -> None:
         end_run(x, RunOutcome.TERMINATED, f"terminated by {token.node.label}")
         return
     empty(x, scope, TokenOutcome.TERMINATED)
-    finish(x, scope)
+    finish(x, scope, TokenOutcome.TERMINATED)
