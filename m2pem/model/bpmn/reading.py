@@ -102,6 +102,16 @@ class PendingDataFlow:
 
 
 @dataclass(slots=True)
+class PendingLoop:
+    """A multi-instance activity whose collections wait until all data objects are known."""
+
+    node: Activity
+    element: etree._Element
+    collection_ref: str
+    output_ref: str
+
+
+@dataclass(slots=True)
 class MessageUse:
     """A place that sends or receives a message, which message flows may have to name."""
 
@@ -154,6 +164,7 @@ class Reading:
     prompts: list[PendingPrompt] = field(default_factory=list)
     calls: list[PendingCall] = field(default_factory=list)
     data_flows: list[PendingDataFlow] = field(default_factory=list)
+    loops: list[PendingLoop] = field(default_factory=list)
     data_stores: set[str] = field(default_factory=set)
     """Ids of data stores, and of references to them."""
     written: list[Association] = field(default_factory=list)

@@ -128,6 +128,16 @@ _TABLE: dict[str, tuple[str, str]] = {
     "timeDuration": ("id language evaluatesToTypeRef", _BASE),
     "timeCycle": ("id language evaluatesToTypeRef", _BASE),
     "association": ("id sourceRef targetRef associationDirection", _BASE),
+    "standardLoopCharacteristics": ("id testBefore loopMaximum", f"{_BASE} loopCondition"),
+    "multiInstanceLoopCharacteristics": (
+        "id isSequential behavior oneBehaviorEventRef noneBehaviorEventRef",
+        f"{_BASE} loopCardinality loopDataInputRef loopDataOutputRef inputDataItem outputDataItem"
+        " complexBehaviorDefinition completionCondition",
+    ),
+    "complexBehaviorDefinition": ("id", f"{_BASE} condition event"),
+    "event": ("id name", _THROW),
+    "inputDataItem": ("id name itemSubjectRef isCollection", f"{_BASE} dataState"),
+    "outputDataItem": ("id name itemSubjectRef isCollection", f"{_BASE} dataState"),
     "participant": (
         "id name processRef",
         f"{_BASE} interfaceRef endPointRef participantMultiplicity",
