@@ -22,7 +22,10 @@ from tests.console import (
 
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
 EXAMPLES = sorted((REPOSITORY / "examples").rglob("README.md"))
-MAKE_TARGETS = set("setup demo test test-long fuzz lint format docs pictures clean".split())
+MAKE_TARGETS = {
+    *("setup", "demo", "test", "test-long", "fuzz", "lint", "format", "docs", "pictures"),
+    *("conformance", "clean"),
+}
 
 BLOCKS = {
     f"{page.relative_to(REPOSITORY)}:{line}": commands

@@ -1,6 +1,7 @@
 """Records, as OCUs and observers read them (docs/records.md)."""
 
 from m2pem.engine.records import (
+    ActivitiesChosen,
     BehaviorCancelRequested,
     BehaviorContinued,
     BehaviorEnded,
@@ -14,6 +15,8 @@ from m2pem.engine.records import (
     EventAwaited,
     EventTriggered,
     FlowTaken,
+    GatewayActivated,
+    GatewayReset,
     GeometryReceived,
     InputDeferred,
     InputIgnored,
@@ -33,6 +36,7 @@ from m2pem.engine.records import (
     RunStarted,
     RunYielded,
     ScopeClosed,
+    ScopeInterrupted,
     ScopeOpened,
     ServiceEnded,
     ServiceRequested,
@@ -41,10 +45,12 @@ from m2pem.engine.records import (
     TokenEntered,
     TokenLeft,
     TokenOutcome,
+    TokensGathered,
     Trigger,
 )
 
 __all__ = [
+    "ActivitiesChosen",
     "BehaviorCancelRequested",
     "BehaviorContinued",
     "BehaviorEnded",
@@ -58,6 +64,8 @@ __all__ = [
     "EventAwaited",
     "EventTriggered",
     "FlowTaken",
+    "GatewayActivated",
+    "GatewayReset",
     "GeometryReceived",
     "InputDeferred",
     "InputIgnored",
@@ -77,6 +85,7 @@ __all__ = [
     "RunStarted",
     "RunYielded",
     "ScopeClosed",
+    "ScopeInterrupted",
     "ScopeOpened",
     "ServiceEnded",
     "ServiceRequested",
@@ -85,5 +94,6 @@ __all__ = [
     "TokenEntered",
     "TokenLeft",
     "TokenOutcome",
+    "TokensGathered",
     "Trigger",
 ]

@@ -13,6 +13,7 @@ from m2pem.engine.state import (
     Behavior,
     BehaviorPhase,
     Join,
+    Letter,
     Prompt,
     RunState,
     RunStatus,
@@ -22,7 +23,10 @@ from m2pem.engine.state import (
     Wait,
 )
 from m2pem.model.elements import (
+    Activity,
+    AdHocSubProcess,
     CallActivity,
+    ComplexGateway,
     Container,
     FlowNode,
     InclusiveGateway,
@@ -49,6 +53,8 @@ def _node(state: RunState, element: str) -> FlowNode:
 
 
 def _is_join(node: FlowNode) -> bool:
+    if isinstance(node, ComplexGateway):
+        return True
     return isinstance(node, (ParallelGateway, InclusiveGateway)) and len(node.incoming) > 1
 
 
@@ -126,7 +132,7 @@ def _scope_opened(state: RunState, record: r.ScopeOpened) -> None:
         assert isinstance(element, (Process, SubProcess))
         container = element
     depth = parent.depth + 1 if parent is not None else 0
-    scope = Scope(record.scope, container, parent, owner, depth)
+    scope = Scope(record.scope, container, parent, owner, depth, state.shared)
     state.scopes[record.scope] = scope
     state.last_scope = record.scope
     if owner is not None:
@@ -137,8 +143,17 @@ def _scope_opened(state: RunState, record: r.ScopeOpened) -> None:
 
 def _scope_closed(state: RunState, record: r.ScopeClosed) -> None:
     scope = state.scopes.pop(record.scope)
+    for wait in list(scope.waits.values()) if scope.waits is not None else ():
+        _end_wait(state, wait)
     if scope.owner is not None:
         scope.owner.inner = None
+
+
+def _scope_interrupted(state: RunState, record: r.ScopeInterrupted) -> None:
+    scope = state.scopes[record.scope]
+    scope.interrupted = True
+    for wait in list(scope.waits.values()) if scope.waits is not None else ():
+        _end_wait(state, wait)
 
 
 def _token_entered(state: RunState, record: r.TokenEntered) -> None:
@@ -149,7 +164,7 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         element = state.mission.elements[record.flow]
         assert isinstance(element, SequenceFlow)
         flow = element
-    token = Token(record.token, node, scope, flow)
+    token = Token(record.token, node, scope, flow, instance=record.instance)
     state.tokens[record.token] = token
     scope.tokens[record.token] = token
     state.last_token = max(state.last_token, record.token)
@@ -158,6 +173,39 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         if join is None:
             join = scope.joins[node] = Join()
         join.by_flow.setdefault(flow, []).append(token)
+    elif flow is None and isinstance(scope.container, AdHocSubProcess) and scope.loop is None:
+        scope.begun[node] = None
+        if scope.chosen and scope.chosen[0] is node:
+            scope.chosen.pop(0)
+    elif isinstance(node, Activity) and node.start_quantity > 1 and record.instance is None:
+        scope.gathered.setdefault(node, []).append(token)
+
+
+def _gateway_activated(state: RunState, record: r.GatewayActivated) -> None:
+    node = _node(state, record.element)
+    used = tuple(flow for flow in node.incoming if flow.id in record.flows)
+    state.scopes[record.scope].activated[node] = used
+
+
+def _gateway_reset(state: RunState, record: r.GatewayReset) -> None:
+    del state.scopes[record.scope].activated[_node(state, record.element)]
+
+
+def _activities_chosen(state: RunState, record: r.ActivitiesChosen) -> None:
+    state.scopes[record.scope].chosen = [_node(state, element) for element in record.elements]
+
+
+def _tokens_gathered(state: RunState, record: r.TokensGathered) -> None:
+    _no_longer_gathered(state.tokens[record.token])
+
+
+def _no_longer_gathered(token: Token) -> None:
+    gathered = token.scope.gathered
+    waiting = gathered.get(token.node)
+    if waiting is not None and token in waiting:
+        waiting.remove(token)
+        if not waiting:
+            del gathered[token.node]
 
 
 def _token_left(state: RunState, record: r.TokenLeft) -> None:
@@ -175,6 +223,8 @@ def _token_left(state: RunState, record: r.TokenLeft) -> None:
             del join.by_flow[token.flow]
             if not join.by_flow:
                 del scope.joins[token.node]
+    elif scope.gathered:
+        _no_longer_gathered(token)
 
 
 # --- behaviors, prompts, services ---------------------------------------------------------------
@@ -278,14 +328,27 @@ def _service_ended(state: RunState, record: r.ServiceEnded | r.ServiceWithdrawn)
 
 
 def _data_written(state: RunState, record: r.DataWritten) -> None:
-    state.scopes[record.store].data[record.key] = record.value
+    if not record.own:
+        store = state.scopes[record.store].data if record.store else state.shared.data
+        store[record.key] = record.value
+        return
+    token = state.tokens[record.own]
+    if token.own is None:
+        token.own = {}
+    token.own[record.key] = record.value
 
 
 def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
-    token = state.tokens[record.token]
+    holder: Token | Scope
+    if record.token:
+        holder = token = state.tokens[record.token]
+        scope = token.scope
+    else:
+        holder, token, scope = state.scopes[record.scope], None, state.scopes[record.scope]
     wait = Wait(
         record.wait,
         token,
+        scope,
         _node(state, record.element),
         record.trigger,
         record.ref,
@@ -296,9 +359,9 @@ def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
     )
     state.last_wait = record.wait
     state.waits[wait.id] = wait
-    if token.waits is None:
-        token.waits = {}
-    token.waits[wait.id] = wait
+    if holder.waits is None:
+        holder.waits = {}
+    holder.waits[wait.id] = wait
     if wait.trigger is r.Trigger.TIMER:
         heappush(state.dates if wait.calendar else state.timers, (wait.due_us, wait.id))
     else:
@@ -307,8 +370,9 @@ def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
 
 def _end_wait(state: RunState, wait: Wait) -> None:
     del state.waits[wait.id]
-    assert wait.token.waits is not None
-    del wait.token.waits[wait.id]
+    waits = wait.token.waits if wait.token is not None else wait.scope.waits
+    assert waits is not None
+    del waits[wait.id]
     if wait.trigger is r.Trigger.TIMER:
         heap = state.dates if wait.calendar else state.timers
         while heap and heap[0][1] not in state.waits:
@@ -329,14 +393,14 @@ def _event_triggered(state: RunState, record: r.EventTriggered) -> None:
     _end_wait(state, wait)
     if record.kept:
         letters = state.mailbox[wait.ref]
-        letters.pop(0)
+        letters.pop(record.letter)
         if not letters:
             del state.mailbox[wait.ref]
 
 
 def _message_thrown(state: RunState, record: r.MessageThrown) -> None:
     if record.kept:
-        state.mailbox.setdefault(record.message, []).append(record.data)
+        state.mailbox.setdefault(record.message, []).append(Letter(record.data, record.keys))
 
 
 _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
@@ -354,9 +418,14 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.GeometryReceived: _geometry_received,
     r.ScopeOpened: _scope_opened,
     r.ScopeClosed: _scope_closed,
+    r.ScopeInterrupted: _scope_interrupted,
     r.TokenEntered: _token_entered,
     r.TokenLeft: _token_left,
     r.FlowTaken: _nothing,
+    r.ActivitiesChosen: _activities_chosen,
+    r.TokensGathered: _tokens_gathered,
+    r.GatewayActivated: _gateway_activated,
+    r.GatewayReset: _gateway_reset,
     r.BehaviorRequested: _behavior_requested,
     r.BehaviorProgressed: _behavior_progressed,
     r.BehaviorCancelRequested: _behavior_cancel_requested,

@@ -9,7 +9,7 @@ from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
 from m2pem.engine.reports import give_up
 from m2pem.engine.state import BehaviorPhase
-from m2pem.engine.waiting import throw_signal
+from m2pem.engine.triggering import throw_signal
 
 
 def taken(x: Execution, item: i.ControlTaken) -> None:

@@ -1,50 +1,126 @@
 """Reading and writing the data store (docs/missions.md, "Data").
 
-Every scope may hold values. A name belongs to the nearest enclosing scope that declares it, for
-reads as for writes, else to the process instance; no further: a called process has its own store.
+Every scope may hold values, and so may the activity that a token is on (its item variable, its
+data inputs and outputs). A name belongs to the nearest of them that declares it, outwards from
+where it is used, for reads as for writes, else to the process instance; no further: a called
+process has its own store. Only what a data store holds is shared by all processes of a run.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import TypeAlias
 
-from m2pem.engine.state import Scope
-from m2pem.model.elements import Process
+from m2pem.engine.state import Loop, Scope, Shared, Token
+from m2pem.model.elements import Activity, Process
 from m2pem.model.values import ReadValue, Value
 
+Place: TypeAlias = Token | Scope
+"""Where a name is used."""
 
-def _stores(scope: Scope, name: str) -> Iterator[Scope]:
-    """Where a name may be: outwards to the scope that declares it, else to the process."""
-    current: Scope | None = scope
+Store: TypeAlias = Place | Shared
+"""Where a name is held."""
+
+LOOP_COUNTER = "loopCounter"
+"""Which instance this is, from 0 (BPMN 2.0.2, table 10.28)."""
+
+
+def _number_of_instances(loop: Loop) -> int:
+    return loop.total if loop.total >= 0 else loop.started
+
+
+INSTANCE_COUNTS: dict[str, Callable[[Loop], int]] = {
+    "numberOfInstances": _number_of_instances,
+    "numberOfActiveInstances": lambda loop: loop.started - loop.completed,
+    "numberOfCompletedInstances": lambda loop: loop.completed,
+}
+"""What the conditions of a multi-instance activity may read (table 10.31)."""
+
+
+def _outwards(place: Place) -> Iterator[Store]:
+    """What encloses a place: its token, the scope, the token on the activity around it, ..."""
+    current: Place | None = place
     while current is not None:
         yield current
-        container = current.container
-        if isinstance(container, Process):
+        if type(current) is Token:
+            current = current.scope
+            continue
+        assert isinstance(current, Scope)
+        if current.loop is None and isinstance(current.container, Process):
+            if current.shared.keys:
+                yield current.shared
             return
-        for declared in container.data:
-            if name == declared.key or name.startswith(f"{declared.key}."):
-                return
-        current = current.parent
+        current = current.owner
 
 
-def reader(scope: Scope) -> ReadValue:
-    """Reads names as an element in `scope` sees them; a missing name is None."""
+def _holds(place: Store, name: str) -> bool:
+    """Whether a value is there under exactly this name."""
+    if type(place) is Token:
+        return (place.own is not None and name in place.own) or (
+            place.instance is not None and name == LOOP_COUNTER
+        )
+    if isinstance(place, Shared):
+        return name in place.data
+    assert isinstance(place, Scope)
+    return name in place.data or (place.loop is not None and name in INSTANCE_COUNTS)
+
+
+def _value(place: Store, name: str) -> Value:
+    if type(place) is Token:
+        if place.own is not None and name in place.own:
+            return place.own[name]
+        return place.instance
+    if isinstance(place, Shared):
+        return place.data[name]
+    assert isinstance(place, Scope)
+    if place.loop is not None and name in INSTANCE_COUNTS:
+        return INSTANCE_COUNTS[name](place.loop)
+    return place.data[name]
+
+
+def _declares(place: Store, name: str) -> bool:
+    """Whether the name, or the name that it begins with, is this place's own."""
+    if type(place) is Token:
+        node = place.node
+        declared_here = node.own_data if isinstance(node, Activity) else ()
+        if place.own is None and not declared_here:
+            return False
+        head = name.partition(".")[0]
+        own = place.own or ()
+        return name in own or head in own or name in declared_here or head in declared_here
+    if isinstance(place, Shared):
+        return name in place.keys or any(name.startswith(f"{key}.") for key in place.keys)
+    assert isinstance(place, Scope)
+    if place.loop is not None:
+        return False
+    return any(
+        name == declared.key or name.startswith(f"{declared.key}.")
+        for declared in place.container.data
+    )
+
+
+def reader(place: Place) -> ReadValue:
+    """Reads names as an element sees them whose token, or scope, this is; a missing one is None."""
 
     def read(name: str) -> Value:
-        for store in _stores(scope, name):
-            if name in store.data:
-                return store.data[name]
-        return _entry_of_map(scope, name)
+        for each in _outwards(place):
+            if _holds(each, name):
+                return _value(each, name)
+            if _declares(each, name):
+                break
+        return _entry_of_map(place, name)
 
     return read
 
 
-def _entry_of_map(scope: Scope, name: str) -> Value:
+def _entry_of_map(place: Place, name: str) -> Value:
     """`item.pose.x` of a map that is stored whole under `item`."""
     head, dot, tail = name.rpartition(".")
     while dot:
-        for store in _stores(scope, head):
-            value = store.data.get(head)
+        for each in _outwards(place):
+            value = _value(each, head) if _holds(each, head) else None
             if isinstance(value, dict):
                 return _descend(value, tail)
+            if _declares(each, head):
+                break
         head, dot, rest = head.rpartition(".")
         tail = f"{rest}.{tail}"
     return None
@@ -58,10 +134,15 @@ def _descend(value: Value, path: str) -> Value:
     return value
 
 
-def store_for(scope: Scope, key: str) -> Scope:
-    """Where a write goes: the nearest scope that declares the name, else the process instance."""
-    *_, outermost = _stores(scope, key)
-    return outermost
+def store_for(place: Place, key: str) -> Store:
+    """Where a write goes: the nearest place that declares the name, else the process instance."""
+    process: Store = place
+    for each in _outwards(place):
+        if _declares(each, key):
+            return each
+        if isinstance(each, Scope):
+            process = each
+    return process
 
 
 def flatten(key: str, value: Value) -> Iterator[tuple[str, Value]]:

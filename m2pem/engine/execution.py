@@ -6,17 +6,18 @@ Every change is a record that is applied at once, so that what is decided next s
 """
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from m2pem.engine import records as r
 from m2pem.engine.apply import apply
-from m2pem.engine.data import flatten, store_for
+from m2pem.engine.data import Store, flatten, store_for
 from m2pem.engine.records import Record, TokenOutcome
 from m2pem.engine.state import RunState, Scope, Token
 from m2pem.model.elements import (
     CallActivity,
     EndEvent,
     Event,
+    EventBasedGateway,
     FlowNode,
     IntermediateThrowEvent,
     Mission,
@@ -24,7 +25,7 @@ from m2pem.model.elements import (
     SequenceFlow,
     StartEvent,
 )
-from m2pem.model.events import MessageEventDefinition
+from m2pem.model.events import EventDefinition, MessageEventDefinition
 from m2pem.model.upstream import upstream
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
@@ -61,7 +62,7 @@ class Execution:
         self.process_ids = [node.container.process.id for node in self.mission.nodes]
         self._reach: dict[FlowNode, dict[FlowNode, int]] = {}
         self._receivable: frozenset[str] | None = None
-        self._triggered_starts: tuple[StartEvent, ...] | None = None
+        self._triggered_starts: tuple[FlowNode, ...] | None = None
 
     def emit(self, record: Record) -> None:
         """State a fact, and let it take effect."""
@@ -91,10 +92,11 @@ class Execution:
         return self._receivable
 
     @property
-    def triggered_starts(self) -> tuple[StartEvent, ...]:
-        """Start events of processes that neither the run began with nor a call activity calls.
+    def triggered_starts(self) -> tuple[FlowNode, ...]:
+        """What begins the processes that neither the run began with nor a call activity calls.
 
-        Each trigger of theirs makes an instance (docs/missions.md).
+        Their typed start events, instantiating receive tasks, and the events behind instantiating
+        event-based gateways. Each trigger of theirs makes an instance (docs/missions.md).
         """
         if self._triggered_starts is None:
             assert self.state.root is not None
@@ -106,15 +108,20 @@ class Execution:
                 start
                 for process in self.mission.processes
                 if process not in elsewhere
-                for start in process.starts
-                if start.definitions
+                for entry in process.entries
+                for start in _triggered(entry)
             )
         return self._triggered_starts
 
     # --- tokens ---------------------------------------------------------------------------------
 
     def enter(
-        self, token: int, node: FlowNode, scope: Scope, flow: SequenceFlow | None = None
+        self,
+        token: int,
+        node: FlowNode,
+        scope: Scope,
+        flow: SequenceFlow | None = None,
+        instance: int | None = None,
     ) -> Token:
         """Put a token on a node, and have it executed in its turn."""
         self.emit(
@@ -124,6 +131,7 @@ class Execution:
                 node.id,
                 scope.id,
                 flow.id if flow is not None else "",
+                instance,
             )
         )
         entered = self.state.tokens[token]
@@ -139,7 +147,14 @@ class Execution:
         """Take a token off its node. It is consumed unless it is entered elsewhere next."""
         node = token.node
         self.emit(
-            r.TokenLeft(token.id, self.process_ids[node.index], node.id, token.scope.id, outcome)
+            r.TokenLeft(
+                token.id,
+                self.process_ids[node.index],
+                node.id,
+                token.scope.id,
+                outcome,
+                token.instance,
+            )
         )
         self.moved.add(token.scope.id)
 
@@ -167,12 +182,16 @@ class Execution:
     def write(self, token: Token, key: str, value: Value) -> None:
         """Write a value as the element that the token is on."""
         for name, item in flatten(key, value):
-            store = store_for(token.scope, name)
-            self.write_into(store, token, name, item)
+            self.write_into(store_for(token, name), token, name, item)
 
-    def write_into(self, store: Scope, token: Token, key: str, value: Value) -> None:
-        """Write one value into a given scope's store."""
+    def write_into(self, place: Store, token: Token, key: str, value: Value) -> None:
+        """Write one value into the store of a given scope, or of a token's activity."""
         node = token.node
+        own = 0
+        if type(place) is Token:
+            store, own = place.scope.id, place.id
+        else:
+            store = place.id if isinstance(place, Scope) else 0
         self.emit(
             r.DataWritten(
                 token.id,
@@ -181,7 +200,8 @@ class Execution:
                 token.scope.id,
                 key,
                 value,
-                store.id,
+                store,
+                own,
             )
         )
 
@@ -191,12 +211,25 @@ class Execution:
             self.write(token, key, value)
 
 
+def definitions_of(node: FlowNode) -> Sequence[EventDefinition]:
+    """What triggers a catch event or receive task."""
+    if isinstance(node, ReceiveTask):
+        return (MessageEventDefinition(node.line, node.message),) if node.message else ()
+    return node.definitions if isinstance(node, Event) else ()
+
+
+def _triggered(entry: FlowNode) -> Sequence[FlowNode]:
+    if isinstance(entry, EventBasedGateway):
+        return [flow.target for flow in entry.outgoing]
+    if isinstance(entry, StartEvent):
+        return [entry] if entry.definitions else []
+    return [entry] if isinstance(entry, ReceiveTask) and entry.instantiate else []
+
+
 def _caught_messages(mission: Mission) -> Iterator[str]:
     for node in mission.nodes:
-        if isinstance(node, ReceiveTask):
-            if node.message is not None:
-                yield node.message.id
-        elif isinstance(node, Event) and not isinstance(node, EndEvent | IntermediateThrowEvent):
-            for definition in node.definitions:
-                if isinstance(definition, MessageEventDefinition):
-                    yield definition.message.id
+        if isinstance(node, EndEvent | IntermediateThrowEvent):
+            continue
+        for definition in definitions_of(node):
+            if isinstance(definition, MessageEventDefinition):
+                yield definition.message.id

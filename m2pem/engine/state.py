@@ -25,11 +25,21 @@ class RunStatus(StrEnum):
 
 
 @dataclass(slots=True, eq=False)
+class Shared:
+    """The data stores of a run, which all its processes share (BPMN 2.0.2, clause 10.4.1)."""
+
+    keys: frozenset[str]
+    data: dict[str, Value] = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
 class Scope:
     """An instance of a container: a process or a subprocess.
 
     `owner` is the token on the activity in `parent`; both None for a process that nobody called.
-    `joins` are the tokens waiting at each join, by the flow that they came by.
+    `joins` are the tokens waiting at each join, by the flow that they came by. `waits` are the
+    start events of its event subprocesses. `loop`: it holds the instances of a loop or
+    multi-instance activity, which is the owner's; its container is then the activity's own.
     """
 
     id: int
@@ -37,9 +47,37 @@ class Scope:
     parent: "Scope | None"
     owner: "Token | None"
     depth: int
+    shared: Shared
     tokens: "dict[int, Token]" = field(default_factory=dict)
     data: dict[str, Value] = field(default_factory=dict)
     joins: "dict[FlowNode, Join]" = field(default_factory=dict)
+    waits: "dict[int, Wait] | None" = None
+    loop: "Loop | None" = None
+    gathered: "dict[FlowNode, list[Token]]" = field(default_factory=dict)
+    """Tokens at activities that several must begin, and that have not begun."""
+    activated: "dict[FlowNode, tuple[SequenceFlow, ...]]" = field(default_factory=dict)
+    """Complex gateways that wait to reset, and the flows whose tokens activated them."""
+    chosen: "list[FlowNode]" = field(default_factory=list)
+    """Of an ad-hoc subprocess: what is to begin, and has not."""
+    begun: "dict[FlowNode, None]" = field(default_factory=dict)
+    """Of an ad-hoc subprocess: what was begun by choice."""
+    interrupted: bool = False
+    """An interrupting event subprocess of it has begun: no other one can."""
+
+
+@dataclass(slots=True, eq=False)
+class Loop:
+    """How far the instances of an activity have come (BPMN 2.0.2, table 10.31).
+
+    `total`: instances there will be, -1 while nobody knows (a standard loop). `items`: what each
+    reads, when they come from a collection. `outputs`: what each gave, by instance.
+    """
+
+    total: int
+    items: tuple[Value, ...] | None
+    started: int = 0
+    completed: int = 0
+    outputs: dict[int, Value] = field(default_factory=dict)
 
 
 @dataclass(slots=True, eq=False)
@@ -54,6 +92,8 @@ class Token:
     """A token on a flow node. `flow`: how it came. A move makes a new object with the same id.
 
     At most one of `behavior`, `prompt`, `service` and `inner` is set: what its activity does.
+    `instance`: which instance of a loop or multi-instance activity it is, from 0; None: none.
+    `own`: data of the activity itself (item variable, data inputs and outputs); None: nothing.
     """
 
     id: int
@@ -65,17 +105,22 @@ class Token:
     prompt: str = ""
     service: str = ""
     inner: Scope | None = None
+    instance: int | None = None
+    own: dict[str, Value] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wait:
-    """A catch event armed for a token: at its own node, or at a boundary event of it.
+    """A catch event that is armed.
 
-    Fields as in record `EventAwaited`.
+    `token` waits: at its own node, at a boundary event of it, or at an event behind the
+    event-based gateway that it is on. None: the start event of an event subprocess of `scope`.
+    Other fields as in record `EventAwaited`.
     """
 
     id: int
-    token: Token
+    token: Token | None
+    scope: Scope
     node: FlowNode
     trigger: Trigger
     ref: str
@@ -137,6 +182,14 @@ class Service:
     properties: dict[str, Value]
 
 
+@dataclass(frozen=True, slots=True)
+class Letter:
+    """A message that nobody took yet: what it carries, and its correlation keys."""
+
+    data: dict[str, Value]
+    keys: dict[str, Value]
+
+
 @dataclass(slots=True, eq=False)
 class RunState:
     """A whole run. Times are microseconds: `_us` since the Unix epoch unless said otherwise."""
@@ -159,6 +212,7 @@ class RunState:
     last_prompt: int = 0
     last_service: int = 0
 
+    shared: Shared = field(init=False)
     root: Scope | None = None
     scopes: dict[int, Scope] = field(default_factory=dict)
     tokens: dict[int, Token] = field(default_factory=dict)
@@ -177,7 +231,7 @@ class RunState:
     """Heap of (due mission time, wait); waits that are over may still be in it, but not first."""
     dates: list[tuple[int, int]] = field(default_factory=list)
     """Heap of (due time since the Unix epoch, wait); likewise."""
-    mailbox: dict[str, list[dict[str, Value]]] = field(default_factory=dict)
+    mailbox: dict[str, list[Letter]] = field(default_factory=dict)
     """Messages that nobody was waiting for yet, by message id; first come first."""
 
     geometries: dict[str, dict[str, Value]] = field(default_factory=dict)
@@ -185,6 +239,9 @@ class RunState:
     yielded: tuple[int, ...] = ()
     seen: dict[str, None] = field(default_factory=dict)
     """Ids of inputs that carried one."""
+
+    def __post_init__(self) -> None:
+        self.shared = Shared(self.mission.data_stores)
 
     def mission_time_us(self, now_us: int) -> int:
         """Microseconds from the start of the run, not counting pauses."""

@@ -3,9 +3,8 @@
 from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
 from m2pem.engine.interruption import end_run
-from m2pem.engine.nodes import EXECUTE
-from m2pem.engine.nodes.containers import look_at
-from m2pem.engine.nodes.gateways import fire_inclusive_joins
+from m2pem.engine.nodes import EXECUTE, look_at
+from m2pem.engine.nodes.joins import fire_joins
 from m2pem.engine.records import Record, RunOutcome
 from m2pem.engine.state import RunState, RunStatus, Scope, Token
 from m2pem.resources.fleet import Fleet
@@ -46,7 +45,7 @@ class Steps(Execution):
                 else:
                     assert isinstance(item, Scope)
                     look_at(self, item)
-            if not fire_inclusive_joins(self):
+            if not fire_joins(self):
                 return
 
     def _is_there(self, item: Token | Scope) -> bool:

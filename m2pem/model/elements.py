@@ -9,11 +9,13 @@ Names are those of BPMN 2.0.2, chapter 10.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import TypeAlias, Union
 
 from m2pem.findings import Finding
 from m2pem.model.behavior import Behavior, Mappings, Prompt, Script, ServiceCall
 from m2pem.model.events import (
+    CorrelationProperty,
     Error,
     Escalation,
     EventDefinition,
@@ -21,6 +23,7 @@ from m2pem.model.events import (
     Signal,
 )
 from m2pem.model.expression import Expression
+from m2pem.model.loops import MultiInstance, StandardLoop
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +86,11 @@ class Process(Element):
     entries: tuple[FlowNode, ...] = field(init=False, repr=False, default=())
     """What gets a token when the container begins (clause 13.2): the start events; without any,
     every node without an incoming flow, boundary events excepted. Empty: nothing to do."""
+    subscription: Mapping[str, Expression] = field(init=False, repr=False, default_factory=dict)
+    """By correlation property, what its instances take messages for (clause 8.4.2)."""
+    event_subprocesses: "tuple[SubProcess, ...]" = field(init=False, repr=False, default=())
+    """Those directly in it, in the order of the XML (clause 13.5.4); they have no token of their
+    own until their start event is triggered."""
 
     @property
     def process(self) -> "Process":
@@ -100,10 +108,24 @@ class Process(Element):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Activity(FlowNode):
-    """Work (clause 10.3). `boundary`: events attached to it, in the order of the XML."""
+    """Work (clause 10.3, tables 10.3 and 10.5).
+
+    `boundary`: events attached to it, in the order of the XML. `data_flow`: what passes between
+    the data around it and its own data inputs and outputs (clause 10.4.2). `start_quantity`
+    tokens begin it, `completion_quantity` leave by each flow. `for_compensation`: it runs only
+    to undo the activity whose `compensation` it is.
+    """
 
     default: SequenceFlow | None = field(init=False, repr=False, default=None)
     boundary: "tuple[BoundaryEvent, ...]" = field(init=False, repr=False, default=())
+    loop: StandardLoop | MultiInstance | None = field(init=False, repr=False, default=None)
+    data_flow: Mappings = field(init=False, repr=False, default=Mappings())
+    own_data: frozenset[str] = field(init=False, repr=False, default=frozenset())
+    """Keys of its data inputs, data outputs and properties: what only it sees."""
+    start_quantity: int = field(init=False, repr=False, default=1)
+    completion_quantity: int = field(init=False, repr=False, default=1)
+    for_compensation: bool = field(init=False, repr=False, default=False)
+    compensation: "Activity | None" = field(init=False, repr=False, default=None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,10 +170,16 @@ class SendTask(Activity):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class BusinessRuleTask(ServiceTask):
+    """A service task whose service decides by business rules (clause 10.3.3)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class ReceiveTask(Activity):
-    """Waits for a message."""
+    """Waits for a message; with `instantiate`, the message begins a process (clause 10.3.3)."""
 
     message: Message | None = None
+    instantiate: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -165,14 +193,20 @@ class CallActivity(Activity):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SubProcess(Activity):
-    """An embedded subprocess (clause 10.3.5); sees its parent's data."""
+    """An embedded subprocess (clause 10.3.5); sees its parent's data.
 
+    `triggered_by_event`: an event subprocess; it has no flows and one typed start event.
+    """
+
+    triggered_by_event: bool = False
     nodes: tuple[FlowNode, ...] = field(init=False, repr=False, default=())
     flows: tuple[SequenceFlow, ...] = field(init=False, repr=False, default=())
     data: tuple[DataObject, ...] = field(init=False, repr=False, default=())
     entries: tuple[FlowNode, ...] = field(init=False, repr=False, default=())
     """What gets a token when the container begins (clause 13.2): the start events; without any,
     every node without an incoming flow, boundary events excepted. Empty: nothing to do."""
+    event_subprocesses: "tuple[SubProcess, ...]" = field(init=False, repr=False, default=())
+    """As for a process."""
 
     @property
     def process(self) -> Process:
@@ -186,6 +220,33 @@ class SubProcess(Activity):
     def starts(self) -> "tuple[StartEvent, ...]":
         """Start events directly in this container, in the order of the XML."""
         return tuple(node for node in self.nodes if isinstance(node, StartEvent))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Transaction(SubProcess):
+    """A subprocess that a cancel end event in it undoes (clauses 10.3.5 and 13.3.4)."""
+
+
+class AdHocOrdering(StrEnum):
+    """How many activities of an ad-hoc subprocess may run at a time (table 10.22)."""
+
+    PARALLEL = "Parallel"
+    SEQUENTIAL = "Sequential"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AdHocSubProcess(SubProcess):
+    """A subprocess whose activities are begun by choice (clauses 10.3.5 and 13.3.5).
+
+    `completion` is asked after each activity; None: it ends when nothing more is chosen.
+    `active_elements` gives the ids to begin instead of an operator's choice; None: operators
+    choose.
+    """
+
+    ordering: AdHocOrdering = AdHocOrdering.PARALLEL
+    completion: Expression | None = None
+    cancel_remaining: bool = True
+    active_elements: Expression | None = None
 
 
 Container: TypeAlias = Union[Process, SubProcess]
@@ -219,19 +280,51 @@ class ParallelGateway(Gateway):
     """Waits for every incoming flow, takes every outgoing one (clause 10.6.4)."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ComplexGateway(Gateway):
+    """Joins when `activation` says so, then waits to reset (clause 10.6.5, table 13.5).
+
+    `activation` reads the data, `activationCount` (incoming flows that have a token) and the
+    number of tokens on each incoming flow by the flow's id; None: any token activates it.
+    Conditions of its outgoing flows may also read `waitingForStart`.
+    """
+
+    default: SequenceFlow | None = field(init=False, repr=False, default=None)
+    activation: Expression | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EventBasedGateway(Gateway):
+    """Waits for the first of the events behind it (clause 10.6.6).
+
+    `instantiate`: those events begin the process. `parallel` (only then): all of them must come.
+    """
+
+    instantiate: bool = False
+    parallel: bool = False
+
+
 # --- events -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Event(FlowNode):
-    """An event (clause 10.5). No definition: a none event."""
+    """An event (clause 10.5). No definition: a none event; several: a multiple event.
+
+    `parallel_multiple`: all definitions of a catch event must be triggered, not one of them.
+    `data_flow`: what passes into what it throws, or out of what it catches (clause 10.4.2).
+    """
 
     definitions: tuple[EventDefinition, ...] = ()
+    parallel_multiple: bool = False
+    data_flow: Mappings = field(init=False, repr=False, default=Mappings())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StartEvent(Event):
-    """Where a container's tokens begin."""
+    """Where a container's tokens begin. `interrupting`: of an event subprocess only."""
+
+    interrupting: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -241,12 +334,16 @@ class EndEvent(Event):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IntermediateCatchEvent(Event):
-    """Waits for its trigger."""
+    """Waits for its trigger. `linked_from`: a link target, and the link sources that lead to it."""
+
+    linked_from: "tuple[IntermediateThrowEvent, ...]" = field(init=False, repr=False, default=())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IntermediateThrowEvent(Event):
-    """Throws, and goes on."""
+    """Throws, and goes on. `links_to`: a link source, and where it leads (table 10.98)."""
+
+    links_to: "IntermediateCatchEvent | None" = field(init=False, repr=False, default=None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -309,6 +406,9 @@ class Mission:
     """Processes, flow nodes and sequence flows by id."""
     associated: frozenset[str] = frozenset()
     """Keys that data output associations name as written; without an effect on execution."""
+    data_stores: frozenset[str] = frozenset()
+    """Keys of the data stores, which all processes of a run share (clause 10.4.1)."""
+    correlation_properties: tuple[CorrelationProperty, ...] = ()
 
     def process(self, process_id: str | None = None) -> Process:
         """The process a run begins with: the one named, else the file's main one.

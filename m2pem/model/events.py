@@ -1,5 +1,6 @@
 """Event definitions and the root elements they refer to (BPMN 2.0.2, clauses 8.4 and 10.5.5)."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -28,9 +29,23 @@ class Signal(RootElement):
 
 @dataclass(frozen=True, slots=True)
 class Message(RootElement):
-    """Something sent to one receiver (clause 8.4.11). `from_operator` as for signals."""
+    """Something sent to one receiver (clause 8.4.11). `from_operator` as for signals.
+
+    `correlation_key`: what sender and receiver must agree on, each by its own data; None: nothing.
+    """
 
     from_operator: bool = False
+    correlation_key: Expression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CorrelationProperty(RootElement):
+    """What messages are matched by (clause 8.4.2).
+
+    `retrieve`: by message id, where a message carries it, as an expression over what it carries.
+    """
+
+    retrieve: Mapping[str, Expression]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,3 +112,34 @@ class TimerEventDefinition(EventDefinition):
 @dataclass(frozen=True, slots=True)
 class TerminateEventDefinition(EventDefinition):
     """Ends its own scope at once (clause 13.5.6)."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionalEventDefinition(EventDefinition):
+    """Triggered when the condition becomes true (table 10.95)."""
+
+    condition: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class LinkEventDefinition(EventDefinition):
+    """Joins a source to the target of the same name in one container (table 10.98)."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class CancelEventDefinition(EventDefinition):
+    """Cancels a transaction, or catches that it was cancelled (clause 10.5.6)."""
+
+
+@dataclass(frozen=True, slots=True)
+class CompensateEventDefinition(EventDefinition):
+    """Undoes completed activities (table 10.94, clause 13.5.5).
+
+    `activity`: the id of the one to undo, "" for all of the scope. `wait`: the throwing event
+    waits until that is done.
+    """
+
+    activity: str = ""
+    wait: bool = True

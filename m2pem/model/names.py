@@ -5,8 +5,13 @@ from dataclasses import dataclass, field
 
 from m2pem.findings import Finding, Severity
 from m2pem.model.behavior import Assignment, Parameter
+from m2pem.model.behavior import Mapping as DataMapping
+from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.elements import (
+    Activity,
+    AdHocSubProcess,
     CallActivity,
+    ComplexGateway,
     Event,
     FlowNode,
     Mission,
@@ -58,9 +63,19 @@ def unwritten(
     for node in mission.nodes:
         store = stores[node.container.process]
         store.reads += _reads(node)
+        for mapping in _data_mappings(node):
+            store.written.add(mapping.target)
         _note_writes(node, store, service_writes)
         if isinstance(node, CallActivity):
             _note_mappings(node, store, stores[node.called])
+    shared = {
+        name
+        for store in stores.values()
+        for name in store.written
+        if name in mission.data_stores or name.partition(".")[0] in mission.data_stores
+    }
+    for store in stores.values():
+        store.written |= shared
     for process, store in stores.items():
         yield from _findings(mission, process, store)
 
@@ -81,10 +96,26 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
                 f"'{name}' is read, but nothing in process '{process.id}' writes it; unless "
                 "--data or an operator does, it is null",
                 did_you_mean(name, store.written, "write it in a task before, or pass it in"),
+                code("unwritten-name"),
             )
 
 
+def _data_mappings(node: FlowNode) -> Iterator[DataMapping]:
+    if isinstance(node, Activity | Event):
+        yield from node.data_flow.inputs
+        yield from node.data_flow.outputs
+
+
 def _reads(node: FlowNode) -> Iterator[Read]:
+    for mapping in _data_mappings(node):
+        if mapping.source.text not in mapping.source.names:  # a copy may well copy nothing
+            yield Read(mapping.source, node.id, mapping.line)
+    if isinstance(node, AdHocSubProcess):
+        for expression in (node.completion, node.active_elements):
+            if expression is not None:
+                yield Read(expression, node.id, node.line)
+    if isinstance(node, ComplexGateway) and node.activation is not None:
+        yield Read(node.activation, node.id, node.line)
     for flow in node.outgoing:
         if flow.condition is not None:
             yield Read(flow.condition, flow.id, flow.line)
@@ -119,6 +150,9 @@ def _note_writes(
                 store.written.add(statement.key)
     elif isinstance(node, UserTask) and node.prompt is not None:
         store.written.add(node.prompt.store)
+    elif isinstance(node, ComplexGateway):
+        store.written |= {"activationCount", "waitingForStart"}
+        store.written.update(flow.id for flow in node.incoming)
     elif isinstance(node, ServiceTask) and node.call is not None:
         writes = service_writes.get(node.call.service)
         if writes is None:

@@ -2,14 +2,15 @@
 
 from collections import OrderedDict
 
-from m2pem.model.elements import BoundaryEvent, FlowNode
+from m2pem.model.elements import FlowNode
+from m2pem.model.reach import preceding
 
 
 def upstream(join: FlowNode) -> dict[FlowNode, int]:
     """For every node that can reach `join`: a bit mask of the incoming flows it can reach.
 
     Bit n stands for `join.incoming[n]`. Paths do not pass `join` itself. A token on an activity
-    can also go by the boundary events attached to it.
+    can also go by the boundary events attached to it, one on a link source by its target.
     """
     reach: dict[FlowNode, int] = {}
     news: OrderedDict[FlowNode, int] = OrderedDict()  # more for a node goes with what waits
@@ -21,8 +22,6 @@ def upstream(join: FlowNode) -> dict[FlowNode, int]:
         if node is join or not bits:
             continue
         reach[node] = reach.get(node, 0) | bits
-        for before in node.incoming:
-            news[before.source] = news.get(before.source, 0) | bits
-        if isinstance(node, BoundaryEvent):
-            news[node.attached_to] = news.get(node.attached_to, 0) | bits
+        for before in preceding(node):
+            news[before] = news.get(before, 0) | bits
     return reach

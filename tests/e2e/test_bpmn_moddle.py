@@ -1,23 +1,14 @@
-"""Every mission of the repository opens in a BPMN editor, complete and tidy.
+"""Every mission of the repository opens in a BPMN editor, complete and tidy."""
 
-bpmn-moddle is what bpmn-js and Camunda Modeler read and write BPMN with; it also carries the
-OMG's XML schemas. `make setup` installs it under tests/js.
-"""
-
-import json
-import shutil
-import subprocess
-from collections.abc import Iterable, Mapping
-from itertools import pairwise
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 from lxml import etree
 
+from tests.editor import BPMNDI, content, edges, has_symbol, read_with_moddle, schema, symbols
+
 REPOSITORY = Path(__file__).parents[2]
-JS = REPOSITORY / "tests" / "js"
-SCHEMA = JS / "node_modules" / "bpmn-moddle" / "resources" / "bpmn" / "xsd" / "BPMN20.xsd"
 MISSIONS = sorted(
     [
         *(REPOSITORY / "missions").glob("*.bpmn"),
@@ -25,30 +16,9 @@ MISSIONS = sorted(
     ]
 )
 
-BPMN = "{http://www.omg.org/spec/BPMN/20100524/MODEL}"
-BPMNDI = "{http://www.omg.org/spec/BPMN/20100524/DI}"
-DC = "{http://www.omg.org/spec/DD/20100524/DC}"
-DI = "{http://www.omg.org/spec/DD/20100524/DI}"
-
 every_mission = pytest.mark.parametrize(
     "mission", MISSIONS, ids=lambda path: f"{path.parent.name}-{path.stem}"
 )
-
-
-def read_with_moddle(files: Iterable[Path]) -> Mapping[str, Mapping[str, object]]:
-    node = shutil.which("node")
-    if node is None or not SCHEMA.exists():
-        pytest.fail("needs Node.js 18 or newer and the packages of tests/js: run `make setup`")
-    done = subprocess.run(
-        [node, "read_bpmn.mjs", *map(str, files)],
-        cwd=JS,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    results: Mapping[str, Mapping[str, object]] = json.loads(done.stdout)
-    return results
 
 
 @pytest.fixture(scope="module")
@@ -84,10 +54,8 @@ def test_an_editor_that_saves_the_mission_keeps_all_of_it(
 
 @every_mission
 def test_the_mission_is_valid_against_the_schema_of_bpmn(mission: Path) -> None:
-    if not SCHEMA.exists():
-        pytest.fail("needs the packages of tests/js: run `make setup`")
-    schema = etree.XMLSchema(etree.parse(SCHEMA))
-    assert schema.validate(etree.parse(mission)), schema.error_log
+    bpmn = schema()
+    assert bpmn.validate(etree.parse(mission)), bpmn.error_log
 
 
 @every_mission
@@ -108,72 +76,3 @@ def test_no_flow_is_drawn_across_a_symbol(mission: Path) -> None:
         if any(box.meets(*segment) for segment in segments)
     ]
     assert crossings == []
-
-
-def content(root: etree._Element) -> list[tuple[str, str, tuple[tuple[str, str], ...]]]:
-    """All elements with their text and attributes, whatever their order and their spacing."""
-    return sorted(
-        (
-            str(element.tag),
-            " ".join((element.text or "").split()),
-            tuple(sorted((str(k), str(v)) for k, v in element.attrib.items())),
-        )
-        for element in root.iter(etree.Element)
-    )
-
-
-def has_symbol(element: etree._Element) -> bool:
-    """Whether BPMN has a symbol or a line for the element."""
-    tag = str(element.tag).removeprefix(BPMN)
-    return tag in {
-        *("participant", "lane", "sequenceFlow", "messageFlow", "dataObjectReference"),
-        *("dataStoreReference", "dataInputAssociation", "dataOutputAssociation"),
-        *("textAnnotation", "association", "callActivity", "subProcess", "boundaryEvent"),
-    } or tag.endswith(("Task", "task", "Gateway", "Event"))
-
-
-class Box(NamedTuple):
-    """Where a symbol is drawn, in the diagram's units; y grows downwards."""
-
-    left: float
-    top: float
-    right: float
-    bottom: float
-
-    def meets(self, x1: float, y1: float, x2: float, y2: float) -> bool:
-        """Whether a line goes through the inside, not just to the rim; a slanting line counts as
-        the box around it."""
-        return (
-            min(x1, x2) < self.right
-            and max(x1, x2) > self.left
-            and min(y1, y2) < self.bottom
-            and max(y1, y2) > self.top
-        )
-
-
-def symbols(root: etree._Element) -> dict[str, Box]:
-    """The symbols that no line may cross: not pools and lanes, nor subprocesses drawn open."""
-    surfaces = {
-        element.get("id")
-        for tag in ("participant", "lane", "subProcess")
-        for element in root.iter(f"{BPMN}{tag}")
-    }
-    boxes = {}
-    for shape in root.iter(f"{BPMNDI}BPMNShape"):
-        bounds = shape.find(f"{DC}Bounds")
-        if bounds is not None and shape.get("bpmnElement") not in surfaces:
-            x, y, width, height = (float(bounds.get(k, "")) for k in ("x", "y", "width", "height"))
-            boxes[shape.get("bpmnElement", "")] = Box(x, y, x + width, y + height)
-    return boxes
-
-
-def edges(root: etree._Element) -> dict[str, list[tuple[float, float, float, float]]]:
-    """The straight pieces of every line, by the element that the line draws."""
-    lines = {}
-    for edge in root.iter(f"{BPMNDI}BPMNEdge"):
-        points = [
-            (float(point.get("x", "")), float(point.get("y", "")))
-            for point in edge.iter(f"{DI}waypoint")
-        ]
-        lines[edge.get("bpmnElement", "")] = [(*a, *b) for a, b in pairwise(points)]
-    return lines

@@ -46,7 +46,12 @@ def _check_waits(state: RunState) -> None:
     of_tokens = {
         wait.id: wait for token in state.tokens.values() for wait in (token.waits or {}).values()
     }
-    assert of_tokens == state.waits
+    of_scopes = {
+        wait.id: wait for scope in state.scopes.values() for wait in (scope.waits or {}).values()
+    }
+    assert not of_tokens.keys() & of_scopes.keys()
+    assert of_tokens | of_scopes == state.waits
+    assert all(wait.token is None for wait in of_scopes.values())
     for heap in (state.timers, state.dates):
         assert not heap or heap[0][1] in state.waits
     caught = {wait.id: wait for each in state.catchers.values() for wait in each.values()}
@@ -56,7 +61,8 @@ def _check_waits(state: RunState) -> None:
     assert set(caught) <= set(state.waits)
     for (trigger, ref), waits in state.catchers.items():
         assert waits, "nobody catches: absent"
-        assert trigger.value == "signal" or ref not in state.mailbox, "a letter and its catcher"
+        for letter in state.mailbox.get(ref, ()) if trigger.value == "message" else ():
+            assert letter.keys, "a letter and its catcher"
 
 
 def _check_work(state: RunState) -> None:

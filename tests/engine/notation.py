@@ -5,10 +5,18 @@
     start -> fast -> go -> end if speed > 3
     no: fast -> end
 
-* A line with `->` is a chain of sequence flows, named f1, f2, ... or as said before a colon; what
-  follows `if` is the condition of its last flow.
+* A line with `->` is a chain of sequence flows, named f1, f2, ...; a name before a colon is that of
+  the first of them, and what follows `if` is the condition of the last.
+* A line `a ~> b` is an association (from a compensation boundary event to its handler); a line
+  `a => b` a message flow between the processes, which then are pools of a collaboration.
 * An event's text says its definition: `signal S`, `message M`, `error E`, `error`, `escalation X`,
-  `escalation`, `timer PT5S`, `date 2026-...`, `cycle R3/PT5S`, `terminate`.
+  `escalation`, `timer PT5S`, `date 2026-...`, `cycle R3/PT5S`, `conditional x > 3`, `link L`,
+  `compensate`, `compensate A`, `cancel`, `terminate`; several definitions stand between `;`.
+* `<loop testBefore="true" loopMaximum="5">x < 3</loop>` within an activity makes it a standard
+  loop. `<each ATTRIBUTES>3 until x > 1</each>` makes it multi-instance: a cardinality, or `in` and
+  `item`, `out` and `result` (ids of data objects, names of the instance's item) among the
+  attributes; what follows `until` is the completion condition. Both come last in a task, and before
+  its elements in a subprocess.
 * A script task's text is `do BEHAVIOR ROLES PARAMETERS` (roles: `uav1`, `evsg1/ptz`, `team:alpha`,
   with `?` optional), or statements separated by `;`.
 * A service task's is `call SERVICE ROLES PARAMETERS`, a user task's `ask DECISIONS`, a call
@@ -29,8 +37,14 @@ _BPMN = "http://www.omg.org/spec/BPMN/20100524/MODEL"
 _OWN = "https://m2pem.org/schema/1"
 _HEAD = f'<definitions xmlns="{_BPMN}" xmlns:m2pem="{_OWN}" id="defs" targetNamespace="test">'
 
+_LOOP = re.compile(r"<loop\b([^<>]*)>(.*?)</loop>", re.S)
+_EACH = re.compile(r"<each\b([^<>]*)>(.*?)</each>", re.S)
+_LINES = re.compile(r"^\s*(?:([\w-]+):)?\s*([\w-]+)\s*([~=]>)\s*([\w-]+)\s*$", re.M)
 _FLOWS = re.compile(r"^\s*(?:([\w-]+):)?\s*([\w-]+(?:\s*->\s*[\w-]+)+)(?:\s+if\s+(.+))?\s*$", re.M)
-_SHORT = re.compile(r"<(\w+)\b([^<>]*)(?<!/)>([^<>]*\S[^<>]*)</\1>")
+_SHORT = re.compile(
+    r"<(\w+)\b([^<>]*)(?<!/)>([^<]*[^\s<][^<]*?)(<(\w+)Characteristics\b.*?</\5Characteristics>\s*)?</\1>"
+)
+_PARTS = re.compile(r"(?<!&lt)(?<!&gt)(?<!&amp);")
 _TIMES = {"timer": "timeDuration", "date": "timeDate", "cycle": "timeCycle"}
 
 
@@ -43,8 +57,60 @@ def xml(text: str) -> str:
     """The BPMN 2.0 XML of it."""
     if "<process" not in text:
         text = f'<process id="MAIN" isExecutable="true">\n{text}\n</process>'
+    text = _EACH.sub(_multi_instance, _LOOP.sub(_standard_loop, text))
+    text, pools = _lines(text)
     body = _SHORT.sub(_long, _flows(text))
-    return f"{_HEAD}{_roots(body)}{body}</definitions>"
+    return f"{_HEAD}{_roots(body + pools)}{pools}{body}</definitions>"
+
+
+def _lines(text: str) -> tuple[str, str]:
+    """Associations in place, at the ends of their containers; message flows as a collaboration."""
+    number = 0
+    flows = ""
+
+    def line(match: re.Match[str]) -> str:
+        nonlocal number, flows
+        number += 1
+        name, source, arrow, target = match.groups()
+        ends = f'sourceRef="{source}" targetRef="{target}"'
+        if arrow == "~>":
+            name = name or f"tie{number}"
+            return f'<association id="{name}" associationDirection="One" {ends}/>'
+        flows += f'<messageFlow id="{name or f"message{number}"}" {ends}/>'
+        return ""
+
+    text = _LINES.sub(line, text)
+    if not flows:
+        return text, ""
+    pools = "".join(
+        f'<participant id="pool_{process}" name="{process}" processRef="{process}"/>'
+        for process in re.findall(r'<process\b[^>]*\bid="([^"]+)"', text)
+    )
+    return text, f'<collaboration id="pools">{pools}{flows}</collaboration>'
+
+
+def _standard_loop(match: re.Match[str]) -> str:
+    condition = match[2].strip()
+    inside = f"<loopCondition>{escape(condition)}</loopCondition>" if condition else ""
+    tag = "standardLoopCharacteristics"
+    return f"<{tag}{match[1]}>{inside}</{tag}>"
+
+
+def _multi_instance(match: re.Match[str]) -> str:
+    attributes = dict(re.findall(r'([\w:]+)="([^"]*)"', match[1]))
+    cardinality, _, until = (part.strip() for part in f" {match[2]} ".partition(" until "))
+    inside = f"<loopCardinality>{escape(cardinality)}</loopCardinality>" if cardinality else ""
+    for key, tag in (("in", "loopDataInputRef"), ("out", "loopDataOutputRef")):
+        if key in attributes:
+            inside += f"<{tag}>{attributes.pop(key)}</{tag}>"
+    for key, tag in (("item", "inputDataItem"), ("result", "outputDataItem")):
+        if name := attributes.pop(key, ""):
+            inside += f'<{tag} id="{tag}_{name}_{match.start()}" name="{name}"/>'
+    if until:
+        inside += f"<completionCondition>{escape(until)}</completionCondition>"
+    rest = "".join(f' {key}="{value}"' for key, value in attributes.items())
+    tag = "multiInstanceLoopCharacteristics"
+    return f"<{tag}{rest}>{inside}</{tag}>"
 
 
 def _flows(text: str) -> str:
@@ -60,7 +126,7 @@ def _flows(text: str) -> str:
             inside = ""
             if condition and place == len(nodes):
                 inside = f"<conditionExpression>{escape(condition)}</conditionExpression>"
-            identifier = name if name and len(nodes) == 2 else f"{name or 'f'}{number}"
+            identifier = name if name and place == 2 else f"f{number}"
             found.append(
                 f'<sequenceFlow id="{identifier}" sourceRef="{source}" targetRef="{target}">'
                 f"{inside}</sequenceFlow>"
@@ -76,6 +142,8 @@ def _roots(body: str) -> str:
     found = []
     for kind in ("signal", "message", "error", "escalation"):
         for name in dict.fromkeys(re.findall(rf'{kind}Ref="([^"]+)"', body)):
+            if f'<{kind} id="{name}"' in body:
+                continue
             code = f' {kind}Code="{name}"' if kind in ("error", "escalation") else ""
             found.append(f'<{kind} id="{name}" name="{name}"{code}/>')
     return "".join(found)
@@ -84,12 +152,12 @@ def _roots(body: str) -> str:
 def _long(match: re.Match[str]) -> str:
     tag, attributes, text = match[1], match[2], match[3].strip()
     if tag.endswith("Event"):
-        inside = _definition(text)
+        inside = "".join(_definition(part.strip()) for part in _PARTS.split(text))
     elif tag in _INSIDES:
         inside = _INSIDES[tag](text)
     else:
         return match[0]
-    return f"<{tag}{attributes}>{inside}</{tag}>"
+    return f"<{tag}{attributes}>{inside}{match[4] or ''}</{tag}>"
 
 
 def _definition(text: str) -> str:
@@ -97,7 +165,13 @@ def _definition(text: str) -> str:
     if word in _TIMES:
         time = _TIMES[word]
         return f"<timerEventDefinition><{time}>{rest}</{time}></timerEventDefinition>"
-    reference = f' {word}Ref="{rest}"' if rest else ""
+    if word == "conditional":
+        condition = f"<condition>{rest}</condition>"
+        return f"<conditionalEventDefinition>{condition}</conditionalEventDefinition>"
+    if word == "link":
+        return f'<linkEventDefinition name="{rest}"/>'
+    key = "activity" if word == "compensate" else word
+    reference = f' {key}Ref="{rest}"' if rest else ""
     return f"<{word}EventDefinition{reference}/>"
 
 

@@ -3,7 +3,19 @@
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from m2pem.engine.state import Behavior, Join, Prompt, RunState, Scope, Service, Token, Wait
+from m2pem.engine.state import (
+    Behavior,
+    Join,
+    Letter,
+    Loop,
+    Prompt,
+    RunState,
+    Scope,
+    Service,
+    Shared,
+    Token,
+    Wait,
+)
 from m2pem.model.elements import Element, Mission
 
 _OBJECTS = (Scope, Token, Wait, Behavior, Prompt, Service)
@@ -31,6 +43,8 @@ def _plain(value: object) -> object:
         return value.id
     if isinstance(value, _OBJECTS):
         return f"{type(value).__name__} {value.id}"
+    if isinstance(value, (Letter, Loop, Shared)):
+        return [(each.name, _plain(getattr(value, each.name))) for each in fields(value)]
     if isinstance(value, Join):
         return _plain(value.by_flow)
     if isinstance(value, dict):

@@ -35,6 +35,11 @@ _LINES: dict[type, Callable[[Any], Iterable[object]]] = {
     r.TokenEntered: lambda x: ("enter", x.element),
     r.TokenLeft: lambda x: ("leave", x.element, _outcome(x)),
     r.FlowTaken: lambda x: ("take", x.flow),
+    r.GatewayActivated: lambda x: ("activate", x.element, *x.flows),
+    r.ActivitiesChosen: lambda x: ("choose", x.element, *x.elements),
+    r.TokensGathered: lambda x: ("gather", x.token, x.element),
+    r.GatewayReset: lambda x: ("reset", x.element),
+    r.ScopeInterrupted: lambda x: ("interrupt", x.scope, x.element),
     r.BehaviorRequested: lambda x: (
         "request",
         _short(x.behavior),

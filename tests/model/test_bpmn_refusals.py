@@ -12,22 +12,13 @@ TASK = '<task id="T"/>'
 
 ERRORS = {
     # --- not executed yet -----------------------------------------------------------------------
-    "business rule task": (
-        around('<businessRuleTask id="T"/>'),
-        [("not-executed", 3, "T")],
-    ),
-    "event-based gateway": (
-        around('<eventBasedGateway id="T"/>'),
-        [("not-executed", 3, "T")],
-    ),
-    "complex gateway": (around('<complexGateway id="T"/>'), [("not-executed", 3, "T")]),
     "transaction": (
         around('<transaction id="T"><task id="x"/></transaction>'),
         [("not-executed", 3, "T")],
     ),
-    "ad-hoc subprocess": (
-        around('<adHocSubProcess id="T"><task id="x"/></adHocSubProcess>'),
-        [("not-executed", 3, "T")],
+    "ordering that nobody knows": (
+        around('<adHocSubProcess id="T" ordering="Random"><task id="x"/></adHocSubProcess>'),
+        [("bad-value", 3, "T")],
     ),
     "event subprocess": (
         process(
@@ -81,21 +72,22 @@ ERRORS = {
         ),
         [("not-executed", 3, "B")],
     ),
-    "several triggers": (
-        around(
-            '<intermediateThrowEvent id="T"><signalEventDefinition signalRef="s"/>'
-            '<signalEventDefinition signalRef="s"/></intermediateThrowEvent>',
-            '<signal id="s"/>',
-        ),
-        [("not-executed", 3, "T")],
+    "start quantity": (around('<task id="T" startQuantity="0"/>'), [("bad-value", 3, "T")]),
+    "completion quantity": (
+        around('<task id="T" completionQuantity="many"/>'),
+        [("bad-value", 3, "T")],
     ),
-    "start quantity": (around('<task id="T" startQuantity="2"/>'), [("not-executed", 3, "T")]),
-    "instantiating receive task": (
-        process(
-            f'<receiveTask id="T" messageRef="m" instantiate="true"/>{E}{flow("T", "E")}',
-            '<message id="m"/>',
+    "assignment that says nothing": (
+        around(
+            '<task id="T"><ioSpecification><dataInput id="i"/></ioSpecification>'
+            '<dataInputAssociation id="a"><targetRef>i</targetRef><assignment><to>i</to>'
+            "</assignment></dataInputAssociation></task>"
         ),
-        [("not-executed", 3, "T")],
+        [("bad-assignment", 3, "T")],
+    ),
+    "parallel event-based gateway that begins nothing": (
+        around('<eventBasedGateway id="T" eventGatewayType="Parallel"/>'),
+        [("parallel-event-gateway", 3, "T")],
     ),
     "global task": (
         around('<callActivity id="T" calledElement="G"/>', '<globalUserTask id="G"/>'),
@@ -354,7 +346,7 @@ def test_refuses(data: bytes, expected: list[tuple[str, int, str]]) -> None:
 
 def test_finds_everything_at_once_sorted_by_line() -> None:
     data = process(
-        '<startEvent id="S"/>\n<businessRuleTask id="A"/>\n<task id="S"/>\n'
+        '<startEvent id="S"/>\n<choreographyTask id="A"/>\n<task id="S"/>\n'
         '<sequenceFlow id="f" sourceRef="S" targetRef="gone"/>\n<task id="T" wrong="1"/>\n'
         '<callActivity id="C" calledElement="Q"/>'
     )
@@ -368,8 +360,8 @@ def test_finds_everything_at_once_sorted_by_line() -> None:
 
 
 def test_a_refused_element_names_its_kind() -> None:
-    (finding,) = findings(around('<eventBasedGateway id="T"/>'))
-    assert finding.message == "m2pem does not execute an event-based gateway yet"
+    (finding,) = findings(around('<choreographyTask id="T"/>'))
+    assert finding.message == "m2pem does not execute a choreography task yet"
 
 
 def test_a_misspelt_reference_gets_the_near_match() -> None:
@@ -383,8 +375,8 @@ def test_a_missing_called_process_lists_those_that_exist() -> None:
 
 
 def test_a_finding_reads_as_one_line() -> None:
-    (finding,) = findings(around('<complexGateway id="T"/>'))
+    (finding,) = findings(around('<choreographyTask id="T"/>'))
     assert str(finding) == (
-        "m.bpmn:3: T: error: m2pem does not execute a complex gateway yet; use an exclusive, "
-        "inclusive or parallel gateway [not-executed]"
+        "m.bpmn:3: T: error: m2pem does not execute a choreography task yet; draw the mission as "
+        "processes [not-executed]"
     )

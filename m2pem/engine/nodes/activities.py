@@ -3,17 +3,17 @@
 from m2pem.engine import records as r
 from m2pem.engine.data import reader
 from m2pem.engine.execution import Execution
-from m2pem.engine.interruption import throw_error
 from m2pem.engine.messaging import send
 from m2pem.engine.nodes.behaviors import request_behavior
-from m2pem.engine.nodes.flows import true_flows
+from m2pem.engine.nodes.completion import complete
 from m2pem.engine.records import Trigger
 from m2pem.engine.state import Token
-from m2pem.engine.waiting import arm_boundary, await_event, collect_letters, due_after
+from m2pem.engine.throwing import throw_error
+from m2pem.engine.triggering import collect_letters
+from m2pem.engine.waiting import await_event, due_after
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.model.behavior import Assignment, ServiceCall
 from m2pem.model.elements import (
-    Activity,
     ReceiveTask,
     ScriptTask,
     SendTask,
@@ -23,15 +23,6 @@ from m2pem.model.elements import (
 from m2pem.model.expression import Expression
 from m2pem.model.values import Value
 from m2pem.resources.allocation import AllocationError, allocate
-
-
-def complete(x: Execution, token: Token) -> None:
-    """The activity has done its work: leave by every flow that is true."""
-    node = token.node
-    assert isinstance(node, Activity)
-    flows = true_flows(x, token, node.default)
-    if flows is not None:
-        x.proceed(token, flows)
 
 
 def pass_through(x: Execution, token: Token) -> None:
@@ -44,8 +35,6 @@ def user_task(x: Execution, token: Token) -> None:
     node = token.node
     assert isinstance(node, UserTask)
     assert node.prompt is not None
-    if not arm_boundary(x, token, node):
-        return
     prompt = node.prompt
     if prompt.timeout is not None:
         try:
@@ -86,8 +75,6 @@ def script_task(x: Execution, token: Token) -> None:
     """Command a behavior (paper, section 4.2), or run assignments."""
     node = token.node
     assert isinstance(node, ScriptTask)
-    if not arm_boundary(x, token, node):
-        return
     if node.behavior is not None:
         request_behavior(x, token, node.behavior)
     else:
@@ -98,7 +85,7 @@ def _run_script(x: Execution, token: Token, node: ScriptTask) -> None:
     for statement in node.script.statements if node.script is not None else ():
         if isinstance(statement, Assignment):
             try:
-                value = statement.expression.evaluate(reader(token.scope))
+                value = statement.expression.evaluate(reader(token))
             except ExpressionError as error:
                 throw_error(x, token, "EXPRESSION", f"line {statement.line}: {error}")
                 return
@@ -113,8 +100,6 @@ def service_task(x: Execution, token: Token) -> None:
     """Run a registered service (paper, section 4.1), or command a behavior."""
     node = token.node
     assert isinstance(node, ServiceTask)
-    if not arm_boundary(x, token, node):
-        return
     if node.behavior is not None:
         request_behavior(x, token, node.behavior)
     elif node.call is not None:
@@ -126,7 +111,7 @@ def service_task(x: Execution, token: Token) -> None:
 def _request_service(x: Execution, token: Token, call: ServiceCall) -> None:
     node = token.node
     properties: dict[str, Value] = {}
-    read = reader(token.scope)
+    read = reader(token)
     for item in call.properties:
         if isinstance(item.value, Expression):
             try:
@@ -159,8 +144,6 @@ def send_task(x: Execution, token: Token) -> None:
     """Throw a message, or command a behavior."""
     node = token.node
     assert isinstance(node, SendTask)
-    if not arm_boundary(x, token, node):
-        return
     if node.behavior is not None:
         request_behavior(x, token, node.behavior)
         return
@@ -175,8 +158,6 @@ def receive_task(x: Execution, token: Token) -> None:
     """Wait for a message; without one, there is nothing to wait for."""
     node = token.node
     assert isinstance(node, ReceiveTask)
-    if not arm_boundary(x, token, node):
-        return
     if node.message is None:
         complete(x, token)
         return

@@ -3,9 +3,9 @@
 from m2pem.engine import records as r
 from m2pem.engine.data import reader
 from m2pem.engine.execution import Execution
-from m2pem.engine.interruption import throw_error
 from m2pem.engine.records import Trigger
 from m2pem.engine.state import BehaviorPhase, Token
+from m2pem.engine.throwing import throw_error
 from m2pem.engine.waiting import await_event
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.model.behavior import Behavior
@@ -72,7 +72,7 @@ def request_behavior(x: Execution, token: Token, behavior: Behavior) -> None:
 
 def _evaluate(x: Execution, token: Token, behavior: Behavior) -> dict[str, Value] | None:
     """Values of the parameters now; None: an error was thrown instead."""
-    read = reader(token.scope)
+    read = reader(token)
     values: dict[str, Value] = {}
     for parameter in behavior.parameters:
         if isinstance(parameter.value, Expression):

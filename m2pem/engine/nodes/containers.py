@@ -1,17 +1,16 @@
 """Subprocesses and call activities (BPMN 2.0.2, clauses 10.3.5, 10.3.6 and 13.3.4)."""
 
-from m2pem.engine import records as r
-from m2pem.engine.data import flatten, reader, store_for
+from m2pem.engine.data import flatten, reader
+from m2pem.engine.data_flow import evaluate, write_values
 from m2pem.engine.execution import Execution
-from m2pem.engine.interruption import close, end_run, throw_error
-from m2pem.engine.nodes.activities import complete
+from m2pem.engine.interruption import end_run
+from m2pem.engine.nodes.completion import complete
 from m2pem.engine.records import RunOutcome, TokenOutcome
+from m2pem.engine.scopes import close, open_scope
 from m2pem.engine.state import Scope, Token
-from m2pem.engine.waiting import arm_boundary
-from m2pem.errors import ExpressionError
-from m2pem.model.behavior import Mapping
-from m2pem.model.elements import CallActivity, SubProcess
-from m2pem.model.values import Value
+from m2pem.engine.throwing import throw_error
+from m2pem.engine.triggering import arm_event_subprocesses
+from m2pem.model.elements import CallActivity
 
 MAX_DEPTH = 1000
 """Scopes within scopes; more is a process that calls itself without end."""
@@ -19,24 +18,21 @@ MAX_DEPTH = 1000
 
 def subprocess(x: Execution, token: Token) -> None:
     """Open its scope and start what is in it."""
-    node = token.node
-    assert isinstance(node, SubProcess)
-    if arm_boundary(x, token, node):
-        scope = _open(x, token)
-        if scope is not None:
-            begin(x, scope)
+    if token.inner is not None:
+        return  # an event subprocess, which its trigger has begun
+    scope = open_inside(x, token)
+    if scope is not None:
+        begin(x, scope)
 
 
 def call_activity(x: Execution, token: Token) -> None:
     """Open an instance of the called process; only what the mappings say passes in and out."""
     node = token.node
     assert isinstance(node, CallActivity)
-    if not arm_boundary(x, token, node):
-        return
-    values = _evaluate(x, token, node.mappings.inputs, token.scope)
+    values = evaluate(x, token, node.mappings.inputs, reader(token))
     if values is None:
         return
-    scope = _open(x, token)
+    scope = open_inside(x, token)
     if scope is None:
         return
     for mapping, value in values:
@@ -45,18 +41,18 @@ def call_activity(x: Execution, token: Token) -> None:
     begin(x, scope)
 
 
-def _open(x: Execution, token: Token) -> Scope | None:
+def open_inside(x: Execution, token: Token) -> Scope | None:
+    """Open the scope of an activity. None: it is too deep, and that error was thrown."""
     if token.scope.depth >= MAX_DEPTH:
         throw_error(x, token, "RECURSION", f"{MAX_DEPTH} scopes within scopes at {token.node.id}")
         return None
-    node = token.node
-    number = x.state.last_scope + 1
-    x.emit(r.ScopeOpened(number, x.process_of(node), node.id, token.scope.id, token.id))
-    return x.state.scopes[number]
+    return open_scope(x, token)
 
 
 def begin(x: Execution, scope: Scope) -> None:
     """A token for each start event of the scope's container (paper, section 4.1)."""
+    if scope.container.event_subprocesses and not arm_event_subprocesses(x, scope):
+        return
     for entry in scope.container.entries:
         x.spawn(entry, scope)
     if not scope.tokens:
@@ -80,25 +76,9 @@ def finish(x: Execution, scope: Scope) -> None:
     node = token.node
     values = None
     if isinstance(node, CallActivity):
-        values = _evaluate(x, token, node.mappings.outputs, scope)
+        values = evaluate(x, token, node.mappings.outputs, reader(scope))
         if values is None:
             return
     close(x, scope, TokenOutcome.COMPLETED)
-    for mapping, value in values or ():
-        for key, item in flatten(mapping.target, value):
-            x.write_into(store_for(token.scope, key), token, key, item)
+    write_values(x, token, token, values or [])
     complete(x, token)
-
-
-def _evaluate(
-    x: Execution, token: Token, mappings: tuple[Mapping, ...], scope: Scope
-) -> list[tuple[Mapping, Value]] | None:
-    read = reader(scope)
-    values = []
-    for mapping in mappings:
-        try:
-            values.append((mapping, mapping.source.evaluate(read)))
-        except ExpressionError as error:
-            throw_error(x, token, "EXPRESSION", f"mapping to {mapping.target}: {error}")
-            return None
-    return values

@@ -1,15 +1,19 @@
 """Events (BPMN 2.0.2, clauses 10.5 and 13.5)."""
 
 from m2pem.engine import records as r
+from m2pem.engine.data_flow import payload
 from m2pem.engine.execution import Execution
-from m2pem.engine.interruption import empty, end_run, throw_error, throw_escalation
+from m2pem.engine.interruption import end_run
 from m2pem.engine.messaging import send
 from m2pem.engine.nodes.containers import finish
 from m2pem.engine.nodes.flows import true_flows
 from m2pem.engine.records import RunOutcome, TokenOutcome
+from m2pem.engine.scopes import empty
 from m2pem.engine.state import Token
-from m2pem.engine.waiting import arm, collect_letters, throw_signal
-from m2pem.model.elements import Event, StartEvent
+from m2pem.engine.throwing import throw_error, throw_escalation
+from m2pem.engine.triggering import collect_letters, throw_signal
+from m2pem.engine.waiting import arm
+from m2pem.model.elements import Event, StartEvent, SubProcess
 from m2pem.model.events import (
     ErrorEventDefinition,
     EscalationEventDefinition,
@@ -30,16 +34,19 @@ def complete(x: Execution, token: Token) -> None:
 def start(x: Execution, token: Token) -> None:
     """A plain start goes on at once; a typed one waits for its trigger (paper, section 4.1).
 
-    The start event of an instance that its trigger has made has happened already.
+    That of an instance, or of an event subprocess, which its trigger has made has happened already.
     """
     node = token.node
     assert isinstance(node, StartEvent)
     root = x.state.root
     assert root is not None
     triggered = token.scope.parent is None and token.scope is not root
+    container = node.container
+    if isinstance(container, SubProcess) and container.triggered_by_event:
+        triggered = True
     if node.definitions and not triggered:
         catch(x, token)
-    else:
+    elif not token.waits:  # else others of its triggers must still come
         complete(x, token)
 
 
@@ -77,10 +84,13 @@ def _throw(x: Execution, token: Token, definition: EventDefinition) -> None:
 
 
 def signal(x: Execution, token: Token, signal_id: str) -> None:
-    """Broadcast a signal in the run."""
+    """Broadcast a signal, with its data inputs, in the run."""
     node = token.node
+    data = payload(x, token)
+    if data is None:
+        return
     x.emit(r.SignalThrown(signal_id, token.id, x.process_of(node), node.id, token.scope.id))
-    throw_signal(x, signal_id, {})
+    throw_signal(x, signal_id, data)
 
 
 def boundary(x: Execution, token: Token) -> None:
@@ -92,7 +102,7 @@ def end(x: Execution, token: Token) -> None:
     """The token ends here, perhaps throwing something."""
     node = token.node
     assert isinstance(node, Event)
-    for definition in node.definitions:
+    for definition in sorted(node.definitions, key=_ends_the_scope):
         match definition:
             case TerminateEventDefinition():
                 _terminate(x, token)
@@ -101,7 +111,7 @@ def end(x: Execution, token: Token) -> None:
                 assert error is not None
                 throw_error(x, token, error.code, f"thrown by {node.label}", leaving=True)
                 return
-            case EscalationEventDefinition(escalation=escalation):
+            case EscalationEventDefinition(escalation=escalation) if len(node.definitions) == 1:
                 assert escalation is not None
                 goes_on = throw_escalation(x, token, escalation, leaving=True)
                 if goes_on and not token.scope.tokens:
@@ -112,6 +122,13 @@ def end(x: Execution, token: Token) -> None:
                 if x.state.tokens.get(token.id) is not token:
                     return
     x.consume(token)
+
+
+def _ends_the_scope(definition: EventDefinition) -> int:
+    """Of several results, those that end the scope come last, so that all are thrown."""
+    if isinstance(definition, TerminateEventDefinition):
+        return 2
+    return 1 if isinstance(definition, ErrorEventDefinition) else 0
 
 
 def _terminate(x: Execution, token: Token) -> None:

@@ -4,22 +4,29 @@ from collections.abc import Sequence
 
 from m2pem.engine.data import reader
 from m2pem.engine.execution import Execution
-from m2pem.engine.interruption import throw_error
 from m2pem.engine.state import Token
+from m2pem.engine.throwing import throw_error
 from m2pem.errors import ExpressionError
 from m2pem.model.elements import SequenceFlow
+from m2pem.model.values import ReadValue
 
 
 def true_flows(
-    x: Execution, token: Token, default: SequenceFlow | None, *, first_only: bool = False
+    x: Execution,
+    token: Token,
+    default: SequenceFlow | None,
+    *,
+    first_only: bool = False,
+    read: ReadValue | None = None,
 ) -> Sequence[SequenceFlow] | None:
     """The flows whose condition is true, in the XML's order, else the default one.
 
-    None: an error was thrown instead, because a condition could not be evaluated (EXPRESSION) or
-    nothing was true and there is no default (NO_FLOW).
+    `read`: how conditions read names, when not just as the token's element does. None: an error
+    was thrown instead, because a condition could not be evaluated (EXPRESSION) or nothing was true
+    and there is no default (NO_FLOW).
     """
     node = token.node
-    read = reader(token.scope)
+    read = read or reader(token)
     chosen: list[SequenceFlow] = []
     for flow in node.outgoing:
         if flow is default:

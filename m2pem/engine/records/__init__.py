@@ -34,7 +34,18 @@ from m2pem.engine.records.run import (
     RunStarted,
     RunYielded,
 )
-from m2pem.engine.records.tokens import FlowTaken, ScopeClosed, ScopeOpened, TokenEntered, TokenLeft
+from m2pem.engine.records.tokens import (
+    ActivitiesChosen,
+    FlowTaken,
+    GatewayActivated,
+    GatewayReset,
+    ScopeClosed,
+    ScopeInterrupted,
+    ScopeOpened,
+    TokenEntered,
+    TokenLeft,
+    TokensGathered,
+)
 from m2pem.engine.records.work import (
     BehaviorCancelRequested,
     BehaviorContinued,
@@ -52,6 +63,7 @@ from m2pem.engine.records.work import (
 )
 
 __all__ = [
+    "ActivitiesChosen",
     "BehaviorCancelRequested",
     "BehaviorContinued",
     "BehaviorEnded",
@@ -65,6 +77,8 @@ __all__ = [
     "EventAwaited",
     "EventTriggered",
     "FlowTaken",
+    "GatewayActivated",
+    "GatewayReset",
     "GeometryReceived",
     "InputDeferred",
     "InputIgnored",
@@ -84,6 +98,7 @@ __all__ = [
     "RunStarted",
     "RunYielded",
     "ScopeClosed",
+    "ScopeInterrupted",
     "ScopeOpened",
     "ServiceEnded",
     "ServiceRequested",
@@ -92,6 +107,7 @@ __all__ = [
     "TokenEntered",
     "TokenLeft",
     "TokenOutcome",
+    "TokensGathered",
     "Trigger",
 ]
 
@@ -110,9 +126,14 @@ Record: TypeAlias = Union[
     GeometryReceived,
     ScopeOpened,
     ScopeClosed,
+    ScopeInterrupted,
     TokenEntered,
     TokenLeft,
+    ActivitiesChosen,
+    TokensGathered,
     FlowTaken,
+    GatewayActivated,
+    GatewayReset,
     BehaviorRequested,
     BehaviorProgressed,
     BehaviorCancelRequested,

@@ -7,7 +7,10 @@ from m2pem.model.values import Value
 
 
 class DataWritten(BaseRecord, frozen=True):
-    """`store` is the scope that holds the key; `scope`, `element` say who wrote it."""
+    """`store` is the scope that holds the key; `scope`, `element` say who wrote it.
+
+    `own`: the token whose activity holds it instead (an item variable, a data input); 0: none.
+    """
 
     token: int
     process: str
@@ -16,10 +19,13 @@ class DataWritten(BaseRecord, frozen=True):
     key: str
     value: Value
     store: int
+    own: int = 0
 
 
 class EventAwaited(BaseRecord, frozen=True):
     """A catch event is armed: `ref` is a signal's or message's id; `due_us` a timer's time.
+
+    `token` 0: it is the start event of an event subprocess, and `scope` waits.
 
     A duration or cycle is due at a mission time (microseconds from the start, which stands during
     a pause); a date (`calendar`) at a time since the Unix epoch. `left`: how often a cycle still
@@ -40,10 +46,14 @@ class EventAwaited(BaseRecord, frozen=True):
 
 
 class EventTriggered(BaseRecord, frozen=True):
-    """The awaited event came; the wait is over. `kept`: it took a message that was kept."""
+    """The awaited event came; the wait is over.
+
+    `kept`: it took a message that was kept, the `letter`-th (from 0) of that message.
+    """
 
     wait: int
     kept: bool = False
+    letter: int = 0
 
 
 class SignalThrown(BaseRecord, frozen=True):
@@ -59,7 +69,7 @@ class SignalThrown(BaseRecord, frozen=True):
 
 class MessageThrown(BaseRecord, frozen=True):
     """By an element, or by an operator (`by`). `kept`: nobody waits for it yet, so its `data` is
-    kept for whoever waits next."""
+    kept for whoever waits next. `keys`: what it is matched by (clause 8.4.2)."""
 
     message: str
     token: int = 0
@@ -69,6 +79,7 @@ class MessageThrown(BaseRecord, frozen=True):
     by: str = ""
     kept: bool = False
     data: dict[str, Value] = msgspec.field(default_factory=dict)
+    keys: dict[str, Value] = msgspec.field(default_factory=dict)
 
 
 class EscalationThrown(BaseRecord, frozen=True):

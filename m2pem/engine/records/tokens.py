@@ -23,23 +23,28 @@ class ScopeClosed(BaseRecord, frozen=True):
 
 
 class TokenEntered(BaseRecord, frozen=True):
-    """A token is on an element. `flow`: the sequence flow that it came by."""
+    """A token is on an element. `flow`: the sequence flow that it came by.
+
+    `instance`: which instance of a loop or multi-instance activity it is, from 0; absent: none.
+    """
 
     token: int
     process: str
     element: str
     scope: int
     flow: str = ""
+    instance: int | None = None
 
 
 class TokenLeft(BaseRecord, frozen=True):
-    """It is there no more. Without a later `TokenEntered` it was consumed."""
+    """It is there no more. Without a later `TokenEntered` it was consumed. `instance` likewise."""
 
     token: int
     process: str
     element: str
     scope: int
     outcome: TokenOutcome
+    instance: int | None = None
 
 
 class FlowTaken(BaseRecord, frozen=True):
@@ -50,3 +55,47 @@ class FlowTaken(BaseRecord, frozen=True):
     element: str
     scope: int
     flow: str
+
+
+class ScopeInterrupted(BaseRecord, frozen=True):
+    """An event subprocess (`element`) has ended all else in the scope; no other can begin."""
+
+    scope: int
+    process: str
+    element: str
+
+
+class ActivitiesChosen(BaseRecord, frozen=True):
+    """An ad-hoc subprocess has begun whose own expression chooses what is done in it, in order."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    elements: tuple[str, ...]
+
+
+class TokensGathered(BaseRecord, frozen=True):
+    """As many tokens have come to an activity as begin it; `token` does so, the others left."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+
+
+class GatewayActivated(BaseRecord, frozen=True):
+    """A complex gateway has used the tokens of `flows`, and waits for the others to reset."""
+
+    process: str
+    element: str
+    scope: int
+    flows: tuple[str, ...]
+
+
+class GatewayReset(BaseRecord, frozen=True):
+    """A complex gateway can be activated again."""
+
+    process: str
+    element: str
+    scope: int

@@ -5,13 +5,15 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
+from m2pem.model.bpmn.correlation import read_subscription
 from m2pem.model.bpmn.data import read_data
+from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.flows import SEQUENCE_FLOW, read_flow
 from m2pem.model.bpmn.lanes import read_lanes
 from m2pem.model.bpmn.names import BPMN, a, kind, local
 from m2pem.model.bpmn.nodes import LOOPS, read_node, refuse_loop
 from m2pem.model.bpmn.reading import Reading
-from m2pem.model.bpmn.scan import Order
+from m2pem.model.bpmn.scan import Order, Scan
 from m2pem.model.bpmn.schema import FLOW_ELEMENT_NAMES, SHAPES, Shape
 from m2pem.model.elements import Container, Process, SubProcess
 from m2pem.model.near import did_you_mean
@@ -23,7 +25,11 @@ _DATA = frozenset(
     BPMN + name for name in ("dataObject", "dataObjectReference", "dataStoreReference", "property")
 )
 _LANES = BPMN + "laneSet"
-_OUTPUTS = BPMN + "dataOutputAssociation"
+_SUBSCRIPTION = BPMN + "correlationSubscription"
+_COMPLETION = BPMN + "completionCondition"
+_DATA_FLOW = frozenset(
+    BPMN + name for name in ("ioSpecification", "dataInputAssociation", "dataOutputAssociation")
+)
 
 
 @dataclass(slots=True)
@@ -32,6 +38,7 @@ class _Frame:
     element: etree._Element
     shape: Shape
     children: Iterator[etree._Element]
+    data_flow: Scan
     order: Order = field(default_factory=Order)
 
 
@@ -51,6 +58,8 @@ def read_process(reading: Reading, element: etree._Element) -> None:
         child = next(frame.children, None)
         if child is None:
             stack.pop()
+            if isinstance(frame.container, SubProcess):
+                read_data_flow(reading, frame.data_flow, frame.container)
             continue
         inner = _read_child(reading, process, frame, child)
         if inner is None:
@@ -71,7 +80,7 @@ def read_process(reading: Reading, element: etree._Element) -> None:
 def _frame(reading: Reading, container: Container, element: etree._Element) -> _Frame:
     shape = SHAPES[element.tag]
     reading.check_attributes(element, shape, container.id)
-    return _Frame(container, element, shape, iter(element))
+    return _Frame(container, element, shape, iter(element), Scan(element, container.id))
 
 
 def _read_child(
@@ -103,8 +112,13 @@ def _read_child(
     if tag in LOOPS:
         refuse_loop(reading, child, container.id)
         return None
-    if tag == _OUTPUTS:
-        reading.note_outputs([child])
+    if tag in _DATA_FLOW:
+        frame.data_flow.children.setdefault(tag, []).append(child)
+        return None
+    if tag == _SUBSCRIPTION:
+        read_subscription(reading, child, process)
+        return None
+    if tag == _COMPLETION:
         return None
     node = read_node(reading, child, container)
     if node is None:

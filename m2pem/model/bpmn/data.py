@@ -22,6 +22,8 @@ def read_data(reading: Reading, element: etree._Element, container: Container) -
         if identifier:
             reading.data.setdefault(identifier, DataEnd(declared.key, [element], declared))
     elif identifier:
+        if what == "dataStoreReference":
+            reading.data_stores.add(identifier)
         target = element.get("dataObjectRef") or element.get("dataStoreRef") or ""
         reading.data.setdefault(
             identifier, DataEnd(name or identifier, [element], refers_to=reference(target))

@@ -2,9 +2,11 @@
 
 from lxml import etree
 
+from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.definitions import read_definition
 from m2pem.model.bpmn.names import BPMN, a, kind, local
 from m2pem.model.bpmn.reading import Reading, reference, text_of
+from m2pem.model.bpmn.rules.events import allowed_triggers
 from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.elements import (
     BoundaryEvent,
@@ -19,14 +21,6 @@ from m2pem.model.elements import (
 from m2pem.model.events import ErrorEventDefinition, EventDefinition
 from m2pem.model.near import did_you_mean
 
-_ALLOWED = {
-    "startEvent": "message timer conditional signal",
-    "endEvent": "message error escalation cancel compensate signal terminate",
-    "intermediateCatchEvent": "message timer conditional link signal",
-    "intermediateThrowEvent": "message escalation link compensate signal",
-    "boundaryEvent": "message timer escalation error cancel compensate conditional signal",
-}
-_ALLOWED_IN_EVENT_SUBPROCESS = "message timer escalation error compensate conditional signal"
 _EXECUTED = frozenset({"message", "timer", "signal", "escalation", "error", "terminate"})
 _CATCHING = frozenset({"startEvent", "intermediateCatchEvent", "boundaryEvent"})
 _NEEDS_TRIGGER = frozenset({"intermediateCatchEvent", "boundaryEvent"})
@@ -40,20 +34,21 @@ def read_event(reading: Reading, element: etree._Element, container: Container) 
     definitions = _definitions(reading, found, place, container)
     name = element.get("name", "")
     line = reading.report.line(element)
-    reading.note_outputs(found.of("dataOutputAssociation"))
+    parallel = reading.boolean(element, "parallelMultiple", False, identifier)
     event: Event
     if place == "startEvent":
-        event = StartEvent(identifier, name, line, definitions)
+        event = StartEvent(identifier, name, line, definitions, parallel)
     elif place == "endEvent":
         event = EndEvent(identifier, name, line, definitions)
     elif place == "intermediateThrowEvent":
         event = IntermediateThrowEvent(identifier, name, line, definitions)
     elif place == "intermediateCatchEvent":
-        event = IntermediateCatchEvent(identifier, name, line, definitions)
+        event = IntermediateCatchEvent(identifier, name, line, definitions, parallel)
         if any(local(tag) == "linkEventDefinition" for tag in found.children):
             reading.self_starting.add(event)
     else:
-        event = _boundary(reading, element, identifier, definitions)
+        event = _boundary(reading, element, identifier, definitions, parallel)
+    read_data_flow(reading, found, event)
     return event
 
 
@@ -62,10 +57,16 @@ def _boundary(
     element: etree._Element,
     identifier: str,
     definitions: tuple[EventDefinition, ...],
+    parallel: bool,
 ) -> BoundaryEvent:
     interrupting = reading.boolean(element, "cancelActivity", True, identifier)
     event = BoundaryEvent(
-        identifier, element.get("name", ""), reading.report.line(element), definitions, interrupting
+        identifier,
+        element.get("name", ""),
+        reading.report.line(element),
+        definitions,
+        parallel,
+        interrupting,
     )
     reading.attachments.append((event, reference(element.get("attachedToRef", ""))))
     if not interrupting and any(isinstance(d, ErrorEventDefinition) for d in definitions):
@@ -85,34 +86,27 @@ def _definitions(
 ) -> tuple[EventDefinition, ...]:
     elements = [
         each
-        for tag, group in found.children.items()
-        if tag.endswith("EventDefinition") and tag.startswith(BPMN)
-        for each in group
+        for each in found.element
+        if each.tag.startswith(BPMN) and each.tag.endswith("EventDefinition")
     ]
     for referring in found.of("eventDefinitionRef"):
         target = _referred_definition(reading, referring, found.id)
         if target is not None:
             elements.append(target)
-    if len(elements) > 1:
-        reading.report.error(
-            found.element,
-            found.id,
-            "not-executed",
-            "m2pem does not execute an event with several triggers or results yet",
-            "use one event for each",
-        )
-        return ()
-    if not elements:
-        if place in _NEEDS_TRIGGER and not found.of("eventDefinitionRef"):
-            _no_trigger(reading, found, place)
-        return ()
-    definition = elements[0]
+    if not elements and place in _NEEDS_TRIGGER and not found.of("eventDefinitionRef"):
+        _no_trigger(reading, found, place)
+    read = [_definition(reading, found, place, container, each) for each in elements]
+    return tuple(definition for definition in read if definition is not None)
+
+
+def _definition(
+    reading: Reading, found: Scan, place: str, container: Container, definition: etree._Element
+) -> EventDefinition | None:
+    """One of its definitions; None when a finding says what is wrong with it."""
     name = local(definition.tag).removesuffix("EventDefinition")
     inside_event_subprocess = container in reading.self_starting
-    allowed = _ALLOWED[place].split()
-    if place == "startEvent" and inside_event_subprocess:
-        allowed = _ALLOWED_IN_EVENT_SUBPROCESS.split()
-    elif place == "startEvent" and not isinstance(container, Process):
+    embedded = not inside_event_subprocess and not isinstance(container, Process)
+    if place == "startEvent" and embedded:
         reading.report.error(
             found.element,
             found.id,
@@ -120,10 +114,9 @@ def _definitions(
             f"a start event in an embedded subprocess cannot wait for {a(kind(definition.tag))}",
             "use a plain start event, and a catching intermediate event after it",
         )
-        return ()
-    if name not in allowed:
-        _not_allowed(reading, found, definition, allowed)
-        return ()
+        return None
+    if name not in allowed_triggers(found.element):
+        return None  # which a rule says
     if name not in _EXECUTED:
         reading.report.error(
             found.element,
@@ -132,9 +125,8 @@ def _definitions(
             f"m2pem does not execute {a(kind(definition.tag))} yet",
             _INSTEAD.get(name, "draw it with the elements that docs/missions.md lists"),
         )
-        return ()
-    read = read_definition(reading, definition, found, catches=place in _CATCHING)
-    return () if read is None else (read,)
+        return None
+    return read_definition(reading, definition, found, catches=place in _CATCHING)
 
 
 _INSTEAD = {
@@ -170,17 +162,4 @@ def _no_trigger(reading: Reading, found: Scan, place: str) -> None:
         "no-trigger",
         f"{a(word)} must say what it waits for",
         f"give it a signal, message or timer event definition{also}",
-    )
-
-
-def _not_allowed(
-    reading: Reading, found: Scan, definition: etree._Element, allowed: list[str]
-) -> None:
-    names = [each for each in allowed if each in _EXECUTED]
-    reading.report.error(
-        found.element,
-        found.id,
-        "event-not-allowed",
-        f"BPMN does not allow {a(kind(definition.tag))} as {a(kind(found.element.tag))}",
-        f"use one of: {', '.join(names)}",
     )

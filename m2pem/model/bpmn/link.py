@@ -8,6 +8,7 @@ from m2pem.model.bpmn.reading import FlowEnds, Reading
 from m2pem.model.elements import (
     Activity,
     BoundaryEvent,
+    ComplexGateway,
     Container,
     DataObject,
     Element,
@@ -21,6 +22,7 @@ from m2pem.model.elements import (
     StartEvent,
 )
 from m2pem.model.near import did_you_mean
+from m2pem.model.reach import instantiates
 
 _set = object.__setattr__
 
@@ -115,17 +117,18 @@ def _called(container: Container) -> str:
 
 def _wrong_end(reading: Reading, flow: SequenceFlow, source: FlowNode, target: FlowNode) -> None:
     if isinstance(source, EndEvent):
+        rule = "flow-out-of-end"
         said = f"out of the end event '{source.id}'"
         remedy = "make it an intermediate throw event, or delete the flow"
     elif isinstance(target, BoundaryEvent):
+        rule = "flow-into-boundary"
         said = f"into the boundary event '{target.id}'"
         remedy = "lead it to the activity, or to what follows the boundary event"
     else:
+        rule = "flow-into-start"
         said = f"into the start event '{target.id}'"
         remedy = "lead it to what follows the start event"
-    reading.report.error(
-        flow.line, flow.id, "flow-end", f"no sequence flow can lead {said}", remedy
-    )
+    reading.report.error(flow.line, flow.id, rule, f"no sequence flow can lead {said}", remedy)
 
 
 def _link_containers(reading: Reading) -> None:
@@ -140,7 +143,11 @@ def _link_containers(reading: Reading) -> None:
         data.setdefault(container, []).append(declared)
     for container, inside in nodes.items():
         _set(container, "nodes", tuple(inside))
-        starts = [node for node in inside if isinstance(node, StartEvent)]
+        starts = [
+            node
+            for node in inside
+            if isinstance(node, StartEvent) or (instantiates(node) and not node.incoming)
+        ]
         _set(
             container,
             "entries",
@@ -164,7 +171,7 @@ def _link_defaults(reading: Reading, flows: dict[str, SequenceFlow]) -> None:
     for node, ref, line in reading.defaults:
         flow = next((flow for flow in node.outgoing if flow.id == ref), None)
         if flow is not None:
-            if isinstance(node, Activity | ExclusiveGateway | InclusiveGateway):
+            if isinstance(node, Activity | ComplexGateway | ExclusiveGateway | InclusiveGateway):
                 _set(node, "default", flow)
             if flow.condition is not None:
                 reading.report.warning(

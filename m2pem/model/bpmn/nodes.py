@@ -4,14 +4,18 @@ from collections.abc import Callable
 
 from lxml import etree
 
+from m2pem.model.bpmn.ad_hoc import read_ad_hoc
 from m2pem.model.bpmn.calls import read_call_activity
+from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.events import read_event
+from m2pem.model.bpmn.gateways import GATEWAYS, read_gateway
 from m2pem.model.bpmn.names import BPMN, a, kind, local
 from m2pem.model.bpmn.prompts import read_user_task
 from m2pem.model.bpmn.reading import Reading, reference
-from m2pem.model.bpmn.scan import Scan, own_extensions, scan
+from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.bpmn.scripts import read_script_task
 from m2pem.model.bpmn.tasks import (
+    read_business_rule_task,
     read_manual_task,
     read_plain_task,
     read_receive_task,
@@ -21,18 +25,21 @@ from m2pem.model.bpmn.tasks import (
 from m2pem.model.elements import (
     Activity,
     Container,
-    ExclusiveGateway,
     FlowNode,
-    Gateway,
-    InclusiveGateway,
-    ParallelGateway,
     SubProcess,
 )
 
-_NONE: frozenset[str] = frozenset()
 _LOOPS = ("loopCharacteristics", "standardLoopCharacteristics", "multiInstanceLoopCharacteristics")
 LOOPS = frozenset(BPMN + name for name in _LOOPS)
 SUBPROCESSES = frozenset(BPMN + name for name in ("subProcess", "transaction", "adHocSubProcess"))
+
+MAX_QUANTITY = 1000
+"""Of tokens that begin an activity, or leave it by one flow."""
+
+_QUANTITIES = {
+    "start_quantity": ("startQuantity", "start-quantity"),
+    "completion_quantity": ("completionQuantity", "completion-quantity"),
+}
 
 _TASKS: dict[str, Callable[[Reading, Scan], Activity]] = {
     BPMN + "task": read_plain_task,
@@ -43,14 +50,7 @@ _TASKS: dict[str, Callable[[Reading, Scan], Activity]] = {
     BPMN + "sendTask": read_send_task,
     BPMN + "receiveTask": read_receive_task,
     BPMN + "callActivity": read_call_activity,
-    BPMN + "businessRuleTask": read_plain_task,
-}
-_GATEWAYS: dict[str, type[Gateway]] = {
-    BPMN + "exclusiveGateway": ExclusiveGateway,
-    BPMN + "inclusiveGateway": InclusiveGateway,
-    BPMN + "parallelGateway": ParallelGateway,
-    BPMN + "complexGateway": Gateway,
-    BPMN + "eventBasedGateway": Gateway,
+    BPMN + "businessRuleTask": read_business_rule_task,
 }
 _EVENTS = frozenset(
     BPMN + name
@@ -63,11 +63,7 @@ _EVENTS = frozenset(
     )
 )
 _REFUSED = {
-    "businessRuleTask": "use a service task",
-    "complexGateway": "use an exclusive, inclusive or parallel gateway",
-    "eventBasedGateway": "wait with boundary events on one task, or with parallel branches",
     "transaction": "use a subprocess with boundary events",
-    "adHocSubProcess": "join its activities by sequence flows, in a plain subprocess",
     "choreographyTask": "draw the mission as processes",
     "callChoreography": "draw the mission as processes",
     "subChoreography": "draw the mission as processes",
@@ -81,32 +77,29 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
     tag = element.tag
     if tag in _EVENTS:
         return read_event(reading, element, container)
+    if tag in GATEWAYS:
+        return read_gateway(reading, element)
     task = _TASKS.get(tag)
-    gateway = _GATEWAYS.get(tag)
     name = local(tag)
-    if task is None and gateway is None and tag not in SUBPROCESSES and name not in _REFUSED:
+    if task is None and tag not in SUBPROCESSES and name not in _REFUSED:
         return None
     if name in _REFUSED:
         not_executed(reading, element, element.get("id", ""), kind(tag), _REFUSED[name])
     identifier = reading.claim(element)
     node: FlowNode
-    if gateway is not None:
-        own_extensions(reading, scan(reading, element, identifier), _NONE)
-        node = gateway(identifier, element.get("name", ""), reading.report.line(element))
-        _note_default(reading, element, node)
-        if reading.boolean(element, "instantiate", False, identifier):
-            reading.self_starting.add(node)
-        return node
     if tag in SUBPROCESSES:
         # Its children are read with its content, by containers.py.
-        node = SubProcess(identifier, element.get("name", ""), reading.report.line(element))
+        if tag == BPMN + "adHocSubProcess":
+            node = read_ad_hoc(reading, element, identifier)
+        else:
+            node = SubProcess(identifier, element.get("name", ""), reading.report.line(element))
         _event_subprocess(reading, element, node)
         _check_activity(reading, element, node)
     elif task is not None:
         found = scan(reading, element, identifier)
         node = task(reading, found)
         if tag != BPMN + "callActivity":
-            reading.note_outputs(found.of("dataOutputAssociation"))
+            read_data_flow(reading, found, node)
         for loop in _LOOPS:
             for each in found.of(loop):
                 refuse_loop(reading, each, identifier)
@@ -155,16 +148,26 @@ def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -
             "compensation activity",
             "draw what undoes the activity after a boundary event",
         )
-    for name in ("startQuantity", "completionQuantity"):
-        quantity = element.get(name, "1").strip()
-        if quantity != "1":
-            reading.report.error(
-                element,
-                node.id,
-                "not-executed",
-                f"m2pem does not execute {name}='{quantity}' yet",
-                "use a parallel gateway for several tokens",
-            )
+    for field, (name, rule) in _QUANTITIES.items():
+        object.__setattr__(node, field, _quantity(reading, element, name, rule))
+
+
+def _quantity(reading: Reading, element: etree._Element, name: str, rule: str) -> int:
+    """How many tokens begin, or leave, an activity (table 10.3)."""
+    text = element.get(name, "1").strip()
+    if text.isascii() and text.isdecimal() and 1 <= int(text) <= MAX_QUANTITY:
+        return int(text)
+    # Some editors write 0 for what was not set.
+    say = reading.report.warning if text == "0" else reading.report.error
+    say(
+        element,
+        element.get("id", ""),
+        rule,
+        f"{name}='{text}' is no number of tokens from 1 to {MAX_QUANTITY}"
+        + ("; it counts as 1" if text == "0" else ""),
+        f'write for example {name}="2", or delete it',
+    )
+    return 1
 
 
 def _note_default(reading: Reading, element: etree._Element, node: FlowNode) -> None:

@@ -11,10 +11,12 @@ from m2pem.model.bpmn.report import Report, Where
 from m2pem.model.bpmn.rewriting import expression_remedy
 from m2pem.model.bpmn.schema import Shape
 from m2pem.model.elements import (
+    Activity,
     BoundaryEvent,
     CallActivity,
     Container,
     DataObject,
+    Event,
     FlowNode,
     Lane,
     MessageFlow,
@@ -89,6 +91,17 @@ class PendingCall:
 
 
 @dataclass(slots=True)
+class PendingDataFlow:
+    """An activity or event whose data associations wait until all data objects are known."""
+
+    node: Activity | Event
+    parameters: dict[str, str]
+    """Keys of its own data inputs, data outputs and properties, by id."""
+    inputs: list[Association]
+    outputs: list[Association]
+
+
+@dataclass(slots=True)
 class MessageUse:
     """A place that sends or receives a message, which message flows may have to name."""
 
@@ -115,6 +128,8 @@ class Reading:
     messages: dict[str, Message] = field(default_factory=dict)
     errors: dict[str, Error] = field(default_factory=dict)
     escalations: dict[str, Escalation] = field(default_factory=dict)
+    correlation_properties: dict[str, etree._Element] = field(default_factory=dict)
+    subscriptions: list[tuple[Process, etree._Element]] = field(default_factory=list)
     participants: list[Participant] = field(default_factory=list)
     message_flows: list[tuple[MessageFlow, str]] = field(default_factory=list)
     lanes: list[Lane] = field(default_factory=list)
@@ -129,6 +144,9 @@ class Reading:
     declared: list[tuple[Container, DataObject]] = field(default_factory=list)
     prompts: list[PendingPrompt] = field(default_factory=list)
     calls: list[PendingCall] = field(default_factory=list)
+    data_flows: list[PendingDataFlow] = field(default_factory=list)
+    data_stores: set[str] = field(default_factory=set)
+    """Ids of data stores, and of references to them."""
     written: list[Association] = field(default_factory=list)
     """Data output associations of all activities and events."""
     written_keys: set[str] = field(default_factory=set)

@@ -1,5 +1,7 @@
 """Tasks other than script tasks and user tasks."""
 
+from typing import TypeVar
+
 from lxml import etree
 
 from m2pem.model.behavior import Behavior, Parameter, ServiceCall
@@ -12,12 +14,20 @@ from m2pem.model.bpmn.names import (
     M2PEM,
     ZEEBE,
     attribute_names,
+    kind,
     local,
 )
 from m2pem.model.bpmn.reading import MessageUse, Reading
 from m2pem.model.bpmn.scan import Scan, own_extensions
 from m2pem.model.bpmn.scripts import BEHAVIOR, read_carried
-from m2pem.model.elements import ManualTask, ReceiveTask, SendTask, ServiceTask, Task
+from m2pem.model.elements import (
+    BusinessRuleTask,
+    ManualTask,
+    ReceiveTask,
+    SendTask,
+    ServiceTask,
+    Task,
+)
 from m2pem.model.events import Message
 from m2pem.model.expression.literals import shorten
 
@@ -44,6 +54,18 @@ def read_manual_task(reading: Reading, found: Scan) -> ManualTask:
 
 def read_service_task(reading: Reading, found: Scan) -> ServiceTask:
     """A service task: a registered service, or a behavior."""
+    return _service_task(reading, found, ServiceTask)
+
+
+def read_business_rule_task(reading: Reading, found: Scan) -> BusinessRuleTask:
+    """A business rule task: likewise."""
+    return _service_task(reading, found, BusinessRuleTask)
+
+
+Serving = TypeVar("Serving", bound=ServiceTask)
+
+
+def _service_task(reading: Reading, found: Scan, task: type[Serving]) -> Serving:
     extensions = own_extensions(reading, found, _SERVICE)
     carried = extensions.get("behavior", [])
     behavior: Behavior | None = read_carried(reading, found, carried) if carried else None
@@ -61,12 +83,13 @@ def read_service_task(reading: Reading, found: Scan) -> ServiceTask:
             found.element,
             found.id,
             "no-service",
-            f"the service task names no service{_bound_elsewhere(found)}; it does nothing",
+            f"the {kind(found.element.tag)} names no service{_bound_elsewhere(found)}; it does "
+            "nothing",
             'add <m2pem:service class="Detector"/> to its extension elements, or make it a plain '
             "task",
         )
     line = reading.report.line(found.element)
-    return ServiceTask(found.id, found.element.get("name", ""), line, call, behavior)
+    return task(found.id, found.element.get("name", ""), line, call, behavior)
 
 
 def _service_call(
@@ -146,17 +169,9 @@ def read_receive_task(reading: Reading, found: Scan) -> ReceiveTask:
     message = _message(reading, found)
     name = found.element.get("name", "")
     line = reading.report.line(found.element)
-    task = ReceiveTask(found.id, name, line, message)
+    instantiate = reading.boolean(found.element, "instantiate", False, found.id)
+    task = ReceiveTask(found.id, name, line, message, instantiate)
     reading.message_uses.append(MessageUse(task, found.id, name, line, True, message))
-    if reading.boolean(found.element, "instantiate", False, found.id):
-        reading.self_starting.add(task)
-        reading.report.error(
-            found.element,
-            found.id,
-            "not-executed",
-            "m2pem does not execute a receive task that starts its process yet",
-            "put a message start event before it, and delete instantiate",
-        )
     return task
 
 

@@ -1,0 +1,107 @@
+"""What passes between the data around an activity or event and its own (BPMN 2.0.2, 10.4.2)."""
+
+from m2pem.engine.data import Place, flatten, reader, store_for
+from m2pem.engine.execution import Execution
+from m2pem.engine.state import Token
+from m2pem.engine.throwing import throw_error
+from m2pem.errors import ExpressionError
+from m2pem.model.behavior import Mapping
+from m2pem.model.elements import Activity, Event, ReceiveTask
+from m2pem.model.values import ReadValue, Value
+
+
+def evaluate(
+    x: Execution, token: Token, mappings: tuple[Mapping, ...], read: ReadValue
+) -> list[tuple[Mapping, Value]] | None:
+    """What each mapping passes; None: a wrong expression's error was thrown."""
+    values = []
+    for mapping in mappings:
+        try:
+            values.append((mapping, mapping.source.evaluate(read)))
+        except ExpressionError as error:
+            throw_error(x, token, "EXPRESSION", f"mapping to {mapping.target}: {error}")
+            return None
+    return values
+
+
+def write_values(
+    x: Execution, token: Token, place: Place, values: list[tuple[Mapping, Value]]
+) -> None:
+    """Write them as names are seen from a place."""
+    for mapping, value in values:
+        for key, item in flatten(mapping.target, value):
+            x.write_into(store_for(place, key), token, key, item)
+
+
+def take_in(x: Execution, token: Token) -> bool:
+    """Fill the data inputs of the activity that a token has come to. False: an error was thrown."""
+    node = token.node
+    assert isinstance(node, Activity)
+    values = evaluate(x, token, node.data_flow.inputs, reader(token.scope))
+    if values is None:
+        return False
+    for mapping, value in values:
+        if value is not None:  # what is not there yet reads as null anyway
+            x.write_into(token, token, mapping.target, value)
+    return True
+
+
+def give_out(x: Execution, token: Token) -> bool:
+    """Pass the data outputs of a completed activity on. False: an error was thrown."""
+    node = token.node
+    assert isinstance(node, Activity)
+    values = evaluate(x, token, node.data_flow.outputs, reader(token))
+    if values is None:
+        return False
+    write_values(x, token, token.scope, values)
+    return True
+
+
+# --- what messages and signals carry ------------------------------------------------------------
+
+
+def payload(x: Execution, token: Token) -> dict[str, Value] | None:
+    """What the event or task under a token sends along: its data inputs.
+
+    None: a wrong expression's error was thrown.
+    """
+    node = token.node
+    assert isinstance(node, Activity | Event)
+    if isinstance(node, Activity):
+        own = token.own or {}
+        return {m.target: own[m.target] for m in node.data_flow.inputs if m.target in own}
+    values = evaluate(x, token, node.data_flow.inputs, reader(token))
+    return None if values is None else {mapping.target: value for mapping, value in values}
+
+
+def receive_payload(x: Execution, token: Token, data: dict[str, Value]) -> bool:
+    """Write what came where the catcher under a token says, else under its own names there.
+
+    A single value fits a single data output whatever their names. False: an error was thrown.
+    """
+    node = token.node
+    if isinstance(node, Event) and node.data_flow.outputs:
+        return _out_of_event(x, token, node, data)
+    if isinstance(node, ReceiveTask) and len(data) == 1 and len(node.data_flow.outputs) == 1:
+        names = list(node.data_flow.outputs[0].source.names)
+        if len(names) == 1:
+            data = {names[0]: next(iter(data.values()))}
+    x.write_all(token, data)
+    return True
+
+
+def _out_of_event(x: Execution, token: Token, node: Event, data: dict[str, Value]) -> bool:
+    around = reader(token)
+    only = next(iter(data.values())) if len(data) == 1 else None
+    alone = len(node.data_flow.outputs) == 1
+
+    def read(name: str) -> Value:
+        if name in data:
+            return data[name]
+        return only if alone and only is not None else around(name)
+
+    values = evaluate(x, token, node.data_flow.outputs, read)
+    if values is None:
+        return False
+    write_values(x, token, token, values)
+    return True

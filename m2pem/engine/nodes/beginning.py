@@ -1,0 +1,55 @@
+"""The beginning of an activity's work (BPMN 2.0.2, clause 13.3.2)."""
+
+from collections.abc import Callable
+
+from m2pem.engine import records as r
+from m2pem.engine.data_flow import take_in
+from m2pem.engine.execution import Execution
+from m2pem.engine.nodes import activities, ad_hoc, containers
+from m2pem.engine.records import TokenOutcome
+from m2pem.engine.state import Token
+from m2pem.engine.triggering import arm_boundary
+from m2pem.model import elements as e
+from m2pem.model.elements import Activity, FlowNode
+
+WORK: dict[type[FlowNode], Callable[[Execution, Token], None]] = {
+    e.Task: activities.pass_through,
+    e.ManualTask: activities.pass_through,
+    e.UserTask: activities.user_task,
+    e.ScriptTask: activities.script_task,
+    e.ServiceTask: activities.service_task,
+    e.BusinessRuleTask: activities.service_task,
+    e.SendTask: activities.send_task,
+    e.ReceiveTask: activities.receive_task,
+    e.SubProcess: containers.subprocess,
+    e.AdHocSubProcess: ad_hoc.ad_hoc,
+    e.CallActivity: containers.call_activity,
+}
+"""What each kind of activity does once it has begun."""
+
+
+def _gather(x: Execution, token: Token, node: Activity) -> bool:
+    """Whether enough tokens have come to begin; all but this one are then consumed (table 10.3)."""
+    waiting = token.scope.gathered.get(node, [])
+    if token not in waiting:
+        return True
+    if len(waiting) < node.start_quantity:
+        return False
+    others = [other for other in waiting if other is not token]
+    for other in others[: node.start_quantity - 1]:
+        x.leave(other, TokenOutcome.COMPLETED)
+    x.emit(r.TokensGathered(token.id, x.process_of(node), node.id, token.scope.id))
+    return True
+
+
+def begin_activity(x: Execution, token: Token) -> None:
+    """A token has come to an activity: arm its boundary events, then do its work."""
+    node = token.node
+    assert isinstance(node, Activity)
+    if node.start_quantity > 1 and not _gather(x, token, node):
+        return
+    if node.boundary and not arm_boundary(x, token, node):
+        return
+    if node.data_flow.inputs and not take_in(x, token):
+        return
+    WORK[type(node)](x, token)

@@ -1,0 +1,25 @@
+"""The end of an activity's work (BPMN 2.0.2, clause 13.3.2)."""
+
+from m2pem.engine.data_flow import give_out
+from m2pem.engine.execution import Execution
+from m2pem.engine.nodes.flows import true_flows
+from m2pem.engine.state import Token
+from m2pem.model.elements import Activity, AdHocSubProcess
+
+
+def complete(x: Execution, token: Token) -> None:
+    """The work of an activity, or of one instance of it, is done."""
+    pass_on(x, token)
+
+
+def pass_on(x: Execution, token: Token) -> None:
+    """The activity as a whole is done: leave by every flow that is true."""
+    node = token.node
+    assert isinstance(node, Activity)
+    if node.data_flow.outputs and not give_out(x, token):
+        return
+    flows = true_flows(x, token, node.default)
+    if flows is not None:
+        x.proceed(token, [*flows] * node.completion_quantity)
+        if isinstance(node.container, AdHocSubProcess):
+            x.queue.append(token.scope)

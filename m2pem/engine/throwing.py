@@ -1,0 +1,180 @@
+"""Errors and escalations: they go up, scope by scope, to what catches them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from m2pem.engine import records as r
+from m2pem.engine.execution import Execution
+from m2pem.engine.interruption import begin_event_subprocess, divert, end_run
+from m2pem.engine.records import RunOutcome, TokenOutcome
+from m2pem.engine.state import Scope, Token
+from m2pem.model.elements import Activity, BoundaryEvent, Event, StartEvent
+from m2pem.model.events import (
+    ErrorEventDefinition,
+    Escalation,
+    EscalationEventDefinition,
+    EventDefinition,
+)
+
+# --- errors -------------------------------------------------------------------------------------
+
+
+def throw_error(
+    x: Execution, token: Token, code: str, reason: str = "", *, leaving: bool = False
+) -> None:
+    """Throw an error where a token is; it goes up scope by scope (BPMN 2.0.2, clause 10.5.7).
+
+    An activity's own boundary events are asked first, then the event subprocesses of its scope,
+    then the boundary events of the activity around it, and so on. What catches it ends the
+    activity or scope. Uncaught, the run fails. `leaving`: the token has done its part with this
+    (an error end event).
+    """
+    node = token.node
+    caught = _catcher(token, code, _error_code)
+    x.emit(
+        r.ErrorThrown(
+            token.id,
+            x.process_of(node),
+            node.id,
+            token.scope.id,
+            code,
+            reason,
+            caught.event.id if caught is not None else "",
+        )
+    )
+    if leaving:
+        x.leave(token, TokenOutcome.COMPLETED)
+    if caught is None:
+        because = f": {reason}" if reason else ""
+        end_run(
+            x, RunOutcome.FAILED, f"error {code} from {node.id} was caught by no boundary{because}"
+        )
+    else:
+        _hand_over(x, caught, TokenOutcome.FAILED)
+
+
+def throw_error_in(x: Execution, scope: Scope, code: str, reason: str) -> None:
+    """Throw an error that arose in a scope as a whole: it is the activity's around it."""
+    if scope.owner is not None:
+        throw_error(x, scope.owner, code, reason)
+        return
+    element = scope.container.id
+    x.emit(r.ErrorThrown(0, element, element, scope.id, code, reason))
+    end_run(x, RunOutcome.FAILED, f"error {code} from {element}: {reason}")
+
+
+# --- escalations --------------------------------------------------------------------------------
+
+
+def throw_escalation(
+    x: Execution, token: Token, escalation: Escalation, *, leaving: bool = False
+) -> bool:
+    """Throw an escalation from the event under a token; the nearest outer scope catches it.
+
+    Returns whether the scope goes on: an interrupting catch ends it. `leaving`: the token has done
+    its part with this (an escalation end event).
+    """
+    node = token.node
+    caught = _catcher(token, escalation.code, _escalation_code)
+    x.emit(
+        r.EscalationThrown(
+            token.id,
+            x.process_of(node),
+            node.id,
+            token.scope.id,
+            escalation.id,
+            escalation.code,
+            caught.event.id if caught is not None else "",
+        )
+    )
+    if leaving:
+        x.leave(token, TokenOutcome.COMPLETED)
+    if caught is None:
+        return True
+    if not caught.event.interrupting:
+        if isinstance(caught.event, BoundaryEvent):
+            x.spawn(caught.event, caught.place.scope)
+        else:
+            begin_event_subprocess(x, caught.place, caught.event)
+        return True
+    _hand_over(x, caught, TokenOutcome.INTERRUPTED)
+    return False
+
+
+# --- who catches --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _AtBoundary:
+    place: Token
+    event: BoundaryEvent
+
+
+@dataclass(frozen=True, slots=True)
+class _InScope:
+    place: Scope
+    event: StartEvent
+
+
+def _hand_over(x: Execution, caught: _AtBoundary | _InScope, outcome: TokenOutcome) -> None:
+    if isinstance(caught, _AtBoundary):
+        divert(x, caught.place, caught.event, outcome)
+    else:
+        begin_event_subprocess(x, caught.place, caught.event)
+
+
+def _error_code(definition: EventDefinition) -> str | None:
+    """The code that an error definition catches, "" for every one; None: it catches no error."""
+    if not isinstance(definition, ErrorEventDefinition):
+        return None
+    return definition.error.code if definition.error is not None else ""
+
+
+def _escalation_code(definition: EventDefinition) -> str | None:
+    if not isinstance(definition, EscalationEventDefinition):
+        return None
+    return definition.escalation.code if definition.escalation is not None else ""
+
+
+def _catcher(
+    thrower: Token, code: str, code_of: Callable[[EventDefinition], str | None]
+) -> _AtBoundary | _InScope | None:
+    """The nearest event that catches a code; one that names it before one that takes all.
+
+    An event subprocess does not catch what is thrown in itself, and none begins in a scope that
+    one has interrupted. The boundary events of a loop or multi-instance activity are the whole
+    activity's, not its instances'.
+    """
+    token: Token | None = thrower
+    while token is not None:
+        node, scope = token.node, token.scope
+        if isinstance(node, Activity) and token.instance is None:
+            boundary = _best(node.boundary, code, code_of)
+            if boundary is not None:
+                return _AtBoundary(token, boundary)
+        if scope.loop is None and not scope.interrupted:
+            handlers = scope.container.event_subprocesses
+            starts = [start for each in handlers if each is not node for start in each.starts]
+            start = _best(starts, code, code_of)
+            if start is not None:
+                return _InScope(scope, start)
+        token = scope.owner
+    return None
+
+
+Catching = TypeVar("Catching", bound=Event)
+
+
+def _best(
+    events: Sequence[Catching], code: str, code_of: Callable[[EventDefinition], str | None]
+) -> Catching | None:
+    for_all = None
+    for event in events:
+        for definition in event.definitions:
+            caught = code_of(definition)
+            if caught == "":
+                for_all = for_all or event
+            elif caught == code:
+                return event
+    return for_all

@@ -1,0 +1,280 @@
+"""What happens when the trigger of a catch event comes."""
+
+from collections.abc import Callable
+
+from m2pem.engine import records as r
+from m2pem.engine.correlation import fits, remember
+from m2pem.engine.data_flow import receive_payload
+from m2pem.engine.execution import Execution, definitions_of
+from m2pem.engine.interruption import begin_event_subprocess, divert
+from m2pem.engine.records import TokenOutcome, Trigger
+from m2pem.engine.state import Scope, Token, Wait
+from m2pem.engine.waiting import arm, arm_again
+from m2pem.model.elements import (
+    Activity,
+    BoundaryEvent,
+    Event,
+    EventBasedGateway,
+    FlowNode,
+    ReceiveTask,
+    StartEvent,
+)
+from m2pem.model.events import EventDefinition, MessageEventDefinition, SignalEventDefinition
+from m2pem.model.values import Value
+
+WHEN_TRIGGERED: dict[type[FlowNode], Callable[[Execution, Token], None]] = {}
+"""What a wait at a token's own node leads to, by kind of node; filled by the handlers."""
+
+
+def arm_boundary(x: Execution, token: Token, activity: Activity) -> bool:
+    """Arm the boundary events of the activity that a token has entered.
+
+    Errors and escalations are not armed: they look for their catcher. False: the token has left
+    already, because a timer was wrong or a message had been kept.
+    """
+    for boundary in activity.boundary:
+        for definition in boundary.definitions:
+            if not arm(x, token, boundary, definition):
+                return False
+    return collect_letters(x, token)
+
+
+def arm_event_subprocesses(x: Execution, scope: Scope) -> bool:
+    """Arm the start events of a scope's event subprocesses (clause 13.5.4).
+
+    False: a timer was wrong, and its error has been thrown.
+    """
+    for container in scope.container.event_subprocesses:
+        for start in container.starts:
+            for definition in start.definitions:
+                if not arm(x, scope, start, definition):
+                    return False
+    return True
+
+
+def collect_letters(x: Execution, token: Token) -> bool:
+    """Let a token that waits for messages have those kept for it. False: it has left with one."""
+    found = bool(x.state.mailbox)
+    while found and token.waits is not None:
+        found = False
+        for wait in list(token.waits.values()):
+            number = _letter_for(x, wait)
+            if number is not None:
+                found = True
+                letter = x.state.mailbox[wait.ref][number]
+                trigger(x, wait, letter.data, letter.keys, letter=number)
+                if x.state.tokens.get(token.id) is not token:
+                    return False
+    return True
+
+
+def _letter_for(x: Execution, wait: Wait) -> int | None:
+    """Which of the messages that were kept is for somebody who waits."""
+    if wait.trigger is not Trigger.MESSAGE:
+        return None
+    for number, letter in enumerate(x.state.mailbox.get(wait.ref, ())):
+        if fits(x, wait.ref, letter.keys, wait.token or wait.scope):
+            return number
+    return None
+
+
+# --- triggering ---------------------------------------------------------------------------------
+
+
+def trigger(
+    x: Execution,
+    wait: Wait,
+    data: dict[str, Value],
+    keys: dict[str, Value] | None = None,
+    *,
+    letter: int | None = None,
+) -> None:
+    """What a token waited for has come: a catch event goes on, a boundary event is entered.
+
+    `keys`: of a message. `letter`: it is the one of that number that was kept.
+    """
+    x.emit(r.EventTriggered(wait.id, letter is not None, letter or 0))
+    token, node = wait.token, wait.node
+    if keys and token is not None:
+        remember(x, token, keys)
+    if token is None:
+        _in_scope(x, wait, data)
+    elif node is token.node:
+        if receive_payload(x, token, data) and not _is_one_of_several(node, token.waits):
+            WHEN_TRIGGERED[type(node)](x, token)
+    elif isinstance(node, BoundaryEvent):
+        _at_boundary(x, wait, token, node, data)
+    else:
+        _behind_gateway(x, token, node, data)
+
+
+def _is_one_of_several(node: FlowNode, waits: dict[int, Wait] | None) -> bool:
+    """Whether a parallel multiple event must still wait for others of its triggers (10.5.1)."""
+    if not isinstance(node, Event) or not node.parallel_multiple:
+        return False
+    return any(wait.node is node for wait in (waits or {}).values())
+
+
+def _arm_again(x: Execution, wait: Wait) -> None:
+    """What does not interrupt catches again; a parallel multiple event, all of its triggers."""
+    node = wait.node
+    if isinstance(node, Event) and node.parallel_multiple:
+        for definition in node.definitions:
+            if not arm(x, wait.token or wait.scope, node, definition):
+                return
+    else:
+        arm_again(x, wait)
+
+
+def _at_boundary(
+    x: Execution, wait: Wait, token: Token, node: BoundaryEvent, data: dict[str, Value]
+) -> None:
+    if _is_one_of_several(node, token.waits):
+        x.write_all(token, data)
+    elif node.interrupting:
+        receive_payload(x, divert(x, token, node, TokenOutcome.INTERRUPTED), data)
+    else:
+        _arm_again(x, wait)
+        receive_payload(x, x.spawn(node, token.scope), data)
+
+
+def _in_scope(x: Execution, wait: Wait, data: dict[str, Value]) -> None:
+    """The start event of an event subprocess; it goes on as one that has happened."""
+    node = wait.node
+    assert isinstance(node, StartEvent)
+    if _is_one_of_several(node, wait.scope.waits):
+        return
+    if not node.interrupting:
+        _arm_again(x, wait)
+    receive_payload(x, begin_event_subprocess(x, wait.scope, node), data)
+
+
+# --- event-based gateways -----------------------------------------------------------------------
+
+
+def await_behind(x: Execution, token: Token, but: FlowNode | None = None) -> bool:
+    """Have a token on an event-based gateway wait for the events behind it, other than `but`.
+
+    False: the token has left already: a timer was wrong, or a condition is true.
+    """
+    for flow in token.node.outgoing:
+        if flow.target is but:
+            continue
+        for definition in definitions_of(flow.target):
+            if not arm(x, token, flow.target, definition):
+                return False
+            if x.state.tokens.get(token.id) is not token:
+                return False
+    return True
+
+
+def _behind_gateway(x: Execution, token: Token, node: FlowNode, data: dict[str, Value]) -> None:
+    """One of the events behind an event-based gateway: the token goes there (13.4.4).
+
+    Behind a parallel one, which begins a process, each event gets a token, and the gateway's own
+    goes with the last.
+    """
+    gateway = token.node
+    assert isinstance(gateway, EventBasedGateway)
+    if _is_one_of_several(node, token.waits):
+        x.write_all(token, data)
+        return
+    flow = next(flow for flow in gateway.outgoing if flow.target is node)
+    if gateway.parallel and token.waits:
+        number = x.state.last_token + 1
+        x.emit(r.FlowTaken(number, x.process_of(gateway), gateway.id, token.scope.id, flow.id))
+        moved = x.enter(number, node, token.scope, flow)
+    else:
+        x.proceed(token, [flow])
+        moved = x.state.tokens[token.id]
+    if receive_payload(x, moved, data):
+        WHEN_TRIGGERED[type(node)](x, moved)
+
+
+# --- signals and messages -----------------------------------------------------------------------
+
+
+def throw_signal(x: Execution, signal: str, data: dict[str, Value]) -> bool:
+    """Reach every catcher in the run, in the order they were armed. True: there was one."""
+    waits = list(x.state.catchers.get((Trigger.SIGNAL, signal), {}).values())
+    for wait in waits:
+        if wait.id in x.state.waits:
+            trigger(x, wait, data)
+    started = False
+    for start in x.triggered_starts:
+        for definition in definitions_of(start):
+            if isinstance(definition, SignalEventDefinition) and definition.signal.id == signal:
+                _instance(x, start, definition, data, {})
+                started = True
+    return bool(waits) or started
+
+
+def message_receiver(x: Execution, message: str, keys: dict[str, Value]) -> Wait | FlowNode | None:
+    """Who gets a message: the one that has waited longest, else a process that it starts."""
+    for wait in x.state.catchers.get((Trigger.MESSAGE, message), {}).values():
+        if not keys or fits(x, message, keys, wait.token or wait.scope):
+            return wait
+    for start in x.triggered_starts:
+        for definition in definitions_of(start):
+            if isinstance(definition, MessageEventDefinition) and definition.message.id == message:
+                return start
+    return None
+
+
+def deliver(
+    x: Execution,
+    receiver: Wait | FlowNode,
+    message: str,
+    data: dict[str, Value],
+    keys: dict[str, Value],
+) -> None:
+    """Hand a message over."""
+    if isinstance(receiver, Wait):
+        trigger(x, receiver, data, keys)
+        return
+    for definition in definitions_of(receiver):
+        if isinstance(definition, MessageEventDefinition) and definition.message.id == message:
+            _instance(x, receiver, definition, data, keys)
+            return
+
+
+def _instance(
+    x: Execution,
+    start: FlowNode,
+    came: EventDefinition,
+    data: dict[str, Value],
+    keys: dict[str, Value],
+) -> None:
+    """One instance of a process, from the element whose trigger came (clause 13.2).
+
+    Of several triggers that must all come, the others are awaited in the instance.
+    """
+    process = start.container
+    number = x.state.last_scope + 1
+    x.emit(r.ScopeOpened(number, process.id, process.id))
+    scope = x.state.scopes[number]
+    if process.event_subprocesses and not arm_event_subprocesses(x, scope):
+        return
+    if isinstance(start, StartEvent):
+        token = x.spawn(start, scope)
+        remember(x, token, keys)
+        receive_payload(x, token, data)
+        others = start.definitions if start.parallel_multiple else ()
+        for definition in others:
+            if definition is not came and not arm(x, token, start, definition):
+                return
+        collect_letters(x, token)
+    elif isinstance(start, ReceiveTask) and start.instantiate:
+        token = x.spawn(start, scope)
+        remember(x, token, keys)
+        if receive_payload(x, token, data):
+            WHEN_TRIGGERED[type(start)](x, token)
+    else:
+        gateway = start.incoming[0].source
+        assert isinstance(gateway, EventBasedGateway)
+        token = x.spawn(gateway, scope)
+        remember(x, token, keys)
+        if not gateway.parallel or await_behind(x, token, start):
+            _behind_gateway(x, token, start, data)
+            if x.state.tokens.get(token.id) is token:
+                collect_letters(x, token)
