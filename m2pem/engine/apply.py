@@ -8,6 +8,7 @@ from collections.abc import Callable
 from heapq import heapify, heappop, heappush
 from typing import Any
 
+from m2pem.engine import apply_compensation as undoing
 from m2pem.engine import records as r
 from m2pem.engine.state import (
     Behavior,
@@ -145,15 +146,26 @@ def _scope_closed(state: RunState, record: r.ScopeClosed) -> None:
     scope = state.scopes.pop(record.scope)
     for wait in list(scope.waits.values()) if scope.waits is not None else ():
         _end_wait(state, wait)
-    if scope.owner is not None:
-        scope.owner.inner = None
+    undoing.settle_owner(scope, record)
 
 
 def _scope_interrupted(state: RunState, record: r.ScopeInterrupted) -> None:
     scope = state.scopes[record.scope]
     scope.interrupted = True
+    undoing.drop_compensations(scope)
     for wait in list(scope.waits.values()) if scope.waits is not None else ():
         _end_wait(state, wait)
+
+
+def _transaction_cancelled(state: RunState, record: r.TransactionCancelled) -> None:
+    """The transaction is not active any more: nothing but its rollback can happen to it."""
+    scope = state.scopes[record.scope]
+    scope.cancelled = scope.interrupted = True
+    undoing.drop_compensations(scope)
+    for holder in (scope, scope.owner):
+        if holder is not None and holder.waits is not None:
+            for wait in list(holder.waits.values()):
+                _end_wait(state, wait)
 
 
 def _token_entered(state: RunState, record: r.TokenEntered) -> None:
@@ -168,6 +180,8 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
     state.tokens[record.token] = token
     scope.tokens[record.token] = token
     state.last_token = max(state.last_token, record.token)
+    if scope.compensations and undoing.enter_to_undo(scope, token):
+        return
     if flow is not None and _is_join(node):
         join = scope.joins.get(node)
         if join is None:
@@ -215,6 +229,7 @@ def _token_left(state: RunState, record: r.TokenLeft) -> None:
     if token.waits is not None:
         for wait in list(token.waits.values()):
             _end_wait(state, wait)
+    undoing.leave_compensation(token)
     if token.flow is not None and _is_join(token.node):
         join = scope.joins[token.node]
         arrived = join.by_flow[token.flow]
@@ -446,4 +461,10 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.MessageThrown: _message_thrown,
     r.EscalationThrown: _nothing,
     r.ErrorThrown: _nothing,
+    r.CompensationEnabled: undoing.compensation_enabled,
+    r.CompensationTriggered: undoing.compensation_triggered,
+    r.CompensationBegan: undoing.compensation_began,
+    r.CompensationEnded: undoing.compensation_ended,
+    r.ScopeReopened: undoing.scope_reopened,
+    r.TransactionCancelled: _transaction_cancelled,
 }

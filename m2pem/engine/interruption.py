@@ -18,6 +18,8 @@ def divert(x: Execution, token: Token, boundary: BoundaryEvent, outcome: TokenOu
     """
     withdraw(x, token, outcome)
     x.leave(token, outcome)
+    if token.undoes is not None:
+        x.queue.append(token.scope)  # it has undone as much as it could: the next one's turn
     return x.enter(token.id, boundary, token.scope)
 
 

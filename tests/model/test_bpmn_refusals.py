@@ -12,10 +12,6 @@ TASK = '<task id="T"/>'
 
 ERRORS = {
     # --- not executed yet -----------------------------------------------------------------------
-    "transaction": (
-        around('<transaction id="T"><task id="x"/></transaction>'),
-        [("not-executed", 3, "T")],
-    ),
     "ordering that nobody knows": (
         around('<adHocSubProcess id="T" ordering="Random"><task id="x"/></adHocSubProcess>'),
         [("bad-value", 3, "T")],
@@ -39,16 +35,6 @@ ERRORS = {
         ),
         [("not-executed", 4, "T")],
     ),
-    "compensation activity": (
-        process(f'{TASK}\n<task id="C" isForCompensation="true"/>\n{line_of("T")}'),
-        [("not-executed", 4, "C")],
-    ),
-    "compensation event": (
-        around(
-            '<intermediateThrowEvent id="T"><compensateEventDefinition/></intermediateThrowEvent>'
-        ),
-        [("not-executed", 3, "T")],
-    ),
     "conditional event": (
         around(
             '<intermediateCatchEvent id="T"><conditionalEventDefinition><condition>x</condition>'
@@ -64,13 +50,6 @@ ERRORS = {
             f"</intermediateCatchEvent>{E}{flow('L2', 'E')}"
         ),
         [("not-executed", 3, "L1"), ("not-executed", 4, "L2")],
-    ),
-    "cancel event": (
-        around(
-            f'{TASK}<boundaryEvent id="B" attachedToRef="T"><cancelEventDefinition/>'
-            "</boundaryEvent>"
-        ),
-        [("not-executed", 3, "B")],
     ),
     "start quantity": (around('<task id="T" startQuantity="0"/>'), [("bad-value", 3, "T")]),
     "completion quantity": (

@@ -1,5 +1,6 @@
 """The end of an activity's work (BPMN 2.0.2, clause 13.3.2)."""
 
+from m2pem.engine.compensation import enable, undone
 from m2pem.engine.data_flow import give_out
 from m2pem.engine.execution import Execution
 from m2pem.engine.nodes.flows import true_flows
@@ -13,13 +14,20 @@ def complete(x: Execution, token: Token) -> None:
 
 
 def pass_on(x: Execution, token: Token) -> None:
-    """The activity as a whole is done: leave by every flow that is true."""
+    """The activity as a whole is done: leave by every flow that is true.
+
+    What undoes another activity leaves by none: it is outside the normal flow (clause 10.7).
+    """
     node = token.node
     assert isinstance(node, Activity)
     if node.data_flow.outputs and not give_out(x, token):
         return
+    if token.undoes is not None:
+        undone(x, token)
+        return
     flows = true_flows(x, token, node.default)
     if flows is not None:
+        enable(x, token)
         x.proceed(token, [*flows] * node.completion_quantity)
         if isinstance(node.container, AdHocSubProcess):
             x.queue.append(token.scope)

@@ -65,11 +65,11 @@ def look_at(x: Execution, scope: Scope) -> None:
         finish(x, scope)
 
 
-def finish(x: Execution, scope: Scope) -> None:
-    """A scope has ended well: its activity goes on, or, without one, perhaps the run is over."""
+def finish(x: Execution, scope: Scope, outcome: TokenOutcome = TokenOutcome.COMPLETED) -> None:
+    """A scope has ended: its activity goes on, or, without one, perhaps the run is over."""
     token = scope.owner
     if token is None:
-        close(x, scope, TokenOutcome.COMPLETED)
+        close(x, scope, outcome)
         if not x.state.scopes:
             end_run(x, RunOutcome.COMPLETED)
         return
@@ -79,6 +79,6 @@ def finish(x: Execution, scope: Scope) -> None:
         values = evaluate(x, token, node.mappings.outputs, reader(scope))
         if values is None:
             return
-    close(x, scope, TokenOutcome.COMPLETED)
+    close(x, scope, outcome)
     write_values(x, token, token, values or [])
     complete(x, token)

@@ -11,6 +11,14 @@ that contains `element`.
 from typing import TypeAlias, Union
 
 from m2pem.engine.records.base import RunOutcome, TokenOutcome, Trigger
+from m2pem.engine.records.compensation import (
+    CompensationBegan,
+    CompensationEnabled,
+    CompensationEnded,
+    CompensationTriggered,
+    ScopeReopened,
+    TransactionCancelled,
+)
 from m2pem.engine.records.events import (
     DataWritten,
     ErrorThrown,
@@ -71,6 +79,10 @@ __all__ = [
     "BehaviorRequested",
     "BehaviorRestarted",
     "BehaviorUnsettled",
+    "CompensationBegan",
+    "CompensationEnabled",
+    "CompensationEnded",
+    "CompensationTriggered",
     "DataWritten",
     "ErrorThrown",
     "EscalationThrown",
@@ -100,6 +112,7 @@ __all__ = [
     "ScopeClosed",
     "ScopeInterrupted",
     "ScopeOpened",
+    "ScopeReopened",
     "ServiceEnded",
     "ServiceRequested",
     "ServiceWithdrawn",
@@ -108,6 +121,7 @@ __all__ = [
     "TokenLeft",
     "TokenOutcome",
     "TokensGathered",
+    "TransactionCancelled",
     "Trigger",
 ]
 
@@ -154,4 +168,10 @@ Record: TypeAlias = Union[
     MessageThrown,
     EscalationThrown,
     ErrorThrown,
+    CompensationEnabled,
+    CompensationTriggered,
+    CompensationBegan,
+    CompensationEnded,
+    ScopeReopened,
+    TransactionCancelled,
 ]

@@ -12,6 +12,8 @@ from m2pem.model.bpmn.rewriting import time_remedy
 from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.duration import cycle, date_us, duration_us
 from m2pem.model.events import (
+    CancelEventDefinition,
+    CompensateEventDefinition,
     Error,
     ErrorEventDefinition,
     Escalation,
@@ -43,6 +45,12 @@ def read_definition(
 
     if name == "terminate":
         return TerminateEventDefinition(line)
+    if name == "cancel":
+        return CancelEventDefinition(line)
+    if name == "compensate":
+        wait = reading.boolean(element, "waitForCompletion", True, event.id)
+        activity = "" if catches else reference(element.get("activityRef", ""))
+        return CompensateEventDefinition(line, activity, wait)
     if name == "timer":
         return _timer(reading, element, event.id)
     if name == "message":

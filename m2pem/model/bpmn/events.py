@@ -21,7 +21,9 @@ from m2pem.model.elements import (
 from m2pem.model.events import ErrorEventDefinition, EventDefinition
 from m2pem.model.near import did_you_mean
 
-_EXECUTED = frozenset({"message", "timer", "signal", "escalation", "error", "terminate"})
+_EXECUTED = frozenset(
+    {"message", "timer", "signal", "escalation", "error", "terminate", "cancel", "compensate"}
+)
 _CATCHING = frozenset({"startEvent", "intermediateCatchEvent", "boundaryEvent"})
 _NEEDS_TRIGGER = frozenset({"intermediateCatchEvent", "boundaryEvent"})
 
@@ -132,8 +134,6 @@ def _definition(
 _INSTEAD = {
     "conditional": "check the condition at a gateway, or throw a signal where it becomes true",
     "link": "join the two ends by a sequence flow",
-    "cancel": "throw and catch an error",
-    "compensate": "draw what undoes the activity after a boundary event",
 }
 
 

@@ -27,6 +27,7 @@ from m2pem.model.elements import (
     Container,
     FlowNode,
     SubProcess,
+    Transaction,
 )
 
 _LOOPS = ("loopCharacteristics", "standardLoopCharacteristics", "multiInstanceLoopCharacteristics")
@@ -63,7 +64,6 @@ _EVENTS = frozenset(
     )
 )
 _REFUSED = {
-    "transaction": "use a subprocess with boundary events",
     "choreographyTask": "draw the mission as processes",
     "callChoreography": "draw the mission as processes",
     "subChoreography": "draw the mission as processes",
@@ -92,7 +92,8 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
         if tag == BPMN + "adHocSubProcess":
             node = read_ad_hoc(reading, element, identifier)
         else:
-            node = SubProcess(identifier, element.get("name", ""), reading.report.line(element))
+            sort = Transaction if tag == BPMN + "transaction" else SubProcess
+            node = sort(identifier, element.get("name", ""), reading.report.line(element))
         _event_subprocess(reading, element, node)
         _check_activity(reading, element, node)
     elif task is not None:
@@ -140,14 +141,7 @@ def _event_subprocess(reading: Reading, element: etree._Element, node: SubProces
 def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -> None:
     _note_default(reading, element, node)
     if reading.boolean(element, "isForCompensation", False, node.id):
-        reading.self_starting.add(node)
-        not_executed(
-            reading,
-            element,
-            node.id,
-            "compensation activity",
-            "draw what undoes the activity after a boundary event",
-        )
+        reading.undoing.add(node)
     for field, (name, rule) in _QUANTITIES.items():
         object.__setattr__(node, field, _quantity(reading, element, name, rule))
 

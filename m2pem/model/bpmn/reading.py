@@ -113,6 +113,15 @@ class MessageUse:
     message: Message | None
 
 
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """An association between two elements, by ids (BPMN 2.0.2, clause 8.4.1)."""
+
+    source_ref: str
+    target_ref: str
+    direction: str
+
+
 @dataclass(slots=True)
 class Reading:
     """The state of reading one file."""
@@ -153,6 +162,9 @@ class Reading:
     message_uses: list[MessageUse] = field(default_factory=list)
     self_starting: set[FlowNode] = field(default_factory=set)
     """Refused nodes that need no incoming flow (event subprocesses, link targets, ...)."""
+    undoing: set[FlowNode] = field(default_factory=set)
+    """Activities that are marked `isForCompensation`."""
+    associations: list[Drawn] = field(default_factory=list)
     broken: set[Container] = field(default_factory=set)
     """Containers whose graph is not what was drawn, because a finding says so."""
 
