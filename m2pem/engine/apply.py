@@ -149,12 +149,19 @@ def _scope_closed(state: RunState, record: r.ScopeClosed) -> None:
     undoing.settle_owner(scope, record)
 
 
+def _is_choice(scope: Scope, node: FlowNode) -> bool:
+    if not isinstance(scope.container, AdHocSubProcess) or scope.loop is not None:
+        return False
+    return node in scope.container.entries
+
+
 def _scope_interrupted(state: RunState, record: r.ScopeInterrupted) -> None:
     scope = state.scopes[record.scope]
     scope.interrupted = True
     undoing.drop_compensations(scope)
     for wait in list(scope.waits.values()) if scope.waits is not None else ():
-        _end_wait(state, wait)
+        if isinstance(wait.node.container, SubProcess):
+            _end_wait(state, wait)
 
 
 def _transaction_cancelled(state: RunState, record: r.TransactionCancelled) -> None:
@@ -187,7 +194,7 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         if join is None:
             join = scope.joins[node] = Join()
         join.by_flow.setdefault(flow, []).append(token)
-    elif flow is None and isinstance(scope.container, AdHocSubProcess) and scope.loop is None:
+    elif _is_choice(scope, node) and flow is None:
         scope.begun[node] = None
         if scope.chosen and scope.chosen[0] is node:
             scope.chosen.pop(0)
@@ -379,6 +386,8 @@ def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
     holder.waits[wait.id] = wait
     if wait.trigger is r.Trigger.TIMER:
         heappush(state.dates if wait.calendar else state.timers, (wait.due_us, wait.id))
+    elif wait.trigger is r.Trigger.CONDITION:
+        state.conditions[wait.id] = not record.spent
     else:
         state.catchers.setdefault((wait.trigger, wait.ref), {})[wait.id] = wait
 
@@ -396,6 +405,9 @@ def _end_wait(state: RunState, wait: Wait) -> None:
             heap[:] = [entry for entry in heap if entry[1] in state.waits]
             heapify(heap)
         return
+    if wait.trigger is r.Trigger.CONDITION:
+        del state.conditions[wait.id]
+        return
     key = (wait.trigger, wait.ref)
     catchers = state.catchers[key]
     del catchers[wait.id]
@@ -411,6 +423,10 @@ def _event_triggered(state: RunState, record: r.EventTriggered) -> None:
         letters.pop(record.letter)
         if not letters:
             del state.mailbox[wait.ref]
+
+
+def _condition_reset(state: RunState, record: r.ConditionReset) -> None:
+    state.conditions[record.wait] = True
 
 
 def _message_thrown(state: RunState, record: r.MessageThrown) -> None:
@@ -457,6 +473,7 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.DataWritten: _data_written,
     r.EventAwaited: _event_awaited,
     r.EventTriggered: _event_triggered,
+    r.ConditionReset: _condition_reset,
     r.SignalThrown: _nothing,
     r.MessageThrown: _message_thrown,
     r.EscalationThrown: _nothing,

@@ -172,7 +172,8 @@ class Wait:
     """A catch event that is armed.
 
     `token` waits: at its own node, at a boundary event of it, or at an event behind the
-    event-based gateway that it is on. None: the start event of an event subprocess of `scope`.
+    event-based gateway that it is on. None: `scope` waits, for the start event of an event
+    subprocess of it, or for a condition that begins another process.
     Other fields as in record `EventAwaited`.
     """
 
@@ -287,6 +288,8 @@ class RunState:
     waits: dict[int, Wait] = field(default_factory=dict)
     catchers: dict[tuple[Trigger, str], dict[int, Wait]] = field(default_factory=dict)
     """Waits for a signal or message, by its id."""
+    conditions: dict[int, bool] = field(default_factory=dict)
+    """Waits for a condition, and whether it may fire: one that has fired must be false first."""
     timers: list[tuple[int, int]] = field(default_factory=list)
     """Heap of (due mission time, wait); waits that are over may still be in it, but not first."""
     dates: list[tuple[int, int]] = field(default_factory=list)

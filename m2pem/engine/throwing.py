@@ -121,7 +121,7 @@ def _hand_over(x: Execution, caught: _AtBoundary | _InScope, outcome: TokenOutco
     if isinstance(caught, _AtBoundary):
         divert(x, caught.place, caught.event, outcome)
     else:
-        begin_event_subprocess(x, caught.place, caught.event)
+        begin_event_subprocess(x, caught.place, caught.event, outcome)
 
 
 def _error_code(definition: EventDefinition) -> str | None:

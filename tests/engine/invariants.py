@@ -95,7 +95,10 @@ def _check_waits(state: RunState) -> None:
     caught = {wait.id: wait for each in state.catchers.values() for wait in each.values()}
     timed = {number for _, number in (*state.timers, *state.dates)}
     for wait in state.waits.values():
-        assert (wait.id in caught) != (wait.id in timed)
+        places = (wait.id in caught, wait.id in timed, wait.id in state.conditions)
+        assert sum(places) == 1
+        assert (wait.trigger.value == "condition") == places[2]
+    assert set(state.conditions) <= set(state.waits)
     assert set(caught) <= set(state.waits)
     for (trigger, ref), waits in state.catchers.items():
         assert waits, "nobody catches: absent"

@@ -16,15 +16,6 @@ ERRORS = {
         around('<adHocSubProcess id="T" ordering="Random"><task id="x"/></adHocSubProcess>'),
         [("bad-value", 3, "T")],
     ),
-    "event subprocess": (
-        process(
-            f'{TASK}\n<subProcess id="X" triggeredByEvent="true">'
-            '<startEvent id="xs"><errorEventDefinition/></startEvent>'
-            '<endEvent id="xe"/><sequenceFlow id="xf" sourceRef="xs" targetRef="xe"/>'
-            f"</subProcess>\n{line_of('T')}"
-        ),
-        [("not-executed", 4, "X")],
-    ),
     "loop": (
         around('<task id="T">\n<standardLoopCharacteristics/></task>'),
         [("not-executed", 4, "T")],
@@ -34,22 +25,6 @@ ERRORS = {
             '<subProcess id="T">\n<multiInstanceLoopCharacteristics/><task id="x"/></subProcess>'
         ),
         [("not-executed", 4, "T")],
-    ),
-    "conditional event": (
-        around(
-            '<intermediateCatchEvent id="T"><conditionalEventDefinition><condition>x</condition>'
-            "</conditionalEventDefinition></intermediateCatchEvent>"
-        ),
-        [("not-executed", 3, "T")],
-    ),
-    "link events": (
-        process(
-            f'{S}<intermediateThrowEvent id="L1"><linkEventDefinition name="l"/>'
-            f"</intermediateThrowEvent>{flow('S', 'L1')}\n"
-            '<intermediateCatchEvent id="L2"><linkEventDefinition name="l"/>'
-            f"</intermediateCatchEvent>{E}{flow('L2', 'E')}"
-        ),
-        [("not-executed", 3, "L1"), ("not-executed", 4, "L2")],
     ),
     "start quantity": (around('<task id="T" startQuantity="0"/>'), [("bad-value", 3, "T")]),
     "completion quantity": (

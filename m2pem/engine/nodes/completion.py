@@ -6,6 +6,7 @@ from m2pem.engine.execution import Execution
 from m2pem.engine.nodes.flows import true_flows
 from m2pem.engine.state import Token
 from m2pem.model.elements import Activity, AdHocSubProcess
+from m2pem.model.reach import begins_by_itself
 
 
 def complete(x: Execution, token: Token) -> None:
@@ -29,5 +30,5 @@ def pass_on(x: Execution, token: Token) -> None:
     if flows is not None:
         enable(x, token)
         x.proceed(token, [*flows] * node.completion_quantity)
-        if isinstance(node.container, AdHocSubProcess):
+        if isinstance(node.container, AdHocSubProcess) and not begins_by_itself(node):
             x.queue.append(token.scope)

@@ -9,7 +9,7 @@ from m2pem.engine.records import RunOutcome, TokenOutcome
 from m2pem.engine.scopes import close, open_scope
 from m2pem.engine.state import Scope, Token
 from m2pem.engine.throwing import throw_error
-from m2pem.engine.triggering import arm_event_subprocesses
+from m2pem.engine.triggering import arm_event_subprocesses, collect_letters
 from m2pem.model.elements import CallActivity
 
 MAX_DEPTH = 1000
@@ -19,7 +19,10 @@ MAX_DEPTH = 1000
 def subprocess(x: Execution, token: Token) -> None:
     """Open its scope and start what is in it."""
     if token.inner is not None:
-        return  # an event subprocess, which its trigger has begun
+        # An event subprocess, which its trigger has begun.
+        if arm_event_subprocesses(x, token.inner):
+            collect_letters(x, token.inner)
+        return
     scope = open_inside(x, token)
     if scope is not None:
         begin(x, scope)
@@ -57,6 +60,7 @@ def begin(x: Execution, scope: Scope) -> None:
         x.spawn(entry, scope)
     if not scope.tokens:
         x.queue.append(scope)
+    collect_letters(x, scope)
 
 
 def look_at(x: Execution, scope: Scope) -> None:

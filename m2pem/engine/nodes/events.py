@@ -15,7 +15,13 @@ from m2pem.engine.throwing import throw_error, throw_escalation
 from m2pem.engine.transactions import cancel
 from m2pem.engine.triggering import collect_letters, throw_signal
 from m2pem.engine.waiting import arm
-from m2pem.model.elements import Event, StartEvent, SubProcess
+from m2pem.model.elements import (
+    Event,
+    IntermediateCatchEvent,
+    IntermediateThrowEvent,
+    StartEvent,
+    SubProcess,
+)
 from m2pem.model.events import (
     CancelEventDefinition,
     CompensateEventDefinition,
@@ -55,10 +61,10 @@ def start(x: Execution, token: Token) -> None:
 
 
 def catch(x: Execution, token: Token) -> None:
-    """Wait for the trigger."""
+    """Wait for the trigger; the target of a link has none (table 10.98)."""
     node = token.node
     assert isinstance(node, Event)
-    if not node.definitions:
+    if not node.definitions or (isinstance(node, IntermediateCatchEvent) and node.linked_from):
         complete(x, token)
         return
     if all(arm(x, token, node, definition) for definition in node.definitions):
@@ -73,7 +79,10 @@ def throw(x: Execution, token: Token) -> None:
         _throw(x, token, definition)
         if x.state.tokens.get(token.id) is not token:
             return
-    if not token.compensations:
+    if isinstance(node, IntermediateThrowEvent) and node.links_to is not None:
+        x.leave(token, TokenOutcome.COMPLETED)
+        x.enter(token.id, node.links_to, token.scope)
+    elif not token.compensations:
         complete(x, token)
 
 

@@ -20,6 +20,7 @@ from m2pem.engine.records.compensation import (
     TransactionCancelled,
 )
 from m2pem.engine.records.events import (
+    ConditionReset,
     DataWritten,
     ErrorThrown,
     EscalationThrown,
@@ -83,6 +84,7 @@ __all__ = [
     "CompensationEnabled",
     "CompensationEnded",
     "CompensationTriggered",
+    "ConditionReset",
     "DataWritten",
     "ErrorThrown",
     "EscalationThrown",
@@ -164,6 +166,7 @@ Record: TypeAlias = Union[
     DataWritten,
     EventAwaited,
     EventTriggered,
+    ConditionReset,
     SignalThrown,
     MessageThrown,
     EscalationThrown,

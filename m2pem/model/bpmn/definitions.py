@@ -10,15 +10,18 @@ from m2pem.model.bpmn.names import local
 from m2pem.model.bpmn.reading import MessageUse, Reading, reference, text_of
 from m2pem.model.bpmn.rewriting import time_remedy
 from m2pem.model.bpmn.scan import Scan, scan
+from m2pem.model.bpmn.schema import SHAPES
 from m2pem.model.duration import cycle, date_us, duration_us
 from m2pem.model.events import (
     CancelEventDefinition,
     CompensateEventDefinition,
+    ConditionalEventDefinition,
     Error,
     ErrorEventDefinition,
     Escalation,
     EscalationEventDefinition,
     EventDefinition,
+    LinkEventDefinition,
     Message,
     MessageEventDefinition,
     RootElement,
@@ -38,7 +41,7 @@ def read_definition(
     reading: Reading, element: etree._Element, event: Scan, *, catches: bool
 ) -> EventDefinition | None:
     """One definition of an event; None when findings say why there is none."""
-    scan(reading, element, event.id)
+    found = scan(reading, element, event.id)
     line = reading.report.line(element)
     label = event.element.get("name", "")
     name = local(element.tag).removesuffix("EventDefinition")
@@ -53,6 +56,10 @@ def read_definition(
         return CompensateEventDefinition(line, activity, wait)
     if name == "timer":
         return _timer(reading, element, event.id)
+    if name == "conditional":
+        return _conditional(reading, found)
+    if name == "link":
+        return LinkEventDefinition(line, (element.get("name") or label).strip())
     if name == "message":
         return _message(reading, element, event, catches=catches)
     if name == "signal":
@@ -124,6 +131,25 @@ def _message(
     where = reading.report.line(event.element)
     reading.message_uses.append(MessageUse(definition, event.id, label, where, catches, message))
     return definition
+
+
+def _conditional(reading: Reading, found: Scan) -> ConditionalEventDefinition | None:
+    for element in found.of("condition"):
+        text = text_of(element)
+        reading.check_attributes(element, SHAPES[element.tag], found.id)
+        if text:
+            condition = reading.expression(element, found.id, text, element.get("language"))
+            if condition is None:
+                return None
+            return ConditionalEventDefinition(reading.report.line(found.element), condition)
+    reading.report.error(
+        found.element,
+        found.id,
+        "no-condition",
+        "the conditional event has no condition",
+        "add one, for example <condition>battery.level &lt; 20</condition>",
+    )
+    return None
 
 
 _TIMES = {kind.value: kind for kind in TimerKind}

@@ -89,12 +89,7 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
     node: FlowNode
     if tag in SUBPROCESSES:
         # Its children are read with its content, by containers.py.
-        if tag == BPMN + "adHocSubProcess":
-            node = read_ad_hoc(reading, element, identifier)
-        else:
-            sort = Transaction if tag == BPMN + "transaction" else SubProcess
-            node = sort(identifier, element.get("name", ""), reading.report.line(element))
-        _event_subprocess(reading, element, node)
+        node = _subprocess(reading, element, identifier)
         _check_activity(reading, element, node)
     elif task is not None:
         found = scan(reading, element, identifier)
@@ -108,6 +103,24 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
     else:
         node = FlowNode(identifier, element.get("name", ""), reading.report.line(element))
     return node
+
+
+def _subprocess(reading: Reading, element: etree._Element, identifier: str) -> SubProcess:
+    triggered = reading.boolean(element, "triggeredByEvent", False, identifier)
+    if triggered and element.tag != BPMN + "subProcess":
+        reading.report.error(
+            element,
+            identifier,
+            "bad-value",
+            f"{a(kind(element.tag))} cannot be an event subprocess too",
+            'put it into a plain <subProcess triggeredByEvent="true">, behind a start event',
+        )
+    if element.tag == BPMN + "adHocSubProcess":
+        return read_ad_hoc(reading, element, identifier)
+    name, line = element.get("name", ""), reading.report.line(element)
+    if element.tag == BPMN + "transaction":
+        return Transaction(identifier, name, line, triggered)
+    return SubProcess(identifier, name, line, triggered)
 
 
 def not_executed(
@@ -124,18 +137,6 @@ def refuse_loop(reading: Reading, element: etree._Element, identifier: str) -> N
     not_executed(
         reading, element, identifier, kind(element.tag), "draw the loop with an exclusive gateway"
     )
-
-
-def _event_subprocess(reading: Reading, element: etree._Element, node: SubProcess) -> None:
-    if reading.boolean(element, "triggeredByEvent", False, node.id):
-        reading.self_starting.add(node)
-        not_executed(
-            reading,
-            element,
-            node.id,
-            "event subprocess",
-            "use a boundary event on a subprocess around the rest",
-        )
 
 
 def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -> None:
