@@ -16,10 +16,16 @@ from m2pem.model.elements import (
     Event,
     EventBasedGateway,
     FlowNode,
+    Process,
     ReceiveTask,
     StartEvent,
 )
-from m2pem.model.events import EventDefinition, MessageEventDefinition, SignalEventDefinition
+from m2pem.model.events import (
+    EventDefinition,
+    MessageEventDefinition,
+    SignalEventDefinition,
+    TimerEventDefinition,
+)
 from m2pem.model.values import Value
 
 WHEN_TRIGGERED: dict[type[FlowNode], Callable[[Execution, Token], None]] = {}
@@ -49,6 +55,19 @@ def arm_event_subprocesses(x: Execution, scope: Scope) -> bool:
             for definition in start.definitions:
                 if not arm(x, scope, start, definition):
                     return False
+    return True
+
+
+def arm_triggered_timers(x: Execution, root: Scope) -> bool:
+    """Arm the timer starts of the processes that get an instance for each trigger.
+
+    They last as long as the process that the run began with. False: a timer was wrong, and its
+    error has been thrown.
+    """
+    for start in x.triggered_starts:
+        for definition in definitions_of(start) if isinstance(start, StartEvent) else ():
+            if isinstance(definition, TimerEventDefinition) and not arm(x, root, start, definition):
+                return False
     return True
 
 
@@ -139,9 +158,15 @@ def _at_boundary(
 
 
 def _in_scope(x: Execution, wait: Wait, data: dict[str, Value]) -> None:
-    """The start event of an event subprocess; it goes on as one that has happened."""
+    """The start event of an event subprocess, which goes on as one that has happened; or a timer
+    that begins a process."""
     node = wait.node
     assert isinstance(node, StartEvent)
+    if isinstance(node.container, Process):
+        arm_again(x, wait)
+        came = next(each for each in node.definitions if isinstance(each, TimerEventDefinition))
+        _instance(x, node, came, data)
+        return
     if _is_one_of_several(node, wait.scope.waits):
         return
     if not node.interrupting:

@@ -103,7 +103,7 @@ class TimerKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class TimerEventDefinition(EventDefinition):
-    """`expression` evaluates to ISO 8601 text; `m2pem.model.duration` reads it."""
+    """`expression` evaluates to a text that `m2pem.model.duration` or `m2pem.model.cycle` reads."""
 
     kind: TimerKind
     expression: Expression

@@ -25,11 +25,12 @@ class DataWritten(BaseRecord, frozen=True):
 class EventAwaited(BaseRecord, frozen=True):
     """A catch event is armed: `ref` is a signal's or message's id; `due_us` a timer's time.
 
-    `token` 0: it is the start event of an event subprocess, and `scope` waits.
+    `token` 0: `scope` waits. It is the start event of an event subprocess, or a timer that starts
+    another process than the one that the run began with.
 
     A duration or cycle is due at a mission time (microseconds from the start, which stands during
     a pause); a date (`calendar`) at a time since the Unix epoch. `left`: how often a cycle still
-    fires after this one (-1: for ever), every `period_us`.
+    fires after this one (-1: for ever); `cycle`: its period or cron text.
     """
 
     token: int

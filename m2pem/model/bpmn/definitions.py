@@ -9,7 +9,8 @@ from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.model.bpmn.names import a, local
 from m2pem.model.bpmn.reading import MessageUse, Reading, reference, text_of
 from m2pem.model.bpmn.scan import Scan, scan
-from m2pem.model.duration import cycle, date_us, duration_us
+from m2pem.model.cycle import cycle
+from m2pem.model.duration import date_us, duration_us
 from m2pem.model.events import (
     Error,
     ErrorEventDefinition,
@@ -147,12 +148,17 @@ def _timer(
             _CHECKS[kind](expression.evaluate(lambda _: None))
         except (ExpressionSyntaxError, ExpressionError) as error:
             reading.report.error(
-                times[0], identifier, "timer-time", f"{name}: {error}", "write it as ISO 8601"
+                times[0], identifier, "timer-time", f"{name}: {error}", _FORMS[kind]
             )
             return None
     return TimerEventDefinition(reading.report.line(element), kind, expression)
 
 
+_FORMS = {
+    TimerKind.DATE: "write it as ISO 8601: 2026-01-31T12:00:00Z",
+    TimerKind.DURATION: "write it as ISO 8601: PT30S",
+    TimerKind.CYCLE: "write it as ISO 8601 (R3/PT10S), or as cron does (0 0 8 * * MON-FRI)",
+}
 _CHECKS: dict[TimerKind, Callable[[Value], object]] = {
     TimerKind.DATE: date_us,
     TimerKind.DURATION: lambda text: duration_us(text, 0),
