@@ -165,7 +165,7 @@ def _in_scope(x: Execution, wait: Wait, data: dict[str, Value]) -> None:
     if isinstance(node.container, Process):
         arm_again(x, wait)
         came = next(each for each in node.definitions if isinstance(each, TimerEventDefinition))
-        _instance(x, node, came, data)
+        _instance(x, node, came, data, {})
         return
     if _is_one_of_several(node, wait.scope.waits):
         return
