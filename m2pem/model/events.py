@@ -1,7 +1,7 @@
 """Event definitions and the root elements they refer to (BPMN 2.0.2, clauses 8.4 and 10.5.5)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from m2pem.model.expression import Expression
@@ -14,6 +14,8 @@ class RootElement:
     id: str
     name: str
     line: int
+    file: str = field(init=False, repr=False, compare=False, default="")
+    """The file that declares it; "" for one that an event of the mission's own file made up."""
 
 
 @dataclass(frozen=True, slots=True)
