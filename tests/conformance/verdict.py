@@ -55,7 +55,7 @@ def judge(case: Case, played: Played) -> Verdict:
 
 
 def _is_about_data(case: Case) -> bool:
-    return case.topic.parent.name.startswith("10.4") or case.variant == "no mapping"
+    return case.topic.parent.name.startswith("10.4")
 
 
 def _moments(case: Case, played: Played) -> list[tuple[str, Counter[str], Counter[str]]]:
