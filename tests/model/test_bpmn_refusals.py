@@ -33,10 +33,6 @@ ERRORS = {
         around('<eventBasedGateway id="T" eventGatewayType="Parallel"/>'),
         [("parallel-event-gateway", 3, "T")],
     ),
-    "global task": (
-        around('<callActivity id="T" calledElement="G"/>', '<globalUserTask id="G"/>'),
-        [("not-executed", 3, "T")],
-    ),
     "called expression": (
         around('<callActivity id="T" calledElement="${which}"/>'),
         [("not-executed", 3, "T")],
