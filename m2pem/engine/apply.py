@@ -15,6 +15,7 @@ from m2pem.engine.state import (
     BehaviorPhase,
     Join,
     Letter,
+    Loop,
     Prompt,
     RunState,
     RunStatus,
@@ -127,13 +128,19 @@ def _scope_opened(state: RunState, record: r.ScopeOpened) -> None:
     owner = state.tokens[record.token] if record.token is not None else None
     container: Container
     element = state.mission.elements[record.element]
-    if isinstance(element, CallActivity):
+    if record.instances is not None:
+        assert isinstance(element, Activity)
+        container = element.container
+    elif isinstance(element, CallActivity):
         container = element.called
     else:
         assert isinstance(element, (Process, SubProcess))
         container = element
     depth = parent.depth + 1 if parent is not None else 0
     scope = Scope(record.scope, container, parent, owner, depth, state.shared)
+    if record.instances is not None:
+        scope.loop = Loop(record.instances, record.items)
+        scope.depth -= 1  # its activity is one level, not two
     state.scopes[record.scope] = scope
     state.last_scope = record.scope
     if owner is not None:
@@ -194,11 +201,13 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         if join is None:
             join = scope.joins[node] = Join()
         join.by_flow.setdefault(flow, []).append(token)
+    elif scope.loop is not None:
+        scope.loop.started += 1
     elif _is_choice(scope, node) and flow is None:
         scope.begun[node] = None
         if scope.chosen and scope.chosen[0] is node:
             scope.chosen.pop(0)
-    elif isinstance(node, Activity) and node.start_quantity > 1 and record.instance is None:
+    elif isinstance(node, Activity) and node.start_quantity > 1:
         scope.gathered.setdefault(node, []).append(token)
 
 
@@ -245,8 +254,19 @@ def _token_left(state: RunState, record: r.TokenLeft) -> None:
             del join.by_flow[token.flow]
             if not join.by_flow:
                 del scope.joins[token.node]
+    elif scope.loop is not None:
+        if record.outcome is r.TokenOutcome.COMPLETED:
+            scope.loop.completed += 1
+        else:
+            scope.loop.terminated += 1
     elif scope.gathered:
         _no_longer_gathered(token)
+
+
+def _instance_output(state: RunState, record: r.InstanceOutput) -> None:
+    loop = state.scopes[record.scope].loop
+    assert loop is not None
+    loop.outputs[record.instance] = record.value
 
 
 # --- behaviors, prompts, services ---------------------------------------------------------------
@@ -452,6 +472,7 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.ScopeInterrupted: _scope_interrupted,
     r.TokenEntered: _token_entered,
     r.TokenLeft: _token_left,
+    r.InstanceOutput: _instance_output,
     r.FlowTaken: _nothing,
     r.ActivitiesChosen: _activities_chosen,
     r.TokensGathered: _tokens_gathered,

@@ -42,6 +42,7 @@ class Execution:
         "_receivable",
         "_triggered_starts",
         "changed",
+        "ended_instances",
         "fleet",
         "mission",
         "moved",
@@ -59,6 +60,7 @@ class Execution:
         self.now_us = 0
         self.records: list[Record] = []
         self.queue: deque[Token | Scope] = deque()
+        self.ended_instances: deque[tuple[Token, TokenOutcome]] | None = None
         self.moved: set[int] = set()  # scopes whose inclusive joins must be looked at
         self.changed = False  # whether conditions must be looked at before the next step
         self.process_ids = [node.container.process.id for node in self.mission.nodes]

@@ -79,13 +79,15 @@ class Loop:
     """How far the instances of an activity have come (BPMN 2.0.2, table 10.31).
 
     `total`: instances there will be, -1 while nobody knows (a standard loop). `items`: what each
-    reads, when they come from a collection. `outputs`: what each gave, by instance.
+    reads, when they come from a collection. `outputs`: what each gave, by instance. Those that
+    were begun are active, or `completed`, or ended otherwise (`terminated`).
     """
 
     total: int
     items: tuple[Value, ...] | None
     started: int = 0
     completed: int = 0
+    terminated: int = 0
     outputs: dict[int, Value] = field(default_factory=dict)
 
 

@@ -24,6 +24,7 @@ from m2pem.model.elements import (
 )
 from m2pem.model.events import ConditionalEventDefinition, TimerEventDefinition
 from m2pem.model.expression import Expression
+from m2pem.model.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
 from m2pem.model.near import did_you_mean
 
 
@@ -91,7 +92,7 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
             said.add((read.element, name))
             yield Finding(
                 Severity.WARNING,
-                mission.file,
+                mission.file_of(process),
                 read.line,
                 read.element,
                 "unwritten-name",
@@ -118,6 +119,8 @@ def _reads(node: FlowNode) -> Iterator[Read]:
                 yield Read(expression, node.id, node.line)
     if isinstance(node, ComplexGateway) and node.activation is not None:
         yield Read(node.activation, node.id, node.line)
+    if isinstance(node, Activity):
+        yield from _loop_reads(node)
     for flow in node.outgoing:
         if flow.condition is not None:
             yield Read(flow.condition, flow.id, flow.line)
@@ -152,6 +155,21 @@ def _seen_from(mission: Mission, node: FlowNode) -> Process:
     return process if called else mission.process()
 
 
+def _loop_reads(node: Activity) -> Iterator[Read]:
+    loop = node.loop
+    found: list[Expression | None] = []
+    if isinstance(loop, StandardLoop):
+        found = [loop.condition]
+    elif loop is not None:
+        found = [loop.cardinality, loop.collection, loop.completion]
+        found += [each.condition for each in loop.complex]
+        if loop.output is not None and loop.output.text not in loop.output.names:
+            found.append(loop.output)
+    for expression in found:
+        if expression is not None:
+            yield Read(expression, node.id, node.line)
+
+
 def _parameters(node: FlowNode, parameters: Iterable[Parameter]) -> Iterator[Read]:
     for parameter in parameters:
         if isinstance(parameter.value, Expression):
@@ -161,6 +179,11 @@ def _parameters(node: FlowNode, parameters: Iterable[Parameter]) -> Iterator[Rea
 def _note_writes(
     node: FlowNode, store: _Store, service_writes: Mapping[str, Sequence[str]]
 ) -> None:
+    if isinstance(node, Activity) and node.loop is not None:
+        store.written.add(LOOP_COUNTER)
+        if isinstance(node.loop, MultiInstance):
+            store.written |= {*INSTANCE_COUNTS, node.loop.item, node.loop.output_item}
+            store.written.add(node.loop.output_collection)
     if isinstance(node, ScriptTask) and node.script is not None:
         for statement in node.script.statements:
             if isinstance(statement, Assignment):
@@ -169,7 +192,7 @@ def _note_writes(
         store.written.add(node.prompt.store)
     elif isinstance(node, ComplexGateway):
         store.written |= {"activationCount", "waitingForStart"}
-        store.written.update(flow.id for flow in node.incoming)
+        store.written.update(flow.local_id for flow in node.incoming)
     elif isinstance(node, ServiceTask) and node.call is not None:
         writes = service_writes.get(node.call.service)
         if writes is None:

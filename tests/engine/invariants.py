@@ -1,6 +1,7 @@
 """What is always true of a run's state between two inputs."""
 
 from m2pem.engine.state import BehaviorPhase, RunState, RunStatus, Scope
+from m2pem.model.elements import Activity
 
 
 def check_state(state: RunState) -> None:
@@ -36,6 +37,7 @@ def _check_tokens(state: RunState) -> None:
                 assert waiting, "an empty flow is absent"
                 assert flow in node.incoming
                 assert all(scope.tokens[t.id] is t and t.node is node for t in waiting)
+        _check_loop(scope)
     for token in tokens:
         assert token.scope.tokens[token.id] is token
         assert token.node.container is token.scope.container
@@ -78,6 +80,23 @@ def _check_done(scope: Scope) -> None:
                 assert not inner.joins
                 assert not inner.compensations
                 kept.append(inner)
+
+
+def _check_loop(scope: Scope) -> None:
+    """Instances are in the scope of their loop, and nothing else is."""
+    loop, owner = scope.loop, scope.owner
+    if loop is None:
+        assert all(token.instance is None for token in scope.tokens.values())
+        return
+    assert owner is not None
+    assert owner.instance is None
+    assert isinstance(owner.node, Activity)
+    assert owner.node.loop is not None
+    assert all(token.node is owner.node for token in scope.tokens.values())
+    numbers = [token.instance for token in scope.tokens.values()]
+    assert len(set(numbers)) == len(numbers) == loop.started - loop.completed - loop.terminated
+    assert loop.total < 0 or loop.started <= loop.total
+    assert set(loop.outputs) <= set(range(loop.started))
 
 
 def _check_waits(state: RunState) -> None:

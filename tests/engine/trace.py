@@ -34,6 +34,7 @@ _LINES: dict[type, Callable[[Any], Iterable[object]]] = {
     r.ScopeClosed: lambda x: ("close", x.element, _outcome(x), "kept" if x.kept else ""),
     r.TokenEntered: lambda x: ("enter", x.element),
     r.TokenLeft: lambda x: ("leave", x.element, _outcome(x)),
+    r.InstanceOutput: lambda x: ("give", x.value),
     r.FlowTaken: lambda x: ("take", x.flow),
     r.GatewayActivated: lambda x: ("activate", x.element, *x.flows),
     r.ActivitiesChosen: lambda x: ("choose", x.element, *x.elements),

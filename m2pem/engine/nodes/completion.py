@@ -4,14 +4,27 @@ from m2pem.engine.compensation import enable, undone
 from m2pem.engine.data_flow import give_out
 from m2pem.engine.execution import Execution
 from m2pem.engine.nodes.flows import true_flows
+from m2pem.engine.nodes.loops import instance_done
+from m2pem.engine.records import TokenOutcome
 from m2pem.engine.state import Token
 from m2pem.model.elements import Activity, AdHocSubProcess
 from m2pem.model.reach import begins_by_itself
 
 
-def complete(x: Execution, token: Token) -> None:
-    """The work of an activity, or of one instance of it, is done."""
-    pass_on(x, token)
+def complete(x: Execution, token: Token, outcome: TokenOutcome = TokenOutcome.COMPLETED) -> None:
+    """The work of an activity, or of one instance of it, is done.
+
+    `outcome` TERMINATED: by a terminate end event in it.
+    """
+    node = token.node
+    assert isinstance(node, Activity)
+    if node.data_flow.outputs and not give_out(x, token):
+        return
+    if token.instance is None:
+        pass_on(x, token)
+        return
+    for whole in instance_done(x, token, outcome):
+        pass_on(x, whole)
 
 
 def pass_on(x: Execution, token: Token) -> None:
@@ -21,8 +34,6 @@ def pass_on(x: Execution, token: Token) -> None:
     """
     node = token.node
     assert isinstance(node, Activity)
-    if node.data_flow.outputs and not give_out(x, token):
-        return
     if token.undoes is not None:
         undone(x, token)
         return

@@ -5,6 +5,7 @@ from m2pem.engine.data_flow import evaluate, write_values
 from m2pem.engine.execution import Execution
 from m2pem.engine.interruption import end_run
 from m2pem.engine.nodes.completion import complete
+from m2pem.engine.nodes.loops import begin_instances
 from m2pem.engine.records import RunOutcome, TokenOutcome
 from m2pem.engine.scopes import close, open_scope
 from m2pem.engine.state import Scope, Token
@@ -65,12 +66,17 @@ def begin(x: Execution, scope: Scope) -> None:
 
 def look_at(x: Execution, scope: Scope) -> None:
     """A scope in which a token was consumed: if it was the last one, the scope has completed."""
-    if not scope.tokens:
+    if scope.loop is not None:
+        begin_instances(x, scope)
+    elif not scope.tokens:
         finish(x, scope)
 
 
 def finish(x: Execution, scope: Scope, outcome: TokenOutcome = TokenOutcome.COMPLETED) -> None:
-    """A scope has ended: its activity goes on, or, without one, perhaps the run is over."""
+    """A scope has ended: its activity goes on, or, without one, perhaps the run is over.
+
+    `outcome` TERMINATED: by a terminate end event in it.
+    """
     token = scope.owner
     if token is None:
         close(x, scope, outcome)
@@ -85,4 +91,4 @@ def finish(x: Execution, scope: Scope, outcome: TokenOutcome = TokenOutcome.COMP
             return
     close(x, scope, outcome)
     write_values(x, token, token, values or [])
-    complete(x, token)
+    complete(x, token, outcome)

@@ -1,5 +1,7 @@
 """Events: which definitions may stand where (BPMN 2.0.2, clause 10.5), and what they say."""
 
+from collections.abc import Iterable
+
 from lxml import etree
 
 from m2pem.model.bpmn.data_flow import read_data_flow
@@ -22,6 +24,7 @@ from m2pem.model.elements import (
 from m2pem.model.events import ErrorEventDefinition, EventDefinition
 from m2pem.model.near import did_you_mean
 
+_THROWN_IMPLICITLY = frozenset({"message", "signal", "escalation", "error"})
 _CATCHING = frozenset({"startEvent", "intermediateCatchEvent", "boundaryEvent"})
 _NEEDS_TRIGGER = frozenset({"intermediateCatchEvent", "boundaryEvent"})
 
@@ -95,19 +98,46 @@ def _no_error(reading: Reading, element: etree._Element, event: Event) -> None:
 def _definitions(
     reading: Reading, found: Scan, place: str, container: Container
 ) -> tuple[EventDefinition, ...]:
+    elements = definition_elements(reading, found)
+    awaited = place in _NEEDS_TRIGGER or (place == "startEvent" and _is_handler(container))
+    if awaited and not elements and not found.of("eventDefinitionRef"):
+        _no_trigger(reading, found, place)
+    read = [_definition(reading, found, place, container, each) for each in elements]
+    return tuple(definition for definition in read if definition is not None)
+
+
+def definition_elements(reading: Reading, found: Scan) -> list[etree._Element]:
+    """The definitions that stand in an event, then those of the file that it refers to."""
     elements = [
         each
         for each in found.element
         if each.tag.startswith(BPMN) and each.tag.endswith("EventDefinition")
     ]
-    for referring in found.of("eventDefinitionRef"):
-        target = _referred_definition(reading, referring, found.id)
+    for each in found.of("eventDefinitionRef"):
+        name = reference(text_of(each))
+        target = referred_definition(reading, each, "eventDefinitionRef", name, found.id)
         if target is not None:
             elements.append(target)
-    awaited = place in _NEEDS_TRIGGER or (place == "startEvent" and _is_handler(container))
-    if awaited and not elements and not found.of("eventDefinitionRef"):
-        _no_trigger(reading, found, place)
-    read = [_definition(reading, found, place, container, each) for each in elements]
+    return elements
+
+
+def read_thrown(
+    reading: Reading, found: Scan, elements: Iterable[etree._Element]
+) -> tuple[EventDefinition, ...]:
+    """What a multi-instance activity throws by itself (table 10.30): an implicit throw event."""
+    read = []
+    for element in elements:
+        name = local(element.tag).removesuffix("EventDefinition")
+        if name in _THROWN_IMPLICITLY:
+            read.append(read_definition(reading, element, found, catches=False))
+        else:
+            reading.report.error(
+                element,
+                found.id,
+                "event-not-allowed",
+                f"a multi-instance activity cannot throw {a(kind(element.tag))} by itself",
+                f"use one of: {', '.join(sorted(_THROWN_IMPLICITLY))}",
+            )
     return tuple(definition for definition in read if definition is not None)
 
 
@@ -135,17 +165,17 @@ def _definition(
     return read_definition(reading, definition, found, catches=place in _CATCHING)
 
 
-def _referred_definition(
-    reading: Reading, referring: etree._Element, identifier: str
+def referred_definition(
+    reading: Reading, referring: etree._Element, attribute: str, name: str, identifier: str
 ) -> etree._Element | None:
-    name = reference(text_of(referring))
+    """The event definition of the file that has an id; says so when there is none."""
     target = reading.event_definitions.get(name)
     if target is None:
         reading.report.error(
             referring,
             identifier,
             "dangling-reference",
-            f"eventDefinitionRef names '{name}', which is no event definition of this file",
+            f"{attribute} names '{name}', which is no event definition of this file",
             did_you_mean(name, reading.event_definitions, "name one that stands in definitions"),
         )
     return target

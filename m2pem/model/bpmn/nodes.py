@@ -9,6 +9,7 @@ from m2pem.model.bpmn.calls import read_call_activity
 from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.events import read_event
 from m2pem.model.bpmn.gateways import GATEWAYS, read_gateway
+from m2pem.model.bpmn.loops import read_loop
 from m2pem.model.bpmn.names import BPMN, a, kind, local
 from m2pem.model.bpmn.prompts import read_user_task
 from m2pem.model.bpmn.reading import Reading, reference
@@ -30,8 +31,6 @@ from m2pem.model.elements import (
     Transaction,
 )
 
-_LOOPS = ("loopCharacteristics", "standardLoopCharacteristics", "multiInstanceLoopCharacteristics")
-LOOPS = frozenset(BPMN + name for name in _LOOPS)
 SUBPROCESSES = frozenset(BPMN + name for name in ("subProcess", "transaction", "adHocSubProcess"))
 
 MAX_QUANTITY = 1000
@@ -96,9 +95,7 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
         node = task(reading, found)
         if tag != BPMN + "callActivity":
             read_data_flow(reading, found, node)
-        for loop in _LOOPS:
-            for each in found.of(loop):
-                refuse_loop(reading, each, identifier)
+        read_loop(reading, found, node)
         _check_activity(reading, element, node)
     else:
         node = FlowNode(identifier, element.get("name", ""), reading.report.line(element))
@@ -129,13 +126,6 @@ def not_executed(
     """Refuse what is BPMN but nothing that m2pem runs."""
     reading.report.error(
         element, identifier, "not-executed", f"m2pem does not execute {a(what)} yet", instead
-    )
-
-
-def refuse_loop(reading: Reading, element: etree._Element, identifier: str) -> None:
-    """Refuse the loop marker of an activity."""
-    not_executed(
-        reading, element, identifier, kind(element.tag), "draw the loop with an exclusive gateway"
     )
 
 

@@ -105,6 +105,16 @@ class PendingDataFlow:
 
 
 @dataclass(slots=True)
+class PendingLoop:
+    """A multi-instance activity whose collections wait until all data objects are known."""
+
+    node: Activity
+    element: etree._Element
+    collection_ref: str
+    output_ref: str
+
+
+@dataclass(slots=True)
 class MessageUse:
     """A place that sends or receives a message, which message flows may have to name."""
 
@@ -135,11 +145,13 @@ class Reading:
     made_up: dict[str, int] = field(default_factory=dict)
     """How many ids were made up for elements without one, by how they begin."""
     event_definitions: dict[str, etree._Element] = field(default_factory=dict)
-    global_tasks: dict[str, str] = field(default_factory=dict)
+    global_tasks: dict[str, etree._Element] = field(default_factory=dict)
     signals: dict[str, Signal] = field(default_factory=dict)
     messages: dict[str, Message] = field(default_factory=dict)
     errors: dict[str, Error] = field(default_factory=dict)
     escalations: dict[str, Escalation] = field(default_factory=dict)
+    declared_roots: set[str] = field(default_factory=set)
+    """Ids of signals, messages, errors and escalations that the file, or an import, declares."""
     correlation_properties: dict[str, etree._Element] = field(default_factory=dict)
     subscriptions: list[tuple[Process, etree._Element]] = field(default_factory=list)
     participants: list[Participant] = field(default_factory=list)
@@ -157,6 +169,7 @@ class Reading:
     prompts: list[PendingPrompt] = field(default_factory=list)
     calls: list[PendingCall] = field(default_factory=list)
     data_flows: list[PendingDataFlow] = field(default_factory=list)
+    loops: list[PendingLoop] = field(default_factory=list)
     data_stores: set[str] = field(default_factory=set)
     """Ids of data stores, and of references to them."""
     written: list[Association] = field(default_factory=list)

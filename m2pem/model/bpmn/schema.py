@@ -50,6 +50,7 @@ _ROOTS = (
     f"|partnerEntity|partnerRole|process|resource|rootElement|signal|{_DEFINITIONS}"
 )
 
+_GLOBAL = f"{_BASE} supportedInterfaceRef ioSpecification ioBinding {_RESOURCES}"
 _ACTIVITY_ATTRIBUTES = "id name isForCompensation startQuantity completionQuantity default"
 
 _TABLE: dict[str, tuple[str, str]] = {
@@ -87,6 +88,11 @@ _TABLE: dict[str, tuple[str, str]] = {
     ),
     "businessRuleTask": (f"{_ACTIVITY_ATTRIBUTES} implementation", _ACTIVITY),
     "callActivity": (f"{_ACTIVITY_ATTRIBUTES} calledElement", _ACTIVITY),
+    "globalTask": ("id name", _GLOBAL),
+    "globalBusinessRuleTask": ("id name implementation class", _GLOBAL),
+    "globalManualTask": ("id name", _GLOBAL),
+    "globalScriptTask": ("id name scriptLanguage", f"{_GLOBAL} script"),
+    "globalUserTask": ("id name implementation", f"{_GLOBAL} rendering"),
     "exclusiveGateway": ("id name gatewayDirection default", _NODE),
     "inclusiveGateway": ("id name gatewayDirection default", _NODE),
     "parallelGateway": ("id name gatewayDirection", _NODE),
@@ -128,6 +134,16 @@ _TABLE: dict[str, tuple[str, str]] = {
     "timeDuration": ("id language evaluatesToTypeRef", _BASE),
     "timeCycle": ("id language evaluatesToTypeRef", _BASE),
     "association": ("id sourceRef targetRef associationDirection", _BASE),
+    "standardLoopCharacteristics": ("id testBefore loopMaximum", f"{_BASE} loopCondition"),
+    "multiInstanceLoopCharacteristics": (
+        "id isSequential behavior oneBehaviorEventRef noneBehaviorEventRef",
+        f"{_BASE} loopCardinality loopDataInputRef loopDataOutputRef inputDataItem outputDataItem"
+        " complexBehaviorDefinition completionCondition",
+    ),
+    "complexBehaviorDefinition": ("id", f"{_BASE} condition event"),
+    "event": ("id name", _THROW),
+    "inputDataItem": ("id name itemSubjectRef isCollection", f"{_BASE} dataState"),
+    "outputDataItem": ("id name itemSubjectRef isCollection", f"{_BASE} dataState"),
     "participant": (
         "id name processRef",
         f"{_BASE} interfaceRef endPointRef participantMultiplicity",
