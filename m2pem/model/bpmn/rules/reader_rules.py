@@ -41,8 +41,8 @@ MISSING_ID = Rule(
     8301,
     "missing-id",
     "8.3.1",
-    E,
-    "an element to which others refer has no id",
+    W,
+    "an element that others could refer to has no id; m2pem makes one up",
     "give it an id that nothing else in the file has",
 )
 DUPLICATE_ID = Rule(

@@ -182,7 +182,7 @@ def place(element: etree._Element) -> str:
         if outside and found.tag not in _PARTS and found.get("id"):
             break
         found = parent
-    return "" if found is None else found.get("id", "")
+    return (element if found is None else found).get("id", "")
 
 
 def children(element: etree._Element, text: str) -> Iterator[etree._Element]:
@@ -201,10 +201,9 @@ def has(element: etree._Element, text: str) -> bool:
 
 
 def parent(element: etree._Element) -> etree._Element:
-    """The parent of an element that is not the root."""
-    found = element.getparent()
-    assert found is not None
-    return found
+    """The parent of an element; the root, which has none, is its own."""
+    found: etree._Element | None = element.getparent()
+    return element if found is None else found
 
 
 def is_true(element: etree._Element, name: str) -> bool:
