@@ -6,11 +6,12 @@ where it is used, for reads as for writes, else to the process instance; no furt
 process has its own store. Only what a data store holds is shared by all processes of a run.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import TypeAlias
 
 from m2pem.engine.state import Loop, Scope, Shared, Token
 from m2pem.model.elements import Activity, Process
+from m2pem.model.loops import INSTANCE_COUNTS, LOOP_COUNTER
 from m2pem.model.values import ReadValue, Value
 
 Place: TypeAlias = Token | Scope
@@ -19,20 +20,12 @@ Place: TypeAlias = Token | Scope
 Store: TypeAlias = Place | Shared
 """Where a name is held."""
 
-LOOP_COUNTER = "loopCounter"
-"""Which instance this is, from 0 (BPMN 2.0.2, table 10.28)."""
 
-
-def _number_of_instances(loop: Loop) -> int:
-    return loop.total if loop.total >= 0 else loop.started
-
-
-INSTANCE_COUNTS: dict[str, Callable[[Loop], int]] = {
-    "numberOfInstances": _number_of_instances,
-    "numberOfActiveInstances": lambda loop: loop.started - loop.completed,
-    "numberOfCompletedInstances": lambda loop: loop.completed,
-}
-"""What the conditions of a multi-instance activity may read (table 10.31)."""
+def instance_counts(loop: Loop) -> dict[str, int]:
+    """What the conditions of a multi-instance activity may read (BPMN 2.0.2, table 10.31)."""
+    active = loop.started - loop.completed - loop.terminated
+    counts = (loop.total, active, loop.completed, loop.terminated)
+    return dict(zip(INSTANCE_COUNTS, counts, strict=True))
 
 
 def _outwards(place: Place) -> Iterator[Store]:
@@ -60,7 +53,12 @@ def _holds(place: Store, name: str) -> bool:
     if isinstance(place, Shared):
         return name in place.data
     assert isinstance(place, Scope)
-    return name in place.data or (place.loop is not None and name in INSTANCE_COUNTS)
+    return name in place.data or (_counts_instances(place) and name in INSTANCE_COUNTS)
+
+
+def _counts_instances(scope: Scope) -> bool:
+    """Whether it holds the instances of a multi-instance activity: a standard loop has none."""
+    return scope.loop is not None and scope.loop.total >= 0
 
 
 def _value(place: Store, name: str) -> Value:
@@ -72,15 +70,14 @@ def _value(place: Store, name: str) -> Value:
         return place.data[name]
     assert isinstance(place, Scope)
     if place.loop is not None and name in INSTANCE_COUNTS:
-        return INSTANCE_COUNTS[name](place.loop)
+        return instance_counts(place.loop)[name]
     return place.data[name]
 
 
 def _declares(place: Store, name: str) -> bool:
     """Whether the name, or the name that it begins with, is this place's own."""
     if type(place) is Token:
-        node = place.node
-        declared_here = node.own_data if isinstance(node, Activity) else ()
+        declared_here = _own_data(place)
         if place.own is None and not declared_here:
             return False
         head = name.partition(".")[0]
@@ -95,6 +92,14 @@ def _declares(place: Store, name: str) -> bool:
         name == declared.key or name.startswith(f"{declared.key}.")
         for declared in place.container.data
     )
+
+
+def _own_data(token: Token) -> frozenset[str]:
+    """Keys of the activity that a token is on: of each instance, not of the whole of them."""
+    node = token.node
+    if not isinstance(node, Activity) or (node.loop is not None and token.instance is None):
+        return frozenset()
+    return node.own_data
 
 
 def reader(place: Place) -> ReadValue:

@@ -7,6 +7,7 @@ from m2pem.engine.throwing import throw_error
 from m2pem.errors import ExpressionError
 from m2pem.model.behavior import Mapping
 from m2pem.model.elements import Activity, Event, ReceiveTask
+from m2pem.model.loops import LOOP_COUNTER, MultiInstance
 from m2pem.model.values import ReadValue, Value
 
 
@@ -34,16 +35,34 @@ def write_values(
 
 
 def take_in(x: Execution, token: Token) -> bool:
-    """Fill the data inputs of the activity that a token has come to. False: an error was thrown."""
+    """Fill the data inputs of the activity, or instance, that a token has come to.
+
+    False: an error was thrown.
+    """
     node = token.node
     assert isinstance(node, Activity)
-    values = evaluate(x, token, node.data_flow.inputs, reader(token.scope))
+    values = evaluate(x, token, node.data_flow.inputs, _around(token))
     if values is None:
         return False
     for mapping, value in values:
         if value is not None:  # what is not there yet reads as null anyway
             x.write_into(token, token, mapping.target, value)
     return True
+
+
+def _around(token: Token) -> ReadValue:
+    """Reads names as they are around an activity; an instance's item and counter belong to that."""
+    outside = reader(token.scope)
+    if token.instance is None:
+        return outside
+    inside = reader(token)
+    item = token.own or {}  # nothing else is there before its inputs are
+
+    def read(name: str) -> Value:
+        mine = name == LOOP_COUNTER or name in item or name.partition(".")[0] in item
+        return inside(name) if mine else outside(name)
+
+    return read
 
 
 def give_out(x: Execution, token: Token) -> bool:
@@ -53,7 +72,10 @@ def give_out(x: Execution, token: Token) -> bool:
     values = evaluate(x, token, node.data_flow.outputs, reader(token))
     if values is None:
         return False
-    write_values(x, token, token.scope, values)
+    gives = node.loop.output_item if isinstance(node.loop, MultiInstance) else ""
+    for mapping, value in values:
+        place = token if mapping.target == gives else token.scope
+        write_values(x, token, place, [(mapping, value)])
     return True
 
 

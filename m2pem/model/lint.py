@@ -11,6 +11,7 @@ from m2pem.findings import Finding, Severity
 from m2pem.model.bpmn.graph import unreachable
 from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.elements import (
+    Activity,
     CallActivity,
     Container,
     EndEvent,
@@ -26,11 +27,13 @@ from m2pem.model.elements import (
     SubProcess,
 )
 from m2pem.model.events import (
+    EventDefinition,
     Message,
     MessageEventDefinition,
     Signal,
     SignalEventDefinition,
 )
+from m2pem.model.loops import MultiInstance
 from m2pem.model.names import unwritten
 from m2pem.model.reach import unreached
 
@@ -101,6 +104,8 @@ def _outside_only(mission: Mission) -> Iterator[Finding]:
     thrown: set[tuple[str, str]] = set()
     caught: dict[tuple[str, str], tuple[Signal | Message, list[FlowNode]]] = {}
     for node in mission.nodes:
+        for root in _thrown_by_instances(node):
+            thrown.add((type(root).__name__, root.id))
         for root in _roots(node):
             key = (type(root).__name__, root.id)
             if isinstance(node, EndEvent | IntermediateThrowEvent | SendTask):
@@ -131,11 +136,23 @@ def _roots(node: FlowNode) -> Iterator[Signal | Message]:
         if node.message is not None:
             yield node.message
     elif isinstance(node, Event):
-        for definition in node.definitions:
-            if isinstance(definition, SignalEventDefinition):
-                yield definition.signal
-            elif isinstance(definition, MessageEventDefinition):
-                yield definition.message
+        yield from _named(node.definitions)
+
+
+def _thrown_by_instances(node: FlowNode) -> Iterator[Signal | Message]:
+    loop = node.loop if isinstance(node, Activity) else None
+    if isinstance(loop, MultiInstance):
+        yield from _named(loop.events)
+        for each in loop.complex:
+            yield from _named(each.events)
+
+
+def _named(definitions: Iterable[EventDefinition]) -> Iterator[Signal | Message]:
+    for definition in definitions:
+        if isinstance(definition, SignalEventDefinition):
+            yield definition.signal
+        elif isinstance(definition, MessageEventDefinition):
+            yield definition.message
 
 
 # --- calls --------------------------------------------------------------------------------------

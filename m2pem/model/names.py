@@ -19,10 +19,12 @@ from m2pem.model.elements import (
     ScriptTask,
     SendTask,
     ServiceTask,
+    StartEvent,
     UserTask,
 )
-from m2pem.model.events import TimerEventDefinition
+from m2pem.model.events import ConditionalEventDefinition, TimerEventDefinition
 from m2pem.model.expression import Expression
+from m2pem.model.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
 from m2pem.model.near import did_you_mean
 
 
@@ -63,6 +65,7 @@ def unwritten(
     for node in mission.nodes:
         store = stores[node.container.process]
         store.reads += _reads(node)
+        stores[_seen_from(mission, node)].reads += _conditions(node)
         for mapping in _data_mappings(node):
             store.written.add(mapping.target)
         _note_writes(node, store, service_writes)
@@ -116,6 +119,8 @@ def _reads(node: FlowNode) -> Iterator[Read]:
                 yield Read(expression, node.id, node.line)
     if isinstance(node, ComplexGateway) and node.activation is not None:
         yield Read(node.activation, node.id, node.line)
+    if isinstance(node, Activity):
+        yield from _loop_reads(node)
     for flow in node.outgoing:
         if flow.condition is not None:
             yield Read(flow.condition, flow.id, flow.line)
@@ -135,6 +140,36 @@ def _reads(node: FlowNode) -> Iterator[Read]:
                 yield Read(definition.expression, node.id, definition.line)
 
 
+def _conditions(node: FlowNode) -> Iterator[Read]:
+    for definition in node.definitions if isinstance(node, Event) else ():
+        if isinstance(definition, ConditionalEventDefinition):
+            yield Read(definition.condition, node.id, definition.line)
+
+
+def _seen_from(mission: Mission, node: FlowNode) -> Process:
+    """The process whose data a condition reads: one that begins a process, the main one's."""
+    process = node.container.process
+    if not isinstance(node, StartEvent) or not isinstance(node.container, Process):
+        return process
+    called = any(isinstance(n, CallActivity) and n.called is process for n in mission.nodes)
+    return process if called else mission.process()
+
+
+def _loop_reads(node: Activity) -> Iterator[Read]:
+    loop = node.loop
+    found: list[Expression | None] = []
+    if isinstance(loop, StandardLoop):
+        found = [loop.condition]
+    elif loop is not None:
+        found = [loop.cardinality, loop.collection, loop.completion]
+        found += [each.condition for each in loop.complex]
+        if loop.output is not None and loop.output.text not in loop.output.names:
+            found.append(loop.output)
+    for expression in found:
+        if expression is not None:
+            yield Read(expression, node.id, node.line)
+
+
 def _parameters(node: FlowNode, parameters: Iterable[Parameter]) -> Iterator[Read]:
     for parameter in parameters:
         if isinstance(parameter.value, Expression):
@@ -144,6 +179,11 @@ def _parameters(node: FlowNode, parameters: Iterable[Parameter]) -> Iterator[Rea
 def _note_writes(
     node: FlowNode, store: _Store, service_writes: Mapping[str, Sequence[str]]
 ) -> None:
+    if isinstance(node, Activity) and node.loop is not None:
+        store.written.add(LOOP_COUNTER)
+        if isinstance(node.loop, MultiInstance):
+            store.written |= {*INSTANCE_COUNTS, node.loop.item, node.loop.output_item}
+            store.written.add(node.loop.output_collection)
     if isinstance(node, ScriptTask) and node.script is not None:
         for statement in node.script.statements:
             if isinstance(statement, Assignment):

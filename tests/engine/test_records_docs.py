@@ -42,6 +42,8 @@ def json_type(kind):
         return PLAIN[kind]
     if isinstance(kind, EnumMeta):
         return "text"
+    if origin is tuple and arguments[0] is Any:
+        return "list"
     if origin is tuple:
         return f"list of {json_type(arguments[0])}s"
     if origin is dict or kind == Input:

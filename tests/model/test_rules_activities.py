@@ -108,13 +108,6 @@ CASES = read_cases("""
 </subProcess>
 ~ <startEvent id="z"><escalationEventDefinition/></startEvent> => <task id="z"/>
 
-# event-subprocess-trigger | x | what it waits for
-*
-<subProcess id="X" triggeredByEvent="true">
-! <startEvent id="x"></startEvent>
-<endEvent id="y"/>[x>y]</subProcess>
-~ id="x"> => id="x"><errorEventDefinition/>
-
 # event-subprocess-twice | Y | 'X' does, too
 *
 <subProcess id="X" triggeredByEvent="true">
@@ -161,19 +154,19 @@ CASES = read_cases("""
 *T
 ~ "serial" => "Sequential"
 
-# two-loops | T | two loop markers
+# two-loops | T | one loop marker
 <task id="T"><standardLoopCharacteristics loopMaximum="2"/>
 ! <multiInstanceLoopCharacteristics><loopCardinality>2</loopCardinality>
 </multiInstanceLoopCharacteristics></task>
 *T
 ~ <standardLoopCharacteristics loopMaximum="2"/> => <documentation/>
 
-# loop-maximum | T | '0' is none
+# loop-maximum | T | 'many'
 <task id="T">
-! <standardLoopCharacteristics loopMaximum="0"/>
+! <standardLoopCharacteristics loopMaximum="many"/>
 </task>
 *T
-~ "0" => "3"
+~ many => 3
 
 # loop-without-condition | T | how long
 <task id="T">
@@ -182,14 +175,14 @@ CASES = read_cases("""
 *T
 ~ ></standard => ><loopCondition>a</loopCondition></standard
 
-# instances-without-number | T | how many
+# instance-count | T | how many
 <task id="T">
 ! <multiInstanceLoopCharacteristics></multiInstanceLoopCharacteristics>
 </task>
 *T
 ~ ></multi => ><loopCardinality>3</loopCardinality></multi
 
-# instances-without-number | T | how many
+# instance-count | T | how many
 <task id="T">
 ! <multiInstanceLoopCharacteristics/>
 </task>
@@ -209,14 +202,6 @@ CASES = read_cases("""
 </multiInstanceLoopCharacteristics></task>
 *T
 ~ "one" => "One"
-
-# instances-event | T | 'f'
-<task id="T">
-! <multiInstanceLoopCharacteristics behavior="One" oneBehaviorEventRef="f">
-<loopCardinality>3</loopCardinality></multiInstanceLoopCharacteristics></task>
-*T
-^ <signalEventDefinition id="d" signalRef="s"/><signal id="s"/>
-~ "f" => "d"
 
 # instances-event-unused | T | oneBehaviorEventRef with the behavior None
 <task id="T">
@@ -241,14 +226,6 @@ CASES = read_cases("""
 *T
 ~ "All" => "Complex"
 
-# instances-complex-condition | T | does not say when
-<task id="T">
-<multiInstanceLoopCharacteristics behavior="Complex"><loopCardinality>3</loopCardinality>
-! <complexBehaviorDefinition><condition/></complexBehaviorDefinition>
-</multiInstanceLoopCharacteristics></task>
-*T
-~ <condition/> => <condition>a</condition>
-
 # input-item-without-input | T | inputDataItem
 <task id="T">
 ! <multiInstanceLoopCharacteristics><loopCardinality>3</loopCardinality>
@@ -263,20 +240,39 @@ CASES = read_cases("""
 *T
 ~ </loopDataOutputRef> => </loopDataOutputRef><outputDataItem id="o"/>
 
-# loop-input | T | 'X'
-<dataObject id="D"/><task id="T">
-! <multiInstanceLoopCharacteristics><loopDataInputRef>X</loopDataInputRef>
-</multiInstanceLoopCharacteristics></task>
-*T
-~ >X< => >D<
 
-# loop-output | T | 'X'
-<dataObject id="D"/><task id="T">
-! <multiInstanceLoopCharacteristics><loopCardinality>3</loopCardinality>
-<loopDataOutputRef>X</loopDataOutputRef><outputDataItem id="o"/>
+# complex-behavior | T | and what
+<task id="T">
+<multiInstanceLoopCharacteristics behavior="Complex"><loopCardinality>3</loopCardinality>
+! <complexBehaviorDefinition><condition>a</condition></complexBehaviorDefinition>
 </multiInstanceLoopCharacteristics></task>
 *T
-~ >X< => >D<
+^ <signal id="s"/>
+~ </condition> => </condition>
+~~ <event id="x" xsi:type="tImplicitThrowEvent"><signalEventDefinition signalRef="s"/></event>
+
+# loop-not-allowed | X | loop marker
+*
+<subProcess id="X" triggeredByEvent="true">
+! <standardLoopCharacteristics loopMaximum="2"/>
+<startEvent id="x"><errorEventDefinition/></startEvent><endEvent id="y"/>[x>y]</subProcess>
+~ <standardLoopCharacteristics loopMaximum="2"/> => <documentation/>
+
+# no-loop | T | which kind
+<task id="T">
+! <loopCharacteristics/>
+</task>
+*T
+~ <loopCharacteristics/> => <standardLoopCharacteristics loopMaximum="2"/>
+
+# event-not-allowed | T | by itself
+<task id="T">
+<multiInstanceLoopCharacteristics behavior="One" oneBehaviorEventRef="d">
+<loopCardinality>3</loopCardinality></multiInstanceLoopCharacteristics></task>
+*T
+^ <signal id="s"/><signalEventDefinition id="e" signalRef="s"/>
+^! <terminateEventDefinition id="d"/>
+~ oneBehaviorEventRef="d" => oneBehaviorEventRef="e"
 """)
 
 

@@ -80,6 +80,14 @@ CASES = read_cases("""
 *T
 ~ <association id="b" sourceRef="B" targetRef="D"/> => <textAnnotation id="t"/>
 
+# two-compensation-events | D | the first counts
+<task id="T"/><task id="U"/>[S>U]<task id="C" isForCompensation="true"/>
+<boundaryEvent id="B" attachedToRef="T"><compensateEventDefinition/></boundaryEvent>
+! <boundaryEvent id="D" attachedToRef="T"><compensateEventDefinition /></boundaryEvent>
+<association id="a" sourceRef="B" targetRef="C"/><association id="b" sourceRef="D" targetRef="C"/>
+*T
+~ id="D" attachedToRef="T" => id="D" attachedToRef="U"
+
 # handler-not-marked | C | not marked | unreachable
 <task id="T"/><boundaryEvent id="B" attachedToRef="T"><compensateEventDefinition/></boundaryEvent>
 ! <task id="C"/>

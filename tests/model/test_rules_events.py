@@ -62,12 +62,19 @@ CASES = read_cases("""
 *T
 ~ "false" => "true"
 
-# error-start-not-interrupting | x | must interrupt
+# error-not-interrupting | x | a start event
 *
 <subProcess id="X" triggeredByEvent="true">
 ! <startEvent id="x" isInterrupting="false"><errorEventDefinition/></startEvent>
 <endEvent id="y"/>[x>y]</subProcess>
 ~ "false" => "true"
+
+# no-trigger | x | what it waits for
+*
+<subProcess id="X" triggeredByEvent="true">
+! <startEvent id="x"></startEvent>
+<endEvent id="y"/>[x>y]</subProcess>
+~ id="x"> => id="x"><errorEventDefinition/>
 
 # not-interrupting-elsewhere | S | no meaning
 ! <startEvent id="S" isInterrupting="false"/>
@@ -147,7 +154,7 @@ CASES = read_cases("""
 ^ <escalation id="e"/>
 ~ <escalation id="e"/> => <escalation id="e" escalationCode="7"/>
 
-# conditional-without-condition | T | no condition
+# no-condition | T | no condition
 <intermediateCatchEvent id="T">
 ! <conditionalEventDefinition></conditionalEventDefinition>
 </intermediateCatchEvent>
@@ -165,21 +172,21 @@ CASES = read_cases("""
 
 # link-name | A | no name
 <startEvent id="S"/><endEvent id="E"/>[S>A][B>E]
-<intermediateThrowEvent id="A">
-! <linkEventDefinition/>
+! <intermediateThrowEvent id="A">
+<linkEventDefinition/>
 </intermediateThrowEvent>
 <intermediateThrowEvent id="C"><linkEventDefinition name="l"/></intermediateThrowEvent>[S>C]
 <intermediateCatchEvent id="B"><linkEventDefinition name="l"/></intermediateCatchEvent>
 ~ <linkEventDefinition/> => <linkEventDefinition name="l"/>
 
-# link-without-target | A | 'k'
+# dangling-link | A | 'k'
 <startEvent id="S"/><endEvent id="E"/>[S>A][B>E][S>C]
 ! <intermediateThrowEvent id="A"><linkEventDefinition name="k"/></intermediateThrowEvent>
 <intermediateThrowEvent id="C"><linkEventDefinition name="l"/></intermediateThrowEvent>
 <intermediateCatchEvent id="B"><linkEventDefinition name="l"/></intermediateCatchEvent>
 ~ "k" => "l"
 
-# link-targets | D | 'B' is already that of 'l'
+# duplicate-link | D | 'B'
 <startEvent id="S"/><endEvent id="E"/>[S>A][B>E][D>E][S>C]
 <intermediateThrowEvent id="A"><linkEventDefinition name="l"/></intermediateThrowEvent>
 <intermediateThrowEvent id="C"><linkEventDefinition name="k"/></intermediateThrowEvent>
@@ -189,29 +196,21 @@ CASES = read_cases("""
 ~ <linkEventDefinition name="l" /> => <signalEventDefinition signalRef="s"/>
 ^ <signal id="s"/>
 
-# link-without-source | B | 'k'
-<startEvent id="S"/><endEvent id="E"/>[S>A][B>E][D>E]
-<intermediateThrowEvent id="A"><linkEventDefinition name="l"/></intermediateThrowEvent>
-<intermediateCatchEvent id="D"><linkEventDefinition name="l"/></intermediateCatchEvent>
-! <intermediateCatchEvent id="B"><linkEventDefinition name="k"/></intermediateCatchEvent>
-<intermediateThrowEvent id="C"><linkEventDefinition name="l" /></intermediateThrowEvent>[S>C]
-~ name="l" /> => name="k"/>
-
-# link-throw-outgoing | A | outgoing
+# link-throw-outgoing | A-E | out of
 <startEvent id="S"/><endEvent id="E"/>[S>A][B>E]
-! <intermediateThrowEvent id="A"><linkEventDefinition name="l"/></intermediateThrowEvent>
+<intermediateThrowEvent id="A"><linkEventDefinition name="l"/></intermediateThrowEvent>
 <intermediateCatchEvent id="B"><linkEventDefinition name="l"/></intermediateCatchEvent>
-[A>E]
+! [A>E]
 ~ id="A-E" sourceRef="A" => id="A-E" sourceRef="B"
 
-# link-catch-incoming | B | incoming
+# link-catch-incoming | S-B | into
 <startEvent id="S"/><endEvent id="E"/>[S>A][B>E]
 <intermediateThrowEvent id="A"><linkEventDefinition name="l"/></intermediateThrowEvent>
-! <intermediateCatchEvent id="B"><linkEventDefinition name="l"/></intermediateCatchEvent>
-[S>B]
+<intermediateCatchEvent id="B"><linkEventDefinition name="l"/></intermediateCatchEvent>
+! [S>B]
 ~ id="S-B" sourceRef="S" targetRef="B" => id="S-B" sourceRef="S" targetRef="E"
 
-# link-crosses-border | A | 'B' has its name elsewhere
+# link-crosses-border | A | 'B' is in another
 <startEvent id="S"/><endEvent id="E"/>[S>A][S>T][T>E]
 ! <intermediateThrowEvent id="A"><linkEventDefinition name="l"/></intermediateThrowEvent>
 <subProcess id="T"><task id="y"/>[B>y]
@@ -225,6 +224,14 @@ CASES = read_cases("""
 </subProcess>
 *T
 ~ subProcess => transaction
+
+# cancel-uncaught | y | no boundary event
+<transaction id="T"><startEvent id="x"/>
+! <endEvent id="y"><cancelEventDefinition/></endEvent>
+[x>y]</transaction><transaction id="U"><task id="z"/></transaction>[S>U]
+<boundaryEvent id="B" attachedToRef="U"><cancelEventDefinition/></boundaryEvent>[B>E]
+*T
+~ attachedToRef="U" => attachedToRef="T"
 
 # cancel-boundary-place | B | only to a transaction
 <subProcess id="T"><task id="x"/></subProcess>

@@ -29,7 +29,7 @@ CASES = read_cases("""
 ^! <relationship id="r" type="t" direction="Up"><source>S</source><target>E</target></relationship>
 ~ Up => Forward
 
-# missing-id | | a task has no id
+# missing-id | task~1 | a task has no id
 <startEvent id="S"/><endEvent id="E"/>[S>E]
 ! <task/>
 ~ <task/> => <dataObject/>

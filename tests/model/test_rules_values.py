@@ -10,11 +10,6 @@ CASES = read_cases("""
 *
 ~ "yes" => "true"
 
-# bad-executed-truth | S | isInterrupting is 'no'
-! <startEvent id="S" isInterrupting="no"/>
-<endEvent id="E"/>[S>E]
-~ "no" => "true"
-
 # bad-value | B | cancelActivity
 <task id="T"/>
 ! <boundaryEvent id="B" attachedToRef="T" cancelActivity="no"><errorEventDefinition/>

@@ -6,6 +6,8 @@ from m2pem.engine import records as r
 from m2pem.engine.data_flow import take_in
 from m2pem.engine.execution import Execution
 from m2pem.engine.nodes import activities, ad_hoc, containers
+from m2pem.engine.nodes.completion import pass_on
+from m2pem.engine.nodes.loops import begin_loop
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.state import Token
 from m2pem.engine.triggering import arm_boundary
@@ -22,6 +24,7 @@ WORK: dict[type[FlowNode], Callable[[Execution, Token], None]] = {
     e.SendTask: activities.send_task,
     e.ReceiveTask: activities.receive_task,
     e.SubProcess: containers.subprocess,
+    e.Transaction: containers.subprocess,
     e.AdHocSubProcess: ad_hoc.ad_hoc,
     e.CallActivity: containers.call_activity,
 }
@@ -43,13 +46,22 @@ def _gather(x: Execution, token: Token, node: Activity) -> bool:
 
 
 def begin_activity(x: Execution, token: Token) -> None:
-    """A token has come to an activity: arm its boundary events, then do its work."""
+    """A token has come to an activity: arm its boundary events, then do its work.
+
+    An instance of a loop or multi-instance activity only works: what else there is to an activity
+    is the whole's, once.
+    """
     node = token.node
     assert isinstance(node, Activity)
     if node.start_quantity > 1 and not _gather(x, token, node):
         return
-    if node.boundary and not arm_boundary(x, token, node):
-        return
+    if token.instance is None:
+        if node.boundary and not arm_boundary(x, token, node):
+            return
+        if node.loop is not None and token.inner is None:
+            if begin_loop(x, token, node.loop):
+                pass_on(x, token)
+            return
     if node.data_flow.inputs and not take_in(x, token):
         return
     WORK[type(node)](x, token)

@@ -1,25 +1,37 @@
 """Records about scopes and tokens: the game itself."""
 
 from m2pem.engine.records.base import BaseRecord, TokenOutcome
+from m2pem.model.values import Value
 
 
 class ScopeOpened(BaseRecord, frozen=True):
-    """An instance of a container has begun. `token` sits on its activity in scope `parent`."""
+    """An instance of a container has begun. `token` sits on its activity in scope `parent`.
+
+    `instances`: the scope is that of the instances of a loop or multi-instance activity; how many
+    there will be, -1 when nobody knows (a standard loop). `items`: what they come from, if from a
+    collection; the nth instance has the nth.
+    """
 
     scope: int
     process: str
     element: str
     parent: int | None = None
     token: int | None = None
+    instances: int | None = None
+    items: tuple[Value, ...] | None = None
 
 
 class ScopeClosed(BaseRecord, frozen=True):
-    """The instance has ended and its data is gone."""
+    """The instance has ended and its data is gone.
+
+    `kept`: it and its data are kept, because something that was done in it can be undone.
+    """
 
     scope: int
     process: str
     element: str
     outcome: TokenOutcome
+    kept: bool = False
 
 
 class TokenEntered(BaseRecord, frozen=True):
@@ -45,6 +57,17 @@ class TokenLeft(BaseRecord, frozen=True):
     scope: int
     outcome: TokenOutcome
     instance: int | None = None
+
+
+class InstanceOutput(BaseRecord, frozen=True):
+    """What an instance of a multi-instance activity has given, to be collected."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    instance: int
+    value: Value
 
 
 class FlowTaken(BaseRecord, frozen=True):

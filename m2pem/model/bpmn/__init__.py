@@ -9,12 +9,14 @@ from m2pem.errors import MissionError
 from m2pem.findings import Finding, Severity, has_errors
 from m2pem.model.bpmn.calls import resolve_calls
 from m2pem.model.bpmn.collaboration import check_collaborations
+from m2pem.model.bpmn.compensation import link_compensation, note_compensation
 from m2pem.model.bpmn.containers import MAX_DEPTH, read_process
 from m2pem.model.bpmn.correlation import resolve_correlation
 from m2pem.model.bpmn.data import resolve_data
 from m2pem.model.bpmn.data_flow import resolve_data_flows
 from m2pem.model.bpmn.graph import add_unreachable, check_graph
 from m2pem.model.bpmn.link import link
+from m2pem.model.bpmn.loop_data import join_default_signals, resolve_loops
 from m2pem.model.bpmn.messages import resolve_messages
 from m2pem.model.bpmn.names import BPMN, local
 from m2pem.model.bpmn.prompts import resolve_prompts
@@ -119,10 +121,14 @@ def _read(report: Report, document: Document, data: bytes) -> Mission | None:
             "draw a process with a start event",
         )
     resolve_data(reading)
+    resolve_loops(reading)
     resolve_data_flows(reading)
     resolve_prompts(reading)
     resolve_calls(reading)
+    note_compensation(reading)
     elements = link(reading)
+    link_compensation(reading)
+    join_default_signals(reading)
     resolve_messages(reading)
     correlation_properties = resolve_correlation(reading)
     check_collaborations(reading, elements)

@@ -5,13 +5,15 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
+from m2pem.model.bpmn.compensation import ASSOCIATION, read_association
 from m2pem.model.bpmn.correlation import read_subscription
 from m2pem.model.bpmn.data import read_data
 from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.flows import SEQUENCE_FLOW, read_flow
 from m2pem.model.bpmn.lanes import read_lanes
+from m2pem.model.bpmn.loops import LOOPS, read_loop
 from m2pem.model.bpmn.names import BPMN, a, kind, local
-from m2pem.model.bpmn.nodes import LOOPS, read_node, refuse_loop
+from m2pem.model.bpmn.nodes import read_node
 from m2pem.model.bpmn.reading import Reading
 from m2pem.model.bpmn.scan import Order, Scan
 from m2pem.model.bpmn.schema import FLOW_ELEMENT_NAMES, SHAPES, Shape
@@ -27,9 +29,8 @@ _DATA = frozenset(
 _LANES = BPMN + "laneSet"
 _SUBSCRIPTION = BPMN + "correlationSubscription"
 _COMPLETION = BPMN + "completionCondition"
-_DATA_FLOW = frozenset(
-    BPMN + name for name in ("ioSpecification", "dataInputAssociation", "dataOutputAssociation")
-)
+_DATA_FLOW = ("ioSpecification", "dataInputAssociation", "dataOutputAssociation")
+_MARKS = frozenset((*LOOPS, *(BPMN + name for name in _DATA_FLOW)))
 
 
 @dataclass(slots=True)
@@ -38,7 +39,8 @@ class _Frame:
     element: etree._Element
     shape: Shape
     children: Iterator[etree._Element]
-    data_flow: Scan
+    marks: Scan
+    """Its children that say what it does as an activity, read when all others have been."""
     order: Order = field(default_factory=Order)
 
 
@@ -59,7 +61,8 @@ def read_process(reading: Reading, element: etree._Element) -> None:
         if child is None:
             stack.pop()
             if isinstance(frame.container, SubProcess):
-                read_data_flow(reading, frame.data_flow, frame.container)
+                read_data_flow(reading, frame.marks, frame.container)
+                read_loop(reading, frame.marks, frame.container)
             continue
         inner = _read_child(reading, process, frame, child)
         if inner is None:
@@ -106,14 +109,14 @@ def _read_child(
     if tag in _DATA:
         read_data(reading, child, container)
         return None
+    if tag == ASSOCIATION:
+        read_association(reading, child)
+        return None
     if tag == _LANES:
         read_lanes(reading, child, process)
         return None
-    if tag in LOOPS:
-        refuse_loop(reading, child, container.id)
-        return None
-    if tag in _DATA_FLOW:
-        frame.data_flow.children.setdefault(tag, []).append(child)
+    if tag in _MARKS:
+        frame.marks.children.setdefault(tag, []).append(child)
         return None
     if tag == _SUBSCRIPTION:
         read_subscription(reading, child, process)

@@ -1,5 +1,7 @@
 """Events: which definitions may stand where (BPMN 2.0.2, clause 10.5), and what they say."""
 
+from collections.abc import Iterable
+
 from lxml import etree
 
 from m2pem.model.bpmn.data_flow import read_data_flow
@@ -17,11 +19,12 @@ from m2pem.model.elements import (
     IntermediateThrowEvent,
     Process,
     StartEvent,
+    SubProcess,
 )
 from m2pem.model.events import ErrorEventDefinition, EventDefinition
 from m2pem.model.near import did_you_mean
 
-_EXECUTED = frozenset({"message", "timer", "signal", "escalation", "error", "terminate"})
+_THROWN_IMPLICITLY = frozenset({"message", "signal", "escalation", "error"})
 _CATCHING = frozenset({"startEvent", "intermediateCatchEvent", "boundaryEvent"})
 _NEEDS_TRIGGER = frozenset({"intermediateCatchEvent", "boundaryEvent"})
 
@@ -37,15 +40,16 @@ def read_event(reading: Reading, element: etree._Element, container: Container) 
     parallel = reading.boolean(element, "parallelMultiple", False, identifier)
     event: Event
     if place == "startEvent":
-        event = StartEvent(identifier, name, line, definitions, parallel)
+        interrupting = reading.boolean(element, "isInterrupting", True, identifier)
+        event = StartEvent(identifier, name, line, definitions, parallel, interrupting)
+        if not interrupting:
+            _no_error(reading, element, event)
     elif place == "endEvent":
         event = EndEvent(identifier, name, line, definitions)
     elif place == "intermediateThrowEvent":
         event = IntermediateThrowEvent(identifier, name, line, definitions)
     elif place == "intermediateCatchEvent":
         event = IntermediateCatchEvent(identifier, name, line, definitions, parallel)
-        if any(local(tag) == "linkEventDefinition" for tag in found.children):
-            reading.self_starting.add(event)
     else:
         event = _boundary(reading, element, identifier, definitions, parallel)
     read_data_flow(reading, found, event)
@@ -69,34 +73,76 @@ def _boundary(
         interrupting,
     )
     reading.attachments.append((event, reference(element.get("attachedToRef", ""))))
-    if not interrupting and any(isinstance(d, ErrorEventDefinition) for d in definitions):
-        reading.report.error(
-            element,
-            identifier,
-            "error-not-interrupting",
-            'a boundary event that catches an error cannot have cancelActivity="false": the '
-            "activity has already failed",
-            "make it interrupting, or throw and catch an escalation",
-        )
+    if not interrupting:
+        _no_error(reading, element, event)
     return event
+
+
+def _no_error(reading: Reading, element: etree._Element, event: Event) -> None:
+    """What catches an error cannot leave running what failed (clause 10.5.6)."""
+    if not any(isinstance(each, ErrorEventDefinition) for each in event.definitions):
+        return
+    word, attribute, what = "boundary", "cancelActivity", "activity"
+    if isinstance(event, StartEvent):
+        word, attribute, what = "start", "isInterrupting", "scope"
+    reading.report.error(
+        element,
+        event.id,
+        "error-not-interrupting",
+        f'a {word} event that catches an error cannot have {attribute}="false": the {what} has '
+        "already failed",
+        "make it interrupting, or throw and catch an escalation",
+    )
 
 
 def _definitions(
     reading: Reading, found: Scan, place: str, container: Container
 ) -> tuple[EventDefinition, ...]:
+    elements = definition_elements(reading, found)
+    awaited = place in _NEEDS_TRIGGER or (place == "startEvent" and _is_handler(container))
+    if awaited and not elements and not found.of("eventDefinitionRef"):
+        _no_trigger(reading, found, place)
+    read = [_definition(reading, found, place, container, each) for each in elements]
+    return tuple(definition for definition in read if definition is not None)
+
+
+def definition_elements(reading: Reading, found: Scan) -> list[etree._Element]:
+    """The definitions that stand in an event, then those of the file that it refers to."""
     elements = [
         each
         for each in found.element
         if each.tag.startswith(BPMN) and each.tag.endswith("EventDefinition")
     ]
-    for referring in found.of("eventDefinitionRef"):
-        target = _referred_definition(reading, referring, found.id)
+    for each in found.of("eventDefinitionRef"):
+        name = reference(text_of(each))
+        target = referred_definition(reading, each, "eventDefinitionRef", name, found.id)
         if target is not None:
             elements.append(target)
-    if not elements and place in _NEEDS_TRIGGER and not found.of("eventDefinitionRef"):
-        _no_trigger(reading, found, place)
-    read = [_definition(reading, found, place, container, each) for each in elements]
+    return elements
+
+
+def read_thrown(
+    reading: Reading, found: Scan, elements: Iterable[etree._Element]
+) -> tuple[EventDefinition, ...]:
+    """What a multi-instance activity throws by itself (table 10.30): an implicit throw event."""
+    read = []
+    for element in elements:
+        name = local(element.tag).removesuffix("EventDefinition")
+        if name in _THROWN_IMPLICITLY:
+            read.append(read_definition(reading, element, found, catches=False))
+        else:
+            reading.report.error(
+                element,
+                found.id,
+                "event-not-allowed",
+                f"a multi-instance activity cannot throw {a(kind(element.tag))} by itself",
+                f"use one of: {', '.join(sorted(_THROWN_IMPLICITLY))}",
+            )
     return tuple(definition for definition in read if definition is not None)
+
+
+def _is_handler(container: Container) -> bool:
+    return isinstance(container, SubProcess) and container.triggered_by_event
 
 
 def _definition(
@@ -104,8 +150,7 @@ def _definition(
 ) -> EventDefinition | None:
     """One of its definitions; None when a finding says what is wrong with it."""
     name = local(definition.tag).removesuffix("EventDefinition")
-    inside_event_subprocess = container in reading.self_starting
-    embedded = not inside_event_subprocess and not isinstance(container, Process)
+    embedded = not _is_handler(container) and not isinstance(container, Process)
     if place == "startEvent" and embedded:
         reading.report.error(
             found.element,
@@ -117,37 +162,20 @@ def _definition(
         return None
     if name not in allowed_triggers(found.element):
         return None  # which a rule says
-    if name not in _EXECUTED:
-        reading.report.error(
-            found.element,
-            found.id,
-            "not-executed",
-            f"m2pem does not execute {a(kind(definition.tag))} yet",
-            _INSTEAD.get(name, "draw it with the elements that docs/missions.md lists"),
-        )
-        return None
     return read_definition(reading, definition, found, catches=place in _CATCHING)
 
 
-_INSTEAD = {
-    "conditional": "check the condition at a gateway, or throw a signal where it becomes true",
-    "link": "join the two ends by a sequence flow",
-    "cancel": "throw and catch an error",
-    "compensate": "draw what undoes the activity after a boundary event",
-}
-
-
-def _referred_definition(
-    reading: Reading, referring: etree._Element, identifier: str
+def referred_definition(
+    reading: Reading, referring: etree._Element, attribute: str, name: str, identifier: str
 ) -> etree._Element | None:
-    name = reference(text_of(referring))
+    """The event definition of the file that has an id; says so when there is none."""
     target = reading.event_definitions.get(name)
     if target is None:
         reading.report.error(
             referring,
             identifier,
             "dangling-reference",
-            f"eventDefinitionRef names '{name}', which is no event definition of this file",
+            f"{attribute} names '{name}', which is no event definition of this file",
             did_you_mean(name, reading.event_definitions, "name one that stands in definitions"),
         )
     return target
@@ -161,5 +189,5 @@ def _no_trigger(reading: Reading, found: Scan, place: str) -> None:
         found.id,
         "no-trigger",
         f"{a(word)} must say what it waits for",
-        f"give it a signal, message or timer event definition{also}",
+        f"give it a signal, message, timer or conditional event definition{also}",
     )

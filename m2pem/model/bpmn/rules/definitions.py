@@ -1,4 +1,4 @@
-"""Event definitions: codes, conditions, cancellation (BPMN 2.0.2, 8.4.3, 8.4.4 and 10.5.5)."""
+"""Event definitions: codes and cancellation (BPMN 2.0.2, 8.4.3, 8.4.4 and 10.5.5)."""
 
 from lxml import etree
 
@@ -7,10 +7,10 @@ from m2pem.model.bpmn.rules.rule import E, Rule, Topic, W, declared
 from m2pem.model.bpmn.rules.tree import (
     THROWING,
     Tree,
+    has_trigger,
     is_false,
     name_of,
     parent,
-    texts,
 )
 
 ERROR_CODE = Rule(
@@ -28,15 +28,6 @@ ESCALATION_CODE = Rule(
     W,
     "the escalation that is thrown has no escalationCode",
     "add escalationCode to the escalation; until then its id is its code",
-)
-CONDITION = Rule(
-    10533,
-    "conditional-without-condition",
-    "10.5.5",
-    E,
-    "the conditional event has no condition",
-    "write the condition that it waits for",
-    same_as=("no-condition", "empty-condition", "bad-expression"),
 )
 CANCEL_END = Rule(
     10549,
@@ -62,6 +53,14 @@ CANCEL_GOES_ON = Rule(
     "a cancel boundary event must interrupt the transaction",
     'delete cancelActivity="false"',
 )
+CANCEL_UNCAUGHT = Rule(
+    10552,
+    "cancel-uncaught",
+    "10.5.6",
+    W,
+    "no boundary event of the transaction catches the cancellation; its token ends there",
+    "attach a cancel boundary event to the transaction",
+)
 
 
 def _error(tree: Tree, definition: etree._Element) -> None:
@@ -83,16 +82,16 @@ def _code(
         tree.say(rule, definition, f"'{name}'")
 
 
-def _conditional(tree: Tree, definition: etree._Element) -> None:
-    if not any(texts(definition, "condition")):
-        tree.say(CONDITION, definition)
-
-
 def _cancel(tree: Tree, definition: etree._Element) -> None:
     event = parent(definition)
     transaction = BPMN + "transaction"
-    if name_of(event) == "endEvent" and parent(event).tag != transaction:
+    around = parent(event)
+    if name_of(event) == "endEvent" and around.tag != transaction:
         tree.say(CANCEL_END, event)
+    elif name_of(event) == "endEvent":
+        attached = tree.boundary.get(around.get("id", ""), [])
+        if not any(has_trigger(tree, each, "cancel") for each in attached):
+            tree.say(CANCEL_UNCAUGHT, event)
     elif name_of(event) == "boundaryEvent":
         host = tree.find(event, event.get("attachedToRef", ""))
         if host is not None and host.tag != transaction:
@@ -106,7 +105,6 @@ TOPIC = Topic(
     {
         "errorEventDefinition": _error,
         "escalationEventDefinition": _escalation,
-        "conditionalEventDefinition": _conditional,
         "cancelEventDefinition": _cancel,
     },
 )

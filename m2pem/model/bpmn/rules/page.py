@@ -1,4 +1,4 @@
-"""docs/rules.md, made from the registry: `python -m m2pem.model.bpmn.rules.page > docs/rules.md`."""
+"""Makes docs/rules.md: `python -m m2pem.model.bpmn.rules.page > docs/rules.md`."""
 
 from collections.abc import Iterator
 
