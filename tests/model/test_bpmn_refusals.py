@@ -37,10 +37,6 @@ ERRORS = {
             ("event-gateway-target", 3, "T"),
         ],
     ),
-    "global task": (
-        around('<callActivity id="T" calledElement="G"/>', '<globalUserTask id="G"/>'),
-        [("not-executed", 3, "T")],
-    ),
     "called expression": (
         around('<callActivity id="T" calledElement="${which}"/>'),
         [("not-executed", 3, "T")],

@@ -129,8 +129,6 @@ def not_executed(
     )
 
 
-
-
 def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -> None:
     _note_default(reading, element, node)
     if reading.boolean(element, "isForCompensation", False, node.id):

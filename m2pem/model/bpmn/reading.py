@@ -142,11 +142,13 @@ class Reading:
     made_up: dict[str, int] = field(default_factory=dict)
     """How many ids were made up for elements without one, by how they begin."""
     event_definitions: dict[str, etree._Element] = field(default_factory=dict)
-    global_tasks: dict[str, str] = field(default_factory=dict)
+    global_tasks: dict[str, etree._Element] = field(default_factory=dict)
     signals: dict[str, Signal] = field(default_factory=dict)
     messages: dict[str, Message] = field(default_factory=dict)
     errors: dict[str, Error] = field(default_factory=dict)
     escalations: dict[str, Escalation] = field(default_factory=dict)
+    declared_roots: set[str] = field(default_factory=set)
+    """Ids of signals, messages, errors and escalations that the file, or an import, declares."""
     correlation_properties: dict[str, etree._Element] = field(default_factory=dict)
     subscriptions: list[tuple[Process, etree._Element]] = field(default_factory=list)
     participants: list[Participant] = field(default_factory=list)

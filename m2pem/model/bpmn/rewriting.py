@@ -4,7 +4,8 @@ import re
 from collections.abc import Callable
 
 from m2pem.errors import ExpressionSyntaxError
-from m2pem.model.duration import cycle, date_us, duration_us
+from m2pem.model.cycle import cycle
+from m2pem.model.duration import date_us, duration_us
 from m2pem.model.expression import parse
 from m2pem.model.expression.literals import shorten, show_scalar
 from m2pem.model.script import parse_script
@@ -86,11 +87,18 @@ def _statements(text: str) -> list[str] | None:
     return None if parse_script("\n".join(found))[1] else found
 
 
+_FORMS = {
+    "timeDate": "write it as ISO 8601: 2026-01-31T12:00:00Z",
+    "timeDuration": "write it as ISO 8601: PT30S",
+    "timeCycle": "write it as ISO 8601 (R3/PT10S), or as cron does (0 0 8 * * MON-FRI)",
+}
+
+
 def time_remedy(kind: str, text: str) -> str:
     """What to write for the text of a timer; `kind` is timeDuration, timeDate or timeCycle."""
     text = text.strip()
     if len(text) > _MAX_TIME_CHARACTERS:
-        return "write it as ISO 8601"
+        return _FORMS[kind]
     for pattern in (_QUOTED, _FEEL_TIME):
         match = pattern.fullmatch(text)
         if match and _reads(_TIMES[kind], match[match.re.groups]):
@@ -111,8 +119,8 @@ def time_remedy(kind: str, text: str) -> str:
     if text.isdecimal():
         return f"write it with its unit: PT{shorten(text)}S are seconds"
     if _NAME.fullmatch(text):
-        return f"write it as ISO 8601; a name of the data is written ${{{shorten(text)}}}"
-    return "write it as ISO 8601"
+        return f"{_FORMS[kind]}; a name of the data is written ${{{shorten(text)}}}"
+    return _FORMS[kind]
 
 
 def _iso(count: int, unit: str) -> str:
