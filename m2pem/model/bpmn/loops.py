@@ -90,7 +90,7 @@ def _standard_loop(reading: Reading, element: etree._Element, node: Activity) ->
         maximum = int(text)
     elif text is not None:
         what = f"loopMaximum='{text}' is no number of rounds"
-        _error(reading, element, node, "bad-value", what, 'write for example loopMaximum="5"')
+        _error(reading, element, node, "loop-maximum", what, 'write for example loopMaximum="5"')
     return StandardLoop(
         _expression(reading, found, "loopCondition", node),
         reading.boolean(element, "testBefore", False, node.id),
@@ -202,7 +202,7 @@ def _check_count(reading: Reading, found: Scan, node: Activity, has_collection: 
             reading,
             found.element,
             node,
-            "instance-count",
+            "instances-counted-twice",
             "the multi-instance activity has both a loopCardinality and a collection, either of "
             "which says how many instances there are",
             "keep one",
@@ -230,7 +230,7 @@ def _behavior(reading: Reading, element: etree._Element, node: Activity) -> Inst
         known = list(InstanceBehavior)
         remedy = did_you_mean(text, known, f"write one of: {', '.join(known)}")
         what = f"behavior='{text}' is no behavior of a multi-instance activity"
-        _error(reading, element, node, "bad-value", what, remedy)
+        _error(reading, element, node, "instances-behavior", what, remedy)
         return InstanceBehavior.ALL
 
 
