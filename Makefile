@@ -19,7 +19,8 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages demo test test-long lint format docs pictures clean
+.PHONY: help setup python-packages npm-packages demo test test-long lint format docs pictures
+.PHONY: conformance clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 12
@@ -88,7 +89,18 @@ pictures: npm-packages ## draw the missions and examples for the docs (needs Chr
 	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn && \
 	for example in ../../examples/*/; do node draw_bpmn.mjs "$$example" "$$example"*.bpmn; done
 
+PEERS := .conformance
+
+conformance: setup $(PEERS)/installed ## compare with other BPMN engines, and write the table into the docs
+	@$(BIN)/python -m tests.conformance --spiffworkflow $(PEERS)/bin/python
+
+$(PEERS)/installed: tests/conformance/spiffworkflow.txt
+	@echo "Installing SpiffWorkflow into $(PEERS)"
+	@$(PYTHON) -m venv --clear $(PEERS)
+	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --requirement $<
+	@touch $@
+
 clean: ## remove all that can be made again
-	@rm -rf $(VENV) $(JS)/node_modules build dist site
+	@rm -rf $(VENV) $(PEERS) $(JS)/node_modules build dist site
 	@rm -rf .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache .coverage
 	@find . -name __pycache__ -prune -exec rm -rf {} +

@@ -16,7 +16,8 @@ class Severity(StrEnum):
 class Finding:
     """What is wrong, where, and what would be right.
 
-    `rule` is a short stable kebab-case name ("dangling-reference"), which docs and tests use.
+    `rule` is a short stable kebab-case name ("dangling-reference"), which docs and tests use;
+    `number` is that of the rule in docs/rules.md ("B15301"), if it is one of mission files.
     `line` counts from 1; 0 means that no line applies. `element` is an id of the mission, or a
     path into a fleet file ("vehicles.evsg1.arbiter"), or "".
     """
@@ -28,12 +29,14 @@ class Finding:
     rule: str
     message: str
     remedy: str = ""
+    number: str = ""
 
     def __str__(self) -> str:
         where = f"{self.file}:{self.line}" if self.line else self.file
         element = f" {self.element}:" if self.element else ""
         remedy = f"; {self.remedy}" if self.remedy else ""
-        return f"{where}:{element} {self.severity.value}: {self.message}{remedy} [{self.rule}]"
+        rule = f"[{self.rule} {self.number}]" if self.number else f"[{self.rule}]"
+        return f"{where}:{element} {self.severity.value}: {self.message}{remedy} {rule}"
 
 
 def has_errors(findings: Iterable[Finding]) -> bool:

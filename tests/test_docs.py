@@ -22,7 +22,10 @@ from tests.console import (
 
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
 EXAMPLES = sorted((REPOSITORY / "examples").rglob("README.md"))
-MAKE_TARGETS = {"setup", "demo", "test", "test-long", "lint", "format", "docs", "pictures", "clean"}
+MAKE_TARGETS = {
+    *("setup", "demo", "test", "test-long", "lint", "format", "docs", "pictures", "conformance"),
+    "clean",
+}
 
 BLOCKS = {
     f"{page.relative_to(REPOSITORY)}:{line}": commands

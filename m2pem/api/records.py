@@ -1,6 +1,7 @@
 """Records, as OCUs and observers read them (docs/records.md)."""
 
 from m2pem.engine.records import (
+    ActivitiesChosen,
     BehaviorCancelRequested,
     BehaviorContinued,
     BehaviorEnded,
@@ -50,6 +51,7 @@ from m2pem.engine.records import (
 )
 
 __all__ = [
+    "ActivitiesChosen",
     "BehaviorCancelRequested",
     "BehaviorContinued",
     "BehaviorEnded",

@@ -13,6 +13,7 @@ from m2pem.engine.state import (
     Behavior,
     BehaviorPhase,
     Join,
+    Letter,
     Loop,
     Prompt,
     RunState,
@@ -24,6 +25,7 @@ from m2pem.engine.state import (
 )
 from m2pem.model.elements import (
     Activity,
+    AdHocSubProcess,
     CallActivity,
     ComplexGateway,
     Container,
@@ -180,6 +182,10 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         join.by_flow.setdefault(flow, []).append(token)
     elif scope.loop is not None:
         scope.loop.started += 1
+    elif flow is None and isinstance(scope.container, AdHocSubProcess):
+        scope.begun[node] = None
+        if scope.chosen and scope.chosen[0] is node:
+            scope.chosen.pop(0)
     elif isinstance(node, Activity) and node.start_quantity > 1:
         scope.gathered.setdefault(node, []).append(token)
 
@@ -192,6 +198,10 @@ def _gateway_activated(state: RunState, record: r.GatewayActivated) -> None:
 
 def _gateway_reset(state: RunState, record: r.GatewayReset) -> None:
     del state.scopes[record.scope].activated[_node(state, record.element)]
+
+
+def _activities_chosen(state: RunState, record: r.ActivitiesChosen) -> None:
+    state.scopes[record.scope].chosen = [_node(state, element) for element in record.elements]
 
 
 def _tokens_gathered(state: RunState, record: r.TokensGathered) -> None:
@@ -403,14 +413,14 @@ def _event_triggered(state: RunState, record: r.EventTriggered) -> None:
     _end_wait(state, wait)
     if record.kept:
         letters = state.mailbox[wait.ref]
-        letters.pop(0)
+        letters.pop(record.letter)
         if not letters:
             del state.mailbox[wait.ref]
 
 
 def _message_thrown(state: RunState, record: r.MessageThrown) -> None:
     if record.kept:
-        state.mailbox.setdefault(record.message, []).append(record.data)
+        state.mailbox.setdefault(record.message, []).append(Letter(record.data, record.keys))
 
 
 _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
@@ -433,6 +443,7 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.TokenLeft: _token_left,
     r.InstanceOutput: _instance_output,
     r.FlowTaken: _nothing,
+    r.ActivitiesChosen: _activities_chosen,
     r.TokensGathered: _tokens_gathered,
     r.GatewayActivated: _gateway_activated,
     r.GatewayReset: _gateway_reset,

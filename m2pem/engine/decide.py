@@ -15,6 +15,7 @@ from m2pem.engine.interruption import end_run
 from m2pem.engine.lifecycle import Welcome, welcome
 from m2pem.engine.messaging import receive
 from m2pem.engine.nodes.activities import answered
+from m2pem.engine.nodes.ad_hoc import chosen
 from m2pem.engine.nodes.completion import complete
 from m2pem.engine.nodes.containers import begin
 from m2pem.engine.records import RunOutcome
@@ -24,7 +25,7 @@ from m2pem.engine.steps import Steps
 from m2pem.engine.throwing import throw_error
 from m2pem.engine.triggering import throw_signal, trigger
 from m2pem.engine.waiting import next_timer
-from m2pem.model.elements import Activity
+from m2pem.model.elements import Activity, AdHocSubProcess
 
 
 def decide(x: Steps, item: i.Input) -> None:
@@ -151,6 +152,8 @@ def _answer(x: Steps, item: i.PromptAnswer) -> None:
     )
     if prompt.behavior:
         settle(x, x.state.behaviors[prompt.behavior], item)
+    elif isinstance(node, AdHocSubProcess):
+        chosen(x, token, item.decision)
     else:
         answered(x, token, item.decision)
 

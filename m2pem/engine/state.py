@@ -57,6 +57,10 @@ class Scope:
     """Tokens at activities that several must begin, and that have not begun."""
     activated: "dict[FlowNode, tuple[SequenceFlow, ...]]" = field(default_factory=dict)
     """Complex gateways that wait to reset, and the flows whose tokens activated them."""
+    chosen: "list[FlowNode]" = field(default_factory=list)
+    """Of an ad-hoc subprocess: what is to begin, and has not."""
+    begun: "dict[FlowNode, None]" = field(default_factory=dict)
+    """Of an ad-hoc subprocess: what was begun by choice."""
     interrupted: bool = False
     """An interrupting event subprocess of it has begun: no other one can."""
 
@@ -180,6 +184,14 @@ class Service:
     properties: dict[str, Value]
 
 
+@dataclass(frozen=True, slots=True)
+class Letter:
+    """A message that nobody took yet: what it carries, and its correlation keys."""
+
+    data: dict[str, Value]
+    keys: dict[str, Value]
+
+
 @dataclass(slots=True, eq=False)
 class RunState:
     """A whole run. Times are microseconds: `_us` since the Unix epoch unless said otherwise."""
@@ -221,7 +233,7 @@ class RunState:
     """Heap of (due mission time, wait); waits that are over may still be in it, but not first."""
     dates: list[tuple[int, int]] = field(default_factory=list)
     """Heap of (due time since the Unix epoch, wait); likewise."""
-    mailbox: dict[str, list[dict[str, Value]]] = field(default_factory=dict)
+    mailbox: dict[str, list[Letter]] = field(default_factory=dict)
     """Messages that nobody was waiting for yet, by message id; first come first."""
 
     geometries: dict[str, dict[str, Value]] = field(default_factory=dict)

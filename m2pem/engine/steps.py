@@ -3,8 +3,7 @@
 from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
 from m2pem.engine.interruption import end_run
-from m2pem.engine.nodes import EXECUTE
-from m2pem.engine.nodes.containers import look_at
+from m2pem.engine.nodes import EXECUTE, look_at
 from m2pem.engine.nodes.joins import fire_joins
 from m2pem.engine.records import Record, RunOutcome
 from m2pem.engine.state import RunState, RunStatus, Scope, Token

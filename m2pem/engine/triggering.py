@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from m2pem.engine import records as r
+from m2pem.engine.correlation import fits, remember
 from m2pem.engine.data_flow import receive_payload
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.interruption import begin_event_subprocess, divert
@@ -57,22 +58,45 @@ def collect_letters(x: Execution, token: Token) -> bool:
     while found and token.waits is not None:
         found = False
         for wait in list(token.waits.values()):
-            letters = x.state.mailbox.get(wait.ref) if wait.trigger is Trigger.MESSAGE else None
-            if letters:
+            number = _letter_for(x, wait)
+            if number is not None:
                 found = True
-                trigger(x, wait, letters[0], kept=True)
+                letter = x.state.mailbox[wait.ref][number]
+                trigger(x, wait, letter.data, letter.keys, letter=number)
                 if x.state.tokens.get(token.id) is not token:
                     return False
     return True
 
 
+def _letter_for(x: Execution, wait: Wait) -> int | None:
+    """Which of the messages that were kept is for somebody who waits."""
+    if wait.trigger is not Trigger.MESSAGE:
+        return None
+    for number, letter in enumerate(x.state.mailbox.get(wait.ref, ())):
+        if fits(x, wait.ref, letter.keys, wait.token or wait.scope):
+            return number
+    return None
+
+
 # --- triggering ---------------------------------------------------------------------------------
 
 
-def trigger(x: Execution, wait: Wait, data: dict[str, Value], *, kept: bool = False) -> None:
-    """What a token waited for has come: a catch event goes on, a boundary event is entered."""
-    x.emit(r.EventTriggered(wait.id, kept))
+def trigger(
+    x: Execution,
+    wait: Wait,
+    data: dict[str, Value],
+    keys: dict[str, Value] | None = None,
+    *,
+    letter: int | None = None,
+) -> None:
+    """What a token waited for has come: a catch event goes on, a boundary event is entered.
+
+    `keys`: of a message. `letter`: it is the one of that number that was kept.
+    """
+    x.emit(r.EventTriggered(wait.id, letter is not None, letter or 0))
     token, node = wait.token, wait.node
+    if keys and token is not None:
+        remember(x, token, keys)
     if token is None:
         _in_scope(x, wait, data)
     elif node is token.node:
@@ -180,16 +204,16 @@ def throw_signal(x: Execution, signal: str, data: dict[str, Value]) -> bool:
     for start in x.triggered_starts:
         for definition in definitions_of(start):
             if isinstance(definition, SignalEventDefinition) and definition.signal.id == signal:
-                _instance(x, start, definition, data)
+                _instance(x, start, definition, data, {})
                 started = True
     return bool(waits) or started
 
 
-def message_receiver(x: Execution, message: str) -> Wait | FlowNode | None:
+def message_receiver(x: Execution, message: str, keys: dict[str, Value]) -> Wait | FlowNode | None:
     """Who gets a message: the one that has waited longest, else a process that it starts."""
-    waits = x.state.catchers.get((Trigger.MESSAGE, message))
-    if waits:
-        return next(iter(waits.values()))
+    for wait in x.state.catchers.get((Trigger.MESSAGE, message), {}).values():
+        if not keys or fits(x, message, keys, wait.token or wait.scope):
+            return wait
     for start in x.triggered_starts:
         for definition in definitions_of(start):
             if isinstance(definition, MessageEventDefinition) and definition.message.id == message:
@@ -197,18 +221,30 @@ def message_receiver(x: Execution, message: str) -> Wait | FlowNode | None:
     return None
 
 
-def deliver(x: Execution, receiver: Wait | FlowNode, message: str, data: dict[str, Value]) -> None:
+def deliver(
+    x: Execution,
+    receiver: Wait | FlowNode,
+    message: str,
+    data: dict[str, Value],
+    keys: dict[str, Value],
+) -> None:
     """Hand a message over."""
     if isinstance(receiver, Wait):
-        trigger(x, receiver, data)
+        trigger(x, receiver, data, keys)
         return
     for definition in definitions_of(receiver):
         if isinstance(definition, MessageEventDefinition) and definition.message.id == message:
-            _instance(x, receiver, definition, data)
+            _instance(x, receiver, definition, data, keys)
             return
 
 
-def _instance(x: Execution, start: FlowNode, came: EventDefinition, data: dict[str, Value]) -> None:
+def _instance(
+    x: Execution,
+    start: FlowNode,
+    came: EventDefinition,
+    data: dict[str, Value],
+    keys: dict[str, Value],
+) -> None:
     """One instance of a process, from the element whose trigger came (clause 13.2).
 
     Of several triggers that must all come, the others are awaited in the instance.
@@ -221,6 +257,7 @@ def _instance(x: Execution, start: FlowNode, came: EventDefinition, data: dict[s
         return
     if isinstance(start, StartEvent):
         token = x.spawn(start, scope)
+        remember(x, token, keys)
         receive_payload(x, token, data)
         others = start.definitions if start.parallel_multiple else ()
         for definition in others:
@@ -229,12 +266,14 @@ def _instance(x: Execution, start: FlowNode, came: EventDefinition, data: dict[s
         collect_letters(x, token)
     elif isinstance(start, ReceiveTask) and start.instantiate:
         token = x.spawn(start, scope)
+        remember(x, token, keys)
         if receive_payload(x, token, data):
             WHEN_TRIGGERED[type(start)](x, token)
     else:
         gateway = start.incoming[0].source
         assert isinstance(gateway, EventBasedGateway)
         token = x.spawn(gateway, scope)
+        remember(x, token, keys)
         if not gateway.parallel or await_behind(x, token, start):
             _behind_gateway(x, token, start, data)
             if x.state.tokens.get(token.id) is token:

@@ -15,6 +15,7 @@ from typing import TypeAlias, Union
 from m2pem.findings import Finding
 from m2pem.model.behavior import Behavior, Mappings, Prompt, Script, ServiceCall
 from m2pem.model.events import (
+    CorrelationProperty,
     Error,
     Escalation,
     EventDefinition,
@@ -85,6 +86,8 @@ class Process(Element):
     entries: tuple[FlowNode, ...] = field(init=False, repr=False, default=())
     """What gets a token when the container begins (clause 13.2): the start events; without any,
     every node without an incoming flow, boundary events excepted. Empty: nothing to do."""
+    subscription: Mapping[str, Expression] = field(init=False, repr=False, default_factory=dict)
+    """By correlation property, what its instances take messages for (clause 8.4.2)."""
     event_subprocesses: "tuple[SubProcess, ...]" = field(init=False, repr=False, default=())
     """Those directly in it, in the order of the XML (clause 13.5.4); they have no token of their
     own until their start event is triggered."""
@@ -405,6 +408,7 @@ class Mission:
     """Keys that data output associations name as written; without an effect on execution."""
     data_stores: frozenset[str] = frozenset()
     """Keys of the data stores, which all processes of a run share (clause 10.4.1)."""
+    correlation_properties: tuple[CorrelationProperty, ...] = ()
 
     def process(self, process_id: str | None = None) -> Process:
         """The process a run begins with: the one named, else the file's main one.

@@ -1,5 +1,6 @@
 """Event definitions and the root elements they refer to (BPMN 2.0.2, clauses 8.4 and 10.5.5)."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -28,9 +29,23 @@ class Signal(RootElement):
 
 @dataclass(frozen=True, slots=True)
 class Message(RootElement):
-    """Something sent to one receiver (clause 8.4.11). `from_operator` as for signals."""
+    """Something sent to one receiver (clause 8.4.11). `from_operator` as for signals.
+
+    `correlation_key`: what sender and receiver must agree on, each by its own data; None: nothing.
+    """
 
     from_operator: bool = False
+    correlation_key: Expression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CorrelationProperty(RootElement):
+    """What messages are matched by (clause 8.4.2).
+
+    `retrieve`: by message id, where a message carries it, as an expression over what it carries.
+    """
+
+    retrieve: Mapping[str, Expression]
 
 
 @dataclass(frozen=True, slots=True)

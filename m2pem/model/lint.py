@@ -8,6 +8,8 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from m2pem.findings import Finding, Severity
+from m2pem.model.bpmn.graph import unreachable
+from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.elements import (
     Activity,
     CallActivity,
@@ -33,7 +35,7 @@ from m2pem.model.events import (
 )
 from m2pem.model.loops import MultiInstance
 from m2pem.model.names import unwritten
-from m2pem.model.reach import unreachable, unreached
+from m2pem.model.reach import unreached
 
 
 def lint(
@@ -59,7 +61,7 @@ def lint(
 def _warning(
     mission: Mission, line: int, element: str, rule: str, said: tuple[str, str]
 ) -> Finding:
-    return Finding(Severity.WARNING, mission.file, line, element, rule, *said)
+    return Finding(Severity.WARNING, mission.file, line, element, rule, *said, code(rule))
 
 
 def _unreachable(mission: Mission) -> Iterator[Finding]:

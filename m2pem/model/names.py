@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 from m2pem.findings import Finding, Severity
 from m2pem.model.behavior import Assignment, Parameter
 from m2pem.model.behavior import Mapping as DataMapping
+from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.elements import (
     Activity,
+    AdHocSubProcess,
     CallActivity,
     ComplexGateway,
     Event,
@@ -95,6 +97,7 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
                 f"'{name}' is read, but nothing in process '{process.id}' writes it; unless "
                 "--data or an operator does, it is null",
                 did_you_mean(name, store.written, "write it in a task before, or pass it in"),
+                code("unwritten-name"),
             )
 
 
@@ -108,6 +111,10 @@ def _reads(node: FlowNode) -> Iterator[Read]:
     for mapping in _data_mappings(node):
         if mapping.source.text not in mapping.source.names:  # a copy may well copy nothing
             yield Read(mapping.source, node.id, mapping.line)
+    if isinstance(node, AdHocSubProcess):
+        for expression in (node.completion, node.active_elements):
+            if expression is not None:
+                yield Read(expression, node.id, node.line)
     if isinstance(node, ComplexGateway) and node.activation is not None:
         yield Read(node.activation, node.id, node.line)
     if isinstance(node, Activity):

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 
-from m2pem.findings import Finding, Severity
 from m2pem.model.elements import (
     Activity,
     BoundaryEvent,
@@ -61,17 +60,3 @@ def unreached(container: Container, also: Iterable[FlowNode] = ()) -> list[FlowN
                 reached.add(each)
                 waiting.append(each)
     return [node for node in container.nodes if node not in reached]
-
-
-def unreachable(file: str, node: FlowNode) -> Finding:
-    """The finding about one of them."""
-    what = "no start event can reach it" if node.container.starts else "nothing can reach it"
-    return Finding(
-        Severity.ERROR,
-        file,
-        node.line,
-        node.id,
-        "unreachable",
-        f"{what}, so it would never run",
-        "draw a sequence flow to it, or delete it",
-    )

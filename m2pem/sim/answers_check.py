@@ -2,10 +2,12 @@
 
 from collections.abc import Collection, Mapping
 
+from m2pem.engine.nodes.ad_hoc import COMPLETE
 from m2pem.engine.reports import RECOVERY_DECISIONS
 from m2pem.findings import Finding
 from m2pem.model.elements import (
     Activity,
+    AdHocSubProcess,
     FlowNode,
     Mission,
     ScriptTask,
@@ -42,6 +44,8 @@ class _Check:
     def _sort(self, task: Activity) -> None:
         if isinstance(task, UserTask) and task.prompt is not None:
             self._decisions[task.id] = [each.value for each in task.prompt.decisions]
+        elif isinstance(task, AdHocSubProcess):
+            self._decisions[task.id] = [*(each.id for each in task.entries), COMPLETE]
         elif isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior is not None:
             self._commanding.append(task.id)
         elif isinstance(task, ServiceTask) and task.call is not None:

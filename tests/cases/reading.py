@@ -39,7 +39,7 @@ def read_topic(path: Path) -> list[Case]:
     try:
         found = YAML().load(path.read_text(encoding="utf-8"))
     except YAMLError as error:
-        raise CaseError(f"{path}: {error}") from error
+        raise CaseError(f"{path}: {error}") from None
     if not isinstance(found, CommentedSeq):
         raise CaseError(f"{path}: is no list of cases")
     cases = []
@@ -51,7 +51,7 @@ def read_topic(path: Path) -> list[Case]:
             cases.append(_case(path, line, item))
         except _WrongError as error:
             title = item.get("case", "a case without a title")
-            raise CaseError(f"{path}:{error.line or line}: {title}: {error}") from error
+            raise CaseError(f"{path}:{error.line or line}: {title}: {error}") from None
     return cases
 
 

@@ -80,7 +80,8 @@ def _check_waits(state: RunState) -> None:
     assert set(caught) <= set(state.waits)
     for (trigger, ref), waits in state.catchers.items():
         assert waits, "nobody catches: absent"
-        assert trigger.value == "signal" or ref not in state.mailbox, "a letter and its catcher"
+        for letter in state.mailbox.get(ref, ()) if trigger.value == "message" else ():
+            assert letter.keys, "a letter and its catcher"
 
 
 def _check_work(state: RunState) -> None:

@@ -5,7 +5,7 @@
     start -> fast -> go -> end if speed > 3
     no: fast -> end
 
-* A line with `->` is a chain of sequence flows, named f1, f2, ...; what is said before a colon names
+* A line with `->` is a chain of sequence flows, named f1, f2, ...; a name before a colon is that of
   the first of them, and what follows `if` is the condition of the last.
 * A line `a ~> b` is an association (from a compensation boundary event to its handler); a line
   `a => b` a message flow between the processes, which then are pools of a collaboration.
@@ -42,7 +42,7 @@ _EACH = re.compile(r"<each\b([^<>]*)>(.*?)</each>", re.S)
 _LINES = re.compile(r"^\s*(?:([\w-]+):)?\s*([\w-]+)\s*([~=]>)\s*([\w-]+)\s*$", re.M)
 _FLOWS = re.compile(r"^\s*(?:([\w-]+):)?\s*([\w-]+(?:\s*->\s*[\w-]+)+)(?:\s+if\s+(.+))?\s*$", re.M)
 _SHORT = re.compile(
-    r"<(\w+)\b([^<>]*)(?<!/)>([^<]*\S[^<]*?)(<(\w+)Characteristics\b.*?</\5Characteristics>\s*)?</\1>"
+    r"<(\w+)\b([^<>]*)(?<!/)>([^<]*[^\s<][^<]*?)(<(\w+)Characteristics\b.*?</\5Characteristics>\s*)?</\1>"
 )
 _PARTS = re.compile(r"(?<!&lt)(?<!&gt)(?<!&amp);")
 _TIMES = {"timer": "timeDuration", "date": "timeDate", "cycle": "timeCycle"}

@@ -6,6 +6,7 @@ from typing import Any
 from m2pem.engine.state import (
     Behavior,
     Join,
+    Letter,
     Loop,
     Prompt,
     RunState,
@@ -42,7 +43,7 @@ def _plain(value: object) -> object:
         return value.id
     if isinstance(value, _OBJECTS):
         return f"{type(value).__name__} {value.id}"
-    if isinstance(value, (Loop, Shared)):
+    if isinstance(value, (Letter, Loop, Shared)):
         return [(each.name, _plain(getattr(value, each.name))) for each in fields(value)]
     if isinstance(value, Join):
         return _plain(value.by_flow)

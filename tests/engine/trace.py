@@ -37,6 +37,7 @@ _LINES: dict[type, Callable[[Any], Iterable[object]]] = {
     r.InstanceOutput: lambda x: ("give", x.value),
     r.FlowTaken: lambda x: ("take", x.flow),
     r.GatewayActivated: lambda x: ("activate", x.element, *x.flows),
+    r.ActivitiesChosen: lambda x: ("choose", x.element, *x.elements),
     r.TokensGathered: lambda x: ("gather", x.token, x.element),
     r.GatewayReset: lambda x: ("reset", x.element),
     r.ScopeInterrupted: lambda x: ("interrupt", x.scope, x.element),

@@ -16,9 +16,9 @@ ERRORS = {
         around('<transaction id="T"><task id="x"/></transaction>'),
         [("not-executed", 3, "T")],
     ),
-    "ad-hoc subprocess": (
-        around('<adHocSubProcess id="T"><task id="x"/></adHocSubProcess>'),
-        [("not-executed", 3, "T")],
+    "ordering that nobody knows": (
+        around('<adHocSubProcess id="T" ordering="Random"><task id="x"/></adHocSubProcess>'),
+        [("bad-value", 3, "T")],
     ),
     "event subprocess": (
         process(

@@ -7,13 +7,30 @@ that wait at their own node to what follows.
 from collections.abc import Callable
 
 from m2pem.engine.execution import Execution
-from m2pem.engine.nodes import activities, complex_gateway, event_gateway, events, gateways
+from m2pem.engine.nodes import (
+    activities,
+    ad_hoc,
+    complex_gateway,
+    containers,
+    event_gateway,
+    events,
+    gateways,
+)
 from m2pem.engine.nodes.beginning import WORK, begin_activity
 from m2pem.engine.nodes.completion import complete
-from m2pem.engine.state import Token
+from m2pem.engine.state import Scope, Token
 from m2pem.engine.triggering import WHEN_TRIGGERED
 from m2pem.model import elements as e
 from m2pem.model.elements import FlowNode
+
+
+def look_at(x: Execution, scope: Scope) -> None:
+    """Something in a scope has ended: perhaps the scope has."""
+    if isinstance(scope.container, e.AdHocSubProcess) and scope.loop is None:
+        ad_hoc.look_at(x, scope)
+    else:
+        containers.look_at(x, scope)
+
 
 EXECUTE: dict[type[FlowNode], Callable[[Execution, Token], None]] = {
     **dict.fromkeys(WORK, begin_activity),

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from m2pem.engine import records as r
 from m2pem.engine.data_flow import take_in
 from m2pem.engine.execution import Execution
-from m2pem.engine.nodes import activities, containers
+from m2pem.engine.nodes import activities, ad_hoc, containers
 from m2pem.engine.nodes.completion import pass_on
 from m2pem.engine.nodes.loops import begin_loop
 from m2pem.engine.records import TokenOutcome
@@ -24,6 +24,7 @@ WORK: dict[type[FlowNode], Callable[[Execution, Token], None]] = {
     e.SendTask: activities.send_task,
     e.ReceiveTask: activities.receive_task,
     e.SubProcess: containers.subprocess,
+    e.AdHocSubProcess: ad_hoc.ad_hoc,
     e.CallActivity: containers.call_activity,
 }
 """What each kind of activity does once it has begun."""

@@ -6,7 +6,7 @@ from m2pem.engine.nodes.flows import true_flows
 from m2pem.engine.nodes.loops import instance_done
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.state import Token
-from m2pem.model.elements import Activity
+from m2pem.model.elements import Activity, AdHocSubProcess
 
 
 def complete(x: Execution, token: Token, outcome: TokenOutcome = TokenOutcome.COMPLETED) -> None:
@@ -32,3 +32,5 @@ def pass_on(x: Execution, token: Token) -> None:
     flows = true_flows(x, token, node.default)
     if flows is not None:
         x.proceed(token, [*flows] * node.completion_quantity)
+        if isinstance(node.container, AdHocSubProcess):
+            x.queue.append(token.scope)

@@ -21,7 +21,7 @@ def subprocess(x: Execution, token: Token) -> None:
     """Open its scope and start what is in it."""
     if token.inner is not None:
         return  # an event subprocess, which its trigger has begun
-    scope = _open(x, token)
+    scope = open_inside(x, token)
     if scope is not None:
         begin(x, scope)
 
@@ -33,7 +33,7 @@ def call_activity(x: Execution, token: Token) -> None:
     values = evaluate(x, token, node.mappings.inputs, reader(token))
     if values is None:
         return
-    scope = _open(x, token)
+    scope = open_inside(x, token)
     if scope is None:
         return
     for mapping, value in values:
@@ -42,7 +42,8 @@ def call_activity(x: Execution, token: Token) -> None:
     begin(x, scope)
 
 
-def _open(x: Execution, token: Token) -> Scope | None:
+def open_inside(x: Execution, token: Token) -> Scope | None:
+    """Open the scope of an activity. None: it is too deep, and that error was thrown."""
     if token.scope.depth >= MAX_DEPTH:
         throw_error(x, token, "RECURSION", f"{MAX_DEPTH} scopes within scopes at {token.node.id}")
         return None

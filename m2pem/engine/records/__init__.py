@@ -35,6 +35,7 @@ from m2pem.engine.records.run import (
     RunYielded,
 )
 from m2pem.engine.records.tokens import (
+    ActivitiesChosen,
     FlowTaken,
     GatewayActivated,
     GatewayReset,
@@ -63,6 +64,7 @@ from m2pem.engine.records.work import (
 )
 
 __all__ = [
+    "ActivitiesChosen",
     "BehaviorCancelRequested",
     "BehaviorContinued",
     "BehaviorEnded",
@@ -129,6 +131,7 @@ Record: TypeAlias = Union[
     ScopeInterrupted,
     TokenEntered,
     TokenLeft,
+    ActivitiesChosen,
     TokensGathered,
     InstanceOutput,
     FlowTaken,

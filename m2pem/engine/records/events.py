@@ -46,10 +46,14 @@ class EventAwaited(BaseRecord, frozen=True):
 
 
 class EventTriggered(BaseRecord, frozen=True):
-    """The awaited event came; the wait is over. `kept`: it took a message that was kept."""
+    """The awaited event came; the wait is over.
+
+    `kept`: it took a message that was kept, the `letter`-th (from 0) of that message.
+    """
 
     wait: int
     kept: bool = False
+    letter: int = 0
 
 
 class SignalThrown(BaseRecord, frozen=True):
@@ -65,7 +69,7 @@ class SignalThrown(BaseRecord, frozen=True):
 
 class MessageThrown(BaseRecord, frozen=True):
     """By an element, or by an operator (`by`). `kept`: nobody waits for it yet, so its `data` is
-    kept for whoever waits next."""
+    kept for whoever waits next. `keys`: what it is matched by (clause 8.4.2)."""
 
     message: str
     token: int = 0
@@ -75,6 +79,7 @@ class MessageThrown(BaseRecord, frozen=True):
     by: str = ""
     kept: bool = False
     data: dict[str, Value] = msgspec.field(default_factory=dict)
+    keys: dict[str, Value] = msgspec.field(default_factory=dict)
 
 
 class EscalationThrown(BaseRecord, frozen=True):

@@ -84,6 +84,16 @@ class ScopeInterrupted(BaseRecord, frozen=True):
     element: str
 
 
+class ActivitiesChosen(BaseRecord, frozen=True):
+    """An ad-hoc subprocess has begun whose own expression chooses what is done in it, in order."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    elements: tuple[str, ...]
+
+
 class TokensGathered(BaseRecord, frozen=True):
     """As many tokens have come to an activity as begin it; `token` does so, the others left."""
 

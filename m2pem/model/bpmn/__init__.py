@@ -10,6 +10,7 @@ from m2pem.findings import Finding, Severity, has_errors
 from m2pem.model.bpmn.calls import resolve_calls
 from m2pem.model.bpmn.collaboration import check_collaborations
 from m2pem.model.bpmn.containers import MAX_DEPTH, read_process
+from m2pem.model.bpmn.correlation import resolve_correlation
 from m2pem.model.bpmn.data import resolve_data
 from m2pem.model.bpmn.data_flow import resolve_data_flows
 from m2pem.model.bpmn.graph import add_unreachable, check_graph
@@ -21,6 +22,8 @@ from m2pem.model.bpmn.prompts import resolve_prompts
 from m2pem.model.bpmn.reading import Reading
 from m2pem.model.bpmn.report import Report
 from m2pem.model.bpmn.roots import read_roots
+from m2pem.model.bpmn.rules import check_rules
+from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.bpmn.xml import MAX_BYTES, Document, XmlError, parse_xml
 from m2pem.model.elements import Mission
 
@@ -51,6 +54,7 @@ def read_mission(path: str | Path) -> Mission:
             "unreadable-file",
             f"cannot read the file: {error.strerror or error}",
             "name a BPMN 2.0 file",
+            code("unreadable-file"),
         )
         raise MissionError(f"{file}: no mission", [finding]) from error
     return parse_mission(data, file)
@@ -67,7 +71,14 @@ def parse_mission(data: bytes, file: str) -> Mission:
         document = parse_xml(data)
     except XmlError as error:
         finding = Finding(
-            Severity.ERROR, file, error.line, "", error.rule, error.message, error.remedy
+            Severity.ERROR,
+            file,
+            error.line,
+            "",
+            error.rule,
+            error.message,
+            error.remedy,
+            code(error.rule),
         )
         raise MissionError(f"{file}: no BPMN 2.0 file", [finding]) from None
     report = Report(file, document.line)
@@ -116,8 +127,10 @@ def _read(report: Report, document: Document, data: bytes) -> Mission | None:
     elements = link(reading)
     join_default_signals(reading)
     resolve_messages(reading)
+    correlation_properties = resolve_correlation(reading)
     check_collaborations(reading, elements)
     check_graph(reading)
+    check_rules(document.root, report, data)
     if has_errors(report.findings):
         add_unreachable(reading)
         return None
@@ -137,5 +150,6 @@ def _read(report: Report, document: Document, data: bytes) -> Mission | None:
         warnings=report.sorted(),
         elements=elements,
         associated=frozenset(reading.written_keys),
+        correlation_properties=correlation_properties,
         data_stores=frozenset(reading.data_key(store) for store in reading.data_stores),
     )

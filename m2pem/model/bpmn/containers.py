@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
+from m2pem.model.bpmn.correlation import read_subscription
 from m2pem.model.bpmn.data import read_data
 from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.flows import SEQUENCE_FLOW, read_flow
@@ -25,6 +26,8 @@ _DATA = frozenset(
     BPMN + name for name in ("dataObject", "dataObjectReference", "dataStoreReference", "property")
 )
 _LANES = BPMN + "laneSet"
+_SUBSCRIPTION = BPMN + "correlationSubscription"
+_COMPLETION = BPMN + "completionCondition"
 _DATA_FLOW = ("ioSpecification", "dataInputAssociation", "dataOutputAssociation")
 _MARKS = frozenset((*LOOPS, *(BPMN + name for name in _DATA_FLOW)))
 
@@ -110,6 +113,11 @@ def _read_child(
         return None
     if tag in _MARKS:
         frame.marks.children.setdefault(tag, []).append(child)
+        return None
+    if tag == _SUBSCRIPTION:
+        read_subscription(reading, child, process)
+        return None
+    if tag == _COMPLETION:
         return None
     node = read_node(reading, child, container)
     if node is None:

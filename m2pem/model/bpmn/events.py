@@ -8,6 +8,7 @@ from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.definitions import read_definition
 from m2pem.model.bpmn.names import BPMN, a, kind, local
 from m2pem.model.bpmn.reading import Reading, reference, text_of
+from m2pem.model.bpmn.rules.events import allowed_triggers
 from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.elements import (
     BoundaryEvent,
@@ -22,14 +23,6 @@ from m2pem.model.elements import (
 from m2pem.model.events import ErrorEventDefinition, EventDefinition
 from m2pem.model.near import did_you_mean
 
-_ALLOWED = {
-    "startEvent": "message timer conditional signal",
-    "endEvent": "message error escalation cancel compensate signal terminate",
-    "intermediateCatchEvent": "message timer conditional link signal",
-    "intermediateThrowEvent": "message escalation link compensate signal",
-    "boundaryEvent": "message timer escalation error cancel compensate conditional signal",
-}
-_ALLOWED_IN_EVENT_SUBPROCESS = "message timer escalation error compensate conditional signal"
 _EXECUTED = frozenset({"message", "timer", "signal", "escalation", "error", "terminate"})
 _THROWN_IMPLICITLY = frozenset({"message", "signal", "escalation", "error"})
 _CATCHING = frozenset({"startEvent", "intermediateCatchEvent", "boundaryEvent"})
@@ -142,10 +135,8 @@ def _definition(
     """One of its definitions; None when a finding says what is wrong with it."""
     name = local(definition.tag).removesuffix("EventDefinition")
     inside_event_subprocess = container in reading.self_starting
-    allowed = _ALLOWED[place].split()
-    if place == "startEvent" and inside_event_subprocess:
-        allowed = _ALLOWED_IN_EVENT_SUBPROCESS.split()
-    elif place == "startEvent" and not isinstance(container, Process):
+    embedded = not inside_event_subprocess and not isinstance(container, Process)
+    if place == "startEvent" and embedded:
         reading.report.error(
             found.element,
             found.id,
@@ -154,9 +145,8 @@ def _definition(
             "use a plain start event, and a catching intermediate event after it",
         )
         return None
-    if name not in allowed:
-        _not_allowed(reading, found, definition, allowed)
-        return None
+    if name not in allowed_triggers(found.element):
+        return None  # which a rule says
     if name not in _EXECUTED:
         reading.report.error(
             found.element,
@@ -202,17 +192,4 @@ def _no_trigger(reading: Reading, found: Scan, place: str) -> None:
         "no-trigger",
         f"{a(word)} must say what it waits for",
         f"give it a signal, message or timer event definition{also}",
-    )
-
-
-def _not_allowed(
-    reading: Reading, found: Scan, definition: etree._Element, allowed: list[str]
-) -> None:
-    names = [each for each in allowed if each in _EXECUTED]
-    reading.report.error(
-        found.element,
-        found.id,
-        "event-not-allowed",
-        f"BPMN does not allow {a(kind(definition.tag))} as {a(kind(found.element.tag))}",
-        f"use one of: {', '.join(names)}",
     )

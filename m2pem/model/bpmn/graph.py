@@ -1,8 +1,10 @@
 """What BPMN asks of the linked graph: a beginning, and conditions in place."""
 
+from m2pem.findings import Finding, Severity
 from m2pem.model.bpmn.reading import Reading
-from m2pem.model.elements import Container, Event, ParallelGateway, SubProcess
-from m2pem.model.reach import unreachable, unreached
+from m2pem.model.bpmn.rules.registry import code
+from m2pem.model.elements import Container, Event, FlowNode, ParallelGateway, SubProcess
+from m2pem.model.reach import unreached
 
 _set = object.__setattr__
 
@@ -65,6 +67,21 @@ def add_unreachable(reading: Reading) -> None:
         for node in unreached(container, loose):
             finding = unreachable(reading.report.file, node)
             reading.report.findings.append(finding)
+
+
+def unreachable(file: str, node: FlowNode) -> Finding:
+    """The finding about one of them."""
+    what = "no start event can reach it" if node.container.starts else "nothing can reach it"
+    return Finding(
+        Severity.ERROR,
+        file,
+        node.line,
+        node.id,
+        "unreachable",
+        f"{what}, so it would never run",
+        "draw a sequence flow to it, or delete it",
+        code("unreachable"),
+    )
 
 
 def _containers(reading: Reading) -> list[Container]:

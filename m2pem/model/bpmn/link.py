@@ -117,17 +117,18 @@ def _called(container: Container) -> str:
 
 def _wrong_end(reading: Reading, flow: SequenceFlow, source: FlowNode, target: FlowNode) -> None:
     if isinstance(source, EndEvent):
+        rule = "flow-out-of-end"
         said = f"out of the end event '{source.id}'"
         remedy = "make it an intermediate throw event, or delete the flow"
     elif isinstance(target, BoundaryEvent):
+        rule = "flow-into-boundary"
         said = f"into the boundary event '{target.id}'"
         remedy = "lead it to the activity, or to what follows the boundary event"
     else:
+        rule = "flow-into-start"
         said = f"into the start event '{target.id}'"
         remedy = "lead it to what follows the start event"
-    reading.report.error(
-        flow.line, flow.id, "flow-end", f"no sequence flow can lead {said}", remedy
-    )
+    reading.report.error(flow.line, flow.id, rule, f"no sequence flow can lead {said}", remedy)
 
 
 def _link_containers(reading: Reading) -> None:

@@ -31,7 +31,17 @@ M2PEM_ELEMENTS = frozenset(
 """Local names of the elements of `M2PEM` that some version of m2pem gives a meaning."""
 
 M2PEM_ATTRIBUTES = frozenset(
-    {"class", "collection", "elementVariable", "from", "role", "service", "store", "timeout"}
+    {
+        "activeElements",
+        "class",
+        "collection",
+        "elementVariable",
+        "from",
+        "role",
+        "service",
+        "store",
+        "timeout",
+    }
 )
 """Local names of the attributes of `M2PEM` that may stand on BPMN elements."""
 

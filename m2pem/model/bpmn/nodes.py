@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from lxml import etree
 
+from m2pem.model.bpmn.ad_hoc import read_ad_hoc
 from m2pem.model.bpmn.calls import read_call_activity
 from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.events import read_event
@@ -34,7 +35,10 @@ SUBPROCESSES = frozenset(BPMN + name for name in ("subProcess", "transaction", "
 MAX_QUANTITY = 1000
 """Of tokens that begin an activity, or leave it by one flow."""
 
-_QUANTITIES = {"start_quantity": "startQuantity", "completion_quantity": "completionQuantity"}
+_QUANTITIES = {
+    "start_quantity": ("startQuantity", "start-quantity"),
+    "completion_quantity": ("completionQuantity", "completion-quantity"),
+}
 
 _TASKS: dict[str, Callable[[Reading, Scan], Activity]] = {
     BPMN + "task": read_plain_task,
@@ -59,7 +63,6 @@ _EVENTS = frozenset(
 )
 _REFUSED = {
     "transaction": "use a subprocess with boundary events",
-    "adHocSubProcess": "join its activities by sequence flows, in a plain subprocess",
     "choreographyTask": "draw the mission as processes",
     "callChoreography": "draw the mission as processes",
     "subChoreography": "draw the mission as processes",
@@ -85,7 +88,10 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
     node: FlowNode
     if tag in SUBPROCESSES:
         # Its children are read with its content, by containers.py.
-        node = SubProcess(identifier, element.get("name", ""), reading.report.line(element))
+        if tag == BPMN + "adHocSubProcess":
+            node = read_ad_hoc(reading, element, identifier)
+        else:
+            node = SubProcess(identifier, element.get("name", ""), reading.report.line(element))
         _event_subprocess(reading, element, node)
         _check_activity(reading, element, node)
     elif task is not None:
@@ -132,20 +138,23 @@ def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -
             "compensation activity",
             "draw what undoes the activity after a boundary event",
         )
-    for field, name in _QUANTITIES.items():
-        object.__setattr__(node, field, _quantity(reading, element, name))
+    for field, (name, rule) in _QUANTITIES.items():
+        object.__setattr__(node, field, _quantity(reading, element, name, rule))
 
 
-def _quantity(reading: Reading, element: etree._Element, name: str) -> int:
+def _quantity(reading: Reading, element: etree._Element, name: str, rule: str) -> int:
     """How many tokens begin, or leave, an activity (table 10.3)."""
     text = element.get(name, "1").strip()
     if text.isascii() and text.isdecimal() and 1 <= int(text) <= MAX_QUANTITY:
         return int(text)
-    reading.report.error(
+    # Some editors write 0 for what was not set.
+    say = reading.report.warning if text == "0" else reading.report.error
+    say(
         element,
         element.get("id", ""),
-        "bad-value",
-        f"{name}='{text}' is no number of tokens from 1 to {MAX_QUANTITY}",
+        rule,
+        f"{name}='{text}' is no number of tokens from 1 to {MAX_QUANTITY}"
+        + ("; it counts as 1" if text == "0" else ""),
         f'write for example {name}="2", or delete it',
     )
     return 1

@@ -135,6 +135,8 @@ class Reading:
     messages: dict[str, Message] = field(default_factory=dict)
     errors: dict[str, Error] = field(default_factory=dict)
     escalations: dict[str, Escalation] = field(default_factory=dict)
+    correlation_properties: dict[str, etree._Element] = field(default_factory=dict)
+    subscriptions: list[tuple[Process, etree._Element]] = field(default_factory=list)
     participants: list[Participant] = field(default_factory=list)
     message_flows: list[tuple[MessageFlow, str]] = field(default_factory=list)
     lanes: list[Lane] = field(default_factory=list)

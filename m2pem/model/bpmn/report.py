@@ -6,6 +6,7 @@ from typing import TypeAlias, Union
 from lxml import etree
 
 from m2pem.findings import Finding, Severity
+from m2pem.model.bpmn.rules.registry import code
 
 Where: TypeAlias = Union[etree._Element, int]
 """An element, or a line."""
@@ -33,7 +34,7 @@ class Report:
         self, severity: Severity, where: Where, element: str, rule: str, said: tuple[str, str]
     ) -> None:
         line = where if isinstance(where, int) else self.line(where)
-        self.findings.append(Finding(severity, self.file, line, element, rule, *said))
+        self.findings.append(Finding(severity, self.file, line, element, rule, *said, code(rule)))
 
     def sorted(self) -> tuple[Finding, ...]:
         """All findings by line; those of one line in the order they were made."""

@@ -3,6 +3,7 @@
 from lxml import etree
 
 from m2pem.model.bpmn.collaboration import read_collaboration
+from m2pem.model.bpmn.correlation import correlation_key, read_property
 from m2pem.model.bpmn.names import BPMN, M2PEM, a, kind, local
 from m2pem.model.bpmn.reading import DataEnd, Reading
 from m2pem.model.bpmn.scan import Order, scan
@@ -46,6 +47,8 @@ def read_roots(reading: Reading, definitions: etree._Element) -> list[etree._Ele
             _read_data_store(reading, element)
         elif name in ("signal", "message", "error", "escalation"):
             _read_event_root(reading, element, name)
+        elif name == "correlationProperty":
+            read_property(reading, element)
         elif name in _CHOREOGRAPHIES:
             _refuse_choreography(reading, element)
         elif name not in ROOT_NAMES and name not in _DI:
@@ -74,7 +77,9 @@ def _read_event_root(reading: Reading, element: etree._Element, name: str) -> No
         signal = Signal(identifier, label, line, sent, returned)
         reading.signals.setdefault(identifier, signal)
     elif name == "message":
-        message = Message(identifier, label, line, _from_operator(reading, element, identifier))
+        sent = _from_operator(reading, element, identifier)
+        key = correlation_key(reading, element, identifier)
+        message = Message(identifier, label, line, sent, key)
         reading.messages.setdefault(identifier, message)
     elif name == "error":
         error = Error(identifier, label, line, element.get("errorCode") or identifier)

@@ -117,6 +117,7 @@ _TABLE: dict[str, tuple[str, str]] = {
     "timerEventDefinition": ("id", f"{_BASE} timeDate|timeDuration|timeCycle"),
     "terminateEventDefinition": ("id", _BASE),
     "activationCondition": ("id language evaluatesToTypeRef", _BASE),
+    "completionCondition": ("id language evaluatesToTypeRef", _BASE),
     "conditionExpression": ("id language evaluatesToTypeRef", _BASE),
     "timeDate": ("id language evaluatesToTypeRef", _BASE),
     "timeDuration": ("id language evaluatesToTypeRef", _BASE),
@@ -152,7 +153,8 @@ class Shape:
     ranks: dict[str, int]
 
 
-def _shape(attributes: str, children: str) -> Shape:
+def shape(attributes: str, children: str) -> Shape:
+    """The shape of an element by the names of its attributes and children, in order."""
     ranks = {
         BPMN + name: rank
         for rank, group in enumerate(children.split())
@@ -161,7 +163,7 @@ def _shape(attributes: str, children: str) -> Shape:
     return Shape(frozenset(attributes.split()), ranks)
 
 
-SHAPES: dict[str, Shape] = {BPMN + name: _shape(*row) for name, row in _TABLE.items()}
+SHAPES: dict[str, Shape] = {BPMN + name: shape(*row) for name, row in _TABLE.items()}
 """By tag; an element that is not here is not looked into."""
 
 SHAPES[BPMN + "childLaneSet"] = SHAPES[BPMN + "laneSet"]

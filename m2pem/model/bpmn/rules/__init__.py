@@ -1,0 +1,33 @@
+"""Static rules: what BPMN 2.0.2 forbids, checked on the XML tree of a file, rule by rule.
+
+Each module is a topic with its rules and checks; `registry` has all of them. docs/rules.md is
+made from it. A check looks at single elements, or at the whole file; time is linear in the file.
+"""
+
+from typing import TYPE_CHECKING
+
+from lxml import etree
+
+from m2pem.model.bpmn.names import BPMN
+from m2pem.model.bpmn.rules.registry import TOPICS
+from m2pem.model.bpmn.rules.rule import Check
+from m2pem.model.bpmn.rules.tree import Tree
+
+if TYPE_CHECKING:
+    from m2pem.model.bpmn.report import Report
+
+_CHECKS: dict[str, list[Check]] = {}
+for _topic in TOPICS:
+    for _name, _check in _topic.by_name.items():
+        _CHECKS.setdefault(BPMN + _name, []).append(_check)
+
+
+def check_rules(root: etree._Element, report: "Report", source: bytes) -> None:
+    """Add what the rules find in a file, and its bytes, to what its readers have found."""
+    tree = Tree(root, report, source)
+    for element in root.iter(*_CHECKS):
+        for check in _CHECKS[element.tag]:
+            check(tree, element)
+    for topic in TOPICS:
+        for whole in topic.whole:
+            whole(tree)

@@ -1,0 +1,112 @@
+"""Event definitions: codes, conditions, cancellation (BPMN 2.0.2, 8.4.3, 8.4.4 and 10.5.5)."""
+
+from lxml import etree
+
+from m2pem.model.bpmn.names import BPMN
+from m2pem.model.bpmn.rules.rule import E, Rule, Topic, W, declared
+from m2pem.model.bpmn.rules.tree import (
+    THROWING,
+    Tree,
+    is_false,
+    name_of,
+    parent,
+    texts,
+)
+
+ERROR_CODE = Rule(
+    8422,
+    "thrown-error-code",
+    "8.4.3",
+    W,
+    "the error that is thrown has no errorCode",
+    "add errorCode to the error; until then its id is its code",
+)
+ESCALATION_CODE = Rule(
+    8432,
+    "thrown-escalation-code",
+    "8.4.4",
+    W,
+    "the escalation that is thrown has no escalationCode",
+    "add escalationCode to the escalation; until then its id is its code",
+)
+CONDITION = Rule(
+    10533,
+    "conditional-without-condition",
+    "10.5.5",
+    E,
+    "the conditional event has no condition",
+    "write the condition that it waits for",
+    same_as=("no-condition", "empty-condition", "bad-expression"),
+)
+CANCEL_END = Rule(
+    10549,
+    "cancel-end-place",
+    "10.5.5",
+    E,
+    "a cancel end event can stand only in a transaction",
+    "make what is around it a transaction, or use an error or terminate end event",
+)
+CANCEL_BOUNDARY = Rule(
+    10550,
+    "cancel-boundary-place",
+    "10.5.5",
+    E,
+    "a cancel boundary event can be attached only to a transaction",
+    "make the activity a transaction, or catch an error",
+)
+CANCEL_GOES_ON = Rule(
+    10551,
+    "cancel-not-interrupting",
+    "10.5.5",
+    E,
+    "a cancel boundary event must interrupt the transaction",
+    'delete cancelActivity="false"',
+)
+
+
+def _error(tree: Tree, definition: etree._Element) -> None:
+    _code(tree, definition, "errorRef", "errorCode", ERROR_CODE)
+
+
+def _escalation(tree: Tree, definition: etree._Element) -> None:
+    _code(tree, definition, "escalationRef", "escalationCode", ESCALATION_CODE)
+
+
+def _code(
+    tree: Tree, definition: etree._Element, reference: str, attribute: str, rule: Rule
+) -> None:
+    name = definition.get(reference)
+    if not name or parent(definition).tag not in THROWING:
+        return
+    root = tree.find(definition, name)
+    if root is not None and name_of(root) == reference[:-3] and not root.get(attribute):
+        tree.say(rule, definition, f"'{name}'")
+
+
+def _conditional(tree: Tree, definition: etree._Element) -> None:
+    if not any(texts(definition, "condition")):
+        tree.say(CONDITION, definition)
+
+
+def _cancel(tree: Tree, definition: etree._Element) -> None:
+    event = parent(definition)
+    transaction = BPMN + "transaction"
+    if name_of(event) == "endEvent" and parent(event).tag != transaction:
+        tree.say(CANCEL_END, event)
+    elif name_of(event) == "boundaryEvent":
+        host = tree.find(event, event.get("attachedToRef", ""))
+        if host is not None and host.tag != transaction:
+            tree.say(CANCEL_BOUNDARY, event)
+        if is_false(event, "cancelActivity"):
+            tree.say(CANCEL_GOES_ON, event)
+
+
+TOPIC = Topic(
+    declared(globals()),
+    {
+        "errorEventDefinition": _error,
+        "escalationEventDefinition": _escalation,
+        "conditionalEventDefinition": _conditional,
+        "cancelEventDefinition": _cancel,
+    },
+)

@@ -1,0 +1,67 @@
+"""Sequence flows (BPMN 2.0.2, 7.6.2 and 8.4.13)."""
+
+from lxml import etree
+
+from m2pem.model.bpmn.names import BPMN
+from m2pem.model.bpmn.rules.rule import Rule, Topic, W, declared
+from m2pem.model.bpmn.rules.tree import ACTIVITIES, Tree, is_false, is_true, parent
+
+LONE_CONDITION = Rule(
+    8476,
+    "lone-condition",
+    "8.4.13",
+    W,
+    "the only flow out of an activity has a condition",
+    "add a flow for when it is false, or delete the condition",
+)
+IMMEDIATE = Rule(
+    8477,
+    "immediate-false",
+    "8.4.13",
+    W,
+    "isImmediate must not be false in an executable process",
+    "delete it",
+)
+LISTED = Rule(
+    8478,
+    "listed-flow",
+    "8.4.13",
+    W,
+    "it lists an incoming or outgoing sequence flow that does not exist",
+    "delete the incoming or outgoing element; the flows themselves count",
+)
+
+
+def _condition(tree: Tree, element: etree._Element) -> None:
+    flow = parent(element)
+    source = tree.find(flow, flow.get("sourceRef", ""))
+    if source is not None and source.tag in ACTIVITIES and len(tree.out(source)) == 1:
+        tree.say(LONE_CONDITION, flow)
+
+
+def _immediate(tree: Tree) -> None:
+    if not tree.mentions("isImmediate"):
+        return
+    for flow in tree.flows:
+        if is_false(flow, "isImmediate"):
+            process = next(flow.iterancestors(BPMN + "process"), None)
+            if process is not None and is_true(process, "isExecutable"):
+                tree.say(IMMEDIATE, flow)
+
+
+def _listed(tree: Tree) -> None:
+    """Compares all names at once; only a file that has a wrong one is looked at in detail."""
+    lists = (BPMN + "incoming", BPMN + "outgoing")
+    listed = {element.text for element in tree.root.iter(*lists)}
+    if not listed:
+        return
+    known = {flow.get("id") for flow in tree.flows}
+    if listed <= known:
+        return
+    for element in tree.root.iter(*lists):
+        name = (element.text or "").strip()
+        if name and name not in known and name.rpartition(":")[2] not in known:
+            tree.say(LISTED, element, f"'{name}'")
+
+
+TOPIC = Topic(declared(globals()), {"conditionExpression": _condition}, (_immediate, _listed))
