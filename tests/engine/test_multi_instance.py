@@ -27,7 +27,7 @@ def asked(each: str, more: str = "", **data: Value) -> Play:
     """A user task with instances."""
     return Play(f"""
         <dataObject id="items"/> <dataObject id="results"/>
-        <startEvent id="s"/> <endEvent id="e"/> <userTask id="u">ask yes no{each}</userTask> {more}
+        <startEvent id="s"/> <endEvent id="e"/> <userTask id="u">ask done no{each}</userTask> {more}
         s -> u -> e
     """).start(data)
 
@@ -161,11 +161,11 @@ def test_the_collection_is_read_once() -> None:
 
 def test_outputs_are_a_list_in_the_order_of_the_instances() -> None:
     play = asked('<each out="results" result="user">3</each>')
-    play.answer("no", prompt="p2").answer("yes", prompt="p3")
+    play.answer("no", prompt="p2").answer(prompt="p3")
     assert "results" not in play.data
-    play.answer("yes", prompt="p1")
+    play.answer(prompt="p1")
     assert play.data == {
-        "results": [{"decision": "yes"}, {"decision": "no"}, {"decision": "yes"}]
+        "results": [{"decision": "done"}, {"decision": "no"}, {"decision": "done"}]
     }
 
 
@@ -180,8 +180,8 @@ def test_the_item_itself_may_be_the_output() -> None:
 
 def test_an_instance_that_gives_nothing_has_null_in_its_place() -> None:
     play = asked('<each out="results" result="user">3 until user.decision == "no"</each>')
-    play.answer("yes", prompt="p3").answer("no", prompt="p1")
-    assert play.data["results"] == [{"decision": "no"}, None, {"decision": "yes"}]
+    play.answer(prompt="p3").answer("no", prompt="p1")
+    assert play.data["results"] == [{"decision": "no"}, None, {"decision": "done"}]
 
 
 def test_no_instances_give_an_empty_list() -> None:
@@ -360,7 +360,7 @@ def test_an_error_in_an_instance_within_an_instance_climbs_to_what_catches_it() 
     play = Play("""
         <startEvent id="s"/> <userTask id="u"/>
         <subProcess id="outer"><each>2</each>
-          <userTask id="ask">ask yes<each>2</each></userTask>
+          <userTask id="ask">ask done<each>2</each></userTask>
           <scriptTask id="bad">throw error E1</scriptTask>
           ask -> bad
         </subProcess>
@@ -401,7 +401,7 @@ def test_an_event_subprocess_catches_the_error_of_its_instance_alone() -> None:
             <startEvent id="on">error E1</startEvent> <userTask id="repair"/>
             on -> repair
           </subProcess>
-          <startEvent id="in"/> <userTask id="u">ask yes</userTask>
+          <startEvent id="in"/> <userTask id="u"/>
           <scriptTask id="bad">throw error E1</scriptTask>
           in -> u -> bad
         </subProcess>
@@ -504,7 +504,7 @@ def test_ten_thousand_instances_take_as_many_steps_and_leave_nothing(sequential:
 def test_a_stop_gets_its_turn_while_instances_are_still_being_begun() -> None:
     play = Play(
         """
-        <startEvent id="s"/> <userTask id="u">ask yes<each>1000</each></userTask>
+        <startEvent id="s"/> <userTask id="u">ask done<each>1000</each></userTask>
         s -> u
         """,
         batch=100,
