@@ -19,7 +19,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages demo test test-long lint format docs pictures
+.PHONY: help setup python-packages npm-packages demo test test-long fuzz lint format docs pictures
 .PHONY: conformance clean
 
 help: ## list the targets
@@ -81,6 +81,11 @@ test: lint ## check all but the long tests
 
 test-long: lint ## check everything: fuzzing, large random counts, foreign corpora too
 	@$(BIN)/pytest -n 2 --timeout 1800
+
+FUZZ_S := 600
+
+fuzz: python-packages ## read and run strange files for FUZZ_S seconds (600)
+	@$(BIN)/python -m tests.foreign.fuzz --seconds $(FUZZ_S) $(M2PEM_CORPORA)
 
 docs: python-packages ## build the documentation into site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict

@@ -4,6 +4,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
+MAX_SHOWN = 400
+"""Characters of a message, or of a remedy, as it is printed."""
+
 
 class Severity(StrEnum):
     """An error stops the mission from starting; a warning does not (unless `--strict`)."""
@@ -33,10 +36,18 @@ class Finding:
 
     def __str__(self) -> str:
         where = f"{self.file}:{self.line}" if self.line else self.file
-        element = f" {self.element}:" if self.element else ""
-        remedy = f"; {self.remedy}" if self.remedy else ""
+        element = f" {_line(self.element)}:" if self.element else ""
+        remedy = f"; {_line(self.remedy)}" if self.remedy else ""
         rule = f"[{self.rule} {self.number}]" if self.number else f"[{self.rule}]"
-        return f"{where}:{element} {self.severity.value}: {self.message}{remedy} {rule}"
+        return f"{where}:{element} {self.severity.value}: {_line(self.message)}{remedy} {rule}"
+
+
+def _line(text: str) -> str:
+    """The text on one line that can be read: it may quote whatever stands in a file."""
+    line = " ".join(text.splitlines())
+    if len(line) <= MAX_SHOWN:
+        return line
+    return f"{line[: MAX_SHOWN // 2]} ... {line[-MAX_SHOWN // 2 :]}"
 
 
 def has_errors(findings: Iterable[Finding]) -> bool:

@@ -152,6 +152,11 @@ def _unsettled(story: Story, run: RunId, record: r.BehaviorUnsettled) -> Told:
     return f"{story.of_behavior(run, record.behavior)}: held, {record.reason}", "yellow"
 
 
+def _compensation(story: Story, run: RunId, record: r.CompensationTriggered) -> Told:
+    what = "undoes what was done" if record.completions else "there is nothing to undo"
+    return f"{story.label(run, record.element)}: {what}", "magenta"
+
+
 _TELLERS: dict[type, Callable[[Story, RunId, Any], Told | None]] = {
     r.RunStarted: lambda story, run, record: (
         f"{run} of {story.label(run, record.process)} started{_by(record)}",
@@ -192,5 +197,14 @@ _TELLERS: dict[type, Callable[[Story, RunId, Any], Told | None]] = {
     ),
     r.EscalationThrown: _escalation,
     r.ErrorThrown: _error,
+    r.CompensationTriggered: _compensation,
+    r.CompensationBegan: lambda story, run, record: (
+        f"{story.label(run, record.activity)}: is undone",
+        "magenta",
+    ),
+    r.TransactionCancelled: lambda story, run, record: (
+        f"{story.label(run, record.element)}: the transaction is cancelled",
+        "yellow",
+    ),
     r.GeometryReceived: lambda _, __, record: (f"{record.name} received{_by(record)}", ""),
 }

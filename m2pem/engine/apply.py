@@ -8,6 +8,7 @@ from collections.abc import Callable
 from heapq import heapify, heappop, heappush
 from typing import Any
 
+from m2pem.engine import apply_compensation as undoing
 from m2pem.engine import records as r
 from m2pem.engine.state import (
     Behavior,
@@ -152,15 +153,33 @@ def _scope_closed(state: RunState, record: r.ScopeClosed) -> None:
     scope = state.scopes.pop(record.scope)
     for wait in list(scope.waits.values()) if scope.waits is not None else ():
         _end_wait(state, wait)
-    if scope.owner is not None:
-        scope.owner.inner = None
+    undoing.settle_owner(scope, record)
+
+
+def _is_choice(scope: Scope, node: FlowNode) -> bool:
+    if not isinstance(scope.container, AdHocSubProcess) or scope.loop is not None:
+        return False
+    return node in scope.container.entries
 
 
 def _scope_interrupted(state: RunState, record: r.ScopeInterrupted) -> None:
     scope = state.scopes[record.scope]
     scope.interrupted = True
+    undoing.drop_compensations(scope)
     for wait in list(scope.waits.values()) if scope.waits is not None else ():
-        _end_wait(state, wait)
+        if isinstance(wait.node.container, SubProcess):
+            _end_wait(state, wait)
+
+
+def _transaction_cancelled(state: RunState, record: r.TransactionCancelled) -> None:
+    """The transaction is not active any more: nothing but its rollback can happen to it."""
+    scope = state.scopes[record.scope]
+    scope.cancelled = scope.interrupted = True
+    undoing.drop_compensations(scope)
+    for holder in (scope, scope.owner):
+        if holder is not None and holder.waits is not None:
+            for wait in list(holder.waits.values()):
+                _end_wait(state, wait)
 
 
 def _token_entered(state: RunState, record: r.TokenEntered) -> None:
@@ -175,6 +194,8 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
     state.tokens[record.token] = token
     scope.tokens[record.token] = token
     state.last_token = max(state.last_token, record.token)
+    if scope.compensations and undoing.enter_to_undo(scope, token):
+        return
     if flow is not None and _is_join(node):
         join = scope.joins.get(node)
         if join is None:
@@ -182,7 +203,7 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         join.by_flow.setdefault(flow, []).append(token)
     elif scope.loop is not None:
         scope.loop.started += 1
-    elif flow is None and isinstance(scope.container, AdHocSubProcess):
+    elif _is_choice(scope, node) and flow is None:
         scope.begun[node] = None
         if scope.chosen and scope.chosen[0] is node:
             scope.chosen.pop(0)
@@ -224,6 +245,7 @@ def _token_left(state: RunState, record: r.TokenLeft) -> None:
     if token.waits is not None:
         for wait in list(token.waits.values()):
             _end_wait(state, wait)
+    undoing.leave_compensation(token)
     if token.flow is not None and _is_join(token.node):
         join = scope.joins[token.node]
         arrived = join.by_flow[token.flow]
@@ -232,7 +254,7 @@ def _token_left(state: RunState, record: r.TokenLeft) -> None:
             del join.by_flow[token.flow]
             if not join.by_flow:
                 del scope.joins[token.node]
-    elif scope.loop is not None:
+    elif scope.loop is not None and token.undoes is None:
         if record.outcome is r.TokenOutcome.COMPLETED:
             scope.loop.completed += 1
         else:
@@ -384,6 +406,8 @@ def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
     holder.waits[wait.id] = wait
     if wait.trigger is r.Trigger.TIMER:
         heappush(state.dates if wait.calendar else state.timers, (wait.due_us, wait.id))
+    elif wait.trigger is r.Trigger.CONDITION:
+        state.conditions[wait.id] = not record.spent
     else:
         state.catchers.setdefault((wait.trigger, wait.ref), {})[wait.id] = wait
 
@@ -401,6 +425,9 @@ def _end_wait(state: RunState, wait: Wait) -> None:
             heap[:] = [entry for entry in heap if entry[1] in state.waits]
             heapify(heap)
         return
+    if wait.trigger is r.Trigger.CONDITION:
+        del state.conditions[wait.id]
+        return
     key = (wait.trigger, wait.ref)
     catchers = state.catchers[key]
     del catchers[wait.id]
@@ -416,6 +443,10 @@ def _event_triggered(state: RunState, record: r.EventTriggered) -> None:
         letters.pop(record.letter)
         if not letters:
             del state.mailbox[wait.ref]
+
+
+def _condition_reset(state: RunState, record: r.ConditionReset) -> None:
+    state.conditions[record.wait] = True
 
 
 def _message_thrown(state: RunState, record: r.MessageThrown) -> None:
@@ -463,8 +494,15 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.DataWritten: _data_written,
     r.EventAwaited: _event_awaited,
     r.EventTriggered: _event_triggered,
+    r.ConditionReset: _condition_reset,
     r.SignalThrown: _nothing,
     r.MessageThrown: _message_thrown,
     r.EscalationThrown: _nothing,
     r.ErrorThrown: _nothing,
+    r.CompensationEnabled: undoing.compensation_enabled,
+    r.CompensationTriggered: undoing.compensation_triggered,
+    r.CompensationBegan: undoing.compensation_began,
+    r.CompensationEnded: undoing.compensation_ended,
+    r.ScopeReopened: undoing.scope_reopened,
+    r.TransactionCancelled: _transaction_cancelled,
 }

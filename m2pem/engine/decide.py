@@ -23,7 +23,7 @@ from m2pem.engine.reports import fault, missing, reported, settle
 from m2pem.engine.state import BehaviorPhase
 from m2pem.engine.steps import Steps
 from m2pem.engine.throwing import throw_error
-from m2pem.engine.triggering import throw_signal, trigger
+from m2pem.engine.triggering import arm_conditional_starts, throw_signal, trigger
 from m2pem.engine.waiting import next_timer
 from m2pem.model.elements import Activity, AdHocSubProcess
 
@@ -69,6 +69,8 @@ def _start(x: Steps, item: i.StartRun) -> None:
         for key, entry in flatten(name, value):
             x.emit(r.DataWritten(0, process.id, process.id, root.id, key, entry, root.id))
     begin(x, root)
+    if root.id in x.state.scopes:
+        arm_conditional_starts(x, root)
 
 
 def _claim(x: Steps, item: i.ClaimRun) -> None:

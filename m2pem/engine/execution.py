@@ -41,6 +41,7 @@ class Execution:
         "_reach",
         "_receivable",
         "_triggered_starts",
+        "changed",
         "ended_instances",
         "fleet",
         "mission",
@@ -61,6 +62,7 @@ class Execution:
         self.queue: deque[Token | Scope] = deque()
         self.ended_instances: deque[tuple[Token, TokenOutcome]] | None = None
         self.moved: set[int] = set()  # scopes whose inclusive joins must be looked at
+        self.changed = False  # whether conditions must be looked at before the next step
         self.process_ids = [node.container.process.id for node in self.mission.nodes]
         self._reach: dict[FlowNode, dict[FlowNode, int]] = {}
         self._receivable: frozenset[str] | None = None
@@ -188,6 +190,7 @@ class Execution:
 
     def write_into(self, place: Store, token: Token, key: str, value: Value) -> None:
         """Write one value into the store of a given scope, or of a token's activity."""
+        self.changed = True
         node = token.node
         own = 0
         if type(place) is Token:
@@ -206,6 +209,20 @@ class Execution:
                 own,
             )
         )
+
+    def write_in(self, scope: Scope, node: FlowNode, data: dict[str, Value]) -> None:
+        """Write values for a node that no token is on, as seen from a scope."""
+        self.changed = True
+        process = self.process_ids[node.index]
+        for key, value in data.items():
+            for name, item in flatten(key, value):
+                place = store_for(scope, name)
+                own, store = 0, 0
+                if isinstance(place, Token):
+                    own, store = place.id, place.scope.id
+                elif isinstance(place, Scope):
+                    store = place.id
+                self.emit(r.DataWritten(0, process, node.id, scope.id, name, item, store, own))
 
     def write_all(self, token: Token, data: dict[str, Value]) -> None:
         """Write several values."""

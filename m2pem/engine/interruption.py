@@ -18,18 +18,28 @@ def divert(x: Execution, token: Token, boundary: BoundaryEvent, outcome: TokenOu
     """
     withdraw(x, token, outcome)
     x.leave(token, outcome)
+    if token.undoes is not None:
+        x.queue.append(token.scope)  # it has undone as much as it could: the next one's turn
     return x.enter(token.id, boundary, token.scope)
 
 
-def begin_event_subprocess(x: Execution, scope: Scope, start: StartEvent) -> Token:
+def begin_event_subprocess(
+    x: Execution,
+    scope: Scope,
+    start: StartEvent,
+    outcome: TokenOutcome = TokenOutcome.INTERRUPTED,
+) -> Token:
     """Begin the event subprocess whose start event was triggered in `scope` (clause 13.5.4).
 
-    An interrupting one ends all else in the scope first. Returns the token on its start event.
+    An interrupting one ends all else in the scope first, with `outcome`. Returns the token on its
+    start event.
     """
     container = start.container
     assert isinstance(container, SubProcess)
     if start.interrupting:
-        empty(x, scope, TokenOutcome.INTERRUPTED)
+        empty(x, scope, outcome)
+        if scope.owner is not None and scope.owner.prompt:
+            x.emit(r.PromptWithdrawn(scope.owner.prompt))  # an ad-hoc subprocess: nothing to choose
         x.emit(r.ScopeInterrupted(scope.id, x.process_of(container), container.id))
     return x.spawn(start, open_scope(x, x.spawn(container, scope)))
 

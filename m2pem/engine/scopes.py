@@ -4,6 +4,8 @@ from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.state import Scope, Token
+from m2pem.model.elements import Activity, Container, SubProcess
+from m2pem.model.events import CompensateEventDefinition
 
 
 def open_scope(x: Execution, token: Token) -> Scope:
@@ -47,9 +49,47 @@ def empty(x: Execution, scope: Scope, outcome: TokenOutcome) -> None:
 
 def close(x: Execution, scope: Scope, outcome: TokenOutcome) -> None:
     """State that a scope has ended. Nothing may be left in it."""
+    kept = outcome is TokenOutcome.COMPLETED and _can_be_undone(scope)
     if scope.owner is not None:
         node = scope.owner.node
         process, element = x.process_of(node), node.id
     else:
         process = element = scope.container.id
-    x.emit(r.ScopeClosed(scope.id, process, element, outcome))
+    x.emit(r.ScopeClosed(scope.id, process, element, outcome, kept))
+
+
+def _can_be_undone(scope: Scope) -> bool:
+    """Whether what is in a scope that has completed can undo its activity (clause 13.5.5).
+
+    By its compensation event subprocess, else by undoing what was done in it. What was interrupted
+    has not completed; a compensation activity is not undone; one of its own goes first.
+    """
+    owner = scope.owner
+    if owner is None or owner.undoes is not None or scope.interrupted:
+        return False
+    node = owner.node
+    assert isinstance(node, Activity)
+    if node.for_compensation or node.compensation is not None or compensates_around(node):
+        return False
+    return bool(scope.done) or (scope.loop is None and compensator(scope.container) is not None)
+
+
+def compensator(container: Container) -> SubProcess | None:
+    """The compensation event subprocess of a container."""
+    for inner in container.event_subprocesses:
+        if compensates_around(inner):
+            return inner
+    return None
+
+
+def compensates_around(node: Activity) -> bool:
+    """Whether it is a compensation event subprocess."""
+    return (
+        isinstance(node, SubProcess)
+        and node.triggered_by_event
+        and any(
+            isinstance(definition, CompensateEventDefinition)
+            for start in node.starts
+            for definition in start.definitions
+        )
+    )

@@ -11,7 +11,7 @@ from enum import StrEnum
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import RunOutcome, Trigger
 from m2pem.model.catalogue import BehaviorState
-from m2pem.model.elements import Container, FlowNode, Mission, SequenceFlow
+from m2pem.model.elements import Activity, Container, FlowNode, Mission, SequenceFlow
 from m2pem.model.values import Value
 
 
@@ -40,6 +40,9 @@ class Scope:
     `joins` are the tokens waiting at each join, by the flow that they came by. `waits` are the
     start events of its event subprocesses. `loop`: it holds the instances of a loop or
     multi-instance activity, which is the owner's; its container is then the activity's own.
+    `done`: activities that completed in it and can be undone, in that order. `compensations`:
+    what is being undone in it. A scope that holds something to undo is kept by its `Completion`
+    when it has completed, out of `RunState.scopes`.
     """
 
     id: int
@@ -63,6 +66,12 @@ class Scope:
     """Of an ad-hoc subprocess: what was begun by choice."""
     interrupted: bool = False
     """An interrupting event subprocess of it has begun: no other one can."""
+    done: "dict[int, Completion] | None" = None
+    compensations: "dict[int, Compensation] | None" = None
+    reopened: bool = False
+    """It had completed, and is being undone."""
+    cancelled: bool = False
+    """A transaction that is left as soon as what was done in it is undone."""
 
 
 @dataclass(slots=True, eq=False)
@@ -80,6 +89,41 @@ class Loop:
     completed: int = 0
     terminated: int = 0
     outputs: dict[int, Value] = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
+class Completion:
+    """An activity, or an instance of one, that completed in `scope` and can be undone.
+
+    `kept`: its own scope as it was then, to be undone by what is in it; None: the activity's
+    compensation activity undoes it. `own`: the data of the activity itself then. `claimed`: the
+    compensation that will undo it; 0: none yet.
+    """
+
+    id: int
+    scope: Scope
+    node: Activity
+    instance: int | None
+    own: dict[str, Value] | None
+    kept: Scope | None
+    claimed: int = 0
+
+
+@dataclass(slots=True, eq=False)
+class Compensation:
+    """Completed activities of `scope` that are being undone, one after the other.
+
+    `left`: those that are still to be undone, in this order. `begins`: the one whose turn it is,
+    and the id of the token that will undo it. `token`: on what undoes it now. `waiter`: on the
+    event that threw it and waits for its end; None: nobody waits.
+    """
+
+    id: int
+    scope: Scope
+    left: list[Completion]
+    waiter: "Token | None" = None
+    begins: tuple[int, Completion] | None = None
+    token: "Token | None" = None
 
 
 @dataclass(slots=True, eq=False)
@@ -109,6 +153,20 @@ class Token:
     inner: Scope | None = None
     instance: int | None = None
     own: dict[str, Value] | None = None
+    compensations: dict[int, Compensation] | None = None
+    """What the compensation event that it is on waits for."""
+    undoes: Compensation | None = None
+    """It is on a compensation activity, or again on a completed activity, to undo one."""
+    kept: Scope | None = None
+    """The scope of its activity, which has completed and holds something to undo."""
+    abnormal: bool = False
+    """What its activity did was ended early (terminated, or interrupted by an event subprocess),
+    so that there is nothing to undo."""
+
+    @property
+    def is_reopened(self) -> bool:
+        """Whether its activity had completed, and is being undone."""
+        return self.inner is not None and self.inner.reopened
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +174,8 @@ class Wait:
     """A catch event that is armed.
 
     `token` waits: at its own node, at a boundary event of it, or at an event behind the
-    event-based gateway that it is on. None: the start event of an event subprocess of `scope`.
+    event-based gateway that it is on. None: `scope` waits, for the start event of an event
+    subprocess of it, or for a condition that begins another process.
     Other fields as in record `EventAwaited`.
     """
 
@@ -210,6 +269,8 @@ class RunState:
     last_token: int = 0
     last_scope: int = 0
     last_wait: int = 0
+    last_completion: int = 0
+    last_compensation: int = 0
     last_behavior: int = 0
     last_prompt: int = 0
     last_service: int = 0
@@ -229,6 +290,8 @@ class RunState:
     waits: dict[int, Wait] = field(default_factory=dict)
     catchers: dict[tuple[Trigger, str], dict[int, Wait]] = field(default_factory=dict)
     """Waits for a signal or message, by its id."""
+    conditions: dict[int, bool] = field(default_factory=dict)
+    """Waits for a condition, and whether it may fire: one that has fired must be false first."""
     timers: list[tuple[int, int]] = field(default_factory=list)
     """Heap of (due mission time, wait); waits that are over may still be in it, but not first."""
     dates: list[tuple[int, int]] = field(default_factory=list)

@@ -1,12 +1,14 @@
 """Doing the steps that an input causes, one after the other: the engine's only loop."""
 
 from m2pem.engine import records as r
-from m2pem.engine.execution import Execution
+from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.interruption import end_run
 from m2pem.engine.nodes import EXECUTE, look_at
 from m2pem.engine.nodes.joins import fire_joins
 from m2pem.engine.records import Record, RunOutcome
 from m2pem.engine.state import RunState, RunStatus, Scope, Token
+from m2pem.engine.triggering import look_at_conditions
+from m2pem.model.events import MessageEventDefinition, SignalEventDefinition
 from m2pem.resources.fleet import Fleet
 
 
@@ -32,7 +34,11 @@ class Steps(Execution):
         """Execute tokens until none can move, or the batch is used up."""
         state, queue = self.state, self.queue
         while state.status is RunStatus.RUNNING:
-            while queue:
+            while queue or self.changed:
+                if self.changed:
+                    self.changed = False
+                    look_at_conditions(self)
+                    continue
                 item = queue.popleft()
                 if not self._is_there(item):
                     continue
@@ -90,13 +96,23 @@ class Steps(Execution):
                 if scope is not None:
                     self.queue.append(scope)
 
+    def _others_can_begin(self) -> bool:
+        """Whether a signal or message from outside can begin another process."""
+        return any(
+            isinstance(definition, SignalEventDefinition | MessageEventDefinition)
+            for start in self.triggered_starts
+            for definition in definitions_of(start)
+        )
+
     def _notice_a_stuck_run(self) -> None:
         """No token can move and nothing is awaited: the run has failed (a deadlock)."""
         state = self.state
         if state.status is not RunStatus.RUNNING:
             return
-        if state.waits or state.prompts or state.services:
+        if state.prompts or state.services or len(state.waits) > len(state.conditions):
             return
+        if state.conditions and state.shared.keys and self._others_can_begin():
+            return  # they may write to a data store what a condition reads
         if any(token.behavior for token in state.tokens.values()):
             return
         stuck = dict.fromkeys(

@@ -121,7 +121,7 @@ def _hand_over(x: Execution, caught: _AtBoundary | _InScope, outcome: TokenOutco
     if isinstance(caught, _AtBoundary):
         divert(x, caught.place, caught.event, outcome)
     else:
-        begin_event_subprocess(x, caught.place, caught.event)
+        begin_event_subprocess(x, caught.place, caught.event, outcome)
 
 
 def _error_code(definition: EventDefinition) -> str | None:
@@ -144,12 +144,12 @@ def _catcher(
 
     An event subprocess does not catch what is thrown in itself, and none begins in a scope that
     one has interrupted. The boundary events of a loop or multi-instance activity are the whole
-    activity's, not its instances'.
+    activity's, not its instances'; those of an activity that is undone are over.
     """
     token: Token | None = thrower
     while token is not None:
         node, scope = token.node, token.scope
-        if isinstance(node, Activity) and token.instance is None:
+        if isinstance(node, Activity) and token.instance is None and not token.is_reopened:
             boundary = _best(node.boundary, code, code_of)
             if boundary is not None:
                 return _AtBoundary(token, boundary)

@@ -3,7 +3,9 @@
 from collections.abc import Callable
 
 from m2pem.engine import records as r
+from m2pem.engine.conditions import comes_true, definition_of
 from m2pem.engine.correlation import fits, remember
+from m2pem.engine.data import Place
 from m2pem.engine.data_flow import receive_payload
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.interruption import begin_event_subprocess, divert
@@ -16,10 +18,16 @@ from m2pem.model.elements import (
     Event,
     EventBasedGateway,
     FlowNode,
+    Process,
     ReceiveTask,
     StartEvent,
 )
-from m2pem.model.events import EventDefinition, MessageEventDefinition, SignalEventDefinition
+from m2pem.model.events import (
+    ConditionalEventDefinition,
+    EventDefinition,
+    MessageEventDefinition,
+    SignalEventDefinition,
+)
 from m2pem.model.values import Value
 
 WHEN_TRIGGERED: dict[type[FlowNode], Callable[[Execution, Token], None]] = {}
@@ -30,13 +38,13 @@ def arm_boundary(x: Execution, token: Token, activity: Activity) -> bool:
     """Arm the boundary events of the activity that a token has entered.
 
     Errors and escalations are not armed: they look for their catcher. False: the token has left
-    already, because a timer was wrong or a message had been kept.
+    already, because a timer was wrong, a message had been kept or a condition was true.
     """
     for boundary in activity.boundary:
         for definition in boundary.definitions:
             if not arm(x, token, boundary, definition):
                 return False
-    return collect_letters(x, token)
+    return collect_letters(x, token) and look_at_conditions(x, token)
 
 
 def arm_event_subprocesses(x: Execution, scope: Scope) -> bool:
@@ -52,18 +60,21 @@ def arm_event_subprocesses(x: Execution, scope: Scope) -> bool:
     return True
 
 
-def collect_letters(x: Execution, token: Token) -> bool:
-    """Let a token that waits for messages have those kept for it. False: it has left with one."""
+def collect_letters(x: Execution, holder: Place) -> bool:
+    """Let a token or scope that waits for messages have those kept for it.
+
+    False: the token has left with one.
+    """
     found = bool(x.state.mailbox)
-    while found and token.waits is not None:
+    while found and holder.waits is not None:
         found = False
-        for wait in list(token.waits.values()):
-            number = _letter_for(x, wait)
+        for wait in list(holder.waits.values()):
+            number = _letter_for(x, wait) if wait.id in x.state.waits else None
             if number is not None:
                 found = True
                 letter = x.state.mailbox[wait.ref][number]
                 trigger(x, wait, letter.data, letter.keys, letter=number)
-                if x.state.tokens.get(token.id) is not token:
+                if isinstance(holder, Token) and x.state.tokens.get(holder.id) is not holder:
                     return False
     return True
 
@@ -76,6 +87,32 @@ def _letter_for(x: Execution, wait: Wait) -> int | None:
         if fits(x, wait.ref, letter.keys, wait.token or wait.scope):
             return number
     return None
+
+
+# --- conditions ---------------------------------------------------------------------------------
+
+
+def arm_conditional_starts(x: Execution, root: Scope) -> None:
+    """Arm the conditions that begin the other processes of the file.
+
+    Those have no data before they begin: the conditions read that of the process that the run
+    began with, and are awaited as long as it lasts (docs/missions.md).
+    """
+    for start in x.triggered_starts:
+        for definition in definitions_of(start):
+            if isinstance(definition, ConditionalEventDefinition):
+                arm(x, root, start, definition)
+
+
+def look_at_conditions(x: Execution, only: Token | None = None) -> bool:
+    """Fire the conditions that have become true, in the order in which they were armed.
+
+    `only`: those that this token waits for. False: it has left with one.
+    """
+    for number in list(x.state.conditions if only is None else only.waits or ()):
+        if number in x.state.conditions and comes_true(x, x.state.waits[number]):
+            trigger(x, x.state.waits[number], {})
+    return only is None or x.state.tokens.get(only.id) is only
 
 
 # --- triggering ---------------------------------------------------------------------------------
@@ -98,7 +135,7 @@ def trigger(
     if keys and token is not None:
         remember(x, token, keys)
     if token is None:
-        _in_scope(x, wait, data)
+        _in_scope(x, wait, data, keys or {})
     elif node is token.node:
         if receive_payload(x, token, data) and not _is_one_of_several(node, token.waits):
             WHEN_TRIGGERED[type(node)](x, token)
@@ -120,7 +157,7 @@ def _arm_again(x: Execution, wait: Wait) -> None:
     node = wait.node
     if isinstance(node, Event) and node.parallel_multiple:
         for definition in node.definitions:
-            if not arm(x, wait.token or wait.scope, node, definition):
+            if not arm(x, wait.token or wait.scope, node, definition, spent=True):
                 return
     else:
         arm_again(x, wait)
@@ -138,15 +175,22 @@ def _at_boundary(
         receive_payload(x, x.spawn(node, token.scope), data)
 
 
-def _in_scope(x: Execution, wait: Wait, data: dict[str, Value]) -> None:
+def _in_scope(x: Execution, wait: Wait, data: dict[str, Value], keys: dict[str, Value]) -> None:
     """The start event of an event subprocess; it goes on as one that has happened."""
     node = wait.node
+    if isinstance(node.container, Process):
+        arm_again(x, wait)
+        _instance(x, node, definition_of(wait), data, keys)
+        return
     assert isinstance(node, StartEvent)
     if _is_one_of_several(node, wait.scope.waits):
+        x.write_in(wait.scope, node, data)
         return
     if not node.interrupting:
         _arm_again(x, wait)
-    receive_payload(x, begin_event_subprocess(x, wait.scope, node), data)
+    begun = begin_event_subprocess(x, wait.scope, node)
+    remember(x, begun, keys)
+    receive_payload(x, begun, data)
 
 
 # --- event-based gateways -----------------------------------------------------------------------
@@ -253,8 +297,21 @@ def _instance(
     number = x.state.last_scope + 1
     x.emit(r.ScopeOpened(number, process.id, process.id))
     scope = x.state.scopes[number]
-    if process.event_subprocesses and not arm_event_subprocesses(x, scope):
-        return
+    _begin_with(x, scope, start, came, data, keys)
+    # Last: what its event subprocesses wait for may be read from the data that came.
+    gone = x.state.scopes.get(number) is not scope
+    if not gone and not scope.interrupted and arm_event_subprocesses(x, scope):
+        collect_letters(x, scope)
+
+
+def _begin_with(
+    x: Execution,
+    scope: Scope,
+    start: FlowNode,
+    came: EventDefinition,
+    data: dict[str, Value],
+    keys: dict[str, Value],
+) -> None:
     if isinstance(start, StartEvent):
         token = x.spawn(start, scope)
         remember(x, token, keys)

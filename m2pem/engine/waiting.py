@@ -16,6 +16,7 @@ from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.model.duration import cycle, date_us, duration_us
 from m2pem.model.elements import FlowNode
 from m2pem.model.events import (
+    ConditionalEventDefinition,
     EventDefinition,
     MessageEventDefinition,
     SignalEventDefinition,
@@ -32,16 +33,28 @@ class _NotATimeError(Exception):
 # --- arming -------------------------------------------------------------------------------------
 
 
-def arm(x: Execution, holder: Place, node: FlowNode, definition: EventDefinition) -> bool:
+def arm(
+    x: Execution,
+    holder: Place,
+    node: FlowNode,
+    definition: EventDefinition,
+    *,
+    spent: bool = False,
+) -> bool:
     """Have a token or scope wait for a trigger at `node`. False: a wrong timer's error was thrown.
 
     What waits nowhere (errors, escalations, compensation, ...) looks for its catcher when thrown.
+    A condition is looked at after the step; `spent`: it has fired before.
     """
     match definition:
         case SignalEventDefinition():
             await_event(x, holder, node, Trigger.SIGNAL, definition.signal.id)
         case MessageEventDefinition():
             await_event(x, holder, node, Trigger.MESSAGE, definition.message.id)
+        case ConditionalEventDefinition():
+            text = definition.condition.text
+            await_event(x, holder, node, Trigger.CONDITION, text, spent=spent)
+            x.changed = True
         case TimerEventDefinition():
             try:
                 _arm_timer(x, holder, node, definition)
@@ -65,6 +78,7 @@ def await_event(
     calendar: bool = False,
     left: int = 0,
     period: str = "",
+    spent: bool = False,
 ) -> None:
     """State that a token or scope waits for a trigger at `node`."""
     scope = holder if isinstance(holder, Scope) else holder.scope
@@ -81,6 +95,7 @@ def await_event(
             calendar,
             left,
             period,
+            spent,
         )
     )
 
@@ -124,7 +139,8 @@ def arm_again(x: Execution, wait: Wait) -> None:
     """What does not interrupt catches as long as its activity, or its scope, lasts."""
     holder = wait.token or wait.scope
     if wait.trigger is not Trigger.TIMER:
-        await_event(x, holder, wait.node, wait.trigger, wait.ref)
+        spent = wait.trigger is Trigger.CONDITION
+        await_event(x, holder, wait.node, wait.trigger, wait.ref, spent=spent)
     elif wait.left != 0:
         left = wait.left - 1 if wait.left > 0 else -1
         at_us = wait.due_us + (0 if wait.calendar else x.state.started_us)

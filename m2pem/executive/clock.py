@@ -89,6 +89,7 @@ class VirtualClock:
     async def sleep_until(self, time_us: int) -> None:
         """Wait until `now_us()` is at least `time_us`."""
         await asyncio.sleep((time_us - self.now_us()) / US_PER_S)
+        self._loop.pass_rest(time_us - self.now_us())
 
 
 def run_virtual(main: Callable[[VirtualClock], Awaitable[T]], start_us: int) -> T:
@@ -104,6 +105,9 @@ def run_virtual(main: Callable[[VirtualClock], Awaitable[T]], start_us: int) -> 
 
     with asyncio.Runner(loop_factory=lambda: loop) as runner:
         return runner.run(entry())
+
+
+_RESOLUTION_S = 0.5 / US_PER_S
 
 
 class _Moment(float):
@@ -124,6 +128,8 @@ class _Moment(float):
 class VirtualLoop(asyncio.SelectorEventLoop):
     """An event loop whose time is virtual; see the module. Use `run_virtual`."""
 
+    _scheduled: list[asyncio.TimerHandle]  # asyncio's heap; its head is never a cancelled one here
+
     def __init__(self) -> None:
         self.elapsed_us = 0
         self.when_idle: Callable[[float | None], bool] = lambda _: False
@@ -133,7 +139,11 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         # asyncio fires timers that are due within the clock's resolution. Half a microsecond never
         # fires one early, as all are due at whole ones; the default, a nanosecond, is lost when
         # added to a float of some months, and then the timer would never be due.
-        self._clock_resolution = 0.5 / US_PER_S
+        self._clock_resolution = _RESOLUTION_S
+
+    def pass_rest(self, rest_us: int) -> None:
+        """Let pass what a timer came too early: centuries in seconds are no exact floats."""
+        self.elapsed_us += max(rest_us, 0)
 
     def time(self) -> float:
         """Virtual seconds since the loop was made."""
@@ -179,6 +189,8 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """
         if self._threads_at_work:
             return True
+        if timeout_s is not None:
+            timeout_s = self._scheduled[0].when() - self.time()  # asyncio waits a day at most
         if self.when_idle(timeout_s):
             return False
         if timeout_s is None:
@@ -191,6 +203,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
                 f"set, and these wait for each other or for something real: {', '.join(waiting)}"
             )
         self.elapsed_us += round(timeout_s * US_PER_S)
+        self._clock_resolution = max(_RESOLUTION_S, math.ulp(self.time()))
         return False
 
 

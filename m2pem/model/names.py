@@ -19,9 +19,10 @@ from m2pem.model.elements import (
     ScriptTask,
     SendTask,
     ServiceTask,
+    StartEvent,
     UserTask,
 )
-from m2pem.model.events import TimerEventDefinition
+from m2pem.model.events import ConditionalEventDefinition, TimerEventDefinition
 from m2pem.model.expression import Expression
 from m2pem.model.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
 from m2pem.model.near import did_you_mean
@@ -64,6 +65,7 @@ def unwritten(
     for node in mission.nodes:
         store = stores[node.container.process]
         store.reads += _reads(node)
+        stores[_seen_from(mission, node)].reads += _conditions(node)
         for mapping in _data_mappings(node):
             store.written.add(mapping.target)
         _note_writes(node, store, service_writes)
@@ -136,6 +138,21 @@ def _reads(node: FlowNode) -> Iterator[Read]:
         for definition in node.definitions:
             if isinstance(definition, TimerEventDefinition):
                 yield Read(definition.expression, node.id, definition.line)
+
+
+def _conditions(node: FlowNode) -> Iterator[Read]:
+    for definition in node.definitions if isinstance(node, Event) else ():
+        if isinstance(definition, ConditionalEventDefinition):
+            yield Read(definition.condition, node.id, definition.line)
+
+
+def _seen_from(mission: Mission, node: FlowNode) -> Process:
+    """The process whose data a condition reads: one that begins a process, the main one's."""
+    process = node.container.process
+    if not isinstance(node, StartEvent) or not isinstance(node.container, Process):
+        return process
+    called = any(isinstance(n, CallActivity) and n.called is process for n in mission.nodes)
+    return process if called else mission.process()
 
 
 def _loop_reads(node: Activity) -> Iterator[Read]:

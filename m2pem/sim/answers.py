@@ -180,7 +180,9 @@ class Answers:
         try:
             await control.answer(prompt.run, prompt.prompt, decision, by=by)
         except OperatorError as error:
-            log.warning("%s: the scripted answer %r: %s", prompt.element, decision, error)
+            # The first decision comes too late where others end the task; nobody scripted it.
+            level = logging.DEBUG if by == BY_DEFAULT else logging.WARNING
+            log.log(level, "%s: the answer %r: %s", prompt.element, decision, error)
 
     async def _send(self, control: MissionControl, run: RunId, clock: Clock) -> None:
         summary = next(each for each in await control.runs() if each.run == run)

@@ -51,6 +51,16 @@ def tell(*records: Record, run: str = "r1") -> str | None:
             r.ServiceEnded(1, "DETECTION", "Detector", 2, "s1", "FAILED", "no power"),
             "DETECTOR: failed, FAILED (no power)",
         ),
+        (
+            r.CompensationTriggered(*ON_ROUTE, 1, 2, (3,)),
+            "DRIVE ROUTE: undoes what was done",
+        ),
+        (r.CompensationTriggered(*ON_ROUTE, 1, 2), "DRIVE ROUTE: there is nothing to undo"),
+        (
+            r.CompensationBegan(8, "DETECTION", "Detector", 2, 1, 3, "DriveRoute"),
+            "DRIVE ROUTE: is undone",
+        ),
+        (r.TransactionCancelled(*ON_ROUTE), "DRIVE ROUTE: the transaction is cancelled"),
         (r.SignalThrown(STOP, by="ann"), "ann: signal 'Stop driving'"),
         (r.SignalThrown(STOP, 1, "DETECTION", "ThrowStop", 2), "stop: signal 'Stop driving'"),
         (

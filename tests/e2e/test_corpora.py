@@ -1,4 +1,4 @@
-"""Public models that others drew: each is refused with findings or rehearsed to an end.
+"""Public models that others drew, rehearsed: what is known of them is what happens.
 
 `M2PEM_CORPORA` names a folder of BPMN files. An `expected.json` in it says what is known of models
 (paths from the folder): `option_to_complete` 0 when no execution of it completes, 1 when every one
@@ -81,19 +81,6 @@ def outcome(path: Path, mission: Mission, process: str) -> tuple[RunStatus | Non
 
 def test_the_corpora_have_models() -> None:
     assert MODELS, f"no .bpmn file in {CORPORA}"
-
-
-@pytest.mark.parametrize("path", MODELS, ids=lambda path: str(path.relative_to(CORPORA)))
-def test_a_model_is_refused_with_findings_or_rehearsed_to_an_end(path: Path) -> None:
-    mission = loaded(path)
-    if mission is None:
-        return
-    for process in mission.processes:
-        status, detail = outcome(path, mission, process.id)
-        assert status in (None, *ENDS, RunStatus.FAILED)
-        if status is RunStatus.FAILED:
-            reasons = ("stuck: ", "nothing that is scheduled", f"it has taken the {MAX_STEPS}")
-            assert detail.startswith(reasons), detail
 
 
 @pytest.mark.parametrize("path", MODELS, ids=lambda path: str(path.relative_to(CORPORA)))

@@ -348,6 +348,18 @@ EXPECTED = {
             never={"at DriveDetour", "at Delivered"},
         ),
     ],
+    "t18": [
+        Course(
+            [
+                *("Patrol: rover single_vehicle_routing", "signal LookThere", "at Asked"),
+                *("Orbit: uav1 orbit", "Orbit: SUCCEEDED", "looks = 1"),
+                *("signal LookThere", "at Asked", "Orbit: SUCCEEDED", "looks = 2"),
+                *("Patrol interrupted", "at Enough", "DriveHome: rover return_to_launch"),
+                *("Patrol: CANCELLED", "DriveHome: SUCCEEDED", "at Home", "completed"),
+            ],
+            never={"at RouteEnded"},
+        )
+    ],
 }
 """By example, a course for each rehearsal of its README. The others are all Python, whose output is
 compared."""

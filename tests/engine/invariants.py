@@ -9,6 +9,8 @@ def check_state(state: RunState) -> None:
     _check_tokens(state)
     _check_waits(state)
     _check_work(state)
+    for scope in state.scopes.values():
+        _check_done(scope)
     if state.status is RunStatus.ENDED:
         assert not state.tokens
         assert not state.scopes
@@ -55,10 +57,46 @@ def _check_loop(scope: Scope) -> None:
     assert isinstance(owner.node, Activity)
     assert owner.node.loop is not None
     assert all(token.node is owner.node for token in scope.tokens.values())
-    numbers = [token.instance for token in scope.tokens.values()]
+    numbers = [token.instance for token in scope.tokens.values() if token.undoes is None]
     assert len(set(numbers)) == len(numbers) == loop.started - loop.completed - loop.terminated
     assert loop.total < 0 or loop.started <= loop.total
     assert set(loop.outputs) <= set(range(loop.started))
+
+
+def _check_done(scope: Scope) -> None:
+    claims: dict[int, int] = {}
+    for number, compensation in (scope.compensations or {}).items():
+        assert compensation.id == number
+        assert compensation.scope is scope
+        assert compensation.begins is None, "it has begun"
+        assert compensation.left or compensation.token, "it has ended"
+        claims |= {completion.id: number for completion in compensation.left}
+        waiter, token = compensation.waiter, compensation.token
+        assert waiter is None or (waiter.compensations or {})[number] is compensation
+        assert token is None or token.undoes is compensation
+        assert token is None or scope.tokens[token.id] is token
+    for token in scope.tokens.values():
+        assert token.kept is None, "what is kept has been handed over"
+        undoes = token.undoes
+        assert undoes is None or (scope.compensations or {})[undoes.id] is undoes
+    kept = [scope]
+    for each in kept:
+        for number, completion in (each.done or {}).items():
+            assert completion.id == number
+            assert completion.scope is each
+            assert completion.node.container is each.container
+            assert completion.claimed == (claims.get(number, 0) if each is scope else 0)
+            if completion.kept is None:
+                assert completion.node.compensation is not None
+            else:
+                inner = completion.kept
+                assert inner.parent is each
+                assert inner.owner is None
+                assert not inner.tokens
+                assert not inner.waits
+                assert not inner.joins
+                assert not inner.compensations
+                kept.append(inner)
 
 
 def _check_waits(state: RunState) -> None:
@@ -76,7 +114,10 @@ def _check_waits(state: RunState) -> None:
     caught = {wait.id: wait for each in state.catchers.values() for wait in each.values()}
     timed = {number for _, number in (*state.timers, *state.dates)}
     for wait in state.waits.values():
-        assert (wait.id in caught) != (wait.id in timed)
+        places = (wait.id in caught, wait.id in timed, wait.id in state.conditions)
+        assert sum(places) == 1
+        assert (wait.trigger.value == "condition") == places[2]
+    assert set(state.conditions) <= set(state.waits)
     assert set(caught) <= set(state.waits)
     for (trigger, ref), waits in state.catchers.items():
         assert waits, "nobody catches: absent"

@@ -214,7 +214,7 @@ class Play:
         """Whether anything from outside can still move a token."""
         state = self.run.state
         return bool(
-            state.waits
+            len(state.waits) > len(state.conditions)
             or state.prompts
             or state.services
             or any(token.behavior for token in state.tokens.values())

@@ -11,7 +11,8 @@
   `a => b` a message flow between the processes, which then are pools of a collaboration.
 * An event's text says its definition: `signal S`, `message M`, `error E`, `error`, `escalation X`,
   `escalation`, `timer PT5S`, `date 2026-...`, `cycle R3/PT5S`, `conditional x > 3`, `link L`,
-  `compensate`, `compensate A`, `cancel`, `terminate`; several definitions stand between `;`.
+  `compensate`, `compensate A`, `compensate A nowait`, `cancel`, `terminate`; several definitions
+  stand between `;`.
 * `<loop testBefore="true" loopMaximum="5">x < 3</loop>` within an activity makes it a standard
   loop. `<each ATTRIBUTES>3 until x > 1</each>` makes it multi-instance: a cardinality, or `in` and
   `item`, `out` and `result` (ids of data objects, names of the instance's item) among the
@@ -21,6 +22,8 @@
   with `?` optional), or statements separated by `;`.
 * A service task's is `call SERVICE ROLES PARAMETERS`, a user task's `ask DECISIONS`, a call
   activity's `in a as b, out c as d`.
+* `A undo B`, on a line of its own, attaches a compensation event (`A_undo`) to A that leads to B.
+  Such lines come last in a process or subprocess.
 
 What signals, messages, errors and escalations are referred to is declared by itself.
 """
@@ -41,6 +44,7 @@ _LOOP = re.compile(r"<loop\b([^<>]*)>(.*?)</loop>", re.S)
 _EACH = re.compile(r"<each\b([^<>]*)>(.*?)</each>", re.S)
 _LINES = re.compile(r"^\s*(?:([\w-]+):)?\s*([\w-]+)\s*([~=]>)\s*([\w-]+)\s*$", re.M)
 _FLOWS = re.compile(r"^\s*(?:([\w-]+):)?\s*([\w-]+(?:\s*->\s*[\w-]+)+)(?:\s+if\s+(.+))?\s*$", re.M)
+_UNDO = re.compile(r"(?:^[ \t]*[\w-]+ undo [\w-]+[ \t]*(?:\n|\Z))+", re.M)
 _SHORT = re.compile(
     r"<(\w+)\b([^<>]*)(?<!/)>([^<]*[^\s<][^<]*?)(<(\w+)Characteristics\b.*?</\5Characteristics>\s*)?</\1>"
 )
@@ -59,7 +63,7 @@ def xml(text: str) -> str:
         text = f'<process id="MAIN" isExecutable="true">\n{text}\n</process>'
     text = _EACH.sub(_multi_instance, _LOOP.sub(_standard_loop, text))
     text, pools = _lines(text)
-    body = _SHORT.sub(_long, _flows(text))
+    body = _SHORT.sub(_long, _UNDO.sub(_undo, _flows(text)))
     return f"{_HEAD}{_roots(body + pools)}{pools}{body}</definitions>"
 
 
@@ -170,9 +174,27 @@ def _definition(text: str) -> str:
         return f"<conditionalEventDefinition>{condition}</conditionalEventDefinition>"
     if word == "link":
         return f'<linkEventDefinition name="{rest}"/>'
+    if rest.endswith("nowait"):
+        activity = rest.removesuffix("nowait").strip()
+        attribute = f' activityRef="{activity}"' if activity else ""
+        return f'<compensateEventDefinition{attribute} waitForCompletion="false"/>'
     key = "activity" if word == "compensate" else word
     reference = f' {key}Ref="{rest}"' if rest else ""
     return f"<{word}EventDefinition{reference}/>"
+
+
+def _undo(match: re.Match[str]) -> str:
+    events, associations = "", ""
+    for line in match[0].splitlines():
+        activity, _, handler = line.split()
+        event = f"{activity}_undo"
+        events += f'<boundaryEvent id="{event}" attachedToRef="{activity}">compensate'
+        events += "</boundaryEvent>"
+        associations += (
+            f'<association id="{event}s" sourceRef="{event}" targetRef="{handler}" '
+            'associationDirection="One"/>'
+        )
+    return f"{events}{associations}\n"
 
 
 def _script(text: str) -> str:

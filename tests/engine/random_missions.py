@@ -1,7 +1,8 @@
 """Random missions in the tests' notation.
 
-`structured`: blocks within blocks (sequence, choice, fork, loop, subprocess, call), each entered
-and left by one token, so that no token can get stuck. `graph`: anything that the reader takes.
+`structured`: blocks within blocks (sequence, choice, fork, loop, link, subprocess, call), each
+entered and left by one token, so that no token can get stuck, with event subprocesses beside them.
+`graph`: anything that the reader takes.
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,8 @@ CONDITIONS = ("a < 2", "b == 1", "a > b", "c == null", "not (a == 1)", "a + b > 
 ASSIGNMENTS = ("a = 0", "a = a + 1", "b = 1", "b = a", "c = a * b", "b = 0", "c.d = b")
 ROLES = ("evsg1", "evsg2", "uav1", "uav2", "evsg1/ptz", "team:alpha", "alpha_2", "evsg1 evsg2")
 EVENTS = ("signal s1", "signal s2", "message m1", "timer PT3S", "cycle R3/PT2S", "cycle R/PT4S")
-CAUGHT = (*EVENTS, "error", "error E1", "escalation", "escalation X1")
+TRUE = ("conditional b == 1", "conditional a > b", "conditional c == null", "conditional 1 / b > 0")
+CAUGHT = (*EVENTS, *TRUE, "error", "error E1", "escalation", "escalation X1")
 THROWN = ("signal s1", "signal s2", "message m1", "message m2", "escalation X1", "escalation X2")
 CODES = ("E1", "E2")
 
@@ -90,10 +92,10 @@ class _Draft:
         self.budget -= 1
         if depth > 5 or self.budget <= 0:
             return self.leaf(inside=inside)
-        kind = self.one_of(("leaf", "seq", "xor", "and", "or", "loop", "sub", "call"))
+        kind = self.one_of(("leaf", "seq", "xor", "and", "or", "loop", "link", "sub", "call"))
         if kind == "leaf":
             return self.leaf(inside=inside)
-        if kind in ("seq", "loop"):
+        if kind in ("seq", "loop", "link"):
             return getattr(self, f"_{kind}")(depth, inside)  # type: ignore[no-any-return]
         if kind in ("sub", "call"):
             return self._nested(kind, depth)
@@ -102,6 +104,19 @@ class _Draft:
     def _seq(self, depth: int, inside: bool) -> _Block:
         first, second = self.block(depth + 1, inside=inside), self.block(depth + 1, inside=inside)
         lines = [*first.lines, *second.lines, f"{first.exit} -> {second.entry}"]
+        return _Block(lines, first.entry, second.exit)
+
+    def _link(self, depth: int, inside: bool) -> _Block:
+        first, second = self.block(depth + 1, inside=inside), self.block(depth + 1, inside=inside)
+        source, target = self.name("l"), self.name("l")
+        lines = [
+            *first.lines,
+            *second.lines,
+            f'<intermediateThrowEvent id="{source}">link {target}</intermediateThrowEvent>',
+            f'<intermediateCatchEvent id="{target}">link {target}</intermediateCatchEvent>',
+            f"{first.exit} -> {source}",
+            f"{target} -> {second.entry}",
+        ]
         return _Block(lines, first.entry, second.exit)
 
     def _branches(self, kind: str, depth: int, inside: bool) -> _Block:
@@ -153,12 +168,26 @@ class _Draft:
         start, end = self.name("start"), self.name("end")
         ends = ("", "", "", "terminate", *THROWN, *(("error E1", "error E2") if inside else ()))
         last = self.one_of(ends)
-        return [
+        lines = [
             f'<startEvent id="{start}">{trigger}</startEvent>',
             *block.lines,
             f'<endEvent id="{end}">{last}</endEvent>',
             f"{start} -> {block.entry}",
             f"{block.exit} -> {end}",
+        ]
+        while self.budget > 0 and self.chance(25):
+            lines += self.handler(depth)
+        return lines
+
+    def handler(self, depth: int) -> list[str]:
+        """An event subprocess."""
+        kind = self.one_of(CAUGHT)
+        inside = self.container(depth + 1, inside=True, trigger=kind)
+        if not kind.startswith("error") and self.chance(60):
+            inside[0] = inside[0].replace("<startEvent", '<startEvent isInterrupting="false"')
+        inner = "\n".join(inside)
+        return [
+            f'<subProcess id="{self.name("h")}" triggeredByEvent="true">\n{inner}\n</subProcess>'
         ]
 
 
@@ -206,6 +235,7 @@ _NODES = (
     "inclusiveGateway",
     "task",
     *(leaf for leaf in _LEAVES if not leaf.startswith("task")),
+    "intermediateCatchEvent {condition}",
     "endEvent",
     "endEvent {thrown}",
     "endEvent terminate",
@@ -241,6 +271,8 @@ def _graph(draft: _Draft, size: int, depth: int) -> str:
             activities.append(name)
         if tag.endswith(("Task", "task", "exclusiveGateway", "inclusiveGateway")):
             conditional.add(name)
+        if depth < 3 and draft.chance(5):
+            lines += draft.handler(4)
         if activities and draft.chance(20):
             boundary = draft.name("b")
             kind = draft.one_of(CAUGHT)
@@ -280,5 +312,6 @@ def _element(draft: _Draft, tag: str, text: str, name: str, depth: int) -> str:
         event=draft.one_of(EVENTS[:4]),
         thrown=draft.one_of(THROWN),
         code=draft.one_of(CODES),
+        condition=draft.one_of(TRUE),
     )
     return f'<{tag} id="{name}">{"" if text == "-" else text}</{tag}>'

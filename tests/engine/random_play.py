@@ -12,6 +12,7 @@ from m2pem.engine import records as r
 from m2pem.engine.run import Step
 from m2pem.engine.state import BehaviorPhase, RunStatus
 from m2pem.model.catalogue import BehaviorState, ResumePolicy
+from m2pem.model.elements import Mission
 from tests.engine.invariants import check_state
 from tests.engine.kit import SECOND_US, Play
 
@@ -77,7 +78,7 @@ class Outside:
 class RandomPlay:
     """A play that never waits: what happens is chosen by numbers."""
 
-    def __init__(self, text: str, batch: int) -> None:
+    def __init__(self, text: str | Mission, batch: int) -> None:
         self.play = Play(text, batch=batch)
         self.play.goes_on = False
         self.outside = Outside()

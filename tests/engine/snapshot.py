@@ -5,6 +5,8 @@ from typing import Any
 
 from m2pem.engine.state import (
     Behavior,
+    Compensation,
+    Completion,
     Join,
     Letter,
     Loop,
@@ -18,7 +20,7 @@ from m2pem.engine.state import (
 )
 from m2pem.model.elements import Element, Mission
 
-_OBJECTS = (Scope, Token, Wait, Behavior, Prompt, Service)
+_OBJECTS = (Scope, Token, Wait, Behavior, Prompt, Service, Completion, Compensation)
 
 
 def snapshot(state: RunState) -> dict[str, Any]:
@@ -29,6 +31,12 @@ def snapshot(state: RunState) -> dict[str, Any]:
         held.extend(kept.values())
     for also in (state.prompts, state.services):
         held.extend(also.values())
+    for each in held:
+        if isinstance(each, Scope):  # grows while it is walked
+            held.extend((each.done or {}).values())
+            held.extend((each.compensations or {}).values())
+        elif isinstance(each, Completion) and each.kept is not None:
+            held.append(each.kept)
     whole["objects"] = [
         (type(each).__name__, {f.name: _plain(getattr(each, f.name)) for f in fields(each)})  # type: ignore[arg-type]
         for each in held

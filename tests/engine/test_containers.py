@@ -222,7 +222,7 @@ def test_terminate_ends_its_subprocess_and_the_parent_goes_on() -> None:
     play.answer(prompt="u")
     assert play.at == "other after"
     assert play.trace("leave", "close", "withdraw") == table("""
-        leave u; leave kill; withdraw p3; leave v terminated; close sub; leave sub
+        leave u; leave kill; withdraw p3; leave v terminated; close sub terminated; leave sub
     """)
 
 

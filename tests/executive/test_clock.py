@@ -145,6 +145,27 @@ def test_sleep_until_wakes_at_exactly_that_time() -> None:
     assert run_virtual(main, START_US) == START_US + 12_345_678
 
 
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("ahead_us", [300 * 365 * DAY_S * 10**6 + 1, 251_635_507_199_000_007])
+def test_centuries_pass_at_once_and_end_as_exactly_as_seconds_can_say(ahead_us: int) -> None:
+    async def main(clock: VirtualClock) -> None:
+        jumps: list[float | None] = []
+
+        def note(ahead_s: float | None) -> bool:
+            jumps.append(ahead_s)
+            return False
+
+        clock.when_idle(note)
+        await clock.sleep_until(START_US + ahead_us)
+        assert 0 <= clock.now_us() - START_US - ahead_us <= inexact_us
+        await clock.sleep_until(START_US + ahead_us + 100)
+        assert 0 <= clock.now_us() - START_US - ahead_us - 100 <= inexact_us
+        assert len(jumps) <= 2
+
+    inexact_us = math.ulp(ahead_us / 1e6) * 1e6
+    run_virtual(main, START_US)
+
+
 def test_no_timer_fires_before_its_microsecond() -> None:
     async def main(clock: VirtualClock) -> list[tuple[str, int]]:
         seen: list[tuple[str, int]] = []

@@ -288,6 +288,14 @@ def test_messages_of_joined_message_flows_are_one() -> None:
     assert one.message is two.message is definition.message is loaded.messages["M"]
 
 
+def test_flows_without_ids_are_called_after_their_ends() -> None:
+    unnamed = '<sequenceFlow sourceRef="S" targetRef="E"/>'
+    mission = load(process(f'<startEvent id="S"/><endEvent id="E"/>{unnamed}{unnamed}'))
+    assert [each.id for each in mission.flows] == ["S~E", "S~E2"]
+    assert [each.id for each in mission.nodes[1].incoming] == ["S~E", "S~E2"]
+    assert mission.warnings == ()
+
+
 def test_an_event_that_names_nothing_has_a_signal_of_its_own() -> None:
     loaded = load(
         around('<intermediateThrowEvent id="T"><signalEventDefinition/></intermediateThrowEvent>')

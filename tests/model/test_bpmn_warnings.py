@@ -1,7 +1,7 @@
 """What is doubtful in a file is a warning: which rule, on which line, for which element."""
 
 import pytest
-from bpmn_text import around, flow, line_of, load, process
+from bpmn_text import around, definitions, flow, line_of, load, process
 
 from m2pem.findings import Severity
 
@@ -44,6 +44,15 @@ WARNINGS = {
             "</extensionElements></userTask>"
         ),
         [("unknown-extension", 4, "T")],
+    ),
+    "no ids": (
+        definitions('<process>\n<task name="Go"/>\n<task/></process>\n<signal/>'),
+        [
+            ("missing-id", 2, "process~1"),
+            ("missing-id", 3, "task~1"),
+            ("missing-id", 4, "task~2"),
+            ("missing-id", 5, "signal~1"),
+        ],
     ),
     "service task without a service": (around('<serviceTask id="T"/>'), [("no-service", 3, "T")]),
     "script task without a script": (around('<scriptTask id="T"/>'), [("empty-script", 3, "T")]),

@@ -10,6 +10,7 @@ from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.model.behavior import Assignment, ThrowError
 from m2pem.model.duration import cycle, date_us, duration_us
 from m2pem.model.expression import parse, template
+from m2pem.model.expression.calls import FLOWABLE, METHODS, XPATH_DATA, XPATH_NAMES
 from m2pem.model.expression.functions import FEEL_NAMES, FUNCTIONS
 from m2pem.model.script import parse_script
 
@@ -51,8 +52,13 @@ def test_the_example_of_every_function_is_true(name, example, value):
     assert repr(parse(example).evaluate(DATA.get)) == repr(json.loads(value))
 
 
-@pytest.mark.parametrize("name", FEEL_NAMES)
+@pytest.mark.parametrize("name", sorted(FEEL_NAMES))
 def test_the_docs_list_every_name_of_feel(name):
+    assert f"`{name}`" in DOCS
+
+
+@pytest.mark.parametrize("name", sorted({*METHODS, *FLOWABLE, *XPATH_DATA, *XPATH_NAMES}))
+def test_the_docs_list_what_is_read_of_other_dialects(name):
     assert f"`{name}`" in DOCS
 
 

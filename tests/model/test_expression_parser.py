@@ -103,7 +103,6 @@ def test_marks_and_language_say_the_dialect(text, language, dialect):
         "groovy",
         "http://groovy.codehaus.org/",
         "javascript",
-        "http://www.w3.org/1999/XPath",
         "steel",
     ],
 )
@@ -119,6 +118,14 @@ def test_a_mark_does_not_excuse_a_language_that_has_it_too(language):
         parse("${a}", language)
 
 
+def test_what_a_range_doubles_is_bounded():
+    text = "= a"
+    for _ in range(40):
+        text = f"= ({text[2:]}) between 1 and 2"
+    with pytest.raises(ExpressionSyntaxError, match="too large, written out"):
+        parse(text)
+
+
 def test_feel_names_may_hold_spaces():
     assert parse('= Vacation   Approval.state = "ok"').names == {"Vacation Approval.state"}
     assert parse("Vacation Approval in [lead time]", "FEEL").names == {
@@ -127,8 +134,62 @@ def test_feel_names_may_hold_spaces():
     }
 
 
+@pytest.mark.parametrize(
+    ("text", "same_as"),
+    [
+        ("${a ? b : c ? d : e}", "a ? b : (c ? d : e)"),
+        ("= if a then b else c + 1", "a ? b : c + 1"),
+        ("= a between b + 1 and 5 and c", "(a >= b + 1 and a <= 5) and c"),
+        ("= a in [1..5]", "a >= 1 and a <= 5"),
+        ("= a in (1..b)", "a > 1 and a < b"),
+        ("= a in ]1..2[", "a > 1 and a < 2"),
+        ('= a in ("x", "y")', "a in ['x', 'y']"),
+        ("= a in (1)", "a in [1]"),
+        ("= a in (b)", "a in b"),
+        ("= a in []", "a in []"),
+        ("= a[1]", "a[0]"),
+        ("= a[-1].b", "a[-1].b"),
+        ("${a['b'].c}", "a['b'].c"),
+        ("a['b']", "a.b"),
+        ("${a.get(0)}", "a[0]"),
+        ("${a.equals('yes') && !b.isEmpty()}", "a == 'yes' and not is_empty(b)"),
+        ("${a.b.equalsIgnoreCase(c)}", "lower(a.b) == lower(c)"),
+        ("${a[0].b.size() > 1}", "length(a[0].b) > 1"),
+        ("${a.toUpperCase().startsWith('X')}", "starts_with(upper(a), 'X')"),
+        ("${execution.getVariable('a') == 1}", "a == 1"),
+        ("${execution.hasVariable('a')}", "exists(a)"),
+        ("${var:equals(a, 1) ? b:c}", "a == 1 ? b : c"),
+        ("${vars:lte('a', 1)}", "a <= 1"),
+        ("${variables:getOrDefault(a, 5)}", "exists(a) ? a : 5"),
+        ("${var:containsAny(a, 1, 2)}", "contains(a, 1) or contains(a, 2)"),
+        ("bpmn:getDataObject('clarified') = 'yes'", "clarified == 'yes'"),
+        ("not(getDataObject('a')) and true()", "not a and true"),
+        ("getProcessProperty('p', 'a') div 2 >= 1", "a / 2 >= 1"),
+        ("starts-with(getDataObject('a'), 'x')", "starts_with(a, 'x')"),
+    ],
+)
+def test_what_others_write_is_what_the_bare_dialect_writes(text, same_as):
+    assert parse(text).tree == parse(same_as).tree
+
+
+def test_xpath_is_read_where_it_is_declared():
+    expression = parse("string-length(a) = 2 or not (b)", "http://www.w3.org/1999/XPath")
+    assert expression.dialect is Dialect.XPATH
+    assert expression.tree == parse("length(a) == 2 or not b").tree
+
+
+def test_what_a_condition_on_items_calls_an_item_is_no_name_of_the_store():
+    assert parse("= some r in levels satisfies r.risk > limit and s").names == {
+        "levels",
+        "limit",
+        "s",
+    }
+    assert parse("= every a in a satisfies a > 1").names == {"a"}
+
+
 def test_words_of_one_dialect_are_names_in_another():
     assert parse("empty + lt + some").names == {"empty", "lt", "some"}
+    assert parse("$" + "{if + then}").names == {"if", "then"}
     assert parse("= empty + lt").names == {"empty", "lt"}
     assert parse("not.a and in.b").names == {"not.a", "in.b"}
 
@@ -155,13 +216,15 @@ def test_names_may_be_of_any_script(name):
         ("a b", 2, "expected an operator or the end, found 'b'"),
         ("a.b.", 3, "missing after '.'"),
         ("a..b", 1, "missing after '.'"),
-        (".a", 0, "unexpected '.'"),
+        (".a", 0, "expected a value, found '.'"),
+        ("a[0].", 5, "expected a name after '.'"),
+        ("a[0", 3, "expected ']' to close '['"),
+        ("'abc'[0]", 5, "expected an operator"),
         ("(a", 2, "expected ')' to close '(' at column 1, found the end"),
         ("a)", 1, "expected an operator or the end, found ')'"),
         ("[1, ]", 4, "expected a value, found ']'"),
         ("[1 2]", 3, "expected ']'"),
         ("[1, 2", 5, "expected ']' to close '['"),
-        ("a[0]", 1, "expected an operator"),
         ("'abc", 0, "the text is not closed by '"),
         ("'abc\\", 0, "the text is not closed by '"),
         (r"'\x41'", 0, r"'\x' is no escape"),
@@ -178,12 +241,20 @@ def test_names_may_be_of_any_script(name):
         ("a && b", 2, "write 'and'"),
         ("a || b", 2, "write 'or'"),
         ("!a", 0, "write 'not'"),
-        ("a ? b : c", 2, "there is no 'a ? b : c'"),
+        ("a ? b", 5, "expected ':' between the two values after '?'"),
+        ("= a ? b : c", 4, "write 'if a then b else c'"),
+        ("a b", 2, "a name has no spaces (in FEEL it may: begin with '=')"),
         ("a == “x”", 5, "straight quotes"),
         ("a == ${b}", 5, "one '${...}'"),
         ("${a} and ${b}", 4, "put all of it between the braces"),
         ("${a", 0, "not closed by '}'"),
-        ("${a.b('x')}", 2, "there is no function 'a.b'"),
+        ("${a.b('x')}", 2, "'b()' would run a method of an object"),
+        ("${a.equals()}", 2, "equals() takes another number of arguments"),
+        ("${a[0].b('x')}", 7, "'b()' would run a method of an object"),
+        ("a.equals('x')", 0, "'a.equals' would run a method of an object"),
+        ("${execution.getVariable(1)}", 2, "takes the name of a variable"),
+        ("${var:base64(a)}", 2, "after 'var:' there are get,"),
+        ("${var:eq(a + 1, 2)}", 2, "takes the name of a variable"),
         ("foor(1)", 0, "did you mean floor?"),
         ("eval('x')", 0, "there is no function 'eval'"),
         ("abs()", 0, "expected abs(x), found 0 arguments"),
@@ -196,8 +267,19 @@ def test_names_may_be_of_any_script(name):
         ("${not a in b}", 2, "ambiguous"),
         ("${empty a + 1}", 2, "ambiguous"),
         ("= not a", 6, "expected '(' after FEEL's 'not'"),
-        ("= if a then b else c", 2, "FEEL's 'if' is not supported"),
-        ("= a in [1..5]", 9, "a number cannot be followed by '.'"),
+        ("= if a then b", 13, "expected 'else' after 'if'"),
+        ("= a in [1..5", 12, "to close the range"),
+        ("= a in ]1, 2[", 9, "expected '..' in a range"),
+        ("= a in 1..5", 8, "expected an operator"),
+        ("= a between 1", 13, "expected 'and' after 'between'"),
+        ("= a between 1 and 2 between 3 and 4", 20, "comparisons do not chain"),
+        ("= some 1 in a satisfies b", 7, "expected a name after 'some'"),
+        ("= some a in b, c in d satisfies a", 13, "expected 'satisfies' after 'some' (of one"),
+        ("= a[b > 1]", 3, "only the number of an item is read"),
+        ("= a[0]", 3, "from 1 on"),
+        ("= for a in b return a", 2, "FEEL's 'for' is not supported"),
+        ("getDataObject('a')/b", 18, "paths into XML"),
+        ("getDataObject(1) = 2", 0, "takes the name of a variable"),
         ("a;", 1, "unexpected ';'"),
         ("a\x00b", 1, "unexpected"),
         ("\ud800", 0, "unexpected"),

@@ -17,7 +17,9 @@ from m2pem.model.expression.tree import (
     Call,
     Compare,
     Comparison,
+    If,
     In,
+    Index,
     ListOf,
     Literal,
     Name,
@@ -65,6 +67,8 @@ def _inner(inner, calls):
         st.builds(Not, inner),
         st.builds(Negate, inner),
         st.builds(In, inner, inner),
+        st.builds(If, inner, inner, inner),
+        st.builds(Index, st.builds(ListOf, st.lists(inner, max_size=3).map(tuple)), inner),
         st.builds(ListOf, st.lists(inner, max_size=3).map(tuple)),
     ]
     return st.one_of(*nodes, _calls(inner)) if calls else st.one_of(*nodes)
@@ -99,6 +103,10 @@ def write(node):
             return f"(-({write(operand)}))"
         case In(item, container):
             return f"({write(item)} in {write(container)})"
+        case If(condition, then, otherwise):
+            return f"({write(condition)} ? {write(then)} : {write(otherwise)})"
+        case Index(container, key):
+            return f"{write(container)}[{write(key)}]"
     return f"({write(node.left)} {node.operator.value} {write(node.right)})"
 
 
@@ -189,6 +197,15 @@ def reference(node, store):
             if not isinstance(b, list):
                 raise FailsError
             return any(same(a, each) for each in b)
+        case If(condition, then, otherwise):
+            return reference(then if truth(reference(condition, store)) else otherwise, store)
+        case Index(container, key):
+            a, b = reference(container, store), reference(key, store)
+            if b is None:
+                return None
+            if isinstance(b, bool) or not isinstance(b, int):
+                raise FailsError
+            return a[b] if -len(a) <= b < len(a) else None
     a, b = reference(node.left, store), reference(node.right, store)
     if isinstance(node, Arithmetic):
         return arithmetic(node.operator.value, a, b)
@@ -223,6 +240,8 @@ def check_errors(tree, store):
 
 WORDS = [
     *["and", "or", "not", "in", "true", "false", "null", "eq", "empty", "div", "some", "if"],
+    *["then", "else", "every", "satisfies", "between", "?", ":", "..", "]", "var:eq(", "a.get("],
+    *["getDataObject(", "execution.getVariable("],
     *["==", "=", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/", "(", ")", "[", "]", ",", "."],
     *[
         "&&",

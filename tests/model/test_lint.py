@@ -218,3 +218,19 @@ def test_findings_are_sorted_by_line_and_have_remedies() -> None:
     findings = lint(load(data))
     assert [each.rule for each in findings] == ["no-conditions", "unwritten-name", "unreachable"]
     assert all(each.remedy and each.message and each.file == "m.bpmn" for each in findings)
+
+
+def test_a_condition_that_begins_a_process_reads_the_main_one() -> None:
+    text = """
+        <process id="MAIN" isExecutable="true"> <startEvent id="s"/>
+          <scriptTask id="set"><script>x = 1</script></scriptTask>
+          <sequenceFlow id="f" sourceRef="s" targetRef="set"/>
+        </process>
+        <process id="OTHER"> <startEvent id="on"><conditionalEventDefinition><condition>x + {y} > 3
+          </condition></conditionalEventDefinition></startEvent> <task id="t"/>
+          <sequenceFlow id="g" sourceRef="on" targetRef="t"/>
+        </process>
+    """
+    assert lint(load(definitions(text.format(y="1")))) == []
+    [found] = lint(load(definitions(text.format(y="y"))))
+    assert (found.rule, found.element) == ("unwritten-name", "on")

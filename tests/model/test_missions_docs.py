@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from bpmn_text import definitions, load
 
-from m2pem.model.elements import CallActivity, ServiceTask
+from m2pem.model.elements import Activity, CallActivity, ServiceTask
 from m2pem.model.lint import lint
 
 DOCS = (Path(__file__).parent.parent.parent / "docs" / "missions.md").read_text()
@@ -49,8 +49,25 @@ def test_an_example_has_no_warning(start: str, wrapper: str) -> None:
         assert len(node.mappings.inputs) == 2
 
 
+def test_the_example_of_compensation_undoes_the_activity() -> None:
+    body = f'<task id="Drop"/>{example("<boundaryEvent")}'
+    mission = load(definitions(f'<process id="P">{body}</process>'))
+    drop = mission.elements["Drop"]
+    assert isinstance(drop, Activity)
+    assert drop.compensation is mission.elements["PickUp"]
+    assert mission.warnings == ()
+
+
+def test_the_event_subprocess_has_no_warning() -> None:
+    task = '<startEvent id="S"/><task id="T"/><sequenceFlow id="f" sourceRef="S" targetRef="T"/>'
+    text = f'<process id="P">{example("<subProcess")}{task}</process>'
+    mission = load(definitions(text))
+    assert mission.warnings == ()
+    assert [each.id for each in mission.processes[0].event_subprocesses] == ["TooManyFinds"]
+
+
 def test_every_example_is_tested() -> None:
-    assert len(EXAMPLES) == 5
+    assert len(EXAMPLES) == 6
 
 
 def test_every_error_that_the_program_throws_is_documented() -> None:

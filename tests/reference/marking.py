@@ -48,6 +48,7 @@ class Scope:
     # Complex gateways that wait for their reset, with the flows consumed from in the first phase.
     fired: dict[str, frozenset[str]] = field(default_factory=dict)
     interrupted: bool = False  # an interrupting event subprocess has begun
+    terminated: bool = False
 
     def is_empty(self) -> bool:
         return not self.works and not self.tokens
@@ -60,7 +61,7 @@ class Scope:
     def key(self) -> Key:
         fired = tuple(sorted((gateway, tuple(sorted(f))) for gateway, f in self.fired.items()))
         tokens = tuple(sorted(self.tokens.items()))
-        return (tokens, sorted_keys(self.works), fired, self.interrupted)
+        return (tokens, sorted_keys(self.works), fired, self.interrupted, self.terminated)
 
 
 @dataclass(eq=False, slots=True)
@@ -136,6 +137,7 @@ def _copy_scope(scope: Scope, owner: Work | None) -> Scope:
     copied.works = [_copy_work(work, copied, None) for work in scope.works]
     copied.fired = dict(scope.fired)
     copied.interrupted = scope.interrupted
+    copied.terminated = scope.terminated
     return copied
 
 

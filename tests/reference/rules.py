@@ -215,6 +215,7 @@ def _terminate(marking: Marking, scope: Scope) -> None:
     scope.tokens.clear()
     scope.works.clear()
     scope.fired.clear()
+    scope.terminated = True
 
 
 def _begin_activity(marking: Marking, scope: Scope, node: Node) -> None:
@@ -252,7 +253,8 @@ def finish(marking: Marking, work: Work) -> None:
     if whole is not None:
         assert whole.instances is not None
         whole.instances.remove(work)
-        whole.completed += 1
+        if work.inside is None or not work.inside.terminated:
+            whole.completed += 1  # table 10.30 counts those that were terminated apart
         _repeat_or_end(marking, whole)
         return
     work.home.works.remove(work)

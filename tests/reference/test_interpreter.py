@@ -325,6 +325,11 @@ def test_the_completion_condition_ends_the_instances_that_are_left() -> None:
         assert all(trace.count("B") == 1 for trace in traces(model))
 
 
+def test_an_instance_that_was_terminated_has_not_completed() -> None:
+    inner = replace(sub("P", A, TERMINATE, flows="A>t"), repeat=Many(2, True, 1))
+    assert traces(drawn(S, inner, flows="s>P")) == {"A A completed"}
+
+
 def test_terminate_ends_one_instance_and_an_error_all() -> None:
     inner = replace(sub("P", A, B, TERMINATE, flows="A>t"), repeat=Many(2, False, None))
     assert "A A C completed" in traces(drawn(S, inner, C, flows="s>P>C"))

@@ -6,6 +6,7 @@ that wait at their own node to what follows.
 
 from collections.abc import Callable
 
+from m2pem.engine.compensation import advance, close_undone
 from m2pem.engine.execution import Execution
 from m2pem.engine.nodes import (
     activities,
@@ -19,14 +20,22 @@ from m2pem.engine.nodes import (
 from m2pem.engine.nodes.beginning import WORK, begin_activity
 from m2pem.engine.nodes.completion import complete
 from m2pem.engine.state import Scope, Token
+from m2pem.engine.transactions import leave_cancelled
 from m2pem.engine.triggering import WHEN_TRIGGERED
 from m2pem.model import elements as e
 from m2pem.model.elements import FlowNode
 
 
 def look_at(x: Execution, scope: Scope) -> None:
-    """Something in a scope has ended: perhaps the scope has."""
-    if isinstance(scope.container, e.AdHocSubProcess) and scope.loop is None:
+    """Something in a scope has ended: perhaps the scope has, or it is the next one's turn to be
+    undone in it."""
+    if scope.compensations:
+        advance(x, scope)
+    elif scope.cancelled or scope.reopened:
+        if not scope.tokens:
+            leave = leave_cancelled if scope.cancelled else close_undone
+            leave(x, scope)
+    elif isinstance(scope.container, e.AdHocSubProcess) and scope.loop is None:
         ad_hoc.look_at(x, scope)
     else:
         containers.look_at(x, scope)
@@ -56,5 +65,7 @@ WHEN_TRIGGERED.update(
         e.ReceiveTask: complete,
         e.StartEvent: events.complete,
         e.IntermediateCatchEvent: events.complete,
+        e.IntermediateThrowEvent: events.complete,
+        e.EndEvent: Execution.consume,
     }
 )

@@ -12,7 +12,7 @@ from m2pem.engine.records import TokenOutcome
 from m2pem.engine.scopes import empty
 from m2pem.engine.state import Scope, Token
 from m2pem.engine.throwing import throw_error
-from m2pem.engine.triggering import arm_event_subprocesses
+from m2pem.engine.triggering import arm_event_subprocesses, collect_letters
 from m2pem.errors import ExpressionError
 from m2pem.model.elements import AdHocOrdering, AdHocSubProcess, FlowNode
 from m2pem.model.expression import Expression
@@ -36,6 +36,7 @@ def ad_hoc(x: Execution, token: Token) -> None:
             return
         x.emit(r.ActivitiesChosen(token.id, x.process_of(node), node.id, scope.id, chosen))
     _go_on(x, token, node, scope)
+    collect_letters(x, scope)
 
 
 def look_at(x: Execution, scope: Scope) -> None:

@@ -24,6 +24,7 @@ WORK: dict[type[FlowNode], Callable[[Execution, Token], None]] = {
     e.SendTask: activities.send_task,
     e.ReceiveTask: activities.receive_task,
     e.SubProcess: containers.subprocess,
+    e.Transaction: containers.subprocess,
     e.AdHocSubProcess: ad_hoc.ad_hoc,
     e.CallActivity: containers.call_activity,
 }

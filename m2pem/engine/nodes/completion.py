@@ -1,5 +1,6 @@
 """The end of an activity's work (BPMN 2.0.2, clause 13.3.2)."""
 
+from m2pem.engine.compensation import enable, undone
 from m2pem.engine.data_flow import give_out
 from m2pem.engine.execution import Execution
 from m2pem.engine.nodes.flows import true_flows
@@ -7,6 +8,7 @@ from m2pem.engine.nodes.loops import instance_done
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.state import Token
 from m2pem.model.elements import Activity, AdHocSubProcess
+from m2pem.model.reach import begins_by_itself
 
 
 def complete(x: Execution, token: Token, outcome: TokenOutcome = TokenOutcome.COMPLETED) -> None:
@@ -26,11 +28,18 @@ def complete(x: Execution, token: Token, outcome: TokenOutcome = TokenOutcome.CO
 
 
 def pass_on(x: Execution, token: Token) -> None:
-    """The activity as a whole is done: leave by every flow that is true."""
+    """The activity as a whole is done: leave by every flow that is true.
+
+    What undoes another activity leaves by none: it is outside the normal flow (clause 10.7).
+    """
     node = token.node
     assert isinstance(node, Activity)
+    if token.undoes is not None:
+        undone(x, token)
+        return
     flows = true_flows(x, token, node.default)
     if flows is not None:
+        enable(x, token)
         x.proceed(token, [*flows] * node.completion_quantity)
-        if isinstance(node.container, AdHocSubProcess):
+        if isinstance(node.container, AdHocSubProcess) and not begins_by_itself(node):
             x.queue.append(token.scope)

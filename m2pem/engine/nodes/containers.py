@@ -10,7 +10,7 @@ from m2pem.engine.records import RunOutcome, TokenOutcome
 from m2pem.engine.scopes import close, open_scope
 from m2pem.engine.state import Scope, Token
 from m2pem.engine.throwing import throw_error
-from m2pem.engine.triggering import arm_event_subprocesses
+from m2pem.engine.triggering import arm_event_subprocesses, collect_letters
 from m2pem.model.elements import CallActivity
 
 MAX_DEPTH = 1000
@@ -20,7 +20,10 @@ MAX_DEPTH = 1000
 def subprocess(x: Execution, token: Token) -> None:
     """Open its scope and start what is in it."""
     if token.inner is not None:
-        return  # an event subprocess, which its trigger has begun
+        # An event subprocess, which its trigger has begun.
+        if arm_event_subprocesses(x, token.inner):
+            collect_letters(x, token.inner)
+        return
     scope = open_inside(x, token)
     if scope is not None:
         begin(x, scope)
@@ -58,6 +61,7 @@ def begin(x: Execution, scope: Scope) -> None:
         x.spawn(entry, scope)
     if not scope.tokens:
         x.queue.append(scope)
+    collect_letters(x, scope)
 
 
 def look_at(x: Execution, scope: Scope) -> None:
@@ -69,13 +73,13 @@ def look_at(x: Execution, scope: Scope) -> None:
 
 
 def finish(x: Execution, scope: Scope, outcome: TokenOutcome = TokenOutcome.COMPLETED) -> None:
-    """A scope has ended well: its activity goes on, or, without one, perhaps the run is over.
+    """A scope has ended: its activity goes on, or, without one, perhaps the run is over.
 
     `outcome` TERMINATED: by a terminate end event in it.
     """
     token = scope.owner
     if token is None:
-        close(x, scope, TokenOutcome.COMPLETED)
+        close(x, scope, outcome)
         if not x.state.scopes:
             end_run(x, RunOutcome.COMPLETED)
         return
@@ -85,6 +89,6 @@ def finish(x: Execution, scope: Scope, outcome: TokenOutcome = TokenOutcome.COMP
         values = evaluate(x, token, node.mappings.outputs, reader(scope))
         if values is None:
             return
-    close(x, scope, TokenOutcome.COMPLETED)
+    close(x, scope, outcome)
     write_values(x, token, token, values or [])
     complete(x, token, outcome)

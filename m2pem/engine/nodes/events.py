@@ -1,6 +1,7 @@
 """Events (BPMN 2.0.2, clauses 10.5 and 13.5)."""
 
 from m2pem.engine import records as r
+from m2pem.engine.compensation import throw_compensation
 from m2pem.engine.data_flow import payload
 from m2pem.engine.execution import Execution
 from m2pem.engine.interruption import end_run
@@ -11,10 +12,19 @@ from m2pem.engine.records import RunOutcome, TokenOutcome
 from m2pem.engine.scopes import empty
 from m2pem.engine.state import Token
 from m2pem.engine.throwing import throw_error, throw_escalation
+from m2pem.engine.transactions import cancel
 from m2pem.engine.triggering import collect_letters, throw_signal
 from m2pem.engine.waiting import arm
-from m2pem.model.elements import Event, StartEvent, SubProcess
+from m2pem.model.elements import (
+    Event,
+    IntermediateCatchEvent,
+    IntermediateThrowEvent,
+    StartEvent,
+    SubProcess,
+)
 from m2pem.model.events import (
+    CancelEventDefinition,
+    CompensateEventDefinition,
     ErrorEventDefinition,
     EscalationEventDefinition,
     EventDefinition,
@@ -51,10 +61,10 @@ def start(x: Execution, token: Token) -> None:
 
 
 def catch(x: Execution, token: Token) -> None:
-    """Wait for the trigger."""
+    """Wait for the trigger; the target of a link has none (table 10.98)."""
     node = token.node
     assert isinstance(node, Event)
-    if not node.definitions:
+    if not node.definitions or (isinstance(node, IntermediateCatchEvent) and node.linked_from):
         complete(x, token)
         return
     if all(arm(x, token, node, definition) for definition in node.definitions):
@@ -69,7 +79,11 @@ def throw(x: Execution, token: Token) -> None:
         _throw(x, token, definition)
         if x.state.tokens.get(token.id) is not token:
             return
-    complete(x, token)
+    if isinstance(node, IntermediateThrowEvent) and node.links_to is not None:
+        x.leave(token, TokenOutcome.COMPLETED)
+        x.enter(token.id, node.links_to, token.scope)
+    elif not token.compensations:
+        complete(x, token)
 
 
 def _throw(x: Execution, token: Token, definition: EventDefinition) -> None:
@@ -81,6 +95,8 @@ def _throw(x: Execution, token: Token, definition: EventDefinition) -> None:
         case EscalationEventDefinition(escalation=escalation):
             assert escalation is not None
             throw_escalation(x, token, escalation)
+        case CompensateEventDefinition():
+            throw_compensation(x, token, definition)
 
 
 def signal(x: Execution, token: Token, signal_id: str) -> None:
@@ -107,6 +123,9 @@ def end(x: Execution, token: Token) -> None:
             case TerminateEventDefinition():
                 _terminate(x, token)
                 return
+            case CancelEventDefinition():
+                cancel(x, token)
+                return
             case ErrorEventDefinition(error=error):
                 assert error is not None
                 throw_error(x, token, error.code, f"thrown by {node.label}", leaving=True)
@@ -121,12 +140,13 @@ def end(x: Execution, token: Token) -> None:
                 _throw(x, token, definition)
                 if x.state.tokens.get(token.id) is not token:
                     return
-    x.consume(token)
+    if not token.compensations:
+        x.consume(token)
 
 
 def _ends_the_scope(definition: EventDefinition) -> int:
     """Of several results, those that end the scope come last, so that all are thrown."""
-    if isinstance(definition, TerminateEventDefinition):
+    if isinstance(definition, TerminateEventDefinition | CancelEventDefinition):
         return 2
     return 1 if isinstance(definition, ErrorEventDefinition) else 0
 

@@ -51,7 +51,7 @@ def _more_can_come(
 
     A token elsewhere in the scope keeps the join waiting when it can reach such a flow, along a
     path that does not pass the join, unless it can also reach one that is taken already. Those
-    that wait at the join itself reach nothing.
+    that wait at the join itself reach nothing, nor does one whose activity is being undone.
     """
     reach = x.upstream(node)
     bits = 0
@@ -59,7 +59,7 @@ def _more_can_come(
         if flow in taken:
             bits |= 1 << place
     for token in scope.tokens.values():
-        reachable = reach.get(token.node, 0)
+        reachable = 0 if token.is_reopened else reach.get(token.node, 0)
         if reachable & ~bits and not reachable & bits:
             return True
     return False

@@ -11,7 +11,16 @@ that contains `element`.
 from typing import TypeAlias, Union
 
 from m2pem.engine.records.base import RunOutcome, TokenOutcome, Trigger
+from m2pem.engine.records.compensation import (
+    CompensationBegan,
+    CompensationEnabled,
+    CompensationEnded,
+    CompensationTriggered,
+    ScopeReopened,
+    TransactionCancelled,
+)
 from m2pem.engine.records.events import (
+    ConditionReset,
     DataWritten,
     ErrorThrown,
     EscalationThrown,
@@ -72,6 +81,11 @@ __all__ = [
     "BehaviorRequested",
     "BehaviorRestarted",
     "BehaviorUnsettled",
+    "CompensationBegan",
+    "CompensationEnabled",
+    "CompensationEnded",
+    "CompensationTriggered",
+    "ConditionReset",
     "DataWritten",
     "ErrorThrown",
     "EscalationThrown",
@@ -102,6 +116,7 @@ __all__ = [
     "ScopeClosed",
     "ScopeInterrupted",
     "ScopeOpened",
+    "ScopeReopened",
     "ServiceEnded",
     "ServiceRequested",
     "ServiceWithdrawn",
@@ -110,6 +125,7 @@ __all__ = [
     "TokenLeft",
     "TokenOutcome",
     "TokensGathered",
+    "TransactionCancelled",
     "Trigger",
 ]
 
@@ -153,8 +169,15 @@ Record: TypeAlias = Union[
     DataWritten,
     EventAwaited,
     EventTriggered,
+    ConditionReset,
     SignalThrown,
     MessageThrown,
     EscalationThrown,
     ErrorThrown,
+    CompensationEnabled,
+    CompensationTriggered,
+    CompensationBegan,
+    CompensationEnded,
+    ScopeReopened,
+    TransactionCancelled,
 ]

@@ -29,6 +29,7 @@ class Trigger(StrEnum):
     SIGNAL = "signal"
     MESSAGE = "message"
     TIMER = "timer"
+    CONDITION = "condition"
 
 
 class BaseRecord(

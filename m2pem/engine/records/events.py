@@ -23,9 +23,12 @@ class DataWritten(BaseRecord, frozen=True):
 
 
 class EventAwaited(BaseRecord, frozen=True):
-    """A catch event is armed: `ref` is a signal's or message's id; `due_us` a timer's time.
+    """A catch event is armed: `ref` is a signal's or message's id, or the text of a condition;
+    `due_us` a timer's time.
 
-    `token` 0: it is the start event of an event subprocess, and `scope` waits.
+    `token` 0: it is the start event of an event subprocess, or begins another process when a
+    condition becomes true, and `scope` waits. `spent`: the condition has fired, and must be seen
+    false (`ConditionReset`) before it can again.
 
     A duration or cycle is due at a mission time (microseconds from the start, which stands during
     a pause); a date (`calendar`) at a time since the Unix epoch. `left`: how often a cycle still
@@ -43,6 +46,7 @@ class EventAwaited(BaseRecord, frozen=True):
     calendar: bool = False
     left: int = 0
     cycle: str = ""
+    spent: bool = False
 
 
 class EventTriggered(BaseRecord, frozen=True):
@@ -54,6 +58,12 @@ class EventTriggered(BaseRecord, frozen=True):
     wait: int
     kept: bool = False
     letter: int = 0
+
+
+class ConditionReset(BaseRecord, frozen=True):
+    """A condition that had fired was seen false: it can fire again."""
+
+    wait: int
 
 
 class SignalThrown(BaseRecord, frozen=True):

@@ -22,12 +22,16 @@ class ScopeOpened(BaseRecord, frozen=True):
 
 
 class ScopeClosed(BaseRecord, frozen=True):
-    """The instance has ended and its data is gone."""
+    """The instance has ended and its data is gone.
+
+    `kept`: it and its data are kept, because something that was done in it can be undone.
+    """
 
     scope: int
     process: str
     element: str
     outcome: TokenOutcome
+    kept: bool = False
 
 
 class TokenEntered(BaseRecord, frozen=True):

@@ -9,6 +9,7 @@ from m2pem.errors import MissionError
 from m2pem.findings import Finding, Severity, has_errors
 from m2pem.model.bpmn.calls import resolve_calls
 from m2pem.model.bpmn.collaboration import check_collaborations
+from m2pem.model.bpmn.compensation import link_compensation, note_compensation
 from m2pem.model.bpmn.containers import MAX_DEPTH, read_process
 from m2pem.model.bpmn.correlation import resolve_correlation
 from m2pem.model.bpmn.data import resolve_data
@@ -124,7 +125,9 @@ def _read(report: Report, document: Document, data: bytes) -> Mission | None:
     resolve_data_flows(reading)
     resolve_prompts(reading)
     resolve_calls(reading)
+    note_compensation(reading)
     elements = link(reading)
+    link_compensation(reading)
     join_default_signals(reading)
     resolve_messages(reading)
     correlation_properties = resolve_correlation(reading)

@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping
 
 from lxml import etree
 
+from m2pem.model.bpmn.compensation import read_association
 from m2pem.model.bpmn.names import BPMN, local
 from m2pem.model.bpmn.reading import Reading, reference
 from m2pem.model.bpmn.scan import scan
@@ -16,6 +17,8 @@ def read_collaboration(reading: Reading, collaboration: etree._Element) -> None:
     reading.optional_id(collaboration)
     for element in collaboration:
         name = local(element.tag) if element.tag.startswith(BPMN) else ""
+        if name == "association":
+            read_association(reading, element)
         if name not in ("participant", "messageFlow"):
             continue
         identifier = reading.optional_id(element)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
+from m2pem.model.bpmn.compensation import ASSOCIATION, read_association
 from m2pem.model.bpmn.correlation import read_subscription
 from m2pem.model.bpmn.data import read_data
 from m2pem.model.bpmn.data_flow import read_data_flow
@@ -107,6 +108,9 @@ def _read_child(
         return None
     if tag in _DATA:
         read_data(reading, child, container)
+        return None
+    if tag == ASSOCIATION:
+        read_association(reading, child)
         return None
     if tag == _LANES:
         read_lanes(reading, child, process)

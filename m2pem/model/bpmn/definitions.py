@@ -6,16 +6,22 @@ from typing import TypeVar
 from lxml import etree
 
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.model.bpmn.names import a, local
+from m2pem.model.bpmn.names import local
 from m2pem.model.bpmn.reading import MessageUse, Reading, reference, text_of
+from m2pem.model.bpmn.rewriting import time_remedy
 from m2pem.model.bpmn.scan import Scan, scan
+from m2pem.model.bpmn.schema import SHAPES
 from m2pem.model.duration import cycle, date_us, duration_us
 from m2pem.model.events import (
+    CancelEventDefinition,
+    CompensateEventDefinition,
+    ConditionalEventDefinition,
     Error,
     ErrorEventDefinition,
     Escalation,
     EscalationEventDefinition,
     EventDefinition,
+    LinkEventDefinition,
     Message,
     MessageEventDefinition,
     RootElement,
@@ -35,15 +41,25 @@ def read_definition(
     reading: Reading, element: etree._Element, event: Scan, *, catches: bool
 ) -> EventDefinition | None:
     """One definition of an event; None when findings say why there is none."""
-    scan(reading, element, event.id)
+    found = scan(reading, element, event.id)
     line = reading.report.line(element)
     label = event.element.get("name", "")
     name = local(element.tag).removesuffix("EventDefinition")
 
     if name == "terminate":
         return TerminateEventDefinition(line)
+    if name == "cancel":
+        return CancelEventDefinition(line)
+    if name == "compensate":
+        wait = reading.boolean(element, "waitForCompletion", True, event.id)
+        activity = "" if catches else reference(element.get("activityRef", ""))
+        return CompensateEventDefinition(line, activity, wait)
     if name == "timer":
         return _timer(reading, element, event.id)
+    if name == "conditional":
+        return _conditional(reading, found)
+    if name == "link":
+        return LinkEventDefinition(line, (element.get("name") or label).strip())
     if name == "message":
         return _message(reading, element, event, catches=catches)
     if name == "signal":
@@ -86,7 +102,7 @@ def look_up(
         stand_in.id,
         "dangling-reference",
         f"{what}Ref names '{name}', but {because}",
-        did_you_mean(name, table, f"name {a(what)} element that stands in definitions"),
+        did_you_mean(name, table, f'put <{what} id="{name}"/> into definitions, or name another'),
     )
     return stand_in
 
@@ -115,6 +131,25 @@ def _message(
     where = reading.report.line(event.element)
     reading.message_uses.append(MessageUse(definition, event.id, label, where, catches, message))
     return definition
+
+
+def _conditional(reading: Reading, found: Scan) -> ConditionalEventDefinition | None:
+    for element in found.of("condition"):
+        text = text_of(element)
+        reading.check_attributes(element, SHAPES[element.tag], found.id)
+        if text:
+            condition = reading.expression(element, found.id, text, element.get("language"))
+            if condition is None:
+                return None
+            return ConditionalEventDefinition(reading.report.line(found.element), condition)
+    reading.report.error(
+        found.element,
+        found.id,
+        "no-condition",
+        "the conditional event has no condition",
+        "add one, for example <condition>battery.level &lt; 20</condition>",
+    )
+    return None
 
 
 _TIMES = {kind.value: kind for kind in TimerKind}
@@ -147,7 +182,7 @@ def _timer(
             _CHECKS[kind](expression.evaluate(lambda _: None))
         except (ExpressionSyntaxError, ExpressionError) as error:
             reading.report.error(
-                times[0], identifier, "timer-time", f"{name}: {error}", "write it as ISO 8601"
+                times[0], identifier, "timer-time", f"{name}: {error}", time_remedy(name, text)
             )
             return None
     return TimerEventDefinition(reading.report.line(element), kind, expression)

@@ -19,12 +19,12 @@ from m2pem.model.elements import (
     IntermediateThrowEvent,
     Process,
     StartEvent,
+    SubProcess,
 )
 from m2pem.model.events import ErrorEventDefinition, EventDefinition
 from m2pem.model.near import did_you_mean
 
-_EXECUTED = frozenset({"message", "timer", "signal", "escalation", "error", "terminate"})
-_THROWN_IMPLICITLY = frozenset({"message", "signal", "escalation", "error"})
+_THROWN_IMPLICITLY = frozenset({"message", "signal", "escalation", "error", "compensate"})
 _CATCHING = frozenset({"startEvent", "intermediateCatchEvent", "boundaryEvent"})
 _NEEDS_TRIGGER = frozenset({"intermediateCatchEvent", "boundaryEvent"})
 
@@ -40,15 +40,16 @@ def read_event(reading: Reading, element: etree._Element, container: Container) 
     parallel = reading.boolean(element, "parallelMultiple", False, identifier)
     event: Event
     if place == "startEvent":
-        event = StartEvent(identifier, name, line, definitions, parallel)
+        interrupting = reading.boolean(element, "isInterrupting", True, identifier)
+        event = StartEvent(identifier, name, line, definitions, parallel, interrupting)
+        if not interrupting:
+            _no_error(reading, element, event)
     elif place == "endEvent":
         event = EndEvent(identifier, name, line, definitions)
     elif place == "intermediateThrowEvent":
         event = IntermediateThrowEvent(identifier, name, line, definitions)
     elif place == "intermediateCatchEvent":
         event = IntermediateCatchEvent(identifier, name, line, definitions, parallel)
-        if any(local(tag) == "linkEventDefinition" for tag in found.children):
-            reading.self_starting.add(event)
     else:
         event = _boundary(reading, element, identifier, definitions, parallel)
     read_data_flow(reading, found, event)
@@ -72,23 +73,34 @@ def _boundary(
         interrupting,
     )
     reading.attachments.append((event, reference(element.get("attachedToRef", ""))))
-    if not interrupting and any(isinstance(d, ErrorEventDefinition) for d in definitions):
-        reading.report.error(
-            element,
-            identifier,
-            "error-not-interrupting",
-            'a boundary event that catches an error cannot have cancelActivity="false": the '
-            "activity has already failed",
-            "make it interrupting, or throw and catch an escalation",
-        )
+    if not interrupting:
+        _no_error(reading, element, event)
     return event
+
+
+def _no_error(reading: Reading, element: etree._Element, event: Event) -> None:
+    """What catches an error cannot leave running what failed (clause 10.5.6)."""
+    if not any(isinstance(each, ErrorEventDefinition) for each in event.definitions):
+        return
+    word, attribute, what = "boundary", "cancelActivity", "activity"
+    if isinstance(event, StartEvent):
+        word, attribute, what = "start", "isInterrupting", "scope"
+    reading.report.error(
+        element,
+        event.id,
+        "error-not-interrupting",
+        f'a {word} event that catches an error cannot have {attribute}="false": the {what} has '
+        "already failed",
+        "make it interrupting, or throw and catch an escalation",
+    )
 
 
 def _definitions(
     reading: Reading, found: Scan, place: str, container: Container
 ) -> tuple[EventDefinition, ...]:
     elements = definition_elements(reading, found)
-    if not elements and place in _NEEDS_TRIGGER and not found.of("eventDefinitionRef"):
+    awaited = place in _NEEDS_TRIGGER or (place == "startEvent" and _is_handler(container))
+    if awaited and not elements and not found.of("eventDefinitionRef"):
         _no_trigger(reading, found, place)
     read = [_definition(reading, found, place, container, each) for each in elements]
     return tuple(definition for definition in read if definition is not None)
@@ -129,13 +141,16 @@ def read_thrown(
     return tuple(definition for definition in read if definition is not None)
 
 
+def _is_handler(container: Container) -> bool:
+    return isinstance(container, SubProcess) and container.triggered_by_event
+
+
 def _definition(
     reading: Reading, found: Scan, place: str, container: Container, definition: etree._Element
 ) -> EventDefinition | None:
     """One of its definitions; None when a finding says what is wrong with it."""
     name = local(definition.tag).removesuffix("EventDefinition")
-    inside_event_subprocess = container in reading.self_starting
-    embedded = not inside_event_subprocess and not isinstance(container, Process)
+    embedded = not _is_handler(container) and not isinstance(container, Process)
     if place == "startEvent" and embedded:
         reading.report.error(
             found.element,
@@ -147,24 +162,7 @@ def _definition(
         return None
     if name not in allowed_triggers(found.element):
         return None  # which a rule says
-    if name not in _EXECUTED:
-        reading.report.error(
-            found.element,
-            found.id,
-            "not-executed",
-            f"m2pem does not execute {a(kind(definition.tag))} yet",
-            _INSTEAD.get(name, "draw it with the elements that docs/missions.md lists"),
-        )
-        return None
     return read_definition(reading, definition, found, catches=place in _CATCHING)
-
-
-_INSTEAD = {
-    "conditional": "check the condition at a gateway, or throw a signal where it becomes true",
-    "link": "join the two ends by a sequence flow",
-    "cancel": "throw and catch an error",
-    "compensate": "draw what undoes the activity after a boundary event",
-}
 
 
 def referred_definition(
@@ -191,5 +189,5 @@ def _no_trigger(reading: Reading, found: Scan, place: str) -> None:
         found.id,
         "no-trigger",
         f"{a(word)} must say what it waits for",
-        f"give it a signal, message or timer event definition{also}",
+        f"give it a signal, message, timer or conditional event definition{also}",
     )

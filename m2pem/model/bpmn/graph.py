@@ -47,13 +47,22 @@ def _check_processes(reading: Reading) -> None:
 
 
 def _check_start(reading: Reading, container: Container) -> None:
-    if not container.entries and reading.self_starting.isdisjoint(container.nodes):
+    if isinstance(container, SubProcess) and container.triggered_by_event:
+        if not container.starts:
+            reading.report.error(
+                container.line,
+                container.id,
+                "no-start",
+                "an event subprocess begins with its start event, and it has none",
+                "add a start event that says what it waits for",
+            )
+    elif not container.entries and reading.self_starting.isdisjoint(container.nodes):
         reading.report.error(
             container.line,
             container.id,
             "no-start",
             "nothing in it can start: there is no start event, and every element has an incoming "
-            "flow",
+            "flow or waits for a trigger",
             "add a start event",
         )
 

@@ -3,6 +3,7 @@
 The only place that sets the fields of elements after they were made.
 """
 
+from m2pem.model.bpmn.links import is_link_target, resolve_links
 from m2pem.model.bpmn.names import a
 from m2pem.model.bpmn.reading import FlowEnds, Reading
 from m2pem.model.elements import (
@@ -20,9 +21,10 @@ from m2pem.model.elements import (
     Process,
     SequenceFlow,
     StartEvent,
+    SubProcess,
 )
 from m2pem.model.near import did_you_mean
-from m2pem.model.reach import instantiates
+from m2pem.model.reach import begins_by_itself, instantiates
 
 _set = object.__setattr__
 
@@ -33,16 +35,17 @@ def link(reading: Reading) -> dict[str, Element]:
     for index, (node, container) in enumerate(zip(reading.nodes, reading.containers, strict=True)):
         _set(node, "index", index)
         _set(node, "container", container)
-        if node.id and node.id not in nodes:
+        if node.id not in nodes:
             nodes[node.id] = node
         else:
             reading.broken.add(container)
     _link_flows(reading, nodes)
     _link_containers(reading)
-    flows = {ends.flow.id: ends.flow for ends in reversed(reading.flows) if ends.flow.id}
+    flows = {ends.flow.id: ends.flow for ends in reversed(reading.flows)}
     _link_defaults(reading, flows)
     _link_boundary(reading, nodes)
-    processes = {process.id: process for process in reversed(reading.processes) if process.id}
+    resolve_links(reading)
+    processes = {process.id: process for process in reversed(reading.processes)}
     _link_calls(reading, processes)
     return {**flows, **nodes, **processes}
 
@@ -153,6 +156,8 @@ def _link_containers(reading: Reading) -> None:
             "entries",
             tuple(starts or [node for node in inside if _begins(reading, node)]),
         )
+        handlers = [n for n in inside if isinstance(n, SubProcess) and n.triggered_by_event]
+        _set(container, "event_subprocesses", tuple(handlers))
     for container, between in flows.items():
         _set(container, "flows", tuple(between))
     for container, objects in data.items():
@@ -163,6 +168,8 @@ def _begins(reading: Reading, node: FlowNode) -> bool:
     return (
         not node.incoming
         and not isinstance(node, BoundaryEvent)
+        and not begins_by_itself(node)
+        and not is_link_target(node)
         and node not in reading.self_starting
     )
 

@@ -26,7 +26,7 @@ def resolve_messages(reading: Reading) -> None:
     for flow, _ in reading.message_flows:
         group = groups[flow.source_id]
         if group not in agreed and (flow.source_id in uses or flow.target_id in uses):
-            identifier = flow.id or f"{flow.source_id}-{flow.target_id}"
+            identifier = flow.id or f"{flow.source_id}~{flow.target_id}"
             message = Message(identifier, flow.name, flow.line)
             agreed[group] = reading.messages.setdefault(identifier, message)
     for use in reading.message_uses:

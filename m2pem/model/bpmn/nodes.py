@@ -28,6 +28,7 @@ from m2pem.model.elements import (
     Container,
     FlowNode,
     SubProcess,
+    Transaction,
 )
 
 SUBPROCESSES = frozenset(BPMN + name for name in ("subProcess", "transaction", "adHocSubProcess"))
@@ -62,7 +63,6 @@ _EVENTS = frozenset(
     )
 )
 _REFUSED = {
-    "transaction": "use a subprocess with boundary events",
     "choreographyTask": "draw the mission as processes",
     "callChoreography": "draw the mission as processes",
     "subChoreography": "draw the mission as processes",
@@ -88,11 +88,7 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
     node: FlowNode
     if tag in SUBPROCESSES:
         # Its children are read with its content, by containers.py.
-        if tag == BPMN + "adHocSubProcess":
-            node = read_ad_hoc(reading, element, identifier)
-        else:
-            node = SubProcess(identifier, element.get("name", ""), reading.report.line(element))
-        _event_subprocess(reading, element, node)
+        node = _subprocess(reading, element, identifier)
         _check_activity(reading, element, node)
     elif task is not None:
         found = scan(reading, element, identifier)
@@ -106,6 +102,24 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
     return node
 
 
+def _subprocess(reading: Reading, element: etree._Element, identifier: str) -> SubProcess:
+    triggered = reading.boolean(element, "triggeredByEvent", False, identifier)
+    if triggered and element.tag != BPMN + "subProcess":
+        reading.report.error(
+            element,
+            identifier,
+            "bad-value",
+            f"{a(kind(element.tag))} cannot be an event subprocess too",
+            'put it into a plain <subProcess triggeredByEvent="true">, behind a start event',
+        )
+    if element.tag == BPMN + "adHocSubProcess":
+        return read_ad_hoc(reading, element, identifier)
+    name, line = element.get("name", ""), reading.report.line(element)
+    if element.tag == BPMN + "transaction":
+        return Transaction(identifier, name, line, triggered)
+    return SubProcess(identifier, name, line, triggered)
+
+
 def not_executed(
     reading: Reading, element: etree._Element, identifier: str, what: str, instead: str
 ) -> None:
@@ -115,29 +129,12 @@ def not_executed(
     )
 
 
-def _event_subprocess(reading: Reading, element: etree._Element, node: SubProcess) -> None:
-    if reading.boolean(element, "triggeredByEvent", False, node.id):
-        reading.self_starting.add(node)
-        not_executed(
-            reading,
-            element,
-            node.id,
-            "event subprocess",
-            "use a boundary event on a subprocess around the rest",
-        )
 
 
 def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -> None:
     _note_default(reading, element, node)
     if reading.boolean(element, "isForCompensation", False, node.id):
-        reading.self_starting.add(node)
-        not_executed(
-            reading,
-            element,
-            node.id,
-            "compensation activity",
-            "draw what undoes the activity after a boundary event",
-        )
+        reading.undoing.add(node)
     for field, (name, rule) in _QUANTITIES.items():
         object.__setattr__(node, field, _quantity(reading, element, name, rule))
 

@@ -8,6 +8,7 @@ from lxml import etree
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.bpmn.names import M2PEM, M2PEM_ATTRIBUTES, a, attribute_names, kind, local
 from m2pem.model.bpmn.report import Report, Where
+from m2pem.model.bpmn.rewriting import expression_remedy
 from m2pem.model.bpmn.schema import Shape
 from m2pem.model.elements import (
     Activity,
@@ -122,6 +123,15 @@ class MessageUse:
     message: Message | None
 
 
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """An association between two elements, by ids (BPMN 2.0.2, clause 8.4.1)."""
+
+    source_ref: str
+    target_ref: str
+    direction: str
+
+
 @dataclass(slots=True)
 class Reading:
     """The state of reading one file."""
@@ -129,6 +139,8 @@ class Reading:
     report: Report
     expression_language: str | None = None
     ids: dict[str, int] = field(default_factory=dict)
+    made_up: dict[str, int] = field(default_factory=dict)
+    """How many ids were made up for elements without one, by how they begin."""
     event_definitions: dict[str, etree._Element] = field(default_factory=dict)
     global_tasks: dict[str, str] = field(default_factory=dict)
     signals: dict[str, Signal] = field(default_factory=dict)
@@ -161,22 +173,18 @@ class Reading:
     message_uses: list[MessageUse] = field(default_factory=list)
     self_starting: set[FlowNode] = field(default_factory=set)
     """Refused nodes that need no incoming flow (event subprocesses, link targets, ...)."""
+    undoing: set[FlowNode] = field(default_factory=set)
+    """Activities that are marked `isForCompensation`."""
+    associations: list[Drawn] = field(default_factory=list)
     broken: set[Container] = field(default_factory=set)
     """Containers whose graph is not what was drawn, because a finding says so."""
 
     def claim(self, element: etree._Element) -> str:
-        """The element's id; says when it has none, or one that is taken."""
-        identifier = element.get("id")
-        if not identifier:
-            self.report.error(
-                element,
-                "",
-                "missing-id",
-                f"{a(kind(element.tag))} has no id"
-                + (f" (its name is '{element.get('name')}')" if element.get("name") else ""),
-                "give it an id that nothing else in the file has",
-            )
-            return ""
+        """The element's id; says when it is taken. One that has none gets one.
+
+        Where nothing refers to an element, its id may be left out (BPMN 2.0.2, table 8.5).
+        """
+        identifier = element.get("id") or self._make_up(element)
         first = self.ids.get(identifier)
         if first is None:
             self.ids[identifier] = self.report.line(element)
@@ -187,6 +195,26 @@ class Reading:
                 "duplicate-id",
                 f"the id '{identifier}' is already that of the element on line {first}",
                 "give one of the two another id, and its references too",
+            )
+        return identifier
+
+    def _make_up(self, element: etree._Element) -> str:
+        """An id that no valid file has: `~` may not stand in one."""
+        what = local(element.tag)
+        flow = what == "sequenceFlow"
+        ends = (element.get("sourceRef", ""), element.get("targetRef", ""))
+        base = "~".join(ends) if flow else f"{what}~"
+        number = self.made_up[base] = self.made_up.get(base, 0) + 1
+        identifier = f"{base}{'' if flow and number == 1 else number}"
+        if not flow:
+            name = element.get("name")
+            self.report.warning(
+                element,
+                identifier,
+                "missing-id",
+                f"{a(kind(element.tag))} has no id{f' (its name is {name!r})' if name else ''}; it "
+                f"is called '{identifier}'",
+                "give it an id that nothing else in the file has, so that others can name it",
             )
         return identifier
 
@@ -286,7 +314,7 @@ class Reading:
             identifier,
             "bad-expression",
             f"not an expression: {error}",
-            "write for example user.decision == 'continue' (docs/conditions.md)",
+            expression_remedy(error.text),
         )
 
 

@@ -66,8 +66,6 @@ def read_roots(reading: Reading, definitions: etree._Element) -> list[etree._Ele
 
 def _read_event_root(reading: Reading, element: etree._Element, name: str) -> None:
     identifier = reading.claim(element)
-    if not identifier:
-        return
     scan(reading, element, identifier)
     label = element.get("name", "")
     line = reading.report.line(element)
@@ -104,10 +102,9 @@ def _from_operator(reading: Reading, element: etree._Element, identifier: str) -
 
 def _read_data_store(reading: Reading, element: etree._Element) -> None:
     identifier = reading.claim(element)
-    if identifier:
-        scan(reading, element, identifier)
-        key = element.get("name") or identifier
-        reading.data.setdefault(identifier, DataEnd(key, [element]))
+    scan(reading, element, identifier)
+    key = element.get("name") or identifier
+    reading.data.setdefault(identifier, DataEnd(key, [element]))
 
 
 def _refuse_choreography(reading: Reading, element: etree._Element) -> None:

@@ -74,7 +74,7 @@ class Order:
             if name.startswith(BPMN):
                 reading.report.warning(
                     child,
-                    identifier,
+                    identifier or child.get("id", ""),
                     "unknown-element",
                     f"BPMN has no '{local(name)}' in {a(kind(parent.tag))}; it is ignored",
                     did_you_mean(local(name), [local(each) for each in shape.ranks], "delete it"),

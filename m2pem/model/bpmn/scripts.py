@@ -6,6 +6,7 @@ from m2pem.model.behavior import Behavior, Script
 from m2pem.model.bpmn.behavior_xml import BehaviorReader, is_behavior
 from m2pem.model.bpmn.names import local
 from m2pem.model.bpmn.reading import Reading
+from m2pem.model.bpmn.rewriting import script_remedy, statement_remedy
 from m2pem.model.bpmn.scan import Scan, own_extensions
 from m2pem.model.bpmn.xml import XmlError, parse_xml
 from m2pem.model.elements import ScriptTask
@@ -73,8 +74,7 @@ def _script(
             found.id,
             "script-language",
             f"m2pem does not run scripts in '{found.element.get('scriptFormat')}'",
-            'write statements (scriptFormat="m2pem") or a behavior '
-            '(scriptFormat="application/xml")',
+            script_remedy(text),
         )
         return None, None
     if len(script):
@@ -83,14 +83,16 @@ def _script(
         return _child_behavior(reading, found, script), None
     if form in _XML_FORMATS or (not form and text.lstrip().startswith("<")):
         return _text_behavior(reading, found, script, text), None
-    statements, problems = parse_script(text, reading.report.line(script))
+    first = reading.report.line(script)
+    statements, problems = parse_script(text, first)
+    lines = text.replace("\r\n", "\n").split("\n")
     for line, message in problems:
         reading.report.error(
             line,
             found.id,
             "bad-script",
             f"the script cannot be run: {message}",
-            "one statement a line: dotted.name = expression, or throw error CODE",
+            statement_remedy(lines[line - first]),
         )
     return None, statements
 

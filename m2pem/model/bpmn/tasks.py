@@ -7,7 +7,16 @@ from lxml import etree
 from m2pem.model.behavior import Behavior, Parameter, ServiceCall
 from m2pem.model.bpmn.behavior_xml import BehaviorReader
 from m2pem.model.bpmn.definitions import look_up
-from m2pem.model.bpmn.names import CAMUNDA, M2PEM, kind, local
+from m2pem.model.bpmn.names import (
+    ACTIVITI,
+    CAMUNDA,
+    FLOWABLE,
+    M2PEM,
+    ZEEBE,
+    attribute_names,
+    kind,
+    local,
+)
 from m2pem.model.bpmn.reading import MessageUse, Reading
 from m2pem.model.bpmn.scan import Scan, own_extensions
 from m2pem.model.bpmn.scripts import BEHAVIOR, read_carried
@@ -20,9 +29,15 @@ from m2pem.model.elements import (
     Task,
 )
 from m2pem.model.events import Message
+from m2pem.model.expression.literals import shorten
 
 _NONE: frozenset[str] = frozenset()
 _SERVICE = frozenset({"behavior", "service", "property", "role"})
+_ENGINES = (CAMUNDA, FLOWABLE, ACTIVITI)
+_CLASSES = tuple(engine + name for engine in _ENGINES for name in ("class", "topic"))
+"""What other engines call the name of who does the work."""
+
+_JOB = ZEEBE + "taskDefinition"
 
 
 def read_plain_task(reading: Reading, found: Scan) -> Task:
@@ -68,7 +83,8 @@ def _service_task(reading: Reading, found: Scan, task: type[Serving]) -> Serving
             found.element,
             found.id,
             "no-service",
-            f"the {kind(found.element.tag)} names no service; it does nothing",
+            f"the {kind(found.element.tag)} names no service{_bound_elsewhere(found)}; it does "
+            "nothing",
             'add <m2pem:service class="Detector"/> to its extension elements, or make it a plain '
             "task",
         )
@@ -84,10 +100,10 @@ def _service_call(
     calls = [reader.service(each) for each in extensions.get("service", [])]
     named = [call for call in calls if call is not None]
     line = reading.report.line(element)
-    for key in ("class", M2PEM + "class", M2PEM + "service", CAMUNDA + "class"):
-        name = (element.get(key) or "").strip()
-        if name:
-            named.append(ServiceCall(name, line))
+    keys = ("class", M2PEM + "class", M2PEM + "service", *_CLASSES)
+    names = [element.get(key) or "" for key in keys]
+    names += [each.get("type") or "" for each in found.extensions() if each.tag == _JOB]
+    named += [ServiceCall(name.strip(), line) for name in names if name.strip()]
     classes = {call.service for call in named}
     if len(classes) > 1:
         reading.report.error(
@@ -104,6 +120,15 @@ def _service_call(
     roles = [*first.roles, *reader.roles(extensions.get("role", []))]
     reader.refuse_repeated(properties, "property")
     return ServiceCall(first.service, first.line, tuple(roles), tuple(properties))
+
+
+def _bound_elsewhere(found: Scan) -> str:
+    """What another engine would do here, for the message."""
+    for key in attribute_names(found.element):
+        if key.startswith(_ENGINES) and local(key) in ("expression", "delegateExpression", "type"):
+            value = found.element.get(key) or ""
+            return f" (its {local(key)} '{shorten(value)}' is another engine's)"
+    return ""
 
 
 def _loose_properties(

@@ -4,12 +4,14 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from m2pem.errors import ExpressionError
+from m2pem.model.expression.binding import some
 from m2pem.model.expression.functions import FUNCTIONS
 from m2pem.model.expression.operators import (
     ARITHMETIC,
     COMPARISONS,
     bounded_list,
     contains,
+    index,
     join,
     negate,
     truth,
@@ -20,7 +22,9 @@ from m2pem.model.expression.tree import (
     Call,
     Compare,
     Comparison,
+    If,
     In,
+    Index,
     Join,
     ListOf,
     Literal,
@@ -29,6 +33,7 @@ from m2pem.model.expression.tree import (
     Node,
     Not,
     Or,
+    Some,
     children,
 )
 from m2pem.model.values import ReadValue, Value
@@ -99,6 +104,14 @@ def _assemble(node: Node, parts: list[_Code]) -> _Code:
         case Arithmetic(operation):
             compute, left, right = ARITHMETIC[operation], parts[0].run, parts[1].run
             return _Code(lambda read: compute(left(read), right(read)))
+        case Index():
+            container, key = parts[0].run, parts[1].run
+            return _Code(lambda read: index(container(read), key(read)))
+        case If():
+            decide, then, otherwise = _test(parts[0], "a condition"), parts[1].run, parts[2].run
+            return _Code(lambda read: then(read) if decide(read) else otherwise(read))
+        case Some(variable):
+            return _boolean(some(variable, parts[0].run, _test(parts[1], "a condition")))
     return _collect(node, tuple(part.run for part in parts))
 
 

@@ -14,6 +14,7 @@ class Dialect(StrEnum):
     BARE = "m2pem"
     JUEL = "juel"
     FEEL = "feel"
+    XPATH = "xpath"
     TEMPLATE = "template"
     TEXT = "text"
 
@@ -29,8 +30,9 @@ class Span:
 MAX_LENGTH = 10_000
 """Characters of a text that holds an expression."""
 
-_ACCEPTED = "supported are m2pem (bare), juel ('${...}') and FEEL (a leading '=')"
+_ACCEPTED = "supported are m2pem (bare), juel ('${...}'), FEEL (a leading '=') and XPath"
 _MARK = re.compile(r"\\[$#]\{|[$#]\{")
+_XPATH_MARK = re.compile(r"\bget(?:DataInput|DataObject|DataOutput|ProcessProperty)\s*\(")
 
 
 def locate(text: str, language: str | None) -> tuple[Dialect, Span]:
@@ -45,7 +47,7 @@ def locate(text: str, language: str | None) -> tuple[Dialect, Span]:
     stripped = text.strip()
     start = len(text) - len(text.lstrip())
     whole = Span(start, start + len(stripped))
-    if language and spoken is None and not (_is_xpath(language) and _is_marked(stripped)):
+    if language and spoken is None:
         raise ExpressionSyntaxError(
             f"the expression language {shorten(language)!r} is not supported; {_ACCEPTED}",
             text,
@@ -64,6 +66,8 @@ def locate(text: str, language: str | None) -> tuple[Dialect, Span]:
         return Dialect.JUEL, span
     if stripped.startswith("="):
         return Dialect.FEEL, Span(start + 1, whole.end)
+    if spoken is None and _XPATH_MARK.search(stripped):
+        return Dialect.XPATH, whole
     return spoken or Dialect.BARE, whole
 
 
@@ -128,14 +132,6 @@ def _spoken(language: str | None) -> Dialect | None:
         return Dialect.BARE
     if parts and parts[-1] == "juel":
         return Dialect.JUEL
+    if "xpath" in language.lower():
+        return Dialect.XPATH
     return None
-
-
-def _is_xpath(language: str) -> bool:
-    return "xpath" in language.lower()
-
-
-def _is_marked(stripped: str) -> bool:
-    # Editors declare XPath, BPMN's default, over files whose expressions are `${...}`, which
-    # no XPath can be.
-    return stripped.startswith(("${", "#{", "="))

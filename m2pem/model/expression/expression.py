@@ -7,9 +7,10 @@ from typing import NoReturn
 from m2pem.errors import ExpressionError
 from m2pem.model.expression.compile import Run, compile_tree
 from m2pem.model.expression.dialect import Dialect, Span, locate, split
+from m2pem.model.expression.feel import FeelParser
 from m2pem.model.expression.literals import shorten, show_scalar
 from m2pem.model.expression.operators import truth
-from m2pem.model.expression.parser import parse_span
+from m2pem.model.expression.parser import Parser
 from m2pem.model.expression.tree import Join, Literal, Node, names
 from m2pem.model.values import ReadValue, Value
 
@@ -91,7 +92,13 @@ def parse(text: str, language: str | None = None) -> Expression:
         ExpressionSyntaxError: it is none, is beyond the limits, or is in another language.
     """
     dialect, span = locate(text, language)
-    return Expression(text, dialect, parse_span(text, span, dialect))
+    return Expression(text, dialect, _tree(text, span, dialect))
+
+
+def _tree(text: str, span: Span, dialect: Dialect) -> Node:
+    if dialect is Dialect.FEEL:
+        return FeelParser(text, span).parse()
+    return Parser(text, span, dialect).parse()
 
 
 def template(text: str) -> Expression:
@@ -111,7 +118,7 @@ def template(text: str) -> Expression:
     if len(spans) == 1 and text[spans[0].start - 2 : spans[0].end + 1] == stripped:
         return parse(text)
     nodes = tuple(
-        parse_span(text, part, Dialect.JUEL) if isinstance(part, Span) else Literal(part)
+        _tree(text, part, Dialect.JUEL) if isinstance(part, Span) else Literal(part)
         for part in parts
     )
     return Expression(text, Dialect.TEMPLATE, Join(nodes))

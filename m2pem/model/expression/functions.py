@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
 from typing import Any
 
-from m2pem.errors import ExpressionError
+import m2pem.model.duration as times  # imports this package too: only its name is bound yet
+from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.model.expression.literals import NUMBER, describe, read_number
 from m2pem.model.expression.operators import (
     bounded,
@@ -143,6 +144,34 @@ def _number(value: int | float | str) -> Value:
         raise ExpressionError(f"number() cannot read {describe(value)}: {error}") from None
 
 
+def _sum(values: list[Value]) -> Value:
+    total: int | float = 0
+    for value in values:
+        if value is None:
+            return None
+        if not isinstance(value, (int, float)) or isinstance(value, bool):
+            raise ExpressionError(f"sum() takes numbers, not {describe(value)}")
+        total = bounded(total + value, "sum()")
+    return total
+
+
+def _date(text: str) -> Value:
+    return _seconds("date", lambda: times.date_us(text))
+
+
+def _duration(text: str) -> Value:
+    if any(sign in text.partition("T")[0] for sign in "YM"):
+        raise ExpressionError("duration() has no years and months: how long they are is not known")
+    return _seconds("duration", lambda: times.duration_us(text, 0))
+
+
+def _seconds(name: str, read_us: Callable[[], int]) -> Value:
+    try:
+        return read_us() / 1_000_000
+    except ExpressionSyntaxError as error:
+        raise ExpressionError(f"{name}(): {error}") from None
+
+
 def _degrees(position: list[Value]) -> tuple[float, float]:
     if len(position) in (2, 3) and all(kind(each) == "number" for each in position[:2]):
         latitude, longitude = position[:2]
@@ -188,6 +217,9 @@ FUNCTIONS: dict[str, Function] = {
         Function("lower(x)", (_TEXT,), _lower),
         Function("exists(x)", (_ANY,), lambda x: x is not None),
         Function("is_empty(x)", (_ANY,), lambda x: x is None or x in ("", [], {})),
+        Function("sum(x)", (("list",),), _sum),
+        Function("date(x)", (_TEXT,), _date),
+        Function("duration(x)", (_TEXT,), _duration),
         Function("distance(a, b)", (("list",), ("list",)), _distance),
     )
 }
@@ -195,7 +227,9 @@ FUNCTIONS: dict[str, Function] = {
 FEEL_NAMES = {
     "ceiling": "ceil",
     "count": "length",
+    "date and time": "date",
     "ends with": "ends_with",
+    "is defined": "exists",
     "list contains": "contains",
     "lower case": "lower",
     "modulo": "mod",

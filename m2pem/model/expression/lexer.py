@@ -1,5 +1,6 @@
 """Splits an expression into tokens. The operators of all dialects get one name each here."""
 
+import re
 from dataclasses import dataclass
 from enum import Enum, auto
 from typing import NoReturn
@@ -34,13 +35,17 @@ class Token:
 
 
 _CONSTANTS = {"true": True, "false": False, "null": None}
-_SYMBOLS = {s: s for s in ("!=", "<=", ">=", "<", ">", "+", "-", "*", "/", "(", ")", "[", "]", ",")}
+_SYMBOLS = {
+    s: s for s in ("!=", "<=", ">=", "<", ">", "+", "-", "*", "/", "(", ")", "[", "]", ",", ".")
+}
+_TERNARY = {"?": "?", ":": ":"}
 _WORDS = {"and": "and", "or": "or", "not": "not", "in": "in"}
 
 SYMBOLS = {
-    Dialect.BARE: {**_SYMBOLS, "==": "=="},
-    Dialect.JUEL: {**_SYMBOLS, "==": "==", "&&": "and", "||": "or", "!": "not"},
-    Dialect.FEEL: {**_SYMBOLS, "=": "=="},
+    Dialect.BARE: {**_SYMBOLS, **_TERNARY, "==": "=="},
+    Dialect.JUEL: {**_SYMBOLS, **_TERNARY, "==": "==", "&&": "and", "||": "or", "!": "not"},
+    Dialect.FEEL: {**_SYMBOLS, "=": "==", "..": ".."},
+    Dialect.XPATH: {s: s for s in _SYMBOLS if s not in "/[]."} | {"=": "=="},
 }
 WORDS = {
     Dialect.BARE: _WORDS,
@@ -55,11 +60,13 @@ WORDS = {
         "div": "/",
         "empty": "empty",
     },
-    Dialect.FEEL: _WORDS,
+    Dialect.FEEL: {
+        **_WORDS,
+        **{word: word for word in ("between", "else", "every", "if", "satisfies", "some", "then")},
+    },
+    Dialect.XPATH: {"and": "and", "or": "or", "div": "/"},
 }
-_FEEL_UNSUPPORTED = frozenset(
-    {"between", "else", "every", "for", "function", "if", "instance", "satisfies", "some", "then"}
-)
+_FEEL_UNSUPPORTED = frozenset({"for", "function", "instance"})
 _HINTS = {
     "=": "'=' compares nothing here; write '==' (or a leading '=' for FEEL)",
     "&": "write 'and'",
@@ -67,7 +74,9 @@ _HINTS = {
     "!": "write 'not'",
     "%": "write mod(x, y) for the remainder",
     "^": "there is no power operator",
-    "?": "there is no 'a ? b : c'",
+    "?": "write 'if a then b else c'",
+    "/": "paths into XML are not read; a division is written 'div'",
+    "@": "paths into XML are not read",
     "{": "maps cannot be written",
     "$": "put the whole expression into one '${...}', or write it without '${' and '}'",
     "#": "put the whole expression into one '${...}', or write it without '#{' and '}'",
@@ -76,6 +85,14 @@ _HINTS = {
     "\N{LEFT SINGLE QUOTATION MARK}": "write straight quotes",
     "\N{RIGHT SINGLE QUOTATION MARK}": "write straight quotes",
 }
+
+
+_CALLED = {
+    Dialect.FEEL: re.compile(r"date and time(?=\s*\()"),
+    Dialect.JUEL: re.compile(r"(?:var|vars|variables):\w+(?=\s*\()"),
+    Dialect.XPATH: re.compile(r"(?:[^\W\d][\w.-]*+:)?+[^\W\d][\w-]*+(?=\s*+\()"),
+}
+"""Names of functions that are no names of the store."""
 
 
 def is_reserved(name: str, dialect: Dialect) -> bool:
@@ -133,6 +150,11 @@ class _Lexer:
     def _token(self) -> Token:
         start = self._position
         character = self._text[start]
+        called = _CALLED.get(self._dialect)
+        name = called.match(self._text, start, self._end) if called else None
+        if name and name[0] not in self._words:
+            self._position = name.end()
+            return Token(Kind.NAME, name[0], start)
         name_end = scan_name(self._text, start, self._end)
         if name_end > start:
             return self._word(name_end)
@@ -150,7 +172,7 @@ class _Lexer:
     def _word(self, end: int) -> Token:
         start = self._position
         word = self._text[start:end]
-        if self._text.startswith(".", end) and end < self._end:
+        if self._text.startswith(".", end) and end < self._end and not self._is_range(end):
             self._fail("a part of the name is missing after '.'", end)
         if self._dialect is Dialect.FEEL and word in _FEEL_UNSUPPORTED:
             self._fail(f"FEEL's '{word}' is not supported", start)
@@ -163,11 +185,16 @@ class _Lexer:
 
     def _number(self, end: int) -> Token:
         start = self._position
-        if end < self._end and (_continues_name(self._text[end]) or self._text[end] == "."):
-            self._fail(f"a number cannot be followed by {self._text[end]!r}", end)
+        following = self._text[end] if end < self._end and not self._is_range(end) else ""
+        if following and (_continues_name(following) or following == "."):
+            self._fail(f"a number cannot be followed by {following!r}", end)
         digits = self._text[start:end]
         self._position = end
         return Token(Kind.NUMBER, digits, start)
+
+    def _is_range(self, position: int) -> bool:
+        """Whether the `..` between two ends of a range stands there."""
+        return ".." in self._symbols and self._text.startswith("..", position)
 
     def _quoted(self, quote: str) -> Token:
         start = self._position

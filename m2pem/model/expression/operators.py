@@ -87,6 +87,17 @@ def contains(container: Value, item: Value) -> bool:
     raise ExpressionError(f"'in' takes a list on its right, not {describe(container)}{hint}")
 
 
+def index(container: Value, key: Value) -> Value:
+    """`container[key]`; null for what is not there."""
+    if container is None or key is None:
+        return None
+    if isinstance(container, list) and isinstance(key, int) and not isinstance(key, bool):
+        return container[key] if -len(container) <= key < len(container) else None
+    if isinstance(container, dict) and isinstance(key, str):
+        return container.get(key)
+    raise ExpressionError(f"{describe(container)} has no item under {describe(key)}")
+
+
 def _ordering(symbol: Comparison, compare: Callable[[Any, Any], bool]) -> Test:
     def test(left: Value, right: Value) -> bool:
         if type(left) in _NUMBERS and type(right) in _NUMBERS:

@@ -1,16 +1,17 @@
 """Parses tokens of any dialect to the one syntax tree, by precedence climbing.
 
-From weak to strong: `or`, `and`, `not`, comparisons (which do not chain), `+ -`, `* /`, unary `-`.
-In the `${...}` dialect `not` (`!`) and `empty` bind like unary `-`, as in JUEL; in FEEL `not(...)`
-looks like a call. Where that would change what a bare expression means, it is refused.
+From weak to strong: `a ? b : c`, `or`, `and`, `not`, comparisons (which do not chain), `+ -`,
+`* /`, unary `-`. In the `${...}` dialect `not` (`!`) and `empty` bind like unary `-`, as in
+JUEL. Where that would change what a bare expression means, it is refused.
 """
 
-import difflib
+import re
+from collections.abc import Callable
 from typing import NoReturn
 
 from m2pem.errors import ExpressionSyntaxError
+from m2pem.model.expression.calls import CallError, meaning, method_call
 from m2pem.model.expression.dialect import Dialect, Span
-from m2pem.model.expression.functions import FEEL_NAMES, FUNCTIONS
 from m2pem.model.expression.lexer import Kind, Token, tokenize
 from m2pem.model.expression.literals import read_number
 from m2pem.model.expression.tree import (
@@ -20,7 +21,9 @@ from m2pem.model.expression.tree import (
     Call,
     Compare,
     Comparison,
+    If,
     In,
+    Index,
     ListOf,
     Literal,
     Name,
@@ -35,46 +38,56 @@ from m2pem.model.expression.tree import (
 MAX_ITEMS = 1_000
 """Items of a list as written, and arguments of a call."""
 
-_LOWEST, _OR, _AND, _NOT, _COMPARISON, _SUM, _PRODUCT, _UNARY = range(8)
+MAX_PARTS = 20_000
+"""Nodes of a tree. A value in a range is there twice, so ranges in each other double it."""
+
+_IDENTIFIER = re.compile(r"[^\W\d]\w*")
+LOWEST, _OR, _AND, _NOT, COMPARISON, _SUM, _PRODUCT, _UNARY = range(8)
 _BINARY = {
     "or": _OR,
     "and": _AND,
-    "in": _COMPARISON,
-    "not": _COMPARISON,
+    "in": COMPARISON,
+    "between": COMPARISON,
+    "not": COMPARISON,
     "+": _SUM,
     "-": _SUM,
     "*": _PRODUCT,
     "/": _PRODUCT,
-    **{comparison.value: _COMPARISON for comparison in Comparison},
+    **{comparison.value: COMPARISON for comparison in Comparison},
 }
 """How strongly an operator after a value binds; `not` there begins `not in`."""
 
 
-def parse_span(text: str, span: Span, dialect: Dialect) -> Node:
-    """The tree of the expression that stands in `text` at `span`.
+class Parser:
+    """Reads one expression, which stands in `text` at `span`; FEEL's own words are `FeelParser`'s.
 
     Raises:
         ExpressionSyntaxError: it is none, or is beyond the limits.
     """
-    return _Parser(text, tokenize(text, span, dialect), dialect).parse()
 
-
-class _Parser:
-    def __init__(self, text: str, tokens: list[Token], dialect: Dialect) -> None:
+    def __init__(self, text: str, span: Span, dialect: Dialect) -> None:
         self._text = text
-        self._tokens = tokens
+        self._tokens = tokenize(text, span, dialect)
         self._dialect = dialect
         self._index = 0
         self._nesting = 0
 
     def parse(self) -> Node:
+        """The tree."""
         if self._ended:
             self._fail("an expression is missing")
-        node = self._expression(_LOWEST)
+        node = self._expression(LOWEST)
         if not self._ended:
-            self._fail(f"expected an operator or the end, found {self._found}")
-        if any(depth > MAX_DEPTH for _, depth in walk(node)):
-            self._fail(f"nested deeper than {MAX_DEPTH} levels; use parentheses or fewer operators")
+            spaces = "; a name has no spaces (in FEEL it may: begin with '=')"
+            hint = spaces if self._token.kind is Kind.NAME else ""
+            self._fail(f"expected an operator or the end, found {self._found}{hint}")
+        for parts, (_, depth) in enumerate(walk(node)):
+            if depth > MAX_DEPTH:
+                self._fail(
+                    f"nested deeper than {MAX_DEPTH} levels; use parentheses or fewer operators"
+                )
+            if parts > MAX_PARTS:
+                self._fail("too large, written out; use fewer ranges in each other")
         return node
 
     @property
@@ -98,12 +111,16 @@ class _Parser:
         node = self._prefix(minimum)
         while (strength := self._strength()) > minimum:
             node = self._binary(node, strength)
+        if minimum == LOWEST and self._take("?"):
+            then = self._expression(LOWEST)
+            self._expect(":", "between the two values after '?'")
+            node = If(node, then, self._expression(LOWEST))
         self._nesting -= 1
         return node
 
     def _strength(self) -> int:
         token = self._token
-        return _BINARY.get(token.text, _LOWEST) if token.kind is Kind.OPERATOR else _LOWEST
+        return _BINARY.get(token.text, LOWEST) if token.kind is Kind.OPERATOR else LOWEST
 
     def _binary(self, left: Node, strength: int) -> Node:
         if strength in (_OR, _AND):
@@ -117,14 +134,17 @@ class _Parser:
         if negated:
             self._expect("in", "after 'not'")
         right = self._expression(strength)
-        if strength == _COMPARISON:
-            if self._strength() == _COMPARISON:
-                self._fail("comparisons do not chain; write 'a < b and b < c', or use parentheses")
+        if strength == COMPARISON:
+            self._refuse_chain()
             if operator in ("in", "not"):
                 member = In(left, right)
                 return Not(member) if negated else member
             return Compare(Comparison(operator), left, right)
         return Arithmetic(Operation(operator), left, right)
+
+    def _refuse_chain(self) -> None:
+        if self._strength() == COMPARISON:
+            self._fail("comparisons do not chain; write 'a < b and b < c', or use parentheses")
 
     def _prefix(self, minimum: int) -> Node:
         token = self._next()
@@ -134,16 +154,16 @@ class _Parser:
             case Kind.CONSTANT:
                 return Literal(token.value)
             case Kind.NAME:
-                return self._name(token)
+                return self._inside(self._name(token))
             case Kind.END:
                 self._fail("expected a value, found the end", token)
         match token.text:
             case "(":
-                node = self._expression(_LOWEST)
+                node = self._expression(LOWEST)
                 self._expect(")", "to close '('", token)
-                return node
+                return self._inside(node)
             case "[":
-                return ListOf(self._items("]", token))
+                return self._inside(ListOf(self._items("]", token)))
             case "-":
                 number = self._token
                 if number.kind is Kind.NUMBER:
@@ -161,16 +181,11 @@ class _Parser:
             if minimum > _NOT:
                 self._fail("put 'not ...' into parentheses here", token)
             return Not(self._expression(_NOT))
-        if self._dialect is Dialect.JUEL:
-            return self._unambiguous(Not(self._expression(_UNARY)), token)
-        opening = self._expect("(", "after FEEL's 'not'")
-        node = self._expression(_LOWEST)
-        self._expect(")", "to close 'not('", opening)
-        return Not(node)
+        return self._unambiguous(Not(self._expression(_UNARY)), token)
 
     def _unambiguous(self, node: Node, token: Token) -> Node:
         # JUEL reads '!a == b' as '(!a) == b', most people as '!(a == b)'.
-        if self._strength() >= _COMPARISON:
+        if self._strength() >= COMPARISON:
             self._fail(
                 f"'{token.text}' is ambiguous before '{self._token.text}'; use parentheses", token
             )
@@ -184,25 +199,43 @@ class _Parser:
 
     def _name(self, token: Token) -> Node:
         name = token.text
-        if self._dialect is Dialect.FEEL:
-            # FEEL's names may hold spaces: two names in a row can only be one.
-            while self._token.kind is Kind.NAME:
-                name += " " + self._next().text
         if opening := self._take("("):
-            return self._call(name, token, opening)
+            arguments = self._items(")", opening)
+            return self._meant(lambda: meaning(name, arguments, self._dialect), token)
         return Name(name)
 
-    def _call(self, name: str, token: Token, opening: Token) -> Node:
-        key = FEEL_NAMES.get(name, name) if self._dialect is Dialect.FEEL else name
-        function = FUNCTIONS.get(key)
-        if function is None:
-            near = difflib.get_close_matches(name, FUNCTIONS, n=1)
-            hint = f"did you mean {near[0]}?" if near else "there are " + ", ".join(FUNCTIONS)
-            self._fail(f"there is no function {name[:40]!r}; {hint}", token)
-        arguments = self._items(")", opening)
-        if not function.accepts(len(arguments)):
-            self._fail(f"expected {function.signature}, found {len(arguments)} arguments", token)
-        return Call(function.name, arguments)
+    def _meant(self, read: Callable[[], Node], token: Token) -> Node:
+        try:
+            return read()
+        except CallError as error:
+            self._fail(str(error), token)
+
+    def _inside(self, node: Node) -> Node:
+        """What follows a value to take something out of it: `[0]`, `['key']`, `.key`."""
+        while True:
+            if opening := self._take("["):
+                key = self._key(opening)
+                self._expect("]", "to close '['", opening)
+                node = _taken(node, key)
+            elif self._take("."):
+                node = self._member(node)
+            else:
+                return node
+
+    def _key(self, opening: Token) -> Node:
+        return self._expression(LOWEST)
+
+    def _member(self, node: Node) -> Node:
+        token = self._next()
+        if token.kind is not Kind.NAME:
+            self._fail("expected a name after '.'", token)
+        *keys, last = token.text.split(".")
+        for key in keys:
+            node = _taken(node, Literal(key))
+        if self._dialect is Dialect.JUEL and (opening := self._take("(")):
+            holder, arguments = node, self._items(")", opening)
+            return self._meant(lambda: method_call(holder, last, arguments), token)
+        return _taken(node, Literal(last))
 
     def _items(self, closing: str, opening: Token) -> tuple[Node, ...]:
         items: list[Node] = []
@@ -211,7 +244,7 @@ class _Parser:
         while True:
             if len(items) == MAX_ITEMS:
                 self._fail(f"more than {MAX_ITEMS} items")
-            items.append(self._expression(_LOWEST))
+            items.append(self._expression(LOWEST))
             if not self._take(","):
                 self._expect(closing, f"to close '{opening.text}'", opening)
                 return tuple(items)
@@ -237,3 +270,11 @@ class _Parser:
 
     def _fail(self, message: str, token: Token | None = None) -> NoReturn:
         raise ExpressionSyntaxError(message, self._text, (token or self._token).position)
+
+
+def _taken(node: Node, key: Node) -> Node:
+    """`a['b']` is `a.b`: a map that was written as a whole is in the store by its keys."""
+    match node, key:
+        case Name(name), Literal(str(part)) if _IDENTIFIER.fullmatch(part):
+            return Name(f"{name}.{part}")
+    return Index(node, key)

@@ -117,6 +117,32 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True)
+class If:
+    """`then` where `condition` is true, else `otherwise`; null counts as false."""
+
+    condition: "Node"
+    then: "Node"
+    otherwise: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class Index:
+    """`container[key]`: an item of a list, counted from 0 (from -1 backwards), or of a map."""
+
+    container: "Node"
+    key: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class Some:
+    """Whether the condition is true with `variable` as one of the items; never, of null."""
+
+    variable: str
+    collection: "Node"
+    condition: "Node"
+
+
+@dataclass(frozen=True, slots=True)
 class Join:
     """A text with `${...}` parts; each part's value is written into it."""
 
@@ -124,7 +150,21 @@ class Join:
 
 
 Node: TypeAlias = Union[
-    Literal, Name, ListOf, Not, And, Or, Compare, In, Negate, Arithmetic, Call, Join
+    Literal,
+    Name,
+    ListOf,
+    Not,
+    And,
+    Or,
+    Compare,
+    In,
+    Negate,
+    Arithmetic,
+    Call,
+    If,
+    Index,
+    Some,
+    Join,
 ]
 
 
@@ -139,6 +179,10 @@ def children(node: Node) -> tuple[Node, ...]:
             return (operand,)
         case Compare(_, left, right) | In(left, right) | Arithmetic(_, left, right):
             return (left, right)
+        case Index(left, right) | Some(_, left, right):
+            return (left, right)
+        case If(condition, then, otherwise):
+            return (condition, then, otherwise)
 
 
 def walk(node: Node) -> Iterator[tuple[Node, int]]:
@@ -151,5 +195,16 @@ def walk(node: Node) -> Iterator[tuple[Node, int]]:
 
 
 def names(node: Node) -> frozenset[str]:
-    """The dotted names that the tree reads."""
-    return frozenset(each.name for each, _ in walk(node) if isinstance(each, Name))
+    """The dotted names that the tree reads from the store."""
+    if isinstance(node, Name):
+        return frozenset({node.name})
+    found = frozenset[str]().union(*map(names, children(node)))
+    if isinstance(node, Some):
+        inside = frozenset(name for name in names(node.condition) if binds(node.variable, name))
+        return names(node.collection) | (found - inside)
+    return found
+
+
+def binds(variable: str, name: str) -> bool:
+    """Whether a name is that of the variable, or of something in it."""
+    return name == variable or name.startswith(variable + ".")

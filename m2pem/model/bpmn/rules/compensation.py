@@ -99,6 +99,14 @@ TWO_HANDLERS = Rule(
     "the compensation boundary event leads to several activities",
     "put them into one subprocess for compensation",
 )
+TWO_EVENTS = Rule(
+    10709,
+    "two-compensation-events",
+    "10.7.1",
+    W,
+    "the activity has several compensation boundary events; the first counts",
+    "keep one of them",
+)
 HANDLER_UNMARKED = Rule(
     10706,
     "handler-not-marked",
@@ -157,6 +165,9 @@ def _boundary(tree: Tree, event: etree._Element) -> None:
         return
     if tree.out(event):
         tree.say(BOUNDARY_FLOW, event)
+    beside = tree.boundary.get(event.get("attachedToRef", ""), [])
+    if [each for each in beside if has_trigger(tree, each, "compensate")][:1] != [event]:
+        tree.say(TWO_EVENTS, event)
     handlers = _associated(tree, event, ACTIVITIES)
     if not handlers:
         tree.say(NO_ASSOCIATION, event)

@@ -7,6 +7,7 @@ from m2pem.model.bpmn.rules.rule import E, Rule, Topic, W, declared
 from m2pem.model.bpmn.rules.tree import (
     THROWING,
     Tree,
+    has_trigger,
     is_false,
     name_of,
     parent,
@@ -62,6 +63,14 @@ CANCEL_GOES_ON = Rule(
     "a cancel boundary event must interrupt the transaction",
     'delete cancelActivity="false"',
 )
+CANCEL_UNCAUGHT = Rule(
+    10552,
+    "cancel-uncaught",
+    "10.5.6",
+    W,
+    "no boundary event of the transaction catches the cancellation; its token ends there",
+    "attach a cancel boundary event to the transaction",
+)
 
 
 def _error(tree: Tree, definition: etree._Element) -> None:
@@ -91,8 +100,13 @@ def _conditional(tree: Tree, definition: etree._Element) -> None:
 def _cancel(tree: Tree, definition: etree._Element) -> None:
     event = parent(definition)
     transaction = BPMN + "transaction"
-    if name_of(event) == "endEvent" and parent(event).tag != transaction:
+    around = parent(event)
+    if name_of(event) == "endEvent" and around.tag != transaction:
         tree.say(CANCEL_END, event)
+    elif name_of(event) == "endEvent":
+        attached = tree.boundary.get(around.get("id", ""), [])
+        if not any(has_trigger(tree, each, "cancel") for each in attached):
+            tree.say(CANCEL_UNCAUGHT, event)
     elif name_of(event) == "boundaryEvent":
         host = tree.find(event, event.get("attachedToRef", ""))
         if host is not None and host.tag != transaction:

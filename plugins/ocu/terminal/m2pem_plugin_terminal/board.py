@@ -110,6 +110,8 @@ class Board:
         self._of_service: dict[str, int] = {}
         self._of_prompt: dict[str, int] = {}
         self._of_wait: dict[int, int] = {}
+        self._of_scopes: dict[int, tuple[int, str]] = {}
+        """What scopes wait for, to begin an event subprocess: the scope and the signal, by wait."""
 
     @property
     def name(self) -> str:
@@ -135,6 +137,7 @@ class Board:
     def signals(self) -> Mapping[str, tuple[str, bool]]:
         """Signals of the mission by id: name, and whether one is awaited now."""
         awaited = {wait.ref for active in self.active.values() for wait in active.waits.values()}
+        awaited.update(ref for _, ref in self._of_scopes.values())
         return {
             signal.id: (signal.name or signal.id, signal.id in awaited)
             for signal in self.mission.signals.values()
@@ -174,6 +177,9 @@ class Board:
                 self.scopes[record.scope] = Scope(record.element, record.parent, record.token)
             case r.ScopeClosed(scope=scope):
                 self.scopes.pop(scope, None)
+                self._forget_waits_of(scope)
+            case r.ScopeInterrupted(scope=scope):
+                self._forget_waits_of(scope)
             case r.TokenEntered():
                 self._order += 1
                 self.active[record.token] = Active(
@@ -221,12 +227,20 @@ class Board:
                 timer = record.trigger is r.Trigger.TIMER and not record.calendar
                 due_s = record.due_us / 1_000_000 if timer else None
                 self._of_wait[record.wait] = record.token
+                if not record.token:
+                    self._of_scopes[record.wait] = (record.scope, record.ref)
                 if active := self.active.get(record.token):
                     wait = Wait(record.element, record.trigger, record.ref, due_s)
                     active.waits[record.wait] = wait
             case r.EventTriggered(wait=over):
+                self._of_scopes.pop(over, None)
                 if active := self.active.get(self._of_wait.pop(over, 0)):
                     active.waits.pop(over, None)
+
+    def _forget_waits_of(self, scope: int) -> None:
+        ended = [wait for wait, (holder, _) in self._of_scopes.items() if holder == scope]
+        for wait in ended:
+            del self._of_scopes[wait]
 
     def _begin(self, token: int, key: str, what: str, who: tuple[str, ...]) -> None:
         if active := self.active.get(token):

@@ -1,0 +1,49 @@
+"""Every file of others loads and is rehearsed, or is refused with findings that help.
+
+`M2PEM_CORPORA` names a folder of them; without it only the project's own are examined.
+"""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.foreign.examination import Outcome, examine
+from tests.foreign.models import models
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = [ROOT / "tests/data", ROOT / "missions"]
+if os.environ.get("M2PEM_CORPORA"):
+    FOLDERS.append(Path(os.environ["M2PEM_CORPORA"]))
+MODELS = [(folder, path) for folder in FOLDERS for path in models(folder)]
+
+
+@pytest.mark.parametrize(
+    "path", [path for _, path in MODELS], ids=[str(path.relative_to(top)) for top, path in MODELS]
+)
+def test_a_model_loads_or_is_refused_with_findings_that_help(path: Path) -> None:
+    found = examine(path)
+    assert found.problems == ()
+    assert (found.outcome is Outcome.LOADED) == bool(found.ends)
+    assert (found.outcome is Outcome.LOADED) != bool(found.rules)
+
+
+def test_what_is_no_model_is_said_to_be_none(tmp_path: Path) -> None:
+    file = tmp_path / "poem.bpmn"
+    file.write_text("Roses are red")
+    found = examine(file)
+    assert found.outcome is Outcome.NO_BPMN
+    assert list(found.rules) == ["not-xml"]
+
+
+def test_an_exception_is_a_problem_and_not_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(data: bytes, file: str) -> None:
+        raise RecursionError(f"{len(data)} bytes")
+
+    file = tmp_path / "m.bpmn"
+    file.write_text("<x/>")
+    monkeypatch.setattr("tests.foreign.examination.parse_mission", broken)
+    (problem,) = examine(file).problems
+    assert "RecursionError: 4 bytes" in problem

@@ -1,0 +1,48 @@
+"""Whatever is in a file, it is refused with useful findings, or it runs, and replays the same."""
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from m2pem.model.bpmn import parse_mission
+from tests.foreign.fuzz import ROOT, case, seeds, survive
+from tests.foreign.models import models
+
+CASES = 250
+MANY_CASES = 20_000
+CORPORA = os.environ.get("M2PEM_CORPORA", "")
+SOUND = models(ROOT / "tests/data")
+
+
+@pytest.mark.parametrize("path", SOUND, ids=lambda path: path.name)
+def test_what_is_mutated_is_sound(path: Path) -> None:
+    assert parse_mission(path.read_bytes(), path.name).warnings == ()
+
+
+def test_mutated_files_are_refused_or_run() -> None:
+    run_cases(range(CASES), seeds())
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+def test_many_mutated_files_are_refused_or_run() -> None:
+    run_cases(range(CASES, MANY_CASES), seeds([Path(CORPORA)] if CORPORA else []))
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes(data: bytes) -> None:
+    assert survive(data, 0) == "refused"
+
+
+def run_cases(numbers: range, sound: list[bytes]) -> None:
+    outcomes = set()
+    for number in numbers:
+        try:
+            outcomes.add(survive(case(number, sound), number))
+        except Exception as error:
+            error.add_note(f"case {number}")
+            raise
+    assert outcomes >= {"refused", "run"}
