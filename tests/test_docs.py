@@ -23,8 +23,8 @@ from tests.console import (
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
 EXAMPLES = sorted((REPOSITORY / "examples").rglob("README.md"))
 MAKE_TARGETS = {
-    *("setup", "demo", "test", "test-long", "lint", "format", "docs", "pictures", "conformance"),
-    "clean",
+    *("setup", "demo", "test", "test-long", "fuzz", "lint", "format", "docs", "pictures"),
+    *("conformance", "clean"),
 }
 
 BLOCKS = {

@@ -46,23 +46,6 @@ def _check_tokens(state: RunState) -> None:
         assert sum(bool(each) for each in busy) <= 1
 
 
-def _check_loop(scope: Scope) -> None:
-    """Instances are in the scope of their loop, and nothing else is."""
-    loop, owner = scope.loop, scope.owner
-    if loop is None:
-        assert all(token.instance is None for token in scope.tokens.values())
-        return
-    assert owner is not None
-    assert owner.instance is None
-    assert isinstance(owner.node, Activity)
-    assert owner.node.loop is not None
-    assert all(token.node is owner.node for token in scope.tokens.values())
-    numbers = [token.instance for token in scope.tokens.values() if token.undoes is None]
-    assert len(set(numbers)) == len(numbers) == loop.started - loop.completed - loop.terminated
-    assert loop.total < 0 or loop.started <= loop.total
-    assert set(loop.outputs) <= set(range(loop.started))
-
-
 def _check_done(scope: Scope) -> None:
     claims: dict[int, int] = {}
     for number, compensation in (scope.compensations or {}).items():
@@ -97,6 +80,23 @@ def _check_done(scope: Scope) -> None:
                 assert not inner.joins
                 assert not inner.compensations
                 kept.append(inner)
+
+
+def _check_loop(scope: Scope) -> None:
+    """Instances are in the scope of their loop, and nothing else is."""
+    loop, owner = scope.loop, scope.owner
+    if loop is None:
+        assert all(token.instance is None for token in scope.tokens.values())
+        return
+    assert owner is not None
+    assert owner.instance is None
+    assert isinstance(owner.node, Activity)
+    assert owner.node.loop is not None
+    assert all(token.node is owner.node for token in scope.tokens.values())
+    numbers = [token.instance for token in scope.tokens.values() if token.undoes is None]
+    assert len(set(numbers)) == len(numbers) == loop.started - loop.completed - loop.terminated
+    assert loop.total < 0 or loop.started <= loop.total
+    assert set(loop.outputs) <= set(range(loop.started))
 
 
 def _check_waits(state: RunState) -> None:
