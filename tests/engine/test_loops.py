@@ -145,7 +145,7 @@ def test_a_called_process_is_called_anew_in_each_round() -> None:
     play = Play("""
         <process id="MAIN" isExecutable="true">
           <startEvent id="s"/>
-          <callActivity id="call" calledElement="ADD">in n as n, loopCounter as k, out n as n
+          <callActivity id="call" calledElement="ADD">in n as n, in loopCounter as k, out n as n
             <loop>n < 4</loop></callActivity>
           s -> call
         </process>

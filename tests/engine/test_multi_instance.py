@@ -269,19 +269,19 @@ def test_a_true_completion_condition_cancels_the_others() -> None:
     play = Play("""
         <dataObject id="items"/> <startEvent id="s"/> <userTask id="after"/>
         <subProcess id="each"><each in="items" item="field">
-            1 until numberOfCompletedInstances >= 2</each>
+             until numberOfCompletedInstances >= 2</each>
           <userTask id="look"/>
         </subProcess>
         s -> each -> after
-    """.replace("1 until", " until")).start({"items": ["a", "b", "c", "d"]})
+    """).start({"items": ["a", "b", "c", "d"]})
     play.answer(prompt="p2").trace()
     assert play.answer(prompt="p4").trace("leave", "withdraw", "close", "enter") == table("""
         leave look; close each; leave each
-        withdraw p1; leave look interrupted; close each interrupted
         withdraw p3; leave look interrupted; close each interrupted
+        withdraw p1; leave look interrupted; close each interrupted
         leave each interrupted; leave each interrupted; close each
         leave each; enter after
-    """) or True
+    """)
     assert play.at == "after"
 
 
@@ -304,9 +304,7 @@ def test_cancelled_instances_have_their_vehicles_cancelled() -> None:
 
 
 def test_a_sequential_one_begins_no_more_when_its_completion_condition_is_true() -> None:
-    play = scripted(
-        '<each isSequential="true">10 until loopCounter == 3</each>', "n = n + 1", n=0
-    )
+    play = scripted('<each isSequential="true">10 until loopCounter == 3</each>', "n = n + 1", n=0)
     assert play.data["n"] == 4
 
 
@@ -514,3 +512,37 @@ def test_a_stop_gets_its_turn_while_instances_are_still_being_begun() -> None:
     play.start()
     assert len(play.run.state.tokens) == 100
     assert play.stop().ended == "stopped"
+
+
+# --- compensation -------------------------------------------------------------------------------
+
+UNDOABLE = """
+    <startEvent id="s"/> <userTask id="u"/> <endEvent id="e"/>
+    <subProcess id="sub">{marker}
+      <startEvent id="in"/> <task id="do"/> <endEvent id="out"/>
+      <scriptTask id="undo" isForCompensation="true">undone = undone * 10 + loopCounter + 1
+      </scriptTask>
+      <boundaryEvent id="b" attachedToRef="do">compensate</boundaryEvent>
+      b ~> undo
+      in -> do -> out
+    </subProcess>
+    <intermediateThrowEvent id="back">compensate{named}</intermediateThrowEvent>
+    s -> sub -> back -> u
+"""
+
+
+@pytest.mark.parametrize("named", ["", " sub"])
+@pytest.mark.parametrize(
+    "marker",
+    ["<each>3</each>", '<each isSequential="true">3</each>', '<loop loopMaximum="3"> </loop>'],
+)
+def test_instances_are_undone_latest_first(marker: str, named: str) -> None:
+    play = Play(UNDOABLE.format(marker=marker, named=named)).start({"undone": 0})
+    assert play.at == "u"
+    assert play.data["undone"] == 321
+
+
+def test_instances_that_were_cancelled_are_not_undone() -> None:
+    marker = "<each>3 until loopCounter == 1</each>"
+    play = Play(UNDOABLE.format(marker=marker, named="")).start({"undone": 0})
+    assert play.data["undone"] == 21
