@@ -1,5 +1,6 @@
 """`m2pem check`: everything that is wrong or doubtful about a mission."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -11,6 +12,7 @@ from m2pem.cli.options import (
     fleet_option,
     format_option,
     mission_argument,
+    path_option,
     process_option,
 )
 from m2pem.errors import FleetError, MissionError
@@ -31,6 +33,7 @@ UNUSABLE = 2
 @mission_argument
 @fleet_option(required=False)
 @process_option
+@path_option
 @data_option
 @click.option("--strict", is_flag=True, help="Warnings are errors.")
 @format_option
@@ -38,6 +41,7 @@ def check(
     mission: str,
     fleet_file: str | None,
     process: str | None,
+    search_path: tuple[Path, ...],
     data: "dict[str, Value]",
     strict: bool,
     output: str,
@@ -47,7 +51,7 @@ def check(
     Prints every finding. Ends with 0 if none is an error, with 1 if one is, and with 2 if the
     mission is no BPMN at all or the fleet cannot be used.
     """
-    findings, unusable = _check(mission, fleet_file, process, data)
+    findings, unusable = _check(mission, fleet_file, process, search_path, data)
     if output == "json":
         click.echo(as_json(findings))
     else:
@@ -60,18 +64,21 @@ def check(
 
 
 def _check(
-    mission_file: str, fleet_file: str | None, process: str | None, data: "dict[str, Value]"
+    mission_file: str,
+    fleet_file: str | None,
+    process: str | None,
+    search_path: tuple[Path, ...],
+    data: "dict[str, Value]",
 ) -> tuple[list[Finding], bool]:
     """All findings, and whether there is nothing there to be checked."""
-    from m2pem.executive.loading import read_source
-    from m2pem.model.bpmn import NO_BPMN_RULES, parse_mission
+    from m2pem.executive.loading import load_source
+    from m2pem.model.bpmn import NO_BPMN_RULES
 
     mission: Mission | None = None
     findings: list[Finding] = []
     unusable = False
     try:
-        name, source = read_source(mission_file)
-        mission = parse_mission(source, name)
+        mission = load_source(mission_file, search_path)
     except MissionError as error:
         findings += error.findings
         unusable = any(finding.rule in NO_BPMN_RULES for finding in error.findings)

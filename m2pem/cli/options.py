@@ -89,6 +89,16 @@ data_option = click.option(
     help="Data that the mission starts with; the value is YAML 1.2. Can be given again.",
 )
 
+path_option = click.option(
+    "--path",
+    "search_path",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    metavar="DIR",
+    multiple=True,
+    help="A folder of processes that missions call, after the mission's own and before those of "
+    "M2PEM_PATH. Can be given again.",
+)
+
 answers_option = click.option(
     "--answers",
     type=click.Path(path_type=Path),

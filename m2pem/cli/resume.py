@@ -54,7 +54,7 @@ async def _resume(
     from m2pem.engine.state import RunStatus
     from m2pem.executive.clock import SystemClock
     from m2pem.journal import file_of
-    from m2pem.model.bpmn import parse_mission
+    from m2pem.journal.mission import mission_of
     from m2pem.plugins import PluginManager
     from m2pem.resources.snapshot import restore
 
@@ -67,7 +67,7 @@ async def _resume(
             raise UnusableError(f"{run_id} has ended ({line.outcome.value}): nothing to resume")
         if line.driven:
             raise UnusableError(f"{run_id} is being driven by an executive that is alive")
-        mission = parse_mission(header.mission, header.mission_name)
+        mission = mission_of(header)
         answers = get_answers(answers_file, mission)
         # Simulated time may have run ahead of the wall clock; it never goes back.
         start_us = max(time.time_ns() // 1000, await last_decided_us(journal, line))

@@ -15,6 +15,7 @@ from m2pem.cli.options import (
     journal_option,
     mission_argument,
     ocu_option,
+    path_option,
     process_option,
     simulate_option,
     speed_option,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 @mission_argument
 @fleet_option(required=True)
 @process_option
+@path_option
 @data_option
 @journal_option
 @ocu_option
@@ -44,6 +46,7 @@ def run(
     mission: str,
     fleet_file: str,
     process: str | None,
+    search_path: tuple[Path, ...],
     data: "dict[str, Value]",
     journal: str | None,
     ocu_names: str | None,
@@ -63,6 +66,7 @@ def run(
             mission,
             fleet_file,
             process=process,
+            search_path=search_path,
             data=data,
             journal_url=journal,
             ocu_names=ocu_names,
@@ -79,6 +83,7 @@ async def _run(
     fleet_name: str,
     *,
     process: str | None,
+    search_path: tuple[Path, ...],
     data: "dict[str, Value]",
     journal_url: str | None,
     ocu_names: str | None,
@@ -94,23 +99,27 @@ async def _run(
     from m2pem.cli.setting import get_answers, get_fleet, make_executive, refuse_speed
     from m2pem.cli.state_files import tidy_up, with_own_state
     from m2pem.executive.clock import SystemClock
-    from m2pem.executive.loading import read_source
+    from m2pem.executive.loading import load_source
     from m2pem.journal import file_of
-    from m2pem.model.bpmn import parse_mission
     from m2pem.plugins import PluginManager
 
     plugins = PluginManager()
     operators = Operators(chosen(ocu_names, plugins), plugins)
     url = url_of(journal_url)
-    name, source = read_source(mission_file)
-    mission = parse_mission(source, name)
+    mission = load_source(mission_file, search_path)
     answers = get_answers(answers_file, mission)
     fleet = with_own_state(get_fleet(fleet_name, mission), file_of(url), simulated=simulated)
     refuse_speed(fleet, speed, simulated=simulated)
     async with journal_at(url) as journal:
         clock = SystemClock(speed)
         executive = make_executive(
-            fleet, journal, plugins, clock, simulated=simulated, answers=answers
+            fleet,
+            journal,
+            plugins,
+            clock,
+            simulated=simulated,
+            answers=answers,
+            search_path=search_path,
         )
         process_id = executive.admit(mission, process, data)
         with output_of(output) as out:

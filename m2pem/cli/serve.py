@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -13,6 +14,7 @@ from m2pem.cli.options import (
     format_option,
     journal_option,
     ocu_option,
+    path_option,
     simulate_option,
     speed_option,
 )
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 @fleet_option(required=True)
 @journal_option
 @ocu_option
+@path_option
 @simulate_option
 @speed_option
 @format_option
@@ -34,6 +37,7 @@ def serve(
     fleet_file: str,
     journal: str | None,
     ocu_names: str | None,
+    search_path: tuple[Path, ...],
     simulate: bool,
     speed: float,
     output: str,
@@ -43,13 +47,14 @@ def serve(
     Takes up runs of the journal that were interrupted, if they had this fleet. Ctrl-C or SIGTERM
     stop the runs, wait until their vehicles are released, and end it with 0.
     """
-    return asyncio.run(_serve(fleet_file, journal, ocu_names, simulate, speed, output))
+    return asyncio.run(_serve(fleet_file, journal, ocu_names, search_path, simulate, speed, output))
 
 
 async def _serve(
     fleet_file: str,
     journal_url: str | None,
     ocu_names: str | None,
+    search_path: tuple[Path, ...],
     simulated: bool,
     speed: float,
     output: str,
@@ -80,6 +85,7 @@ async def _serve(
             plugins,
             SystemClock(speed, await _start_us(journal, mine)),
             simulated=simulated,
+            search_path=search_path,
         )
         with output_of(output) as out:
             async with driving(executive, out, operators, file_of(url), one=False) as interruption:

@@ -1,5 +1,6 @@
 """What a command needs to drive runs, read from its words; refused before anything moves."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +70,7 @@ def make_executive(
     *,
     simulated: bool,
     answers: Answers | None = None,
+    search_path: Sequence[Path] = (),
 ) -> Executive:
     """An executive that has not connected yet.
 
@@ -85,6 +87,7 @@ def make_executive(
             script=answers,
             speed=clock.speed,
             rehearse=_rehearse,
+            search_path=search_path,
         )
     except PluginError as error:
         raise UnusableError(f"{fleet.file}: {error}") from error

@@ -14,6 +14,7 @@ from m2pem.cli.options import (
     fleet_option,
     format_option,
     mission_argument,
+    path_option,
     process_option,
 )
 
@@ -45,6 +46,7 @@ def _read_start(_: click.Context, __: click.Parameter, text: str | None) -> int 
 @mission_argument
 @fleet_option(required=False)
 @process_option
+@path_option
 @data_option
 @answers_option
 @click.option(
@@ -69,6 +71,7 @@ def simulate(
     mission: str,
     fleet_file: str | None,
     process: str | None,
+    search_path: tuple[Path, ...],
     data: "dict[str, Value]",
     answers: Path | None,
     start_us: int | None,
@@ -83,13 +86,11 @@ def simulate(
     """
     from m2pem.cli.output import output_of
     from m2pem.cli.setting import get_answers, get_fleet
-    from m2pem.executive.loading import read_source
-    from m2pem.model.bpmn import parse_mission
+    from m2pem.executive.loading import load_source
     from m2pem.plugins import PluginManager
     from m2pem.sim.rehearsal import START_US, rehearse
 
-    name, source = read_source(mission)
-    loaded = parse_mission(source, name)
+    loaded = load_source(mission, search_path)
     fleet = get_fleet(fleet_file, loaded) if fleet_file is not None else None
     script = get_answers(answers, loaded)
     kept: list[StampedRecord] = []
@@ -106,7 +107,7 @@ def simulate(
                 raise BrokenPipeError
 
         result = rehearse(
-            mission,
+            loaded,
             fleet,
             plugins=PluginManager(),
             process=process,

@@ -9,7 +9,7 @@ from m2pem.engine.records import DataWritten, Record
 from m2pem.engine.run import MissionRun
 from m2pem.executive.control import summary
 from m2pem.journal.base import RunLine
-from m2pem.model.bpmn import parse_mission
+from m2pem.journal.mission import mission_of
 from m2pem.model.values import Value
 from m2pem.resources.snapshot import restore
 
@@ -17,8 +17,7 @@ from m2pem.resources.snapshot import restore
 def run_of(line: RunLine) -> MissionRun:
     """The run of a journal before anything has happened in it."""
     header = line.header
-    mission = parse_mission(header.mission, header.mission_name)
-    return MissionRun(mission, restore(header.fleet) if header.fleet else None, line.run)
+    return MissionRun(mission_of(header), restore(header.fleet) if header.fleet else None, line.run)
 
 
 class Standing:

@@ -95,7 +95,7 @@ async def _catalogue(control: MissionControl, _: Nothing) -> Any:
 
 async def _mission(control: MissionControl, p: OfRun) -> Any:
     mission = await control.mission(p.run)
-    return {"file": mission.file, "source": b64encode(mission.source).decode()}
+    return {"file": mission.file, "source": mission.source, "library": mission.library}
 
 
 METHODS: dict[str, Method] = {

@@ -26,6 +26,7 @@ from m2pem.findings import Finding
 from m2pem.model.bpmn import parse_mission
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
 from m2pem.model.elements import Mission
+from m2pem.model.library import KeptLibrary, Source
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
 from m2pem.resources.snapshot import restore
@@ -196,7 +197,10 @@ class RemoteControl:
         if run not in self._missions:
             told = await self._ask("mission", run=run)
             source = b64decode(told["source"])
-            self._missions[run] = await asyncio.to_thread(parse_mission, source, told["file"])
+            library = KeptLibrary(msgspec.convert(told["library"], list[Source]))
+            self._missions[run] = await asyncio.to_thread(
+                parse_mission, source, told["file"], library
+            )
         return self._missions[run]
 
     async def mission_time_s(self, run: RunId) -> float:

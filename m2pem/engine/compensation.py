@@ -50,7 +50,9 @@ def throw_compensation(x: Execution, token: Token, definition: CompensateEventDe
     is about the scope around that (tables 10.88 and 10.89). A named activity is looked for outwards
     from there; the activity that the event itself is in stands for all that was done in it.
     """
-    named = x.mission.elements.get(definition.activity)
+    qualifier = token.node.qualifier
+    name = f"{qualifier}:{definition.activity}" if qualifier else definition.activity
+    named = x.mission.elements.get(name) if definition.activity else None
     scope = _target(token.scope, named)
     found = [
         completion

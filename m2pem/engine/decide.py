@@ -23,7 +23,12 @@ from m2pem.engine.reports import fault, missing, reported, settle
 from m2pem.engine.state import BehaviorPhase
 from m2pem.engine.steps import Steps
 from m2pem.engine.throwing import throw_error
-from m2pem.engine.triggering import arm_conditional_starts, throw_signal, trigger
+from m2pem.engine.triggering import (
+    arm_conditional_starts,
+    arm_triggered_timers,
+    throw_signal,
+    trigger,
+)
 from m2pem.engine.waiting import next_timer
 from m2pem.model.elements import Activity, AdHocSubProcess
 
@@ -68,6 +73,8 @@ def _start(x: Steps, item: i.StartRun) -> None:
     for name, value in item.data.items():
         for key, entry in flatten(name, value):
             x.emit(r.DataWritten(0, process.id, process.id, root.id, key, entry, root.id))
+    if not arm_triggered_timers(x, root):
+        return
     begin(x, root)
     if root.id in x.state.scopes:
         arm_conditional_starts(x, root)

@@ -27,6 +27,7 @@ from m2pem.model.events import (
     EventDefinition,
     MessageEventDefinition,
     SignalEventDefinition,
+    TimerEventDefinition,
 )
 from m2pem.model.values import Value
 
@@ -57,6 +58,19 @@ def arm_event_subprocesses(x: Execution, scope: Scope) -> bool:
             for definition in start.definitions:
                 if not arm(x, scope, start, definition):
                     return False
+    return True
+
+
+def arm_triggered_timers(x: Execution, root: Scope) -> bool:
+    """Arm the timer starts of the processes that get an instance for each trigger.
+
+    They last as long as the process that the run began with. False: a timer was wrong, and its
+    error has been thrown.
+    """
+    for start in x.triggered_starts:
+        for definition in definitions_of(start) if isinstance(start, StartEvent) else ():
+            if isinstance(definition, TimerEventDefinition) and not arm(x, root, start, definition):
+                return False
     return True
 
 
@@ -176,11 +190,12 @@ def _at_boundary(
 
 
 def _in_scope(x: Execution, wait: Wait, data: dict[str, Value], keys: dict[str, Value]) -> None:
-    """The start event of an event subprocess; it goes on as one that has happened."""
+    """The start event of an event subprocess, which goes on as one that has happened; or a timer
+    or condition that begins a process."""
     node = wait.node
     if isinstance(node.container, Process):
         arm_again(x, wait)
-        _instance(x, node, definition_of(wait), data, keys)
+        _instance(x, node, _came(wait), data, keys)
         return
     assert isinstance(node, StartEvent)
     if _is_one_of_several(node, wait.scope.waits):
@@ -191,6 +206,14 @@ def _in_scope(x: Execution, wait: Wait, data: dict[str, Value], keys: dict[str, 
     begun = begin_event_subprocess(x, wait.scope, node)
     remember(x, begun, keys)
     receive_payload(x, begun, data)
+
+
+def _came(wait: Wait) -> EventDefinition:
+    """The definition of a condition or timer that begins a process."""
+    if wait.trigger is Trigger.CONDITION:
+        return definition_of(wait)
+    definitions = definitions_of(wait.node)
+    return next(each for each in definitions if isinstance(each, TimerEventDefinition))
 
 
 # --- event-based gateways -----------------------------------------------------------------------

@@ -2,8 +2,9 @@
 
 A wait belongs to a token: at its own node (catch event, receive task, typed start), at a boundary
 event of the activity that it is on, or at an event behind the event-based gateway that it is on. Or
-it belongs to a scope: the start event of an event subprocess. When it is over it is gone; what
-catches again is armed again.
+it belongs to a scope: the start event of an event subprocess, or, of the scope that the run began
+with, a timer that begins another process. When it is over it is gone; what catches again is armed
+again.
 """
 
 from m2pem.engine import records as r
@@ -13,7 +14,8 @@ from m2pem.engine.records import Trigger
 from m2pem.engine.state import Scope, Token, Wait
 from m2pem.engine.throwing import throw_error, throw_error_in
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.model.duration import cycle, date_us, duration_us
+from m2pem.model.cycle import cycle, next_round
+from m2pem.model.duration import date_us, duration_us
 from m2pem.model.elements import FlowNode
 from m2pem.model.events import (
     ConditionalEventDefinition,
@@ -126,13 +128,10 @@ def _arm_timer(
         await_event(x, holder, node, Trigger.TIMER, due_us=date_us(text), calendar=True)
         return
     rounds = cycle(text)
-    left = -1 if rounds.repetitions is None else rounds.repetitions - 1
-    if rounds.start_us is not None:
-        due_us = rounds.first_us(x.now_us)
-        await_event(x, holder, node, Trigger.TIMER, "", due_us, True, left, rounds.period)
-    else:
-        due_us = x.state.mission_time_us(x.now_us) + duration_us(rounds.period, x.now_us)
-        await_event(x, holder, node, Trigger.TIMER, "", due_us, False, left, rounds.period)
+    due_us, left = rounds.first(x.now_us)
+    if not rounds.dated:
+        due_us += x.state.mission_time_us(x.now_us) - x.now_us
+    await_event(x, holder, node, Trigger.TIMER, "", due_us, rounds.dated, left, rounds.period)
 
 
 def arm_again(x: Execution, wait: Wait) -> None:
@@ -141,15 +140,16 @@ def arm_again(x: Execution, wait: Wait) -> None:
     if wait.trigger is not Trigger.TIMER:
         spent = wait.trigger is Trigger.CONDITION
         await_event(x, holder, wait.node, wait.trigger, wait.ref, spent=spent)
-    elif wait.left != 0:
-        left = wait.left - 1 if wait.left > 0 else -1
-        at_us = wait.due_us + (0 if wait.calendar else x.state.started_us)
-        try:
-            due_us = wait.due_us + duration_us(wait.cycle, at_us)
-        except ExpressionSyntaxError:  # the next round is beyond the calendar: it never comes
-            return
+        return
+    # A mission time as a date, because months are those of the calendar.
+    shift_us = 0 if wait.calendar else x.state.started_us
+    now_us = x.now_us if wait.calendar else x.state.mission_time_us(x.now_us) + shift_us
+    due_us = wait.due_us + shift_us
+    following = next_round(wait.cycle, due_us, now_us, wait.left, dated=wait.calendar)
+    if following is not None:
+        next_us, left = following[0] - shift_us, following[1]
         await_event(
-            x, holder, wait.node, Trigger.TIMER, "", due_us, wait.calendar, left, wait.cycle
+            x, holder, wait.node, Trigger.TIMER, "", next_us, wait.calendar, left, wait.cycle
         )
 
 

@@ -20,10 +20,10 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import MissionError, OperatorError
-from m2pem.executive.loading import findings_for, read_source
+from m2pem.executive.loading import findings_for, load_source
 from m2pem.findings import Finding
 from m2pem.journal.base import RunLine
-from m2pem.model.bpmn import parse_mission
+from m2pem.journal.mission import mission_of
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
 from m2pem.model.elements import Mission
 from m2pem.model.events import Signal
@@ -189,8 +189,7 @@ class Control:
             return runner.run.state.mission
         for line in await self._executive.journal.runs():
             if line.run == run:
-                header = line.header
-                return await asyncio.to_thread(parse_mission, header.mission, header.mission_name)
+                return await asyncio.to_thread(mission_of, line.header)
         raise OperatorError(f"the journal has no run {run}")
 
     async def mission_time_s(self, run: RunId) -> float:
@@ -223,8 +222,7 @@ class Control:
         """All findings of `m2pem check` for a mission and the fleet in use."""
         executive = self._executive
         try:
-            name, source = read_source(mission)
-            loaded = parse_mission(source, name)
+            loaded = load_source(mission, executive.search_path)
         except MissionError as error:
             return error.findings
         return findings_for(
@@ -244,7 +242,11 @@ class Control:
         if executive.rehearse is None:
             raise OperatorError("this executive cannot rehearse missions")
         rehearse = partial(executive.rehearse, plugins=executive.plugins, observed=False)
-        settings = {"max_steps": REHEARSED_STEPS, **options}
+        settings = {
+            "max_steps": REHEARSED_STEPS,
+            "search_path": executive.search_path,
+            **options,
+        }
         return await asyncio.to_thread(rehearse, mission, executive.fleet, **settings)
 
 

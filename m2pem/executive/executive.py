@@ -29,7 +29,7 @@ from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.control import Control
 from m2pem.executive.dispatch import Dispatcher
 from m2pem.executive.handover import Handover
-from m2pem.executive.loading import findings_for, known_data, read_source, refuse_errors
+from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
 from m2pem.executive.notices import Notices
 from m2pem.executive.recovery import replay, take_over
 from m2pem.executive.runner import Outside, Runner
@@ -38,7 +38,7 @@ from m2pem.executive.services import Services
 from m2pem.gateway.bus import Bus
 from m2pem.gateway.watch import Watch, watch
 from m2pem.journal.base import Journal, RunHeader
-from m2pem.model.bpmn import parse_mission
+from m2pem.journal.mission import mission_of
 from m2pem.model.catalogue import ResourceId
 from m2pem.model.elements import Mission
 from m2pem.model.geometry import Geometry
@@ -65,6 +65,7 @@ class Executive:
     `speed`: of the clock against the wall clock, kept in the journal for a resume. `watch_links`:
     whether silence of a vehicle ends its behaviors. `max_steps` as in `Runner`. `observed`: whether
     plugins are told of records. `rehearse`: what `MissionControl.simulate` calls, in a thread.
+    `search_path`: folders of processes that missions call.
     """
 
     def __init__(
@@ -81,6 +82,7 @@ class Executive:
         watch_links: bool = True,
         max_steps: int | None = None,
         observed: bool = True,
+        search_path: Sequence[Path] = (),
         rehearse: Callable[..., SimulationResult] | None = None,
     ) -> None:
         self.fleet = fleet
@@ -94,6 +96,7 @@ class Executive:
         self.runners: dict[RunId, Runner] = {}
         self.control = Control(self)
         self.rehearse = rehearse
+        self.search_path = tuple(search_path)
         self._observed = observed
         self._script = script
         self._speed = speed
@@ -218,8 +221,7 @@ class Executive:
         Raises:
             MissionError: with every finding.
         """
-        name, source = read_source(mission)
-        loaded = parse_mission(source, name)
+        loaded = load_source(mission, self.search_path)
         return loaded, self.admit(loaded, process, data)
 
     def admit(self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None) -> str:
@@ -263,6 +265,7 @@ class Executive:
             self.simulated,
             self._speed,
             self.clock.now_us(),
+            loaded.library,
         )
         number = await self.journal.create(header)
         batch = min(STEPS_AT_ONCE, self._max_steps or STEPS_AT_ONCE)
@@ -291,7 +294,7 @@ class Executive:
         if line.last_seq == 0:
             raise OperatorError(f"{number} never began: start its mission again")
         epoch = await self.journal.claim(number)
-        mission = parse_mission(line.header.mission, line.header.mission_name)
+        mission = mission_of(line.header)
         run = MissionRun(mission, self.fleet, number)
         last_us = await replay(self.journal, run, self._script)
         runner = self._runner(run, epoch)
@@ -302,12 +305,7 @@ class Executive:
 
     def _runner(self, run: MissionRun, epoch: int) -> Runner:
         outside = Outside(
-            self.journal,
-            self.clock,
-            self.dispatcher,
-            self.services,
-            self.notices,
-            self._observe,
+            self.journal, self.clock, self.dispatcher, self.services, self.notices, self._observe
         )
         runner = Runner(run, epoch, outside, self._max_steps)
         self.runners[runner.id] = runner

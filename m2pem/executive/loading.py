@@ -10,8 +10,10 @@ from urllib.request import urlopen
 from m2pem.errors import MissionError
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.findings import Finding, Severity, has_errors
+from m2pem.model.bpmn import parse_mission
+from m2pem.model.bpmn.search_path import SearchPath
 from m2pem.model.elements import Mission, ServiceTask
-from m2pem.model.lint import lint
+from m2pem.model.lint import by_file, lint
 from m2pem.model.near import did_you_mean
 from m2pem.resources.check import check_mission
 
@@ -22,25 +24,30 @@ FETCH_TIMEOUT_S = 10.0
 MAX_BYTES = 20_000_000
 
 
-def read_source(mission: Path | str | bytes) -> tuple[str, bytes]:
-    """The file's name for people, and its bytes. `str` is a path or a file:, http:, https: URL.
+def load_source(mission: Path | str | bytes, search_path: Iterable[Path] = ()) -> Mission:
+    """Read a mission, and the files that it uses. `str` is a path or a file:, http:, https: URL.
+
+    `search_path`: folders to look in for what it calls, after its own; one that did not come from a
+    file has none of its own.
 
     Raises:
-        MissionError: it cannot be read, or is too big.
+        MissionError: it cannot be read, is too big, or is wrong; with every finding.
     """
     if isinstance(mission, bytes):
-        return "mission.bpmn", mission
+        return parse_mission(mission, "mission.bpmn", SearchPath(None, search_path))
     if isinstance(mission, str):
         parts = urlsplit(mission)
         if parts.scheme in ("http", "https"):
-            return Path(unquote(parts.path)).name or mission, _fetch(mission)
+            name = Path(unquote(parts.path)).name or mission
+            return parse_mission(_fetch(mission), name, SearchPath(None, search_path))
         mission = Path(unquote(parts.path)) if parts.scheme == "file" else Path(mission)
     try:
         if mission.stat().st_size > MAX_BYTES:
             raise _unreadable(str(mission), f"it is bigger than {MAX_BYTES // 1_000_000} MB")
-        return str(mission), mission.read_bytes()
+        source = mission.read_bytes()
     except OSError as error:
         raise _unreadable(str(mission), error.strerror or str(error)) from error
+    return parse_mission(source, str(mission), SearchPath(mission, search_path))
 
 
 def _fetch(url: str) -> bytes:
@@ -76,8 +83,8 @@ def findings_for(
     """
     writes = {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
     findings = [*mission.warnings, *lint(mission, data, writes)]
-    if process is not None and process not in {each.id for each in mission.processes}:
-        known = ", ".join(each.id for each in mission.processes)
+    beginning = [each.id for each in mission.processes if not each.global_task]
+    if process is not None and process not in beginning:
         findings.append(
             Finding(
                 Severity.ERROR,
@@ -86,7 +93,7 @@ def findings_for(
                 process,
                 "unknown-process",
                 f"there is no process {process!r}",
-                f"name one of: {known}",
+                f"name one of: {', '.join(beginning)}",
             )
         )
     fleet = arbiters.fleet if arbiters is not None else None
@@ -94,7 +101,8 @@ def findings_for(
         findings += check_mission(mission, arbiters.fleet, arbiters.offered, simulated=simulated)
     findings += _unprovided(mission, writes)
     findings += plugins.check_mission(mission, fleet)
-    return sorted(findings, key=lambda finding: (finding.line, finding.element, finding.rule))
+    order = by_file(mission)
+    return sorted(findings, key=lambda each: (order(each), each.line, each.element, each.rule))
 
 
 def _unprovided(mission: Mission, services: Collection[str]) -> list[Finding]:
@@ -105,7 +113,7 @@ def _unprovided(mission: Mission, services: Collection[str]) -> list[Finding]:
     return [
         Finding(
             Severity.WARNING,
-            mission.file,
+            mission.file_of(task),
             task.call.line,
             task.id,
             "unknown-service",

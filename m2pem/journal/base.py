@@ -9,15 +9,17 @@ from typing import Protocol
 
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record, RunOutcome
+from m2pem.model.library import Source
 
 
 @dataclass(frozen=True, slots=True)
 class RunHeader:
     """What a run needs to be rebuilt from nothing else: the mission and the fleet themselves.
 
-    `mission_name` is the file's name for people, `mission` its bytes; `fleet` is
-    `m2pem.resources.snapshot.dump(fleet)`, or b"" without one. `simulated`: every arbiter was
-    replaced by the simulated one; `speed`: of the clock against the wall clock.
+    `mission_name` is the file's name for people, `mission` its bytes, `library` the other files
+    that it uses; `fleet` is `m2pem.resources.snapshot.dump(fleet)`, or b"" without one.
+    `simulated`: every arbiter was replaced by the simulated one; `speed`: of the clock against
+    the wall clock.
     """
 
     mission_name: str
@@ -27,6 +29,7 @@ class RunHeader:
     simulated: bool = False
     speed: float = 1.0
     created_us: int = 0
+    library: tuple[Source, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record
 from m2pem.errors import InternalError, JournalError
 from m2pem.journal.base import Entry
+from m2pem.model.library import Source
 
 # 18 digits: what the 64-bit keys of a database hold.
 _RUN_ID = re.compile(r"r[1-9][0-9]{0,17}")
@@ -55,6 +56,23 @@ def decode_body(body: bytes | str) -> Body:
     try:
         return _decoder.decode(body)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise JournalError(f"damaged, or written by a newer m2pem: {error}") from error
+
+
+def encode_library(library: tuple[Source, ...]) -> str:
+    """The other files of a mission as JSON; their bytes are base64."""
+    return _encoder.encode(library).decode()
+
+
+def decode_library(text: str) -> tuple[Source, ...]:
+    """What `encode_library` wrote.
+
+    Raises:
+        JournalError: the text is damaged, or of a newer m2pem.
+    """
+    try:
+        return msgspec.json.decode(text, type=tuple[Source, ...])
+    except (msgspec.DecodeError, UnicodeError) as error:
         raise JournalError(f"damaged, or written by a newer m2pem: {error}") from error
 
 

@@ -15,7 +15,7 @@ from typing import Any
 from m2pem.engine.records import RunOutcome
 from m2pem.errors import InternalError, JournalError
 from m2pem.journal.base import Entry, RunHeader
-from m2pem.journal.codec import run_id, unknown_run
+from m2pem.journal.codec import encode_library, run_id, unknown_run
 from m2pem.journal.lease import RunLocks
 from m2pem.journal.standing import Standing
 
@@ -66,7 +66,7 @@ class Ledger:
         standing = Standing(epoch=1, pid=os.getpid(), started_us=header.created_us)
         self._take(number, standing)
         self._connection.execute(
-            "INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
             (
                 number,
                 header.mission_name,
@@ -76,6 +76,7 @@ class Ledger:
                 header.simulated,
                 header.speed,
                 header.created_us,
+                encode_library(header.library),
             ),
         )
         self._changed[number] = standing

@@ -54,7 +54,15 @@ def runs_standings_and_entries(connection: sqlite3.Connection) -> None:
     )
 
 
-MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (runs_standings_and_entries,)
+def other_files_of_missions(connection: sqlite3.Connection) -> None:
+    """0.2: the files that a mission calls into or imports are kept with it."""
+    connection.execute("ALTER TABLE runs ADD COLUMN library TEXT NOT NULL DEFAULT '[]'")
+
+
+MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
+    runs_standings_and_entries,
+    other_files_of_missions,
+)
 
 
 def check(connection: sqlite3.Connection, path: Path) -> None:

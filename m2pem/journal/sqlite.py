@@ -11,7 +11,14 @@ from typing import Any, TypeVar
 
 from m2pem.errors import JournalError
 from m2pem.journal.base import Entry, RunHeader, RunLine
-from m2pem.journal.codec import decode_body, encode_body, run_id, run_number, unknown_run
+from m2pem.journal.codec import (
+    decode_body,
+    decode_library,
+    encode_body,
+    run_id,
+    run_number,
+    unknown_run,
+)
 from m2pem.journal.database import in_plain_words, open_for_reading, open_for_writing
 from m2pem.journal.lease import RunLocks, run_locks
 from m2pem.journal.ledger import Ledger, Row, standing_of
@@ -164,7 +171,9 @@ class SqliteJournal:
         return [self._line(*row) for row in rows]
 
     def _line(self, number: int, *columns: Any) -> RunLine:
-        mission_name, mission, process, fleet, simulated, speed, created_us, *standing = columns
+        mission_name, mission, process, fleet, simulated, speed, created_us, library, *standing = (
+            columns
+        )
         header = RunHeader(
             mission_name=mission_name,
             mission=mission,
@@ -173,6 +182,7 @@ class SqliteJournal:
             simulated=bool(simulated),
             speed=speed,
             created_us=created_us,
+            library=decode_library(library),
         )
         return standing_of(standing).line(run_id(number), header, self._locks.held(number))
 

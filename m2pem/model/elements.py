@@ -20,19 +20,31 @@ from m2pem.model.events import (
     Escalation,
     EventDefinition,
     Message,
+    RootElement,
     Signal,
 )
 from m2pem.model.expression import Expression
+from m2pem.model.library import Source
 from m2pem.model.loops import MultiInstance, StandardLoop
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Element:
-    """Anything with an id in a mission. `line` is the line of its start tag, from 1."""
+    """Anything with an id in a mission. `line` is the line of its start tag, from 1.
+
+    In files that the mission calls into, ids begin with the file's name: `survey:Start`.
+    """
 
     id: str
     name: str
     line: int
+    qualifier: str = field(init=False, repr=False, default="")
+    """What the id begins with, before a colon; "" in the mission's own file."""
+
+    @property
+    def local_id(self) -> str:
+        """The id as it is in its file: what expressions there know it by."""
+        return self.id[len(self.qualifier) + 1 :] if self.qualifier else self.id
 
     @property
     def label(self) -> str:
@@ -77,9 +89,15 @@ class DataObject(Element):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Process(Element):
-    """A process (clause 10.2). `executable` is the file's `isExecutable`."""
+    """A process (clause 10.2). `executable` is the file's `isExecutable`.
+
+    `global_task`: it has a global task of its id in it, and nothing else; it can only be called.
+    """
 
     executable: bool = False
+    global_task: bool = False
+    file: str = field(init=False, repr=False, default="")
+    """The file that it is in; "" in the mission's own."""
     nodes: tuple[FlowNode, ...] = field(init=False, repr=False, default=())
     flows: tuple[SequenceFlow, ...] = field(init=False, repr=False, default=())
     data: tuple[DataObject, ...] = field(init=False, repr=False, default=())
@@ -184,7 +202,7 @@ class ReceiveTask(Activity):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CallActivity(Activity):
-    """Calls a process of the mission (clause 10.3.6). `called` is linked after all are read."""
+    """Calls a process or global task (clause 10.3.6). `called` is linked after all are read."""
 
     called_id: str = ""
     mappings: Mappings = field(default_factory=Mappings)
@@ -382,11 +400,12 @@ class Lane(Element):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mission:
-    """A whole BPMN file, ready to run.
+    """A whole BPMN file with all that it calls, ready to run.
 
-    `file` is its name for findings; `source` its bytes, kept for the journal. `nodes` and `flows`
-    list all of them, of all containers; `element.index` is the place there. `processes` are in
-    the order of the XML.
+    `file` is its name for findings; `source` its bytes, kept for the journal; `library` the other
+    files that it uses. `nodes` and `flows` list all of them, of all containers; `element.index` is
+    the place there. `processes` are in the order of the XML, those of other files last: only the
+    ones that are called.
     """
 
     file: str
@@ -409,6 +428,7 @@ class Mission:
     data_stores: frozenset[str] = frozenset()
     """Keys of the data stores, which all processes of a run share (clause 10.4.1)."""
     correlation_properties: tuple[CorrelationProperty, ...] = ()
+    library: tuple[Source, ...] = field(repr=False, default=())
 
     def process(self, process_id: str | None = None) -> Process:
         """The process a run begins with: the one named, else the file's main one.
@@ -419,11 +439,23 @@ class Mission:
         Raises:
             KeyError: no process has that id.
         """
+        own = [process for process in self.processes if not process.global_task]
         if process_id is not None:
-            return {process.id: process for process in self.processes}[process_id]
-        called = {node.called_id for node in self.nodes if isinstance(node, CallActivity)}
-        candidates = [p for p in self.processes if p.executable] or list(self.processes)
-        return next((p for p in candidates if p.id not in called), candidates[0])
+            return {process.id: process for process in own}[process_id]
+        own = [process for process in own if not process.file]
+        called = {
+            node.called
+            for node in self.nodes
+            if isinstance(node, CallActivity) and not node.container.process.file
+        }
+        candidates = [process for process in own if process.executable] or own
+        return next((each for each in candidates if each not in called), candidates[0])
+
+    def file_of(self, element: FlowNode | Process | RootElement) -> str:
+        """The name of the file that an element is in, for findings."""
+        if isinstance(element, FlowNode):
+            element = element.container.process
+        return element.file or self.file
 
     def activities(self) -> Iterator[Activity]:
         """Every activity, in the order of the XML."""

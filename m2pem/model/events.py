@@ -1,7 +1,7 @@
 """Event definitions and the root elements they refer to (BPMN 2.0.2, clauses 8.4 and 10.5.5)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from m2pem.model.expression import Expression
@@ -14,6 +14,8 @@ class RootElement:
     id: str
     name: str
     line: int
+    file: str = field(init=False, repr=False, compare=False, default="")
+    """The file that declares it; "" for one that an event of the mission's own file made up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +105,7 @@ class TimerKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class TimerEventDefinition(EventDefinition):
-    """`expression` evaluates to ISO 8601 text; `m2pem.model.duration` reads it."""
+    """`expression` evaluates to a text that `m2pem.model.duration` or `m2pem.model.cycle` reads."""
 
     kind: TimerKind
     expression: Expression

@@ -5,7 +5,7 @@ they can be verified and simulated, and are errors of `check`.
 """
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from m2pem.findings import Finding, Severity
 from m2pem.model.bpmn.graph import unreachable
@@ -43,7 +43,7 @@ def lint(
     known_names: Iterable[str] = (),
     service_writes: Mapping[str, Sequence[str]] | None = None,
 ) -> list[Finding]:
-    """Look over a whole mission; findings are sorted by line.
+    """Look over a whole mission; findings are sorted by file and line.
 
     `known_names`: names that are written from outside (`--data`). `service_writes`: what each
     registered service class writes; a class that is not there may write anything.
@@ -55,13 +55,20 @@ def lint(
         *_recursion(mission),
         *unwritten(mission, known_names, service_writes or {}),
     ]
-    return sorted(findings, key=lambda finding: finding.line)
+    order = by_file(mission)
+    return sorted(findings, key=lambda finding: (order(finding), finding.line))
+
+
+def by_file(mission: Mission) -> Callable[[Finding], tuple[bool, str]]:
+    """Orders findings by file, the mission's own first."""
+    return lambda finding: (finding.file != mission.file, finding.file)
 
 
 def _warning(
-    mission: Mission, line: int, element: str, rule: str, said: tuple[str, str]
+    mission: Mission, about: FlowNode | Signal | Message, rule: str, said: tuple[str, str]
 ) -> Finding:
-    return Finding(Severity.WARNING, mission.file, line, element, rule, *said, code(rule))
+    file = mission.file_of(about)
+    return Finding(Severity.WARNING, file, about.line, about.id, rule, *said, code(rule))
 
 
 def _unreachable(mission: Mission) -> Iterator[Finding]:
@@ -69,7 +76,7 @@ def _unreachable(mission: Mission) -> Iterator[Finding]:
     containers: list[Container] = [*mission.processes, *inner]
     for container in containers:
         for node in unreached(container):
-            yield unreachable(mission.file, node)
+            yield unreachable(mission.file_of(node), node)
 
 
 def _undecided_gateways(mission: Mission) -> Iterator[Finding]:
@@ -86,8 +93,7 @@ def _undecided_gateways(mission: Mission) -> Iterator[Finding]:
             )
             yield _warning(
                 mission,
-                node.line,
-                node.id,
+                node,
                 "no-conditions",
                 (
                     f"none of the gateway's {len(node.outgoing)} outgoing flows has a condition; "
@@ -113,14 +119,15 @@ def _outside_only(mission: Mission) -> Iterator[Finding]:
             else:
                 caught.setdefault(key, (root, []))[1].append(node)
     for key, (root, catchers) in caught.items():
-        if key in thrown or root.from_operator or (isinstance(root, Signal) and root.returned):
+        known = (mission.signals if isinstance(root, Signal) else mission.messages).get(root.id)
+        sent = root.from_operator or (known is not None and known.from_operator)
+        if key in thrown or sent or (isinstance(root, Signal) and root.returned):
             continue
         what = key[0].lower()
         waiting = ", ".join(f"'{node.id}'" for node in catchers)
         yield _warning(
             mission,
-            root.line,
-            root.id,
+            root,
             "outside-only",
             (
                 f"{waiting} {'wait' if len(catchers) > 1 else 'waits'} for the {what} "
@@ -170,8 +177,7 @@ def _recursion(mission: Mission) -> Iterator[Finding]:
             if group[call.called] == group[process]:
                 yield _warning(
                     mission,
-                    call.line,
-                    call.id,
+                    call,
                     "call-recursion",
                     (
                         f"process '{process.id}' calls itself through '{call.called.id}'"

@@ -92,7 +92,7 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
             said.add((read.element, name))
             yield Finding(
                 Severity.WARNING,
-                mission.file,
+                mission.file_of(process),
                 read.line,
                 read.element,
                 "unwritten-name",
@@ -192,7 +192,7 @@ def _note_writes(
         store.written.add(node.prompt.store)
     elif isinstance(node, ComplexGateway):
         store.written |= {"activationCount", "waitingForStart"}
-        store.written.update(flow.id for flow in node.incoming)
+        store.written.update(flow.local_id for flow in node.incoming)
     elif isinstance(node, ServiceTask) and node.call is not None:
         writes = service_writes.get(node.call.service)
         if writes is None:

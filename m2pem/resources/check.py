@@ -28,7 +28,7 @@ def check_mission(
     simulated arbiter, which then stands in for all. Findings come in the order of the mission.
     A geometry that the fleet lacks is a warning: an operator may hand it over in time.
     """
-    check = _Check(mission.file, fleet, ResourceGraph(fleet, catalogue), catalogue, simulated)
+    check = _Check(mission, fleet, ResourceGraph(fleet, catalogue), catalogue, simulated)
     findings = [finding for task in mission.activities() for finding in check.task(task)]
     return [*findings, *_returned(mission, fleet)]
 
@@ -40,7 +40,7 @@ def _returned(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
         if signal.returned and signal.returned not in known:
             yield Finding(
                 Severity.ERROR,
-                mission.file,
+                mission.file_of(signal),
                 signal.line,
                 signal.id,
                 "unknown-resource",
@@ -60,14 +60,14 @@ class _Taker:
 
 @dataclass(frozen=True, slots=True)
 class _Check:
-    file: str
+    mission: Mission
     fleet: Fleet
     graph: ResourceGraph
     catalogue: Catalogue
     simulated: bool
 
     def task(self, task: Activity) -> list[Finding]:
-        findings = TaskFindings(self.file, task)
+        findings = TaskFindings(self.mission.file_of(task), task)
         if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior:
             self._behavior(task.behavior, findings)
         elif isinstance(task, ServiceTask) and task.call:

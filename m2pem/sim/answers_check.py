@@ -89,7 +89,7 @@ class _Check:
     def _unknown(self, path: tuple[str, str], name: str, what: str, known: Collection[str]) -> None:
         there = self._mission.elements.get(name)
         if isinstance(there, FlowNode):
-            message = f"'{name}' (line {there.line} of {self._mission.file}) is no {what}"
+            message = f"'{name}' (line {there.line} of {self._mission.file_of(there)}) is no {what}"
         else:
             message = f"{self._mission.file} has no {what} '{name}'"
         plural = what.replace("task", "tasks", 1)

@@ -20,7 +20,7 @@ def refuse_commands(mission: Mission) -> None:
     findings = [
         Finding(
             Severity.ERROR,
-            mission.file,
+            mission.file_of(task),
             work.line,
             task.id,
             "needs-fleet",

@@ -18,13 +18,12 @@ from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import AnswersError
 from m2pem.executive.clock import US_PER_S, VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
-from m2pem.executive.loading import read_source
+from m2pem.executive.loading import load_source
 from m2pem.executive.runner import Runner
 from m2pem.executive.script import ScriptedBehavior, ScriptedService
 from m2pem.findings import has_errors
 from m2pem.journal.base import Entry
 from m2pem.journal.memory import MemoryJournal
-from m2pem.model.bpmn import parse_mission
 from m2pem.model.elements import Mission
 from m2pem.model.values import Value
 from m2pem.plugins import PluginManager
@@ -77,6 +76,7 @@ def rehearse(
     max_steps: int = MAX_STEPS,
     on_record: OnRecord | None = None,
     observed: bool = True,
+    search_path: Sequence[Path] = (),
 ) -> RehearsalResult:
     """Run a mission to its end on a virtual clock that begins at `start_us` (since the epoch).
 
@@ -84,17 +84,14 @@ def rehearse(
     for a mission that commands no resource. `answers`: a file, or one that was loaded and has not
     been used. `on_record` gets each record as soon as it is committed; what it raises ends the
     rehearsal. `observed`: whether observers among the plugins are told.
+    `search_path`: folders of processes that the mission calls.
 
     Raises:
         MissionError: the mission cannot be loaded, does not fit the fleet, or needs one.
         AnswersError: the answers cannot be used, or do not fit the mission.
         FleetError: the fleet cannot be simulated.
     """
-    if isinstance(mission, Mission):
-        loaded = mission
-    else:
-        name, source = read_source(mission)
-        loaded = parse_mission(source, name)
+    loaded = mission if isinstance(mission, Mission) else load_source(mission, search_path)
     if fleet is None:
         refuse_commands(loaded)
         fleet = NO_FLEET

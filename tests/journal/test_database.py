@@ -37,7 +37,7 @@ def test_every_commit_is_synced_to_a_write_ahead_log(path):
 
 def test_a_new_file_is_its_owners_alone(path):
     with closing(open_for_writing(path)) as connection:
-        connection.execute("INSERT INTO runs VALUES (1, '', '', '', '', 0, 1, 0)")
+        connection.execute("INSERT INTO runs VALUES (1, '', '', '', '', 0, 1, 0, '[]')")
         for name in ("journal.db", "journal.db-wal", "journal.db-shm"):
             assert path.with_name(name).stat().st_mode & 0o777 == 0o600
 

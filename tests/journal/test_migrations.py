@@ -44,12 +44,15 @@ def test_migrating_again_changes_nothing(connection):
 
 
 def test_an_older_database_gets_the_steps_that_it_lacks(connection, monkeypatch):
+    monkeypatch.setattr(migrations, "MIGRATIONS", MIGRATIONS[:1])
     migrate(connection, PATH)
     connection.execute("INSERT INTO runs VALUES (1, 'm', '', 'P', '', 0, 1, 0)")
     monkeypatch.setattr(migrations, "MIGRATIONS", (*MIGRATIONS, add_a_note))
     migrate(connection, PATH)
     assert version(connection) == len(MIGRATIONS) + 1
-    assert connection.execute("SELECT mission_name, note FROM runs").fetchall() == [("m", "")]
+    assert connection.execute("SELECT mission_name, library, note FROM runs").fetchall() == [
+        ("m", "[]", "")
+    ]
 
 
 def test_a_step_that_fails_leaves_the_database_as_it_was(connection, monkeypatch):

@@ -8,7 +8,7 @@ from m2pem.model.behavior import (
     RoleKind,
     ServiceCall,
 )
-from m2pem.model.elements import Activity, Mission, ScriptTask, ServiceTask
+from m2pem.model.elements import Activity, Mission, Process, ScriptTask, ServiceTask
 from m2pem.model.expression import Expression, template
 
 READ_LATER = template("${mission.value}")
@@ -46,11 +46,14 @@ def drive(*roles: Role, **parameters: str | Expression) -> Behavior:
 
 def mission(*tasks: Behavior | ServiceCall) -> Mission:
     """A mission with one task each: DriveRoute, Task2, Task3, ... in line 12."""
+    process = Process("PATROL", "", 2)
     activities = tuple(_activity(index, task) for index, task in enumerate(tasks))
+    for activity in activities:
+        object.__setattr__(activity, "container", process)
     return Mission(
         file="patrol.bpmn",
         source=b"",
-        processes=(),
+        processes=(process,),
         nodes=activities,
         flows=(),
         signals={},

@@ -136,7 +136,7 @@ def _evaluate(
     x: Execution, token: Token, node: AdHocSubProcess, expression: Expression
 ) -> tuple[str, ...] | None:
     """The ids that the subprocess's own expression gives; None: its error was thrown."""
-    known = [each.id for each in node.entries]
+    known = {each.local_id: each.id for each in node.entries}
     try:
         value = expression.evaluate(reader(token))
     except ExpressionError as error:
@@ -150,4 +150,4 @@ def _evaluate(
         )
         throw_error(x, token, "EXPRESSION", reason)
         return None
-    return tuple(str(each) for each in value)
+    return tuple(known[str(each)] for each in value)

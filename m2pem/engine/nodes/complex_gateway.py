@@ -116,7 +116,7 @@ def _reader(
         WAITING_FOR_START: waiting_for_start,
     }
     for flow in node.incoming:
-        own[flow.id] = len(by_flow.get(flow, ()))
+        own[flow.local_id] = len(by_flow.get(flow, ()))
 
     def read(name: str) -> Value:
         return own[name] if name in own else outer(name)

@@ -27,12 +27,12 @@ class EventAwaited(BaseRecord, frozen=True):
     `due_us` a timer's time.
 
     `token` 0: it is the start event of an event subprocess, or begins another process when a
-    condition becomes true, and `scope` waits. `spent`: the condition has fired, and must be seen
-    false (`ConditionReset`) before it can again.
+    condition becomes true or a timer is due, and `scope` waits. `spent`: the condition has fired,
+    and must be seen false (`ConditionReset`) before it can again.
 
     A duration or cycle is due at a mission time (microseconds from the start, which stands during
     a pause); a date (`calendar`) at a time since the Unix epoch. `left`: how often a cycle still
-    fires after this one (-1: for ever), every `period_us`.
+    fires after this one (-1: for ever); `cycle`: its period or cron text.
     """
 
     token: int

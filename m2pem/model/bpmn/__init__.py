@@ -3,6 +3,7 @@
 Everything that is wrong with a file is found at once. See docs/missions.md for what is read.
 """
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from m2pem.errors import MissionError
@@ -10,23 +11,24 @@ from m2pem.findings import Finding, Severity, has_errors
 from m2pem.model.bpmn.calls import resolve_calls
 from m2pem.model.bpmn.collaboration import check_collaborations
 from m2pem.model.bpmn.compensation import link_compensation, note_compensation
-from m2pem.model.bpmn.containers import MAX_DEPTH, read_process
+from m2pem.model.bpmn.containers import MAX_DEPTH
 from m2pem.model.bpmn.correlation import resolve_correlation
 from m2pem.model.bpmn.data import resolve_data
 from m2pem.model.bpmn.data_flow import resolve_data_flows
+from m2pem.model.bpmn.files import Files, Part, open_part
 from m2pem.model.bpmn.graph import add_unreachable, check_graph
 from m2pem.model.bpmn.link import link
 from m2pem.model.bpmn.loop_data import join_default_signals, resolve_loops
+from m2pem.model.bpmn.merge import merge
 from m2pem.model.bpmn.messages import resolve_messages
-from m2pem.model.bpmn.names import BPMN, local
 from m2pem.model.bpmn.prompts import resolve_prompts
-from m2pem.model.bpmn.reading import Reading
-from m2pem.model.bpmn.report import Report
-from m2pem.model.bpmn.roots import read_roots
 from m2pem.model.bpmn.rules import check_rules
 from m2pem.model.bpmn.rules.registry import code
-from m2pem.model.bpmn.xml import MAX_BYTES, Document, XmlError, parse_xml
+from m2pem.model.bpmn.search_path import SearchPath
+from m2pem.model.bpmn.targets import find_called
+from m2pem.model.bpmn.xml import MAX_BYTES
 from m2pem.model.elements import Mission
+from m2pem.model.library import Library
 
 __all__ = ["MAX_BYTES", "MAX_DEPTH", "NO_BPMN_RULES", "parse_mission", "read_mission"]
 
@@ -36,8 +38,10 @@ NO_BPMN_RULES = frozenset(
 """Rules of the findings that say that a file is no BPMN at all (`m2pem check`: exit 2)."""
 
 
-def read_mission(path: str | Path) -> Mission:
-    """Read a mission file.
+def read_mission(path: str | Path, search_path: Iterable[Path | str] = ()) -> Mission:
+    """Read a mission file, and the files that it calls into or imports.
+
+    `search_path`: folders to look in for what it calls, after its own (docs/missions.md).
 
     Raises:
         MissionError: the file cannot be read or executed; it carries every finding.
@@ -58,64 +62,47 @@ def read_mission(path: str | Path) -> Mission:
             code("unreadable-file"),
         )
         raise MissionError(f"{file}: no mission", [finding]) from error
-    return parse_mission(data, file)
+    return parse_mission(data, file, SearchPath(Path(path), map(Path, search_path)))
 
 
-def parse_mission(data: bytes, file: str) -> Mission:
+def parse_mission(data: bytes, file: str, library: Library | None = None) -> Mission:
     """Parse the bytes of a mission file; `file` is its name in findings.
+
+    `library` has the other files that it calls into or imports; without one there are none.
 
     Raises:
         MissionError: it is no BPMN 2.0, or has something that m2pem cannot execute; it carries
-            every finding, errors and warnings, by line.
+            every finding, errors and warnings, by file and line.
     """
-    try:
-        document = parse_xml(data)
-    except XmlError as error:
-        finding = Finding(
-            Severity.ERROR,
-            file,
-            error.line,
-            "",
-            error.rule,
-            error.message,
-            error.remedy,
-            code(error.rule),
-        )
-        raise MissionError(f"{file}: no BPMN 2.0 file", [finding]) from None
-    report = Report(file, document.line)
-    if document.root.tag != BPMN + "definitions":
-        _not_bpmn(report, document)
-        raise MissionError(f"{file}: no BPMN 2.0 file", report.findings)
-    mission = _read(report, document, data)
-    if mission is None:
-        count = sum(finding.severity is Severity.ERROR for finding in report.findings)
-        problems = "1 problem" if count == 1 else f"{count} problems"
-        raise MissionError(f"{file}: the mission has {problems}", report.sorted())
-    return mission
+    files = Files(open_part(data, file), library)
+    reached = find_called(files)
+    parts = [part for part in files.parts if part.is_read]
+    for part in parts:
+        _resolve(part)
+    findings = [each for part in files.parts for each in part.reading.report.sorted()]
+    if has_errors([*findings, *files.findings]):
+        for part in parts:
+            add_unreachable(part.reading)
+        raise _refusal(file, files)
+    return merge(files, reached)
 
 
-def _not_bpmn(report: Report, document: Document) -> None:
-    tag = document.root.tag
-    namespace = tag.rpartition("}")[0].removeprefix("{") or "none"
-    report.error(
-        document.root,
-        document.root.get("id", ""),
-        "not-bpmn",
-        f"the file's root is '{local(tag)}' of the namespace {namespace}, not BPMN 2.0's "
-        "'definitions'",
-        f'export it as BPMN 2.0: xmlns="{BPMN[1:-1]}"',
-    )
+def _refusal(file: str, files: Files) -> MissionError:
+    findings = [each for part in files.parts for each in part.reading.report.sorted()]
+    findings += files.findings
+    count = sum(finding.severity is Severity.ERROR for finding in findings)
+    problems = "1 problem" if count == 1 else f"{count} problems"
+    return MissionError(f"{file}: the mission has {problems}", findings)
 
 
-def _read(report: Report, document: Document, data: bytes) -> Mission | None:
-    reading = Reading(report)
-    processes = read_roots(reading, document.root)
-    for element in processes:
-        read_process(reading, element)
-    if not processes:
-        report.error(
-            document.root,
-            document.root.get("id", ""),
+def _resolve(part: Part) -> None:
+    """Look up what is referred to within the file, and check what it is then."""
+    reading = part.reading
+    if not reading.processes:
+        root = part.document.root
+        reading.report.error(
+            root,
+            root.get("id", ""),
             "no-process",
             "the file has no process",
             "draw a process with a start event",
@@ -130,29 +117,7 @@ def _read(report: Report, document: Document, data: bytes) -> Mission | None:
     link_compensation(reading)
     join_default_signals(reading)
     resolve_messages(reading)
-    correlation_properties = resolve_correlation(reading)
+    part.correlation = resolve_correlation(reading)
     check_collaborations(reading, elements)
     check_graph(reading)
-    check_rules(document.root, report, data)
-    if has_errors(report.findings):
-        add_unreachable(reading)
-        return None
-    return Mission(
-        file=report.file,
-        source=data,
-        processes=tuple(reading.processes),
-        nodes=tuple(reading.nodes),
-        flows=tuple(ends.flow for ends in reading.flows),
-        signals=reading.signals,
-        messages=reading.messages,
-        errors=reading.errors,
-        escalations=reading.escalations,
-        participants=tuple(reading.participants),
-        message_flows=tuple(flow for flow, _ in reading.message_flows),
-        lanes=tuple(reading.lanes),
-        warnings=report.sorted(),
-        elements=elements,
-        associated=frozenset(reading.written_keys),
-        correlation_properties=correlation_properties,
-        data_stores=frozenset(reading.data_key(store) for store in reading.data_stores),
-    )
+    check_rules(part.document.root, reading.report, part.data)

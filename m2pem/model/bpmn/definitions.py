@@ -11,7 +11,8 @@ from m2pem.model.bpmn.reading import MessageUse, Reading, reference, text_of
 from m2pem.model.bpmn.rewriting import time_remedy
 from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.bpmn.schema import SHAPES
-from m2pem.model.duration import cycle, date_us, duration_us
+from m2pem.model.cycle import cycle
+from m2pem.model.duration import date_us, duration_us
 from m2pem.model.events import (
     CancelEventDefinition,
     CompensateEventDefinition,
@@ -59,7 +60,7 @@ def read_definition(
     if name == "conditional":
         return _conditional(reading, found)
     if name == "link":
-        return LinkEventDefinition(line, (element.get("name") or label).strip())
+        return LinkEventDefinition(line, element.get("name", "").strip())
     if name == "message":
         return _message(reading, element, event, catches=catches)
     if name == "signal":

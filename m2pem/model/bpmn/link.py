@@ -46,7 +46,6 @@ def link(reading: Reading) -> dict[str, Element]:
     _link_boundary(reading, nodes)
     resolve_links(reading)
     processes = {process.id: process for process in reversed(reading.processes)}
-    _link_calls(reading, processes)
     return {**flows, **nodes, **processes}
 
 
@@ -235,28 +234,3 @@ def _link_boundary(reading: Reading, nodes: dict[str, FlowNode]) -> None:
         reading.report.error(event.line, event.id, rule, message, remedy)
     for host, events in attached.items():
         _set(host, "boundary", tuple(events))
-
-
-def _link_calls(reading: Reading, processes: dict[str, Process]) -> None:
-    for pending in reading.calls:
-        call = pending.call
-        called = processes.get(call.called_id)
-        if called is not None:
-            _set(call, "called", called)
-            continue
-        rule = "dangling-reference"
-        existing = ", ".join(f"'{name}'" for name in list(processes)[::-1][:10])
-        remedy = f"name a process of this file: {existing}"
-        if not call.called_id:
-            rule, message = "no-called-element", "the call activity does not say what it calls"
-        elif call.called_id.startswith("=") or "{" in call.called_id:
-            rule = "not-executed"
-            message = "m2pem does not execute a calledElement that is an expression yet"
-        elif call.called_id in reading.global_tasks:
-            rule = "not-executed"
-            word = reading.global_tasks[call.called_id]
-            message = f"m2pem does not execute {a(word)} ('{call.called_id}') yet"
-            remedy = "draw the task in a process of its own, and call that"
-        else:
-            message = f"calledElement names '{call.called_id}', which is no process of this file"
-        reading.report.error(call.line, call.id, rule, message, remedy)

@@ -85,7 +85,7 @@ def _standard_loop(reading: Reading, element: etree._Element, node: Activity) ->
         maximum = int(text)
     elif text is not None:
         what = f"loopMaximum='{text}' is no number of rounds"
-        _error(reading, element, node, "bad-value", what, 'write for example loopMaximum="5"')
+        _error(reading, element, node, "loop-maximum", what, 'write for example loopMaximum="5"')
     return StandardLoop(
         _expression(reading, found, "loopCondition", node),
         reading.boolean(element, "testBefore", False, node.id),
@@ -222,7 +222,15 @@ def _behavior(element: etree._Element) -> InstanceBehavior:
     try:
         return InstanceBehavior(text)
     except ValueError:
+<<<<<<< HEAD
         return InstanceBehavior.ALL  # a rule says that it is none
+=======
+        known = list(InstanceBehavior)
+        remedy = did_you_mean(text, known, f"write one of: {', '.join(known)}")
+        what = f"behavior='{text}' is no behavior of a multi-instance activity"
+        _error(reading, element, node, "instances-behavior", what, remedy)
+        return InstanceBehavior.ALL
+>>>>>>> main
 
 
 def _events(

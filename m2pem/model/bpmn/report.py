@@ -13,12 +13,15 @@ Where: TypeAlias = Union[etree._Element, int]
 
 
 class Report:
-    """Findings of one file, in the order they were made."""
+    """Findings of one file, in the order they were made; `qualifier` goes in front of ids."""
 
-    __slots__ = ("file", "findings", "line")
+    __slots__ = ("file", "findings", "line", "qualifier")
 
-    def __init__(self, file: str, line: Callable[[etree._Element], int]) -> None:
+    def __init__(
+        self, file: str, line: Callable[[etree._Element], int], qualifier: str = ""
+    ) -> None:
         self.file = file
+        self.qualifier = qualifier
         self.line = line
         self.findings: list[Finding] = []
 
@@ -34,6 +37,8 @@ class Report:
         self, severity: Severity, where: Where, element: str, rule: str, said: tuple[str, str]
     ) -> None:
         line = where if isinstance(where, int) else self.line(where)
+        if self.qualifier and element:
+            element = f"{self.qualifier}:{element}"
         self.findings.append(Finding(severity, self.file, line, element, rule, *said, code(rule)))
 
     def sorted(self) -> tuple[Finding, ...]:

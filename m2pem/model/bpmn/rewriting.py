@@ -4,7 +4,8 @@ import re
 from collections.abc import Callable
 
 from m2pem.errors import ExpressionSyntaxError
-from m2pem.model.duration import cycle, date_us, duration_us
+from m2pem.model.cycle import cycle
+from m2pem.model.duration import date_us, duration_us
 from m2pem.model.expression import parse
 from m2pem.model.expression.literals import shorten, show_scalar
 from m2pem.model.script import parse_script
@@ -17,6 +18,7 @@ _MAX_CHARACTERS = 2_000
 
 _MAX_STATEMENTS = 5
 _MAX_TIME_CHARACTERS = 50
+_WORDS = re.compile(r"[\w .,:;!?@/+-]+")
 _COMMENT = re.compile(r"//|#(?!\{)")
 _PRINT = re.compile(r"(?:System\.out\.print(?:ln)?|console\.log|print(?:ln)?)\b.*")
 _SET = re.compile(r"(?:execution|kcontext)\.setVariable\(\s*(['\"])([\w.]+)\1\s*,\s*(.*)\)")
@@ -43,6 +45,13 @@ def expression_remedy(text: str) -> str:
         if _reads(parse, inner):
             return f"write {shorten(inner)}, without a language"
     return EXPRESSION
+
+
+def value_remedy(text: str) -> str:
+    """What to write for a value that is no expression: other engines take a text as it stands."""
+    if _WORDS.fullmatch(text.strip()):
+        return f"a text is written in quotes: '{shorten(text.strip())}'"
+    return expression_remedy(text)
 
 
 def script_remedy(text: str) -> str:
@@ -86,11 +95,18 @@ def _statements(text: str) -> list[str] | None:
     return None if parse_script("\n".join(found))[1] else found
 
 
+_FORMS = {
+    "timeDate": "write it as ISO 8601: 2026-01-31T12:00:00Z",
+    "timeDuration": "write it as ISO 8601: PT30S",
+    "timeCycle": "write it as ISO 8601 (R3/PT10S), or as cron does (0 0 8 * * MON-FRI)",
+}
+
+
 def time_remedy(kind: str, text: str) -> str:
     """What to write for the text of a timer; `kind` is timeDuration, timeDate or timeCycle."""
     text = text.strip()
     if len(text) > _MAX_TIME_CHARACTERS:
-        return "write it as ISO 8601"
+        return _FORMS[kind]
     for pattern in (_QUOTED, _FEEL_TIME):
         match = pattern.fullmatch(text)
         if match and _reads(_TIMES[kind], match[match.re.groups]):
@@ -111,8 +127,8 @@ def time_remedy(kind: str, text: str) -> str:
     if text.isdecimal():
         return f"write it with its unit: PT{shorten(text)}S are seconds"
     if _NAME.fullmatch(text):
-        return f"write it as ISO 8601; a name of the data is written ${{{shorten(text)}}}"
-    return "write it as ISO 8601"
+        return f"{_FORMS[kind]}; a name of the data is written ${{{shorten(text)}}}"
+    return _FORMS[kind]
 
 
 def _iso(count: int, unit: str) -> str:

@@ -42,7 +42,7 @@ def read_roots(reading: Reading, definitions: etree._Element) -> list[etree._Ele
                 reading.event_definitions[reading.claim(element)] = element
         elif name.startswith("global") and name.endswith("Task"):
             if element.get("id"):
-                reading.global_tasks[reading.claim(element)] = kind(tag)
+                reading.global_tasks[reading.claim(element)] = element
         elif name == "dataStore":
             _read_data_store(reading, element)
         elif name in ("signal", "message", "error", "escalation"):
@@ -67,6 +67,7 @@ def read_roots(reading: Reading, definitions: etree._Element) -> list[etree._Ele
 def _read_event_root(reading: Reading, element: etree._Element, name: str) -> None:
     identifier = reading.claim(element)
     scan(reading, element, identifier)
+    reading.declared_roots.add(identifier)
     label = element.get("name", "")
     line = reading.report.line(element)
     if name == "signal":

@@ -50,6 +50,7 @@ _ROOTS = (
     f"|partnerEntity|partnerRole|process|resource|rootElement|signal|{_DEFINITIONS}"
 )
 
+_GLOBAL = f"{_BASE} supportedInterfaceRef ioSpecification ioBinding {_RESOURCES}"
 _ACTIVITY_ATTRIBUTES = "id name isForCompensation startQuantity completionQuantity default"
 
 _TABLE: dict[str, tuple[str, str]] = {
@@ -87,6 +88,11 @@ _TABLE: dict[str, tuple[str, str]] = {
     ),
     "businessRuleTask": (f"{_ACTIVITY_ATTRIBUTES} implementation", _ACTIVITY),
     "callActivity": (f"{_ACTIVITY_ATTRIBUTES} calledElement", _ACTIVITY),
+    "globalTask": ("id name", _GLOBAL),
+    "globalBusinessRuleTask": ("id name implementation class", _GLOBAL),
+    "globalManualTask": ("id name", _GLOBAL),
+    "globalScriptTask": ("id name scriptLanguage", f"{_GLOBAL} script"),
+    "globalUserTask": ("id name implementation", f"{_GLOBAL} rendering"),
     "exclusiveGateway": ("id name gatewayDirection default", _NODE),
     "inclusiveGateway": ("id name gatewayDirection default", _NODE),
     "parallelGateway": ("id name gatewayDirection", _NODE),

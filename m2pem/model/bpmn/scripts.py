@@ -4,7 +4,7 @@ from lxml import etree
 
 from m2pem.model.behavior import Behavior, Script
 from m2pem.model.bpmn.behavior_xml import BehaviorReader, is_behavior
-from m2pem.model.bpmn.names import local
+from m2pem.model.bpmn.names import BPMN, local
 from m2pem.model.bpmn.reading import Reading
 from m2pem.model.bpmn.rewriting import script_remedy, statement_remedy
 from m2pem.model.bpmn.scan import Scan, own_extensions
@@ -14,6 +14,7 @@ from m2pem.model.script import parse_script
 
 _XML_FORMATS = frozenset({"application/xml", "text/xml", "xml"})
 _OWN_FORMATS = frozenset({"", "m2pem"})
+GLOBAL_SCRIPT = BPMN + "globalScriptTask"
 BEHAVIOR = frozenset({"behavior"})
 
 
@@ -66,14 +67,15 @@ def read_carried(reading: Reading, found: Scan, carried: list[etree._Element]) -
 def _script(
     reading: Reading, found: Scan, script: etree._Element
 ) -> tuple[Behavior | None, Script | None]:
-    form = found.element.get("scriptFormat", "").strip().lower()
+    written = found.element.get(_language(found), "")
+    form = written.strip().lower()
     text = script.text or ""
     if form not in _XML_FORMATS and form not in _OWN_FORMATS:
         reading.report.error(
             found.element,
             found.id,
             "script-language",
-            f"m2pem does not run scripts in '{found.element.get('scriptFormat')}'",
+            f"m2pem does not run scripts in '{written}'",
             script_remedy(text),
         )
         return None, None
@@ -97,13 +99,19 @@ def _script(
     return None, statements
 
 
+def _language(found: Scan) -> str:
+    """The attribute that says it (BPMN 2.0.2, tables 10.17 and 10.18)."""
+    return "scriptLanguage" if found.element.tag == GLOBAL_SCRIPT else "scriptFormat"
+
+
 def _form_differs(reading: Reading, found: Scan, actual: str) -> None:
     reading.report.error(
         found.element,
         found.id,
         "script-language",
-        f"the script says scriptFormat='{found.element.get('scriptFormat')}', but is {actual}",
-        "correct its scriptFormat",
+        f"the script says {_language(found)}='{found.element.get(_language(found))}', but is "
+        f"{actual}",
+        f"correct its {_language(found)}",
     )
 
 

@@ -32,6 +32,7 @@ from m2pem.engine.records import (
 from m2pem.errors import InternalError, JournalError, StaleEpochError
 from m2pem.journal.base import Entry, Journal, RunHeader, RunLine
 from m2pem.model.catalogue import BehaviorState
+from m2pem.model.library import Source
 from m2pem.model.values import Value
 from m2pem.testing.contracts.contract import Contract, needs
 
@@ -43,6 +44,10 @@ HEADER = RunHeader(
     simulated=True,
     speed=2.5,
     created_us=1_767_225_600_000_001,
+    library=(
+        Source("lib/süd.bpmn", b"\x00\xff", (("call", "SEARCH", ""), ("import", "a.bpmn", "m"))),
+        Source("b.bpmn", b""),
+    ),
 )
 
 OpenJournal: TypeAlias = Callable[[], Journal]
