@@ -12,6 +12,7 @@ from tests.cases.playing import play_case
 from tests.conformance.peers import VERBS, Played
 
 _BPMN = "{http://www.omg.org/spec/BPMN/20100524/MODEL}"
+_MARKERS = ("standardLoopCharacteristics", "multiInstanceLoopCharacteristics")
 _JOINS = ("parallelGateway", "inclusiveGateway", "complexGateway")
 
 
@@ -76,7 +77,8 @@ def uncounted(file: Path) -> frozenset[str]:
 
     At a join some note each token that comes, others when it goes on. Some enter an event
     subprocess as such, others its start event only; some a compensation boundary event when its
-    activity has completed. What comes after tells them apart.
+    activity has completed. A loop or multi-instance activity is entered as a whole, for each
+    instance, or both. What comes after, or is inside, tells them apart.
     """
     root = etree.parse(file).getroot()
     incoming = Counter(flow.get("targetRef") for flow in root.iter(f"{_BPMN}sequenceFlow"))
@@ -96,7 +98,12 @@ def uncounted(file: Path) -> frozenset[str]:
         for event in root.iter(f"{_BPMN}boundaryEvent")
         if event.find(f"{_BPMN}compensateEventDefinition") is not None
     }
-    return frozenset(joins | inside | compensation)
+    looping = {
+        str(marker.getparent().get("id"))
+        for tag in _MARKERS
+        for marker in root.iter(f"{_BPMN}{tag}")
+    }
+    return frozenset(joins | inside | compensation | looping)
 
 
 def _difference(when: str, expected: Counter[str], got: Counter[str], played: Played) -> str:
