@@ -50,7 +50,7 @@ def examine(path: Path, max_steps: int = MAX_STEPS) -> Examination:
         try:
             mission = load_source(path)
         except MissionError as error:
-            return _refused(path, error.findings)
+            return _refused(error.findings)
         problems = list(_flaws(findings_for(mission, None, plugins())))
         ends: list[str] = []
         own = [each for each in mission.processes if mission.file_of(each) == str(path)]
@@ -79,15 +79,13 @@ def _flaws(findings: Sequence[Finding]) -> Iterator[str]:
         yield from flaws(Path(name).read_bytes(), name, here)
 
 
-def _refused(path: Path, findings: tuple[Finding, ...]) -> Examination:
+def _refused(findings: tuple[Finding, ...]) -> Examination:
     rules = {
         each.rule: f"{each.message}; {each.remedy}"
         for each in reversed(findings)
         if each.severity is Severity.ERROR
     }
     problems = list(_flaws(findings))
-    if not any(finding.file == str(path) for finding in findings):
-        problems.append(f"no finding names the file itself: {findings[0]}")
     if not rules:
         problems.append("it is refused without an error among the findings")
     outcome = Outcome.NO_BPMN if NO_BPMN_RULES & rules.keys() else Outcome.REFUSED
