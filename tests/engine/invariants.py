@@ -93,7 +93,7 @@ def _check_loop(scope: Scope) -> None:
     assert isinstance(owner.node, Activity)
     assert owner.node.loop is not None
     assert all(token.node is owner.node for token in scope.tokens.values())
-    numbers = [token.instance for token in scope.tokens.values()]
+    numbers = [token.instance for token in scope.tokens.values() if token.undoes is None]
     assert len(set(numbers)) == len(numbers) == loop.started - loop.completed - loop.terminated
     assert loop.total < 0 or loop.started <= loop.total
     assert set(loop.outputs) <= set(range(loop.started))
