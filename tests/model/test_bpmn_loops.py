@@ -191,7 +191,10 @@ def test_a_name_where_bpmn_has_a_reference_is_taken_with_a_warning() -> None:
 
 # --- what is thrown -----------------------------------------------------------------------------
 
-ROOTS = '<signal id="Sig"/><signalEventDefinition id="d" signalRef="Sig"/><timerEventDefinition id="t"/>'
+ROOTS = (
+    '<signal id="Sig"/><signalEventDefinition id="d" signalRef="Sig"/>'
+    '<timerEventDefinition id="t"/>'
+)
 NAMED = 'behavior="One" oneBehaviorEventRef="d"'
 THREE = "<loopCardinality>3</loopCardinality>"
 
