@@ -238,15 +238,18 @@ def test_complex_behavior_has_conditions_and_events() -> None:
 # --- what is wrong ------------------------------------------------------------------------------
 
 WRONG = {
-    "no count": (instances(), "instances-without-number"),
+    "no count": (instances(), "instance-count"),
     "an empty count": (
         instances("<loopCardinality> </loopCardinality>"),
-        "instances-without-number",
+        "instance-count",
     ),
     "two counts": (instances(THREE, 'm2pem:collection="f"'), "instances-counted-twice"),
     "two markers": (f"<standardLoopCharacteristics/>\n{instances(THREE)}", "two-loops"),
     "no kind of loop": ("<loopCharacteristics/>", "no-loop"),
-    "a maximum that is no number": ('<standardLoopCharacteristics loopMaximum="-1"/>', "bad-value"),
+    "a maximum that is no number": (
+        '<standardLoopCharacteristics loopMaximum="-1"/>',
+        "loop-maximum",
+    ),
     "a condition that is no expression": (
         "<standardLoopCharacteristics><loopCondition>x &lt;</loopCondition>"
         "</standardLoopCharacteristics>",
@@ -278,7 +281,7 @@ WRONG = {
             "</complexBehaviorDefinition>",
             'behavior="Complex"',
         ),
-        "instances-complex-event",
+        "complex-behavior",
     ),
 }
 
