@@ -191,7 +191,10 @@ def test_a_name_where_bpmn_has_a_reference_is_taken_with_a_warning() -> None:
 
 # --- what is thrown -----------------------------------------------------------------------------
 
-ROOTS = '<signal id="Sig"/><signalEventDefinition id="d" signalRef="Sig"/><timerEventDefinition id="t"/>'
+ROOTS = (
+    '<signal id="Sig"/><signalEventDefinition id="d" signalRef="Sig"/>'
+    '<timerEventDefinition id="t"/>'
+)
 NAMED = 'behavior="One" oneBehaviorEventRef="d"'
 THREE = "<loopCardinality>3</loopCardinality>"
 
@@ -235,15 +238,18 @@ def test_complex_behavior_has_conditions_and_events() -> None:
 # --- what is wrong ------------------------------------------------------------------------------
 
 WRONG = {
-    "no count": (instances(), "instances-without-number"),
+    "no count": (instances(), "instance-count"),
     "an empty count": (
         instances("<loopCardinality> </loopCardinality>"),
-        "instances-without-number",
+        "instance-count",
     ),
     "two counts": (instances(THREE, 'm2pem:collection="f"'), "instances-counted-twice"),
     "two markers": (f"<standardLoopCharacteristics/>\n{instances(THREE)}", "two-loops"),
     "no kind of loop": ("<loopCharacteristics/>", "no-loop"),
-    "a maximum that is no number": ('<standardLoopCharacteristics loopMaximum="-1"/>', "bad-value"),
+    "a maximum that is no number": (
+        '<standardLoopCharacteristics loopMaximum="-1"/>',
+        "loop-maximum",
+    ),
     "a condition that is no expression": (
         "<standardLoopCharacteristics><loopCondition>x &lt;</loopCondition>"
         "</standardLoopCharacteristics>",
@@ -275,7 +281,7 @@ WRONG = {
             "</complexBehaviorDefinition>",
             'behavior="Complex"',
         ),
-        "instances-complex-event",
+        "complex-behavior",
     ),
 }
 

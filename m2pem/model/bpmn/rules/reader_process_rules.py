@@ -115,7 +115,7 @@ THROWN = Rule(
     "10.3.8",
     E,
     "a multi-instance activity throws by itself what it cannot",
-    "let it throw a message, signal, escalation or error",
+    "let it throw a message, signal, escalation, error or compensation",
 )
 ASSIGNMENT = Rule(
     10424,
