@@ -59,7 +59,10 @@ def test_the_example_of_compensation_undoes_the_activity() -> None:
 
 
 def test_the_event_subprocess_has_no_warning() -> None:
-    text = f'<process id="P">{example("<subProcess")}<task id="T"/></process>'
+    task = (
+        '<startEvent id="S"/><endEvent id="E"/><sequenceFlow id="f" sourceRef="S" targetRef="E"/>'
+    )
+    text = f'<process id="P">{example("<subProcess")}{task}</process>'
     mission = load(definitions(text))
     assert mission.warnings == ()
     assert [each.id for each in mission.processes[0].event_subprocesses] == ["TooManyFinds"]

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Iterator
 
 from m2pem.engine import records as r
+from m2pem.engine.compensation import enable
 from m2pem.engine.data import reader, store_for
 from m2pem.engine.execution import Execution
 from m2pem.engine.nodes.instances import collect, natural, occasions, throw
@@ -135,12 +136,14 @@ def _settle(x: Execution, token: Token, outcome: TokenOutcome) -> Token | None:
     assert isinstance(whole.node, Activity)
     loop = whole.node.loop
     if isinstance(loop, StandardLoop):
+        enable(x, token)
         x.leave(token, outcome)
         return _next_round(x, token, whole, loop)
     assert loop is not None
     assert scope.loop is not None
     if loop.output_collection and not collect(x, token, loop):
         return None
+    enable(x, token)
     x.leave(token, outcome)
     if outcome is TokenOutcome.COMPLETED and not _throw_all(x, token, whole, loop):
         return None

@@ -24,7 +24,7 @@ from m2pem.model.elements import (
 from m2pem.model.events import ErrorEventDefinition, EventDefinition
 from m2pem.model.near import did_you_mean
 
-_THROWN_IMPLICITLY = frozenset({"message", "signal", "escalation", "error"})
+_THROWN_IMPLICITLY = frozenset({"message", "signal", "escalation", "error", "compensate"})
 _CATCHING = frozenset({"startEvent", "intermediateCatchEvent", "boundaryEvent"})
 _NEEDS_TRIGGER = frozenset({"intermediateCatchEvent", "boundaryEvent"})
 

@@ -3,7 +3,15 @@
 from m2pem.findings import Finding, Severity
 from m2pem.model.bpmn.reading import Reading
 from m2pem.model.bpmn.rules.registry import code
-from m2pem.model.elements import Container, Event, FlowNode, ParallelGateway, SubProcess
+from m2pem.model.elements import (
+    Container,
+    Event,
+    FlowNode,
+    IntermediateCatchEvent,
+    ParallelGateway,
+    SubProcess,
+)
+from m2pem.model.events import LinkEventDefinition
 from m2pem.model.reach import unreached
 
 _set = object.__setattr__
@@ -74,6 +82,11 @@ def add_unreachable(reading: Reading) -> None:
 def unreachable(file: str, node: FlowNode) -> Finding:
     """The finding about one of them."""
     what = "no start event can reach it" if node.container.starts else "nothing can reach it"
+    remedy = "draw a sequence flow to it, or delete it"
+    if isinstance(node, IntermediateCatchEvent):
+        for definition in node.definitions:
+            if isinstance(definition, LinkEventDefinition):
+                remedy = f"add a link throw event of the name '{definition.name}', or delete it"
     return Finding(
         Severity.ERROR,
         file,
@@ -81,7 +94,7 @@ def unreachable(file: str, node: FlowNode) -> Finding:
         node.id,
         "unreachable",
         f"{what}, so it would never run",
-        "draw a sequence flow to it, or delete it",
+        remedy,
         code("unreachable"),
     )
 
