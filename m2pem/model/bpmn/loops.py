@@ -222,15 +222,7 @@ def _behavior(element: etree._Element) -> InstanceBehavior:
     try:
         return InstanceBehavior(text)
     except ValueError:
-<<<<<<< HEAD
         return InstanceBehavior.ALL  # a rule says that it is none
-=======
-        known = list(InstanceBehavior)
-        remedy = did_you_mean(text, known, f"write one of: {', '.join(known)}")
-        what = f"behavior='{text}' is no behavior of a multi-instance activity"
-        _error(reading, element, node, "instances-behavior", what, remedy)
-        return InstanceBehavior.ALL
->>>>>>> main
 
 
 def _events(
