@@ -254,7 +254,7 @@ def _token_left(state: RunState, record: r.TokenLeft) -> None:
             del join.by_flow[token.flow]
             if not join.by_flow:
                 del scope.joins[token.node]
-    elif scope.loop is not None:
+    elif scope.loop is not None and token.undoes is None:
         if record.outcome is r.TokenOutcome.COMPLETED:
             scope.loop.completed += 1
         else:

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Iterator
 
 from m2pem.engine import records as r
+from m2pem.engine.compensation import enable
 from m2pem.engine.data import reader, store_for
 from m2pem.engine.execution import Execution
 from m2pem.engine.nodes.instances import collect, natural, occasions, throw
@@ -135,13 +136,13 @@ def _settle(x: Execution, token: Token, outcome: TokenOutcome) -> Token | None:
     assert isinstance(whole.node, Activity)
     loop = whole.node.loop
     if isinstance(loop, StandardLoop):
-        x.leave(token, outcome)
+        _leave(x, token, outcome)
         return _next_round(x, token, whole, loop)
     assert loop is not None
     assert scope.loop is not None
     if loop.output_collection and not collect(x, token, loop):
         return None
-    x.leave(token, outcome)
+    _leave(x, token, outcome)
     if outcome is TokenOutcome.COMPLETED and not _throw_all(x, token, whole, loop):
         return None
     if loop.completion is not None:
@@ -156,6 +157,12 @@ def _settle(x: Execution, token: Token, outcome: TokenOutcome) -> Token | None:
     elif not scope.tokens:
         return _finish(x, scope, whole, loop)
     return None
+
+
+def _leave(x: Execution, token: Token, outcome: TokenOutcome) -> None:
+    if outcome is TokenOutcome.COMPLETED:
+        enable(x, token)
+    x.leave(token, outcome)
 
 
 def _throw_all(x: Execution, token: Token, whole: Token, loop: MultiInstance) -> bool:
