@@ -18,7 +18,8 @@ class RunHeader:
 
     `mission_name` is the file's name for people, `mission` its bytes, `library` the other files
     that it uses; `fleet` is `m2pem.resources.snapshot.dump(fleet)`, or b"" without one.
-    `simulated`: every arbiter was replaced by the simulated one; `speed`: of the clock against the wall clock.
+    `simulated`: every arbiter was replaced by the simulated one; `speed`: of the clock against
+    the wall clock.
     """
 
     mission_name: str

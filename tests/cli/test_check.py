@@ -112,7 +112,18 @@ def test_findings_as_json(invoke: Invoke, doubtful: Path) -> None:
     (finding,) = json.loads(out)
     assert finding["file"] == str(doubtful)
     assert finding["severity"] == "warning"
-    assert set(finding) == {"severity", "file", "line", "element", "rule", "message", "remedy"}
+    assert finding["rule"] == "unwritten-name"
+    assert finding["number"] == "M307"
+    assert set(finding) == {
+        "severity",
+        "file",
+        "line",
+        "element",
+        "rule",
+        "message",
+        "remedy",
+        "number",
+    }
     assert json.loads(invoke("check", MISSION, "--format", "json")[1]) == []
 
 

@@ -9,12 +9,14 @@ import io
 import json
 import sys
 from datetime import UTC, datetime, timedelta, tzinfo
+from types import SimpleNamespace
 from typing import Any
 
 from SpiffWorkflow.bpmn.parser import BpmnParser
 from SpiffWorkflow.bpmn.parser.ValidationException import ValidationException
 from SpiffWorkflow.bpmn.script_engine import PythonScriptEngine, TaskDataEnvironment
 from SpiffWorkflow.bpmn.specs.event_definitions import timer
+from SpiffWorkflow.bpmn.specs.event_definitions.conditional import ConditionalEventDefinition
 from SpiffWorkflow.bpmn.specs.event_definitions.item_aware_event import SignalEventDefinition
 from SpiffWorkflow.bpmn.specs.event_definitions.message import MessageEventDefinition
 from SpiffWorkflow.bpmn.specs.mixins import ServiceTaskMixin, StartEventMixin, UserTaskMixin
@@ -130,6 +132,10 @@ class Application:
                     if isinstance(task.task_spec, ServiceTaskMixin):
                         task.complete()
                         moved = True
+                for task in list(workflow.event_manager.tasks.values()):
+                    if isinstance(task.task_spec.event_definition, ConditionalEventDefinition):
+                        task.task_spec._update(task)
+                        moved = moved or task.state == TaskState.READY
                 for event in workflow.get_events():
                     moved = self.deliver(event, workflow) or moved
         self.look()
@@ -214,7 +220,9 @@ class Application:
             ]
             if len(tasks) < step["number"]:
                 raise LookupError(f"{name} does not wait")
-            tasks[step["number"] - 1].run()
+            task = tasks[step["number"] - 1]
+            task.data["user"] = SimpleNamespace(decision=step["word"] or "done")
+            task.run()
             self.settle()
         elif verb == "signal":
             self.send(BpmnEvent(SignalEventDefinition(name), payload=step["data"]))

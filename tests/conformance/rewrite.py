@@ -12,8 +12,8 @@ from pathlib import Path
 from lxml import etree
 
 _BPMN = "{http://www.omg.org/spec/BPMN/20100524/MODEL}"
-_CONDITIONS = ("conditionExpression", "condition", "activationCondition")
-_LOOPS = ("loopCondition", "loopCardinality", "completionCondition")
+_CONDITIONS = ("conditionExpression", "activationCondition")
+_LOOPS = ("loopCondition", "loopCardinality", "completionCondition", "condition")
 _TIMES = ("timeDuration", "timeDate", "timeCycle")
 _NOT_BEFORE = ("documentation", "extensionElements")
 

@@ -1,6 +1,7 @@
 """MissionControl through the socket is the same as in the executive."""
 
 import asyncio
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +12,7 @@ from m2pem.control_socket.remote import RemoteControl
 from m2pem.errors import NotDrivenError, OperatorError
 from m2pem.model.catalogue import ResourceId
 from tests.control_socket.conftest import Served
+from tests.executive.conftest import mission, sequence
 
 
 async def test_everything_that_is_asked_for_comes_as_it_is(served: Served) -> None:
@@ -24,6 +26,18 @@ async def test_everything_that_is_asked_for_comes_as_it_is(served: Served) -> No
         mission = await remote.mission(run)
         assert mission.source == (await served.control.mission(run)).source
         assert mission.elements["Ask"].label == "Ask"
+
+
+async def test_a_mission_comes_with_the_files_that_it_calls(
+    served: Served, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "s.bpmn").write_bytes(mission('<process id="S"><task id="Look"/></process>'))
+    monkeypatch.setenv("M2PEM_PATH", str(tmp_path))
+    calling = sequence(("Call", '<callActivity id="Call" calledElement="S"/>'))
+    run = await served.control.start(mission(calling))
+    (tmp_path / "s.bpmn").unlink()
+    async with RemoteControl(served.path) as remote:
+        assert "s:Look" in (await remote.mission(run)).elements
 
 
 async def test_it_follows_a_run_to_its_end(served: Served) -> None:

@@ -25,11 +25,18 @@ def named() -> Iterator[tuple[str, etree._Element]]:
         yield f"{file.parent.name}/{file.name}", etree.parse(file).getroot()
 
 
+def known(root: etree._Element) -> object:
+    """The content, but for what bpmn-moddle writes under another name than it has read."""
+    for path in [*root.iter(f"{BPMN}messagePath"), *root.iter(f"{BPMN}dataPath")]:
+        path.tag = f"{BPMN}formalExpression"
+    return content(root)
+
+
 def test_an_editor_reads_every_case_without_warning_and_keeps_all_of_it() -> None:
     wrong = []
     for name, read in read_with_moddle(FILES).items():
         rewritten = etree.fromstring(str(read["rewritten"]).encode())
-        kept = content(rewritten) == content(etree.parse(name).getroot())
+        kept = known(rewritten) == known(etree.parse(name).getroot())
         if read["warnings"] or not kept:
             wrong.append((Path(name).name, read["warnings"] or "loses something"))
     assert wrong == []

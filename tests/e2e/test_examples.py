@@ -199,6 +199,7 @@ def happening(record: Record) -> str:
 
 ONE_LAP = ["DriveLap: rover single_vehicle_routing", "DriveLap: SUCCEEDED", "at Count"]
 VISIT = ["FlyToSite: uav1 goto", "CircleSite: uav1 orbit", "at CountVisit", "at EndInspect"]
+INSPECTED = ["inspection:FlyToSite: uav1 goto", "inspection:CircleSite: uav1 orbit"]
 PICTURE = ["at EveryMinute", "TakePicture: uav1/camera take_picture", "at PictureTaken"]
 SECTION = "rover1 rover2 rover3"
 
@@ -376,6 +377,22 @@ EXPECTED = {
                 *("at Cancelled", "DriveHome: rover return_to_launch", "at GivenUp", "completed"),
             ],
             never={"at End"},
+        ),
+    ],
+    "t21": [
+        Course(
+            [
+                *("at InspectGate", "site = gate", *INSPECTED, "report.gate = True"),
+                *("at InspectBridge", "site = bridge", *INSPECTED, "report.bridge = True"),
+                *("FlyHome: uav1 return_to_launch", "at End", "completed"),
+            ]
+        ),
+        Course(
+            [
+                *("at InspectGate", "site = gate", *INSPECTED, "report.gate = True"),
+                *("FlyHome: uav1 return_to_launch", "at End", "completed"),
+            ],
+            never={"at InspectBridge"},
         ),
     ],
 }

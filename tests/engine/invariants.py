@@ -10,7 +10,7 @@ def check_state(state: RunState) -> None:
     _check_waits(state)
     _check_work(state)
     for scope in state.scopes.values():
-        _check_done(scope, steps_left=bool(state.yielded))
+        _check_done(scope, looked_at=-scope.id not in state.yielded)
     if state.status is RunStatus.ENDED:
         assert not state.tokens
         assert not state.scopes
@@ -46,13 +46,13 @@ def _check_tokens(state: RunState) -> None:
         assert sum(bool(each) for each in busy) <= 1
 
 
-def _check_done(scope: Scope, *, steps_left: bool) -> None:
+def _check_done(scope: Scope, *, looked_at: bool) -> None:
     claims: dict[int, int] = {}
     for number, compensation in (scope.compensations or {}).items():
         assert compensation.id == number
         assert compensation.scope is scope
         assert compensation.begins is None, "it has begun"
-        assert compensation.left or compensation.token or steps_left, "it has ended"
+        assert compensation.left or compensation.token or not looked_at, "it has ended"
         claims |= {completion.id: number for completion in compensation.left}
         waiter, token = compensation.waiter, compensation.token
         assert waiter is None or (waiter.compensations or {})[number] is compensation
@@ -93,7 +93,7 @@ def _check_loop(scope: Scope) -> None:
     assert isinstance(owner.node, Activity)
     assert owner.node.loop is not None
     assert all(token.node is owner.node for token in scope.tokens.values())
-    numbers = [token.instance for token in scope.tokens.values()]
+    numbers = [token.instance for token in scope.tokens.values() if token.undoes is None]
     assert len(set(numbers)) == len(numbers) == loop.started - loop.completed - loop.terminated
     assert loop.total < 0 or loop.started <= loop.total
     assert set(loop.outputs) <= set(range(loop.started))

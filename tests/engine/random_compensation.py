@@ -33,6 +33,9 @@ def with_compensation(text: str, dice: Random) -> tuple[Mission, str]:
     for element in list(root.iter(f"{_B}subProcess", f"{_B}transaction")):
         if dice.randrange(100) < 20:
             _event_subprocess(element, dice)
+    for element in list(root.iter(*(_B + name for name in (*_UNDONE, "transaction")))):
+        if element.get("triggeredByEvent") is None and dice.randrange(100) < 20:
+            _repeat(element, dice)
     whole = etree.tostring(root, encoding="unicode", pretty_print=True)
     return parse_mission(whole.encode(), "test.bpmn"), whole
 
@@ -88,6 +91,13 @@ def _line(inside: etree._Element, name: str, trigger: str | None, dice: Random) 
         _add(inside, "sequenceFlow", id=f"{name}f{number}", **ends)
     if dice.randrange(2):
         _add(end, "compensateEventDefinition")
+
+
+def _repeat(activity: etree._Element, dice: Random) -> None:
+    sequential = dice.choice(("true", "false"))
+    loop = etree.Element(f"{_B}multiInstanceLoopCharacteristics", isSequential=sequential)
+    _add(loop, "loopCardinality").text = str(dice.randrange(3))
+    activity.insert(0, loop)
 
 
 def _event_subprocess(around: etree._Element, dice: Random) -> None:

@@ -107,3 +107,32 @@ def test_one_beside_the_choices_does_not_count_as_one() -> None:
     assert play.answer("a", prompt="sub").at == "hu a"
     assert play.answer(prompt="hu").at == "a"
     assert play.answer(prompt="a").ended == "completed"
+
+
+def test_one_in_a_multi_instance_subprocess_ends_each_instance_by_itself() -> None:
+    play = Play(f"""<startEvent id="start"/> <task id="done"/>
+        <subProcess id="sub">
+          <multiInstanceLoopCharacteristics><loopCardinality>2</loopCardinality>
+          </multiInstanceLoopCharacteristics>
+          {WORK} {handler("message go")}
+        </subProcess>
+        start -> sub -> done
+    """).start()
+    assert play.at == "a a"
+    assert play.message("go").at == "a hu"
+    assert play.message("go").at == "hu hu"
+    play.entered()
+    assert play.answer().answer().entered() == "done"
+
+
+def test_an_error_in_an_instance_begins_the_one_around_the_whole() -> None:
+    play = Play(
+        """<startEvent id="start"/>
+        <serviceTask id="t">call Detector <each>2</each></serviceTask>
+        start -> t
+        """
+        + handler("error E")
+    ).start()
+    assert play.at == "t t"
+    play.fail("t", "E")
+    assert play.at == "hu"

@@ -141,7 +141,7 @@ def _one(number: int, sound: list[bytes], keep: Path) -> str:
         file.write_bytes(data)
         outcome = survive(data, number)
     except Exception:
-        print(f"case {number}, {file}:\n{traceback.format_exc()}", flush=True)
+        print(f"case {number}, {file}:\n{traceback.format_exc(chain=False)[-3000:]}", flush=True)
         return "BROKEN"
     finally:
         faulthandler.cancel_dump_traceback_later()

@@ -31,6 +31,25 @@ def test_many_mutated_files_are_refused_or_run() -> None:
     run_cases(range(CASES, MANY_CASES), seeds([Path(CORPORA)] if CORPORA else []))
 
 
+PROCESS = '<process id="P"><task id="T"/></process>'
+ONCE_BROKE = {
+    "a cancel event definition beside the processes": f"<cancelEventDefinition/>{PROCESS}",
+    "timers in the far future": PROCESS.replace(
+        "<task",
+        '<intermediateCatchEvent id="C"><timerEventDefinition><timeDate>9999-12-31T23:59:59Z'
+        "</timeDate></timerEventDefinition></intermediateCatchEvent><task",
+    ),
+}
+"""What mutations found, as small as it can be."""
+
+
+@pytest.mark.parametrize("name", ONCE_BROKE)
+def test_what_once_broke_m2pem(name: str) -> None:
+    bpmn = "http://www.omg.org/spec/BPMN/20100524/MODEL"
+    data = f'<definitions xmlns="{bpmn}" targetNamespace="urn:t">\n{ONCE_BROKE[name]}</definitions>'
+    survive(data.encode(), 0)
+
+
 @given(st.binary(max_size=200))
 def test_any_bytes(data: bytes) -> None:
     assert survive(data, 0) == "refused"

@@ -55,6 +55,7 @@ function advance(seconds) {
 // --- scripts, conditions and expressions ------------------------------------------------------
 
 const data = { ...order.given };
+let written = false;
 function javascript(expression) {
   return expression
     .replace(/\band\b/g, '&&')
@@ -84,6 +85,7 @@ function execute(script) {
     const [, name, expression] = line.match(/^\s*(\w+)\s*=(?!=)\s*(.*)$/) ?? [];
     if (!name) throw new Error(`no assignment: ${line}`);
     data[name] = evaluate(expression);
+    written = true;
   }
 }
 
@@ -121,8 +123,16 @@ const expressions = {
 
 // --- the run ----------------------------------------------------------------------------------
 
+// What counts when it has caught: it is entered, or armed, before.
 const CATCHES = new Set(['bpmn:BoundaryEvent', 'bpmn:StartEvent']);
-let kinds;
+let catches;
+
+function isCatch({ $type, incoming = [], eventDefinitions = [] }) {
+  return CATCHES.has($type)
+    || incoming.some(({ sourceRef }) => sourceRef.$type === 'bpmn:EventBasedGateway')
+    || ($type === 'bpmn:IntermediateCatchEvent'
+      && eventDefinitions.some((each) => each.$type === 'bpmn:LinkEventDefinition'));
+}
 
 // A send task is a service task to the engine: its users say how to send.
 function sending(activity) {
@@ -138,7 +148,7 @@ function sending(activity) {
 
 async function load() {
   const { rootElement, references, elementsById } = await new BpmnModdle().fromXML(order.xml);
-  kinds = Object.fromEntries(Object.entries(elementsById).map(([id, { $type }]) => [id, $type]));
+  catches = new Set(Object.keys(elementsById).filter((id) => isCatch(elementsById[id])));
   const types = serializer.TypeResolver(elements);
   const context = serializer.Serializer({ rootElement, references, elementsById }, types);
   const environment = new elements.Environment({
@@ -158,10 +168,8 @@ function looping(activity) {
 function watch(definition) {
   definition.broker.subscribeTmp('event', 'activity.#', (key, { content }) => {
     const { id, executionId } = content;
-    const type = kinds[id];
     if (process.env.TRACE) console.error(key, id, executionId);
-    const caught = CATCHES.has(type);
-    if (key === (caught ? 'activity.end' : 'activity.enter')) entered.push(id);
+    if (key === (catches.has(id) ? 'activity.end' : 'activity.enter')) entered.push(id);
     if (key === 'activity.leave' || key === 'activity.end' || key === 'activity.consumed') {
       waiting = waiting.filter((each) => each.executionId !== executionId);
     }
@@ -176,16 +184,23 @@ function watch(definition) {
   });
 }
 
+// Does what is left to the application: manual tasks, and telling conditions that data has changed.
 function settle() {
   for (;;) {
     const manual = waiting.find(({ type }) => type === 'bpmn:ManualTask');
-    if (!manual) return;
-    waiting = waiting.filter((each) => each !== manual);
-    manual.signal();
+    if (manual) {
+      waiting = waiting.filter((each) => each !== manual);
+      manual.signal();
+    } else if (written) {
+      written = false;
+      for (const each of waiting) if (each.content.condition) each.signal();
+    } else {
+      return;
+    }
   }
 }
 
-function step({ verb, name, number, seconds, data: payload }) {
+function step({ verb, name, word, number, seconds, data: payload }) {
   switch (verb) {
     case 'start':
       definition.run();
@@ -194,6 +209,8 @@ function step({ verb, name, number, seconds, data: payload }) {
       const tasks = waiting.filter(({ id }) => id === name);
       if (tasks.length < number) throw new RangeError(`${name} does not wait`);
       waiting = waiting.filter((each) => each !== tasks[number - 1]);
+      data.user = { decision: word || 'done' };
+      written = true;
       tasks[number - 1].signal();
       break;
     }

@@ -24,7 +24,7 @@ WARNINGS = {
     ),
     "unknown child": (around('<task id="T">\n<foo/></task>'), [("unknown-element", 4, "T")]),
     "element order": (
-        around('<task id="T"><outgoing>x</outgoing>\n<incoming>y</incoming></task>'),
+        around('<task id="T"><outgoing>T-E</outgoing>\n<incoming>S-T</incoming></task>'),
         [("element-order", 4, "T")],
     ),
     "element order in a process": (

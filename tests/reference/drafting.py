@@ -10,7 +10,7 @@ from random import Random
 
 from tests.reference.diagram import Event, Flow, Is, Level, Loop, Many, Node
 
-NOT_YET = frozenset({"link", "standard_loop", "multi_instance", "event_subprocess"})
+NOT_YET = frozenset({"standard_loop", "multi_instance", "event_subprocess"})
 ALL_ELEMENTS = frozenset(
     {
         "task",  # a task that does nothing

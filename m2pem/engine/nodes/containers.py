@@ -48,9 +48,22 @@ def call_activity(x: Execution, token: Token) -> None:
 def open_inside(x: Execution, token: Token) -> Scope | None:
     """Open the scope of an activity. None: it is too deep, and that error was thrown."""
     if token.scope.depth >= MAX_DEPTH:
-        throw_error(x, token, "RECURSION", f"{MAX_DEPTH} scopes within scopes at {token.node.id}")
+        throw_error(x, token, "RECURSION", _too_deep(token))
         return None
     return open_scope(x, token)
+
+
+def _too_deep(token: Token) -> str:
+    node = token.node
+    reason = f"{MAX_DEPTH} scopes within scopes at {node.id}"
+    if not isinstance(node, CallActivity):
+        return reason
+    around, times = token.scope, 0
+    while around.parent is not None:
+        times += around.container is node.called
+        around = around.parent
+    what = f"process {node.called.id} is in itself {times} times: nothing ends its calls of itself"
+    return f"{reason}; {what}" if times > 1 else reason
 
 
 def begin(x: Execution, scope: Scope) -> None:

@@ -1,8 +1,10 @@
 """What the instances of a multi-instance activity give and throw (BPMN 2.0.2, table 10.29)."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from m2pem.engine import records as r
+from m2pem.engine.compensation import throw_compensation
 from m2pem.engine.data import instance_counts, reader
 from m2pem.engine.execution import Execution
 from m2pem.engine.messaging import send
@@ -12,6 +14,7 @@ from m2pem.engine.throwing import throw_error, throw_escalation
 from m2pem.engine.triggering import throw_signal, trigger
 from m2pem.errors import ExpressionError
 from m2pem.model.events import (
+    CompensateEventDefinition,
     ErrorEventDefinition,
     EscalationEventDefinition,
     EventDefinition,
@@ -107,6 +110,8 @@ def throw(x: Execution, whole: Token, scope: Scope, definition: EventDefinition)
             throw_signal(x, signal.id, {**instance_counts(scope.loop)} if default else {})
         case MessageEventDefinition(message=message):
             _throw_message(x, whole, message.id)
+        case CompensateEventDefinition():  # it goes on meanwhile, as it works itself
+            throw_compensation(x, whole, replace(definition, wait=False))
         case EscalationEventDefinition(escalation=escalation):
             assert escalation is not None
             throw_escalation(x, whole, escalation)

@@ -136,13 +136,15 @@ def _settle(x: Execution, token: Token, outcome: TokenOutcome) -> Token | None:
     assert isinstance(whole.node, Activity)
     loop = whole.node.loop
     if isinstance(loop, StandardLoop):
-        _leave(x, token, outcome)
+        enable(x, token)
+        x.leave(token, outcome)
         return _next_round(x, token, whole, loop)
     assert loop is not None
     assert scope.loop is not None
     if loop.output_collection and not collect(x, token, loop):
         return None
-    _leave(x, token, outcome)
+    enable(x, token)
+    x.leave(token, outcome)
     if outcome is TokenOutcome.COMPLETED and not _throw_all(x, token, whole, loop):
         return None
     if loop.completion is not None:
@@ -157,12 +159,6 @@ def _settle(x: Execution, token: Token, outcome: TokenOutcome) -> Token | None:
     elif not scope.tokens:
         return _finish(x, scope, whole, loop)
     return None
-
-
-def _leave(x: Execution, token: Token, outcome: TokenOutcome) -> None:
-    if outcome is TokenOutcome.COMPLETED:
-        enable(x, token)
-    x.leave(token, outcome)
 
 
 def _throw_all(x: Execution, token: Token, whole: Token, loop: MultiInstance) -> bool:

@@ -113,7 +113,7 @@ def _source(reading: Reading, found: Scan, element: etree._Element) -> Expressio
         return None
     if element.tag.startswith(ZEEBE):
         return reading.template(element, found.id, text)
-    return reading.expression(element, found.id, text)
+    return reading.value(element, found.id, text)
 
 
 def _refuse_propagation(reading: Reading, found: Scan, element: etree._Element) -> None:

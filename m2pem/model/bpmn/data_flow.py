@@ -107,22 +107,31 @@ def _assignment(
     reading: Reading, pending: PendingDataFlow, element: etree._Element, target: str
 ) -> Iterator[Mapping]:
     ends = {local(child.tag): child for child in element}
-    written = text_of(ends["to"]).strip("${} ") if "to" in ends else ""
+    written = text_of(ends["to"]).strip("#${} ") if "to" in ends else ""
     head, dot, rest = written.partition(".")
     key = pending.parameters.get(head) or reading.data_key(head) or head
     key = f"{key}{dot}{rest}" or target
+    if "from" in ends and not text_of(ends["from"]):
+        reading.report.warning(
+            ends["from"],
+            pending.node.id,
+            "empty-assignment",
+            f"the assignment of '{written}' has an empty 'from'; it assigns nothing",
+            "write what it assigns, or delete it",
+        )
+        return
     if "from" not in ends or not KEY.fullmatch(key):
         reading.report.error(
             element,
             pending.node.id,
             "bad-assignment",
-            "the assignment does not say what to write, or where",
+            f"the assignment's 'to', '{written}', is no name of the data"
+            if "from" in ends and written
+            else "the assignment does not say what to write, or where",
             "write <assignment><from>expression</from><to>name</to></assignment>",
         )
         return
     source = ends["from"]
-    expression = reading.expression(
-        source, pending.node.id, text_of(source), source.get("language")
-    )
+    expression = reading.value(source, pending.node.id, text_of(source), source.get("language"))
     if expression is not None:
         yield Mapping(expression, key, reading.report.line(element))

@@ -3,7 +3,15 @@
 from m2pem.findings import Finding, Severity
 from m2pem.model.bpmn.reading import Reading
 from m2pem.model.bpmn.rules.registry import code
-from m2pem.model.elements import Container, Event, FlowNode, ParallelGateway, SubProcess
+from m2pem.model.elements import (
+    Container,
+    Event,
+    FlowNode,
+    IntermediateCatchEvent,
+    ParallelGateway,
+    SubProcess,
+)
+from m2pem.model.events import LinkEventDefinition
 from m2pem.model.reach import unreached
 
 _set = object.__setattr__
@@ -48,15 +56,8 @@ def _check_processes(reading: Reading) -> None:
 
 def _check_start(reading: Reading, container: Container) -> None:
     if isinstance(container, SubProcess) and container.triggered_by_event:
-        if not container.starts:
-            reading.report.error(
-                container.line,
-                container.id,
-                "no-start",
-                "an event subprocess begins with its start event, and it has none",
-                "add a start event that says what it waits for",
-            )
-    elif not container.entries and reading.self_starting.isdisjoint(container.nodes):
+        return  # a rule says that it needs a start event
+    if not container.entries and reading.self_starting.isdisjoint(container.nodes):
         reading.report.error(
             container.line,
             container.id,
@@ -81,6 +82,11 @@ def add_unreachable(reading: Reading) -> None:
 def unreachable(file: str, node: FlowNode) -> Finding:
     """The finding about one of them."""
     what = "no start event can reach it" if node.container.starts else "nothing can reach it"
+    remedy = "draw a sequence flow to it, or delete it"
+    if isinstance(node, IntermediateCatchEvent):
+        for definition in node.definitions:
+            if isinstance(definition, LinkEventDefinition):
+                remedy = f"add a link throw event of the name '{definition.name}', or delete it"
     return Finding(
         Severity.ERROR,
         file,
@@ -88,7 +94,7 @@ def unreachable(file: str, node: FlowNode) -> Finding:
         node.id,
         "unreachable",
         f"{what}, so it would never run",
-        "draw a sequence flow to it, or delete it",
+        remedy,
         code("unreachable"),
     )
 

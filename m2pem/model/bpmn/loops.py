@@ -13,7 +13,6 @@ from m2pem.model.elements import Activity, SubProcess
 from m2pem.model.events import EventDefinition, Signal, SignalEventDefinition
 from m2pem.model.expression import Expression
 from m2pem.model.loops import ComplexBehavior, InstanceBehavior, MultiInstance, StandardLoop
-from m2pem.model.near import did_you_mean
 
 _STANDARD = BPMN + "standardLoopCharacteristics"
 _MULTI_INSTANCE = BPMN + "multiInstanceLoopCharacteristics"
@@ -35,10 +34,6 @@ def read_loop(reading: Reading, found: Scan, node: Activity) -> None:
     if not markers:
         return
     element = markers[0]
-    if len(markers) > 1:
-        _error(
-            reading, markers[1], node, "two-loops", "an activity has one loop marker", "keep one"
-        )
     if isinstance(node, SubProcess) and node.triggered_by_event:
         _error(
             reading,
@@ -90,7 +85,7 @@ def _standard_loop(reading: Reading, element: etree._Element, node: Activity) ->
         maximum = int(text)
     elif text is not None:
         what = f"loopMaximum='{text}' is no number of rounds"
-        _error(reading, element, node, "bad-value", what, 'write for example loopMaximum="5"')
+        _error(reading, element, node, "loop-maximum", what, 'write for example loopMaximum="5"')
     return StandardLoop(
         _expression(reading, found, "loopCondition", node),
         reading.boolean(element, "testBefore", False, node.id),
@@ -121,7 +116,7 @@ def _multi_instance(
         pending.output_ref = ""
     if pending.collection_ref or pending.output_ref:
         reading.loops.append(pending)
-    behavior = _behavior(reading, element, node)
+    behavior = _behavior(element)
     return MultiInstance(
         sequential=reading.boolean(element, "isSequential", False, node.id),
         cardinality=_expression(reading, found, "loopCardinality", node),
@@ -202,7 +197,7 @@ def _check_count(reading: Reading, found: Scan, node: Activity, has_collection: 
             reading,
             found.element,
             node,
-            "instance-count",
+            "instances-counted-twice",
             "the multi-instance activity has both a loopCardinality and a collection, either of "
             "which says how many instances there are",
             "keep one",
@@ -212,7 +207,7 @@ def _check_count(reading: Reading, found: Scan, node: Activity, has_collection: 
             reading,
             found.element,
             node,
-            "instance-count",
+            "instances-without-number",
             "the multi-instance activity does not say how many instances it has",
             "add a loopCardinality (a number or an expression), or name a collection: "
             'm2pem:collection="fields" m2pem:elementVariable="field"',
@@ -222,16 +217,12 @@ def _check_count(reading: Reading, found: Scan, node: Activity, has_collection: 
 # --- what instances throw -----------------------------------------------------------------------
 
 
-def _behavior(reading: Reading, element: etree._Element, node: Activity) -> InstanceBehavior:
+def _behavior(element: etree._Element) -> InstanceBehavior:
     text = element.get("behavior", "All").strip()
     try:
         return InstanceBehavior(text)
     except ValueError:
-        known = list(InstanceBehavior)
-        remedy = did_you_mean(text, known, f"write one of: {', '.join(known)}")
-        what = f"behavior='{text}' is no behavior of a multi-instance activity"
-        _error(reading, element, node, "bad-value", what, remedy)
-        return InstanceBehavior.ALL
+        return InstanceBehavior.ALL  # a rule says that it is none
 
 
 def _events(
@@ -259,18 +250,17 @@ def _complex(reading: Reading, found: Scan, node: Activity) -> tuple[ComplexBeha
         definition = scan(reading, each, node.id)
         condition = _expression(reading, definition, "condition", node)
         events = definition.of("event")
-        if not events or not definition.of("condition"):
+        if not events:
             _error(
                 reading,
                 each,
                 node,
-                "complex-behavior",
-                "a complexBehaviorDefinition says when something is thrown, and what",
-                "give it a condition, and an event with an event definition",
+                "instances-complex-event",
+                "the complexBehaviorDefinition does not say what is thrown",
+                "add an event with an event definition",
             )
         elif condition is not None:
             thrower = scan(reading, events[0], events[0].get("id") or node.id)
-            elements = definition_elements(reading, thrower)
-            thrown = read_thrown(reading, thrower, elements)
+            thrown = read_thrown(reading, thrower, definition_elements(reading, thrower))
             result.append(ComplexBehavior(condition, thrown))
     return tuple(result)

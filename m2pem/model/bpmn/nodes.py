@@ -135,6 +135,14 @@ def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -
         reading.undoing.add(node)
     for field, (name, rule) in _QUANTITIES.items():
         object.__setattr__(node, field, _quantity(reading, element, name, rule))
+    if isinstance(node, SubProcess) and node.triggered_by_event and node.start_quantity > 1:
+        reading.report.error(
+            element,
+            node.id,
+            "start-quantity",
+            "an event subprocess is begun by its start event, not by tokens that come to it",
+            "delete startQuantity",
+        )
 
 
 def _quantity(reading: Reading, element: etree._Element, name: str, rule: str) -> int:

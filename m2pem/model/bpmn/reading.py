@@ -8,7 +8,7 @@ from lxml import etree
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.bpmn.names import M2PEM, M2PEM_ATTRIBUTES, a, attribute_names, kind, local
 from m2pem.model.bpmn.report import Report, Where
-from m2pem.model.bpmn.rewriting import expression_remedy
+from m2pem.model.bpmn.rewriting import expression_remedy, value_remedy
 from m2pem.model.bpmn.schema import Shape
 from m2pem.model.elements import (
     Activity,
@@ -33,6 +33,9 @@ from m2pem.model.near import did_you_mean
 
 KEY = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
 """A dotted name of the data store."""
+
+MARK = re.compile(r"[$#]\{")
+"""Where an expression in `${...}` begins, as a whole text or as a part of one."""
 
 _TRUTH = {"true": True, "1": True, "false": False, "0": False}
 
@@ -310,13 +313,27 @@ class Reading:
             self._bad_expression(where, identifier, error)
             return None
 
-    def _bad_expression(self, where: Where, identifier: str, error: ExpressionSyntaxError) -> None:
+    def value(
+        self, where: Where, identifier: str, text: str, language: str | None = None
+    ) -> Expression | None:
+        """What is copied somewhere: an expression, or a text with `${...}` parts."""
+        try:
+            if MARK.search(text) and not text.lstrip().startswith("="):
+                return template(text)
+            return self._parse(text, language)
+        except ExpressionSyntaxError as error:
+            self._bad_expression(where, identifier, error, value_remedy(text))
+            return None
+
+    def _bad_expression(
+        self, where: Where, identifier: str, error: ExpressionSyntaxError, remedy: str = ""
+    ) -> None:
         self.report.error(
             where,
             identifier,
             "bad-expression",
             f"not an expression: {error}",
-            expression_remedy(error.text),
+            remedy or expression_remedy(error.text),
         )
 
 

@@ -18,6 +18,7 @@ _MAX_CHARACTERS = 2_000
 
 _MAX_STATEMENTS = 5
 _MAX_TIME_CHARACTERS = 50
+_WORDS = re.compile(r"[\w .,:;!?@/+-]+")
 _COMMENT = re.compile(r"//|#(?!\{)")
 _PRINT = re.compile(r"(?:System\.out\.print(?:ln)?|console\.log|print(?:ln)?)\b.*")
 _SET = re.compile(r"(?:execution|kcontext)\.setVariable\(\s*(['\"])([\w.]+)\1\s*,\s*(.*)\)")
@@ -44,6 +45,13 @@ def expression_remedy(text: str) -> str:
         if _reads(parse, inner):
             return f"write {shorten(inner)}, without a language"
     return EXPRESSION
+
+
+def value_remedy(text: str) -> str:
+    """What to write for a value that is no expression: other engines take a text as it stands."""
+    if _WORDS.fullmatch(text.strip()):
+        return f"a text is written in quotes: '{shorten(text.strip())}'"
+    return expression_remedy(text)
 
 
 def script_remedy(text: str) -> str:

@@ -75,7 +75,20 @@ def parse_xml(data: bytes, *, declared: bool = True) -> Document:
     text = _decode(data) if declared else data.decode()
     _refuse_doctype(text)
     utf8 = text.encode()
-    parser = etree.XMLParser(
+    parser = _parser()
+    try:
+        root = etree.fromstring(utf8, parser)
+    except etree.XMLSyntaxError as error:
+        if any(entry.type != etree.ErrorTypes.WAR_NS_URI for entry in parser.error_log):
+            raise _not_well_formed(error) from None
+        root = etree.fromstring(utf8, _parser(recover=True))  # names of namespaces may be any text
+    if root.getroottree().docinfo.internalDTD is not None:
+        raise _doctype_found(1)
+    return Document(root, _line_finder(root, utf8))
+
+
+def _parser(*, recover: bool = False) -> etree.XMLParser:
+    return etree.XMLParser(
         encoding="utf-8",
         resolve_entities=False,
         load_dtd=False,
@@ -83,14 +96,8 @@ def parse_xml(data: bytes, *, declared: bool = True) -> Document:
         huge_tree=True,
         remove_comments=True,
         remove_pis=True,
+        recover=recover,
     )
-    try:
-        root = etree.fromstring(utf8, parser)
-    except etree.XMLSyntaxError as error:
-        raise _not_well_formed(error) from None
-    if root.getroottree().docinfo.internalDTD is not None:
-        raise _doctype_found(1)
-    return Document(root, _line_finder(root, utf8))
 
 
 def _decode(data: bytes) -> str:

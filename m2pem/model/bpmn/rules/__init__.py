@@ -16,10 +16,22 @@ from m2pem.model.bpmn.rules.tree import Tree
 if TYPE_CHECKING:
     from m2pem.model.bpmn.report import Report
 
+
+def _of_root(check: Check) -> Check:
+    """A check of root elements only: a script's behavior may have elements of the same name."""
+
+    def checked(tree: Tree, element: etree._Element) -> None:
+        if element.getparent() is tree.root:
+            check(tree, element)
+
+    return checked
+
+
 _CHECKS: dict[str, list[Check]] = {}
 for _topic in TOPICS:
     for _name, _check in _topic.by_name.items():
-        _CHECKS.setdefault(BPMN + _name, []).append(_check)
+        _added = _of_root(_check) if _name == "resource" else _check
+        _CHECKS.setdefault(BPMN + _name, []).append(_added)
 
 
 def check_rules(root: etree._Element, report: "Report", source: bytes) -> None:

@@ -1,4 +1,4 @@
-"""Event definitions: codes, conditions, cancellation (BPMN 2.0.2, 8.4.3, 8.4.4 and 10.5.5)."""
+"""Event definitions: codes and cancellation (BPMN 2.0.2, 8.4.3, 8.4.4 and 10.5.5)."""
 
 from lxml import etree
 
@@ -11,7 +11,6 @@ from m2pem.model.bpmn.rules.tree import (
     is_false,
     name_of,
     parent,
-    texts,
 )
 
 ERROR_CODE = Rule(
@@ -29,15 +28,6 @@ ESCALATION_CODE = Rule(
     W,
     "the escalation that is thrown has no escalationCode",
     "add escalationCode to the escalation; until then its id is its code",
-)
-CONDITION = Rule(
-    10533,
-    "conditional-without-condition",
-    "10.5.5",
-    E,
-    "the conditional event has no condition",
-    "write the condition that it waits for",
-    same_as=("no-condition", "empty-condition", "bad-expression"),
 )
 CANCEL_END = Rule(
     10549,
@@ -92,11 +82,6 @@ def _code(
         tree.say(rule, definition, f"'{name}'")
 
 
-def _conditional(tree: Tree, definition: etree._Element) -> None:
-    if not any(texts(definition, "condition")):
-        tree.say(CONDITION, definition)
-
-
 def _cancel(tree: Tree, definition: etree._Element) -> None:
     event = parent(definition)
     transaction = BPMN + "transaction"
@@ -120,7 +105,6 @@ TOPIC = Topic(
     {
         "errorEventDefinition": _error,
         "escalationEventDefinition": _escalation,
-        "conditionalEventDefinition": _conditional,
         "cancelEventDefinition": _cancel,
     },
 )

@@ -68,14 +68,6 @@ BOUNDARY = Rule(
     "compensation, condition or signal",
     "give it one of these triggers",
 )
-ERROR_GOES_ON = Rule(
-    10509,
-    "error-start-not-interrupting",
-    "10.5.2",
-    E,
-    "an event subprocess that catches an error must interrupt what is around it",
-    'delete isInterrupting="false", or throw and catch an escalation',
-)
 OUTSIDE = Rule(
     10511,
     "not-interrupting-elsewhere",
@@ -183,8 +175,6 @@ def _start(tree: Tree, event: etree._Element) -> None:
     outer = parent(event)
     if is_true(outer, "triggeredByEvent"):
         _allow(tree, event)
-        if is_false(event, "isInterrupting") and has_trigger(tree, event, "error"):
-            tree.say(ERROR_GOES_ON, event)
     else:
         if outer.tag not in SUBPROCESSES:
             _allow(tree, event)

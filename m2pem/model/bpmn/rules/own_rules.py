@@ -48,6 +48,7 @@ unwritten-name | a name is read that nothing writes | write it before, or pass i
 outside-only | what is awaited only the outside can send | mark it m2pem:from="operator"
 no-conditions | no flow out of a gateway has a condition | give the flows conditions
 call-recursion | a process can call itself | make sure that a decision can end it
+empty-assignment | an assignment's 'from' is empty | write what it assigns, or delete it
 """
 
 

@@ -1,4 +1,4 @@
-"""BPMN's rules that the readers hold: what they find on the way while they read.
+"""BPMN's rules that the readers hold: ids, references, flows, where elements stand.
 
 Their findings bear these slugs; `registry` gives them their numbers.
 """
@@ -41,8 +41,8 @@ MISSING_ID = Rule(
     8301,
     "missing-id",
     "8.3.1",
-    E,
-    "an element to which others refer has no id",
+    W,
+    "an element that others could refer to has no id; m2pem makes one up",
     "give it an id that nothing else in the file has",
 )
 DUPLICATE_ID = Rule(
@@ -52,6 +52,38 @@ DUPLICATE_ID = Rule(
     E,
     "two elements have the same id",
     "give one of the two another id, and its references too",
+)
+RETRIEVAL_MESSAGE = Rule(
+    8412,
+    "retrieval-message",
+    "8.4.2",
+    E,
+    "the retrieval expression's messageRef names no message",
+    "name the message from which the value is read",
+)
+RETRIEVAL_PATH = Rule(
+    8413,
+    "retrieval-path",
+    "8.4.2",
+    E,
+    "the retrieval expression has no messagePath",
+    "write the expression that gives the value",
+)
+BINDING_PROPERTY = Rule(
+    8417,
+    "binding-property",
+    "8.4.2",
+    E,
+    "the correlation binding's correlationPropertyRef names no correlation property",
+    "name a correlationProperty that stands in definitions",
+)
+BINDING_PATH = Rule(
+    8418,
+    "binding-path",
+    "8.4.2",
+    E,
+    "the correlation binding has no dataPath",
+    "write the expression that gives the value in the process",
 )
 CONDITION_PLACE = Rule(
     8471,
@@ -93,148 +125,12 @@ EMPTY_CONDITION = Rule(
     "a conditionExpression is empty",
     "write the condition, or delete the conditionExpression",
 )
-TYPED_START = Rule(
-    10331,
-    "typed-start-in-subprocess",
-    "10.3.5",
-    E,
-    "a start event in an embedded subprocess waits for something",
-    "use a plain start event, and a catching intermediate event after it",
-)
-NO_CALLED = Rule(
-    10321,
-    "no-called-element",
-    "10.3.6",
-    E,
-    "a call activity does not say what it calls",
-    "name a process in calledElement",
-)
-NO_TRIGGER = Rule(
-    10507,
-    "no-trigger",
-    "10.5.4",
-    E,
-    "a catching intermediate event or a boundary event has no trigger",
-    "give it an event definition",
-)
-ERROR_GOES_ON = Rule(
-    10508,
-    "error-not-interrupting",
-    "10.5.4",
-    E,
-    "a boundary event that catches an error does not interrupt",
-    "make it interrupting, or throw and catch an escalation",
-)
-ATTACHMENT = Rule(
-    10519,
-    "bad-attachment",
-    "10.5.4",
-    E,
-    "a boundary event is attached to no activity beside it",
-    "attach it to an activity of the same process or subprocess",
-)
-TIMER = Rule(
-    10531,
-    "timer-time",
-    "10.5.5",
-    E,
-    "a timer has no time, several, or one that is no ISO 8601",
-    "give it one timeDuration, timeDate or timeCycle",
-)
-MISSING_REFERENCE = Rule(
-    10532,
-    "missing-reference",
-    "10.5.5",
-    W,
-    "an event or task names no message, signal, error or escalation",
-    "add messageRef, signalRef, errorRef or escalationRef",
-)
-RETRIEVAL_MESSAGE = Rule(
-    8412,
-    "retrieval-message",
-    "8.4.2",
-    E,
-    "the retrieval expression's messageRef names no message",
-    "name the message from which the value is read",
-)
-RETRIEVAL_PATH = Rule(
-    8413,
-    "retrieval-path",
-    "8.4.2",
-    E,
-    "the retrieval expression has no messagePath",
-    "write the expression that gives the value",
-)
-BINDING_PROPERTY = Rule(
-    8417,
-    "binding-property",
-    "8.4.2",
-    E,
-    "the correlation binding's correlationPropertyRef names no correlation property",
-    "name a correlationProperty that stands in definitions",
-)
-BINDING_PATH = Rule(
-    8418,
-    "binding-path",
-    "8.4.2",
-    E,
-    "the correlation binding has no dataPath",
-    "write the expression that gives the value in the process",
-)
-START_QUANTITY = Rule(
-    10301,
-    "start-quantity",
-    "10.3",
-    E,
-    "startQuantity is no whole number from 1 (a warning for 0, which counts as 1)",
-    "write how many tokens begin the activity, or delete it",
-)
-COMPLETION_QUANTITY = Rule(
-    10302,
-    "completion-quantity",
-    "10.3",
-    E,
-    "completionQuantity is no whole number from 1 (a warning for 0, which counts as 1)",
-    "write how many tokens leave the activity, or delete it",
-)
-AD_HOC_ORDERING = Rule(
-    10355,
-    "ad-hoc-ordering",
-    "10.3.5",
-    E,
-    "the ad-hoc subprocess's ordering is none that BPMN has",
-    "write Parallel or Sequential",
-)
-ASSIGNMENT = Rule(
-    10424,
-    "bad-assignment",
-    "10.4.1",
-    E,
-    "an assignment of a data association lacks from or to",
-    "write both",
-)
-ACTIVATION = Rule(
-    10605,
-    "no-activation-condition",
-    "10.6.5",
-    W,
-    "a complex gateway does not say when it is activated",
-    "add an activationCondition",
-)
-PARALLEL_EVENTS = Rule(
-    10618,
-    "parallel-event-gateway",
-    "10.6.6",
-    E,
-    "an event-based gateway that does not begin a process cannot be parallel",
-    "use a parallel gateway before the events",
-)
 NO_START = Rule(
     13201,
     "no-start",
     "13.2",
     E,
-    "nothing in a process or subprocess can start",
+    "nothing in a process or subprocess can start, or an event subprocess has no start event",
     "add a start event",
 )
 UNREACHABLE = Rule(

@@ -1,6 +1,6 @@
 """Attributes and order of the elements that no reader looks into (BPMN 2.0.2, 15.3).
 
-The table is that of the readers (`schema.py`) for the rest of BPMN; what stands in both is theirs.
+The table is that of the readers (`schema.py`) for the rest of BPMN.
 """
 
 from lxml import etree
@@ -9,7 +9,7 @@ from m2pem.model.bpmn.names import BPMN, a, attribute_names, kind, local
 from m2pem.model.bpmn.rules.reader_rules import ELEMENT_ORDER, UNKNOWN_ATTRIBUTE, UNKNOWN_ELEMENT
 from m2pem.model.bpmn.rules.rule import Check, Topic
 from m2pem.model.bpmn.rules.tree import Tree
-from m2pem.model.bpmn.schema import SHAPES, Shape, shape
+from m2pem.model.bpmn.schema import Shape, shape
 from m2pem.model.near import did_you_mean
 
 _BASE = "documentation extensionElements"
@@ -29,7 +29,6 @@ _TABLE: dict[str, tuple[str, str]] = {
     "category": ("id name", f"{_BASE} categoryValue"),
     "categoryValue": ("id value", _BASE),
     "group": ("id categoryValueRef", _BASE),
-    "association": ("id sourceRef targetRef associationDirection", _BASE),
     "textAnnotation": ("id textFormat", f"{_BASE} text"),
     "itemDefinition": ("id structureRef isCollection itemKind", _BASE),
     "interface": ("id name implementationRef", f"{_BASE} operation"),
@@ -98,27 +97,8 @@ _TABLE: dict[str, tuple[str, str]] = {
     "dataInputAssociation": ("id", _ASSOCIATION),
     "dataOutputAssociation": ("id", _ASSOCIATION),
     "assignment": ("id", f"{_BASE} from to"),
-    "standardLoopCharacteristics": (
-        "id testBefore loopMaximum",
-        f"{_BASE} loopCondition",
-    ),
-    "multiInstanceLoopCharacteristics": (
-        "id isSequential behavior oneBehaviorEventRef noneBehaviorEventRef",
-        f"{_BASE} loopCardinality loopDataInputRef loopDataOutputRef inputDataItem outputDataItem"
-        " complexBehaviorDefinition completionCondition",
-    ),
-    "complexBehaviorDefinition": ("id", f"{_BASE} condition event"),
-    "inputDataItem": ("id name itemSubjectRef isCollection", f"{_BASE} dataState"),
-    "outputDataItem": ("id name itemSubjectRef isCollection", f"{_BASE} dataState"),
     "loopCondition": _EXPRESSION,
     "loopCardinality": _EXPRESSION,
-    "completionCondition": _EXPRESSION,
-    "activationCondition": _EXPRESSION,
-    "condition": _EXPRESSION,
-    "conditionalEventDefinition": ("id", f"{_BASE} condition"),
-    "linkEventDefinition": ("id name", f"{_BASE} source target"),
-    "cancelEventDefinition": ("id", _BASE),
-    "compensateEventDefinition": ("id waitForCompletion activityRef", _BASE),
     "rendering": ("id", _BASE),
     "auditing": ("id", _BASE),
     "monitoring": ("id", _BASE),
@@ -175,5 +155,5 @@ def _children(tree: Tree, element: etree._Element, expected: Shape) -> None:
 
 TOPIC = Topic(
     (),
-    {name: _check(shape(*row)) for name, row in _TABLE.items() if BPMN + name not in SHAPES},
+    {name: _check(shape(*row)) for name, row in _TABLE.items()},
 )

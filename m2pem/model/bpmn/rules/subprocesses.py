@@ -8,7 +8,6 @@ from m2pem.model.bpmn.rules.tree import (
     SUBPROCESSES,
     Tree,
     children,
-    has,
     is_false,
     is_true,
     parent,
@@ -38,17 +37,8 @@ STARTS = Rule(
     "event-subprocess-starts",
     "10.3.5",
     E,
-    "an event subprocess must have exactly one start event",
+    "an event subprocess must not have several start events",
     "keep one, or draw an event subprocess for each",
-)
-TRIGGER = Rule(
-    10335,
-    "event-subprocess-trigger",
-    "10.3.5",
-    E,
-    "the start event of an event subprocess must say what it waits for",
-    "give it an event definition",
-    same_as=("no-trigger",),
 )
 METHOD = Rule(
     10341,
@@ -115,11 +105,8 @@ def _subprocess(tree: Tree, element: etree._Element) -> None:
     if tree.out(element):
         tree.say(FLOW_OUT, element)
     starts = list(children(element, "startEvent"))
-    if len(starts) != 1:
+    if len(starts) > 1:
         tree.say(STARTS, element, f"this one has {len(starts)}")
-    for start in starts:
-        if not triggers(tree, start) and not has(start, "eventDefinitionRef"):
-            tree.say(TRIGGER, start)
 
 
 def _same_events(tree: Tree) -> None:

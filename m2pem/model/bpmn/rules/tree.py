@@ -16,6 +16,9 @@ from m2pem.model.bpmn.rules.rule import Rule
 if TYPE_CHECKING:
     from m2pem.model.bpmn.report import Report
 
+_NOTHING = " "
+"""What no reference names."""
+
 Flows = Mapping[str, list[etree._Element]]
 
 
@@ -47,6 +50,7 @@ _PARTS = names(
     "dataInputAssociation dataOutputAssociation resourceRole performer humanPerformer "
     "potentialOwner correlationSubscription"
 )
+_NAMED_BY_READERS = NODES | names("sequenceFlow process")
 _TRUE = frozenset({"true", "1"})
 
 
@@ -95,11 +99,11 @@ class Tree:
 
     def into(self, element: etree._Element) -> list[etree._Element]:
         """The sequence flows that name the element as their target."""
-        return self._ends[0].get(element.get("id", ""), [])
+        return self._ends[0].get(element.get("id") or _NOTHING, [])
 
     def out(self, element: etree._Element) -> list[etree._Element]:
         """The sequence flows that name the element as their source."""
-        return self._ends[1].get(element.get("id", ""), [])
+        return self._ends[1].get(element.get("id") or _NOTHING, [])
 
     @cached_property
     def boundary(self) -> Flows:
@@ -158,7 +162,8 @@ class Tree:
     def _said(self) -> dict[tuple[int, str], set[str]]:
         said: dict[tuple[int, str], set[str]] = {}
         for finding in self._report.findings:
-            said.setdefault((finding.line, finding.element), set()).add(finding.rule)
+            for name in (finding.element, ""):
+                said.setdefault((finding.line, name), set()).add(finding.rule)
         return said
 
     def say(self, rule: Rule, element: etree._Element, detail: str = "", right: str = "") -> None:
@@ -174,15 +179,19 @@ class Tree:
 
 
 def place(element: etree._Element) -> str:
-    """The id that a finding about an element shows: that of what is drawn, or of a root element."""
+    """The id that a finding about an element shows: that of what is drawn, or of a root element.
+
+    "" for a node or flow without one: the readers make one up.
+    """
     found: etree._Element | None = element
     while found is not None:
         parent = found.getparent()
         outside = parent is None or parent.tag in _OUTER
-        if outside and found.tag not in _PARTS and found.get("id"):
+        named = found.get("id") or found.tag in _NAMED_BY_READERS
+        if outside and named and found.tag not in _PARTS:
             break
         found = parent
-    return "" if found is None else found.get("id", "")
+    return (element if found is None else found).get("id", "")
 
 
 def children(element: etree._Element, text: str) -> Iterator[etree._Element]:
@@ -201,10 +210,9 @@ def has(element: etree._Element, text: str) -> bool:
 
 
 def parent(element: etree._Element) -> etree._Element:
-    """The parent of an element that is not the root."""
-    found = element.getparent()
-    assert found is not None
-    return found
+    """The parent of an element; the root, which has none, is its own."""
+    found: etree._Element | None = element.getparent()
+    return element if found is None else found
 
 
 def is_true(element: etree._Element, name: str) -> bool:

@@ -3,7 +3,7 @@
 from lxml import etree
 
 from m2pem.model.bpmn.names import a, kind
-from m2pem.model.bpmn.rules.rule import Check, E, Rule, Topic, W, declared
+from m2pem.model.bpmn.rules.rule import Check, Rule, Topic, W, declared
 from m2pem.model.bpmn.rules.tree import Tree, is_true, name_of, parent
 
 ITEM_KIND = Rule(
@@ -35,18 +35,8 @@ TRUTH = Rule(
     "bad-truth",
     "15.3",
     W,
-    "an attribute is neither true nor false",
+    "an attribute without an effect on execution is neither true nor false",
     "write true or false",
-    same_as=("bad-value",),
-)
-EXECUTED_TRUTH = Rule(
-    15306,
-    "bad-executed-truth",
-    "15.3",
-    E,
-    "an attribute that execution needs is neither true nor false",
-    "write true or false",
-    same_as=("bad-value",),
 )
 REPEATED = Rule(
     15307,
@@ -67,19 +57,6 @@ _TRUTHS = {
     "resourceParameter": "isRequired",
     "extension": "mustUnderstand",
 }
-_EXECUTED_TRUTHS = {
-    "startEvent": "isInterrupting parallelMultiple",
-    "intermediateCatchEvent": "parallelMultiple",
-    "boundaryEvent": "parallelMultiple cancelActivity",
-    "receiveTask": "instantiate",
-    "eventBasedGateway": "instantiate",
-    "subProcess": "triggeredByEvent",
-    "transaction": "triggeredByEvent",
-    "adHocSubProcess": "triggeredByEvent cancelRemainingInstances",
-    "multiInstanceLoopCharacteristics": "isSequential",
-    "standardLoopCharacteristics": "testBefore",
-    "compensateEventDefinition": "waitForCompletion",
-}
 _ONCE = (
     "extensionElements ioSpecification conditionExpression script activationCondition "
     "completionCondition loopCondition loopCardinality loopDataInputRef loopDataOutputRef "
@@ -88,12 +65,12 @@ _ONCE = (
 )
 
 
-def _truth(attributes: str, rule: Rule) -> Check:
+def _truth(attributes: str) -> Check:
     def check(tree: Tree, element: etree._Element) -> None:
         for name in attributes.split():
             text = element.get(name, "true").strip()
             if text not in ("true", "false", "1", "0"):
-                tree.say(rule, element, f"{name} is '{text}'")
+                tree.say(TRUTH, element, f"{name} is '{text}'")
 
     return check
 
@@ -122,7 +99,4 @@ TOPIC = Topic(
     declared(globals()),
     {"itemDefinition": _item, "process": _process, **dict.fromkeys(_ONCE.split(), _once)},
 )
-TRUTHS = Topic((), {name: _truth(each, TRUTH) for name, each in _TRUTHS.items()})
-EXECUTED_TRUTHS = Topic(
-    (), {name: _truth(each, EXECUTED_TRUTH) for name, each in _EXECUTED_TRUTHS.items()}
-)
+TRUTHS = Topic((), {name: _truth(each) for name, each in _TRUTHS.items()})

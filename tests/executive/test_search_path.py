@@ -1,0 +1,67 @@
+"""Missions that come as bytes, and what they call in the folders of the executive."""
+
+from pathlib import Path
+
+from m2pem.api.control import RunStatus
+from m2pem.journal import MemoryJournal
+
+from .conftest import World, mission, question, sequence
+
+CALL = sequence(("Call", '<callActivity id="Call" calledElement="SEARCH"/>'))
+SEARCH = '<process id="SEARCH"><task id="Look"/></process>'
+
+
+def test_a_mission_that_came_as_bytes_calls_what_is_in_the_folders(play, tmp_path: Path) -> None:
+    (tmp_path / "search.bpmn").write_bytes(mission(SEARCH))
+
+    async def story(world: World):
+        control = world.executive.control
+        assert control.check(mission(CALL)) == []
+        run = await control.start(mission(CALL))
+        return await control.wait(run), await control.mission(run)
+
+    summary, loaded = play(story, search_path=[tmp_path])
+    assert summary.status is RunStatus.COMPLETED
+    assert "search:Look" in loaded.elements
+
+
+def test_a_mission_of_the_journal_has_the_files_that_it_had(play, tmp_path: Path) -> None:
+    journal = MemoryJournal()
+    file = tmp_path / "search.bpmn"
+    file.write_bytes(mission(SEARCH))
+
+    async def story(world: World):
+        run = await world.executive.control.start(mission(CALL))
+        await world.executive.control.wait(run)
+
+    play(story, journal=journal, search_path=[tmp_path])
+    file.unlink()
+
+    async def later(world: World):
+        return await world.executive.control.mission("r1")
+
+    assert "search:Look" in play(later, journal=journal).elements
+
+
+def test_a_mission_that_calls_what_is_nowhere_says_where_it_was_looked_for(
+    play, tmp_path: Path
+) -> None:
+    async def story(world: World):
+        return world.executive.control.check(mission(CALL))
+
+    [finding] = play(story, search_path=[tmp_path])
+    assert str(tmp_path) in finding.message
+
+
+def test_a_rehearsal_beside_missions_has_the_path_too(play, tmp_path: Path) -> None:
+    (tmp_path / "search.bpmn").write_bytes(mission(SEARCH))
+    given = []
+
+    def rehearse(_mission, _fleet, **options):
+        given.append(options["search_path"])
+
+    async def story(world: World):
+        await world.executive.control.simulate(mission(sequence(("Ask", question("Ask")))))
+
+    play(story, search_path=[tmp_path], rehearse=rehearse)
+    assert given == [(tmp_path,)]
