@@ -166,6 +166,16 @@ def _scope_interrupted(state: RunState, record: r.ScopeInterrupted) -> None:
     scope = state.scopes[record.scope]
     scope.interrupted = True
     undoing.drop_compensations(scope)
+    _disarm_event_subprocesses(state, scope)
+
+
+def _scope_completing(state: RunState, record: r.ScopeCompleting) -> None:
+    scope = state.scopes[record.scope]
+    scope.completing = True
+    _disarm_event_subprocesses(state, scope)
+
+
+def _disarm_event_subprocesses(state: RunState, scope: Scope) -> None:
     for wait in list(scope.waits.values()) if scope.waits is not None else ():
         if isinstance(wait.node.container, SubProcess):
             _end_wait(state, wait)
@@ -470,6 +480,7 @@ _APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.ScopeOpened: _scope_opened,
     r.ScopeClosed: _scope_closed,
     r.ScopeInterrupted: _scope_interrupted,
+    r.ScopeCompleting: _scope_completing,
     r.TokenEntered: _token_entered,
     r.TokenLeft: _token_left,
     r.InstanceOutput: _instance_output,

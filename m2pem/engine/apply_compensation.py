@@ -115,5 +115,6 @@ def settle_owner(scope: Scope, record: r.ScopeClosed) -> None:
     if record.kept:
         owner.kept = scope
         scope.owner = None
+        drop_compensations(scope)
     elif scope.interrupted or record.outcome is not r.TokenOutcome.COMPLETED:
         owner.abnormal = True

@@ -14,6 +14,7 @@ from m2pem.engine.data import Store, flatten, store_for
 from m2pem.engine.records import Record, TokenOutcome
 from m2pem.engine.state import RunState, Scope, Token
 from m2pem.model.elements import (
+    AdHocSubProcess,
     CallActivity,
     EndEvent,
     Event,
@@ -165,8 +166,7 @@ class Execution:
     def consume(self, token: Token) -> None:
         """The token has done its part and goes nowhere; its scope may be complete now."""
         self.leave(token, TokenOutcome.COMPLETED)
-        if not token.scope.tokens:
-            self.queue.append(token.scope)
+        self.look_later(token.scope)
 
     def proceed(self, token: Token, flows: Iterable[SequenceFlow]) -> None:
         """Leave along `flows`: the token takes the first, a new one each of the others (4.1)."""
@@ -178,8 +178,15 @@ class Execution:
             self.emit(r.FlowTaken(number, process, node.id, scope.id, flow.id))
             self.enter(number, flow.target, scope, flow)
             number = self.state.last_token + 1
+        self.look_later(scope)
+
+    def look_later(self, scope: Scope) -> None:
+        """A token of a scope has been consumed: perhaps the scope is complete."""
+        container = scope.container
         if not scope.tokens:
             self.queue.append(scope)
+        elif container.event_subprocesses and not isinstance(container, AdHocSubProcess):
+            self.queue.append(scope)  # perhaps only they are left
 
     # --- data -----------------------------------------------------------------------------------
 

@@ -64,6 +64,8 @@ class Scope:
     """Of an ad-hoc subprocess: what is to begin, and has not."""
     begun: "dict[FlowNode, None]" = field(default_factory=dict)
     """Of an ad-hoc subprocess: what was begun by choice."""
+    completing: bool = False
+    """Only event subprocesses are active in it any more: no other one can begin."""
     interrupted: bool = False
     """An interrupting event subprocess of it has begun: no other one can."""
     done: "dict[int, Completion] | None" = None

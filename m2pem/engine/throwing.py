@@ -143,8 +143,9 @@ def _catcher(
     """The nearest event that catches a code; one that names it before one that takes all.
 
     An event subprocess does not catch what is thrown in itself, and none begins in a scope that
-    one has interrupted. The boundary events of a loop or multi-instance activity are the whole
-    activity's, not its instances'; those of an activity that is undone are over.
+    one has interrupted, or in which only they are left. The boundary events of a loop or
+    multi-instance activity are the whole activity's, not its instances'; those of an activity that
+    is undone are over.
     """
     token: Token | None = thrower
     while token is not None:
@@ -153,7 +154,7 @@ def _catcher(
             boundary = _best(node.boundary, code, code_of)
             if boundary is not None:
                 return _AtBoundary(token, boundary)
-        if scope.loop is None and not scope.interrupted:
+        if scope.loop is None and not (scope.interrupted or scope.completing):
             handlers = scope.container.event_subprocesses
             starts = [start for each in handlers if each is not node for start in each.starts]
             start = _best(starts, code, code_of)

@@ -90,9 +90,12 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
             if store.has(name) or (read.element, name) in said:
                 continue
             said.add((read.element, name))
+            reader = mission.elements.get(
+                read.element
+            )  # a call reads what another file's process has
             yield Finding(
                 Severity.WARNING,
-                mission.file_of(process),
+                mission.file_of(reader if isinstance(reader, FlowNode) else process),
                 read.line,
                 read.element,
                 "unwritten-name",

@@ -361,6 +361,24 @@ EXPECTED = {
             never={"at RouteEnded"},
         )
     ],
+    "t19": [
+        Course(
+            [
+                *("DropFirst: SUCCEEDED", "DropSecond: SUCCEEDED", "AskKeep: keep by default"),
+                *("at Laid", "at End", "completed"),
+            ],
+            never={"at FetchFirst", "at FetchSecond", "at Cancelled"},
+        ),
+        Course(
+            [
+                *("DropFirst: SUCCEEDED", "DropSecond: SUCCEEDED", "at Abort"),
+                *("at FetchSecond", "TakeSecond: SUCCEEDED"),
+                *("at FetchFirst", "TakeFirst: SUCCEEDED"),
+                *("at Cancelled", "DriveHome: rover return_to_launch", "at GivenUp", "completed"),
+            ],
+            never={"at End"},
+        ),
+    ],
     "t20": [
         Course(
             [

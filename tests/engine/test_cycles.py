@@ -123,6 +123,21 @@ def test_a_cron_text_whose_dates_are_over_throws_expression() -> None:
     assert "timer of tick: none of its dates is left" in play.detail
 
 
+def test_an_event_subprocess_begins_in_each_round_while_its_scope_lasts() -> None:
+    play = Play("""
+        <startEvent id="start"/> <userTask id="u"/>
+        <subProcess id="handler" triggeredByEvent="true">
+          <startEvent id="tick" isInterrupting="false">cycle R3/PT10S</startEvent>
+          <scriptTask id="count">n = n + 1</scriptTask>
+          tick -> count
+        </subProcess>
+        start -> u
+    """).start({"n": 0})
+    assert play.advance(15).data["n"] == 1
+    assert outage(play, 5).data["n"] == 2
+    assert play.answer().ended == "completed"
+
+
 # --- starts of other processes ----------------------------------------------------------------
 
 POOLS = """

@@ -40,6 +40,7 @@ _LINES: dict[type, Callable[[Any], Iterable[object]]] = {
     r.ActivitiesChosen: lambda x: ("choose", x.element, *x.elements),
     r.TokensGathered: lambda x: ("gather", x.token, x.element),
     r.GatewayReset: lambda x: ("reset", x.element),
+    r.ScopeCompleting: lambda x: ("completing", x.scope),
     r.ScopeInterrupted: lambda x: ("interrupt", x.scope, x.element),
     r.BehaviorRequested: lambda x: (
         "request",

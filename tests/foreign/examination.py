@@ -2,7 +2,7 @@
 
 import re
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cache
@@ -10,9 +10,9 @@ from pathlib import Path
 
 from m2pem.api.control import RunStatus, StampedRecord
 from m2pem.errors import FleetError, MissionError
-from m2pem.executive.loading import findings_for
+from m2pem.executive.loading import findings_for, load_source
 from m2pem.findings import Finding, Severity, has_errors
-from m2pem.model.bpmn import NO_BPMN_RULES, parse_mission
+from m2pem.model.bpmn import NO_BPMN_RULES
 from m2pem.model.elements import Mission
 from m2pem.plugins import PluginManager
 from m2pem.resources.madeup import fleet_for
@@ -46,17 +46,17 @@ class Examination:
 
 def examine(path: Path, max_steps: int = MAX_STEPS) -> Examination:
     """Read a file; judge the findings; rehearse it from each of its processes if it loads."""
-    name = str(path)
-    data = path.read_bytes()
     try:
         try:
-            mission = parse_mission(data, name)
+            mission = load_source(path)
         except MissionError as error:
-            return _refused(data, name, error.findings)
-        findings = findings_for(mission, None, plugins())
-        problems = list(flaws(data, name, findings))
+            return _refused(error.findings)
+        problems = list(_flaws(findings_for(mission, None, plugins())))
         ends: list[str] = []
-        for process in mission.processes:
+        own = [each for each in mission.processes if mission.file_of(each) == str(path)]
+        for process in own:
+            if process.global_task:
+                continue
             end, problem = _rehearse(mission, process.id, max_steps)
             ends.append(end)
             if problem:
@@ -72,13 +72,20 @@ def plugins() -> PluginManager:
     return PluginManager(block=("all",))
 
 
-def _refused(data: bytes, name: str, findings: tuple[Finding, ...]) -> Examination:
+def _flaws(findings: Sequence[Finding]) -> Iterator[str]:
+    """What is wrong with findings, each in the file that it names."""
+    for name in {finding.file for finding in findings}:
+        here = [finding for finding in findings if finding.file == name]
+        yield from flaws(Path(name).read_bytes(), name, here)
+
+
+def _refused(findings: tuple[Finding, ...]) -> Examination:
     rules = {
         each.rule: f"{each.message}; {each.remedy}"
         for each in reversed(findings)
         if each.severity is Severity.ERROR
     }
-    problems = list(flaws(data, name, findings))
+    problems = list(_flaws(findings))
     if not rules:
         problems.append("it is refused without an error among the findings")
     outcome = Outcome.NO_BPMN if NO_BPMN_RULES & rules.keys() else Outcome.REFUSED

@@ -47,7 +47,8 @@ def _elements(data: bytes) -> tuple[dict[int, list[str]], set[str]]:
 
 
 def _known(finding: Finding, ids: set[str]) -> bool:
-    return finding.element in ids or "~" in finding.element
+    inner = finding.element.rpartition(":")[2]  # behind the name of the file that is called
+    return finding.element in ids or inner in ids or "~" in finding.element  # which is made up
 
 
 def _anonymous(finding: Finding, where: list[str]) -> bool:

@@ -3,7 +3,6 @@
 import pytest
 from bpmn_text import around, findings, flow, line_of, load, process, summary
 
-from m2pem.findings import Severity
 from m2pem.model.elements import Event, IntermediateCatchEvent, Mission, SubProcess
 from m2pem.model.events import ConditionalEventDefinition
 from m2pem.model.lint import lint
@@ -15,8 +14,8 @@ SIGNAL = '<signal id="go"/>'
 def handler(start: str, identifier: str = "H", more: str = "") -> str:
     """An event subprocess with one start event, `hs`, on one line."""
     return (
-        f'<subProcess id="{identifier}" triggeredByEvent="true">{start}<endEvent id="he"/>'
-        f"{flow('hs', 'he')}{more}</subProcess>"
+        f'<subProcess id="{identifier}" triggeredByEvent="true">{start}<task id="ht"/>'
+        f'{flow("hs", "ht")}<endEvent id="he"/>{flow("ht", "he")}{more}</subProcess>'
     )
 
 
@@ -68,7 +67,7 @@ def test_its_start_event_interrupts_unless_it_says_otherwise() -> None:
 
 
 def test_event_subprocesses_nest() -> None:
-    inner = handler(on_signal(), "I").replace("hs", "is").replace("he", "ie")
+    inner = handler(on_signal(), "I").replace("hs", "is").replace("ht", "it").replace("he", "ie")
     mission = load(with_handler(on_signal(), more=inner))
     assert sub(mission, "H").event_subprocesses == (mission.elements["I"],)
 
@@ -80,14 +79,13 @@ REFUSED = {
             '<subProcess id="H" triggeredByEvent="true"><task id="ht"/></subProcess>\n'
             f"{TASK}{line_of('T')}"
         ),
-        [("event-subprocess-starts", 3, "H")],
+        [("no-start", 3, "H")],
     ),
     "an error that does not interrupt": (
         with_handler(
-            '<startEvent id="hs" isInterrupting="false"><errorEventDefinition errorRef="E1"/>'
-            "</startEvent>"
-        ).replace(b"<signal", b'<error id="E1" errorCode="E1"/><signal'),
-        [("error-start-not-interrupting", 3, "hs")],
+            '<startEvent id="hs" isInterrupting="false"><errorEventDefinition/></startEvent>'
+        ),
+        [("error-not-interrupting", 3, "hs")],
     ),
     "a trigger that starts nothing": (
         with_handler('<startEvent id="hs"><terminateEventDefinition/></startEvent>'),
@@ -98,11 +96,7 @@ REFUSED = {
             '<adHocSubProcess id="H" triggeredByEvent="true"><task id="ht"/></adHocSubProcess>\n'
             f"{TASK}{line_of('T')}"
         ),
-        [
-            ("bad-value", 3, "H"),
-            ("event-subprocess-starts", 3, "H"),
-            ("unreachable", 3, "H"),
-        ],
+        [("bad-value", 3, "H"), ("unreachable", 3, "H")],
     ),
     "several tokens": (
         process(
@@ -224,6 +218,13 @@ def test_links_join_sources_and_target_of_a_name_both_ways() -> None:
     assert not lint(mission)
 
 
+def test_a_link_without_a_name_has_that_of_its_event() -> None:
+    named = linked(
+        throw("").replace('id="L1"', 'id="L1" name="a"').replace(' name=""', "", 1), catch("a")
+    )
+    assert load(named).elements["L1"].links_to is not None  # type: ignore[attr-defined]
+
+
 def test_links_of_one_name_in_two_containers_are_apart() -> None:
     ends = throw("a", "L3") + catch("a", "L4")
     inner = f'<subProcess id="X">{ends}{TASK}{flow("L4", "T")}</subProcess>'
@@ -233,31 +234,60 @@ def test_links_of_one_name_in_two_containers_are_apart() -> None:
 
 
 def test_a_container_without_start_events_does_not_begin_at_its_link_target() -> None:
-    inner = (
-        f'<subProcess id="T">{throw("a")}{catch("a")}<task id="U"/>{flow("L2", "U")}</subProcess>'
-    )
+    ends = throw("a") + catch("a")
+    inner = f'<subProcess id="T">{ends}<task id="U"/>{flow("L2", "U")}</subProcess>'
     assert [each.id for each in sub(load(around(inner)), "T").entries] == ["L1"]
 
 
 WRONG_LINKS = {
-    "no target": (linked(throw("a"), catch("b")), ["link-without-target"]),
+    "no target": (linked(throw("a"), catch("b")), [("dangling-link", 3, "L1")]),
+    "two targets": (
+        linked(throw("a"), catch("a"), catch("a", "L3"), more=flow("L3", "E")),
+        [("duplicate-link", 5, "L3")],
+    ),
     "a target in a subprocess": (
         process(
             f"{throw('a')}\n<subProcess id='X'>{throw('a', 'in')}{catch('a')}{TASK}"
             f"{flow('L2', 'T')}</subProcess>\n{line_of('X')}{flow('X', 'L1')}"
         ),
-        ["link-crosses-border"],
+        [("link-crosses-border", 3, "L1")],
     ),
-    "no name": (linked(throw(""), catch("a")), ["link-name"]),
-    "two targets": (
-        linked(throw("a"), catch("a"), catch("a", "L3"), more=flow("L3", "E")),
-        ["link-targets"],
+    "no name": (linked(throw(""), catch("a")), [("link-name", 3, "L1")]),
+    "a flow out of a source": (
+        linked(throw("a"), catch("a"), more=f"\n{flow('L1', 'E')}"),
+        [("link-throw-outgoing", 6, "L1-E")],
+    ),
+    "a flow into a target": (
+        linked(throw("a"), catch("a"), more=f"\n{flow('S', 'L2')}"),
+        [("link-catch-incoming", 6, "S-L2")],
+    ),
+    "a link as a start event": (
+        process(
+            '<startEvent id="S"><linkEventDefinition name="a"/></startEvent><endEvent id="E"/>'
+            + flow("S", "E")
+        ),
+        [("start-trigger", 3, "S")],
     ),
 }
 
 
 @pytest.mark.parametrize("case", WRONG_LINKS)
-def test_a_link_that_leads_nowhere_or_anywhere_is_refused_once(case: str) -> None:
+def test_a_link_is_refused(case: str) -> None:
     data, expected = WRONG_LINKS[case]
-    errors = [each.rule for each in findings(data) if each.severity is Severity.ERROR]
-    assert [rule for rule in errors if rule != "unreachable"] == expected
+    assert summary(data) == expected
+
+
+def test_the_finding_of_a_missing_target_names_a_near_one_or_says_where_it_is() -> None:
+    [near] = findings(linked(throw("home"), catch("hone")))
+    assert (near.message, near.remedy) == (
+        "the link 'home' has no target",
+        "did you mean 'hone'?",
+    )
+    [elsewhere] = findings(WRONG_LINKS["a target in a subprocess"][0])
+    assert "'L2' is in another process or subprocess" in elsewhere.message
+
+
+def test_a_target_that_nothing_leads_to_is_unreachable() -> None:
+    [found] = lint(load(process(f"{catch('a', 'L2')}{TASK}{line_of('T')}")))
+    assert (found.rule, found.element) == ("unreachable", "L2")
+    assert found.remedy == "add a link throw event of the name 'a', or delete it"

@@ -36,7 +36,7 @@ def task_of(mission: Mission) -> e.FlowNode:
         ('<globalManualTask id="G"/>', e.ManualTask),
         ('<globalUserTask id="G"/>', e.UserTask),
         ('<globalScriptTask id="G"><script>x = 1</script></globalScriptTask>', e.ScriptTask),
-        ('<globalBusinessRuleTask id="G" class="Rules"/>', e.BusinessRuleTask),
+        ('<globalBusinessRuleTask id="G" m2pem:service="Rules"/>', e.BusinessRuleTask),
     ],
 )
 def test_a_global_task_is_called_as_the_task_it_is(xml: str, kind: type) -> None:

@@ -1,11 +1,14 @@
 """What is doubtful about a mission as a whole."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import pytest
 from bpmn_text import around, definitions, flow, line_of, load, process
 
 from m2pem.findings import Severity
+from m2pem.model.bpmn import parse_mission
+from m2pem.model.bpmn.search_path import SearchPath
 from m2pem.model.lint import lint
 
 
@@ -234,3 +237,20 @@ def test_a_condition_that_begins_a_process_reads_the_main_one() -> None:
     assert lint(load(definitions(text.format(y="1")))) == []
     [found] = lint(load(definitions(text.format(y="y"))))
     assert (found.rule, found.element) == ("unwritten-name", "on")
+
+
+def test_what_a_call_reads_of_a_process_in_another_file_is_found_in_the_file_that_calls(
+    tmp_path: Path,
+) -> None:
+    out = '<extensionElements><m2pem:out source="x" target="y"/></extensionElements>'
+    caller, called = tmp_path / "caller.bpmn", tmp_path / "called.bpmn"
+    caller.write_bytes(around(f'<callActivity id="T" calledElement="Q">\n{out}</callActivity>'))
+    called.write_bytes(definitions('<process id="Q"><task id="A"/></process>'))
+    mission = parse_mission(caller.read_bytes(), str(caller), SearchPath(caller))
+    [found] = lint(mission)
+    assert (found.rule, found.file, found.line, found.element) == (
+        "unwritten-name",
+        str(caller),
+        4,
+        "T",
+    )

@@ -1,7 +1,7 @@
 """What both generators of random models share: the elements they may use, and a level being drawn.
 
 `ELEMENTS` is the switch: models are made of those that are named in it, and of user tasks, none
-start and end events, which every model has. What the engine does not execute is in `NOT_YET`.
+start and end events, which every model has.
 """
 
 from collections.abc import Sequence
@@ -10,8 +10,7 @@ from random import Random
 
 from tests.reference.diagram import Event, Flow, Is, Level, Loop, Many, Node
 
-NOT_YET = frozenset({"standard_loop", "multi_instance", "event_subprocess"})
-ALL_ELEMENTS = frozenset(
+ELEMENTS = frozenset(
     {
         "task",  # a task that does nothing
         "exclusive",
@@ -37,7 +36,6 @@ ALL_ELEMENTS = frozenset(
         "event_subprocess",
     }
 )
-ELEMENTS = ALL_ELEMENTS - NOT_YET
 SIGNALS = ("go", "stop", "turn")
 ERRORS = ("E1", "E2")
 ESCALATIONS = ("X1", "X2")

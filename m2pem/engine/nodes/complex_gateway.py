@@ -75,8 +75,7 @@ def reset(x: Execution, scope: Scope, node: ComplexGateway) -> None:
     for waiting in _waiting(scope, node):
         x.queue.append(waiting)
         break
-    if not scope.tokens:
-        x.queue.append(scope)
+    x.look_later(scope)
 
 
 def _waiting(scope: Scope, node: ComplexGateway) -> list[Token]:

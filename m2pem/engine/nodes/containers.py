@@ -1,5 +1,6 @@
 """Subprocesses and call activities (BPMN 2.0.2, clauses 10.3.5, 10.3.6 and 13.3.4)."""
 
+from m2pem.engine import records as r
 from m2pem.engine.data import flatten, reader
 from m2pem.engine.data_flow import evaluate, write_values
 from m2pem.engine.execution import Execution
@@ -83,6 +84,18 @@ def look_at(x: Execution, scope: Scope) -> None:
         begin_instances(x, scope)
     elif not scope.tokens:
         finish(x, scope)
+    elif scope.container.event_subprocesses and not (scope.completing or scope.interrupted):
+        _complete_handlers(x, scope)
+
+
+def _complete_handlers(x: Execution, scope: Scope) -> None:
+    """A scope whose own work is done waits for its event subprocesses, and begins no more of them
+    (clause 13.3.2: it is completing)."""
+    handlers = scope.container.event_subprocesses
+    if all(token.node in handlers for token in scope.tokens.values()):
+        owner = scope.owner
+        element = owner.node.id if owner is not None else scope.container.id
+        x.emit(r.ScopeCompleting(scope.id, scope.container.process.id, element))
 
 
 def finish(x: Execution, scope: Scope, outcome: TokenOutcome = TokenOutcome.COMPLETED) -> None:

@@ -133,8 +133,8 @@ def end(x: Execution, token: Token) -> None:
             case EscalationEventDefinition(escalation=escalation) if len(node.definitions) == 1:
                 assert escalation is not None
                 goes_on = throw_escalation(x, token, escalation, leaving=True)
-                if goes_on and not token.scope.tokens:
-                    x.queue.append(token.scope)
+                if goes_on:
+                    x.look_later(token.scope)
                 return
             case _:
                 _throw(x, token, definition)

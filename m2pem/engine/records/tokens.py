@@ -88,6 +88,14 @@ class ScopeInterrupted(BaseRecord, frozen=True):
     element: str
 
 
+class ScopeCompleting(BaseRecord, frozen=True):
+    """Only event subprocesses are active in the scope any more: no other one can begin."""
+
+    scope: int
+    process: str
+    element: str
+
+
 class ActivitiesChosen(BaseRecord, frozen=True):
     """An ad-hoc subprocess has begun whose own expression chooses what is done in it, in order."""
 

@@ -60,7 +60,7 @@ def read_definition(
     if name == "conditional":
         return _conditional(reading, found)
     if name == "link":
-        return LinkEventDefinition(line, element.get("name", "").strip())
+        return LinkEventDefinition(line, (element.get("name") or label).strip())
     if name == "message":
         return _message(reading, element, event, catches=catches)
     if name == "signal":

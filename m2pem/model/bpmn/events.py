@@ -42,6 +42,8 @@ def read_event(reading: Reading, element: etree._Element, container: Container) 
     if place == "startEvent":
         interrupting = reading.boolean(element, "isInterrupting", True, identifier)
         event = StartEvent(identifier, name, line, definitions, parallel, interrupting)
+        if not interrupting:
+            _no_error(reading, element, event)
     elif place == "endEvent":
         event = EndEvent(identifier, name, line, definitions)
     elif place == "intermediateThrowEvent":
@@ -71,16 +73,26 @@ def _boundary(
         interrupting,
     )
     reading.attachments.append((event, reference(element.get("attachedToRef", ""))))
-    if not interrupting and any(isinstance(each, ErrorEventDefinition) for each in definitions):
-        reading.report.error(
-            element,
-            identifier,
-            "error-not-interrupting",
-            'a boundary event that catches an error cannot have cancelActivity="false": the '
-            "activity has already failed",
-            "make it interrupting, or throw and catch an escalation",
-        )
+    if not interrupting:
+        _no_error(reading, element, event)
     return event
+
+
+def _no_error(reading: Reading, element: etree._Element, event: Event) -> None:
+    """What catches an error cannot leave running what failed (clause 10.5.6)."""
+    if not any(isinstance(each, ErrorEventDefinition) for each in event.definitions):
+        return
+    word, attribute, what = "boundary", "cancelActivity", "activity"
+    if isinstance(event, StartEvent):
+        word, attribute, what = "start", "isInterrupting", "scope"
+    reading.report.error(
+        element,
+        event.id,
+        "error-not-interrupting",
+        f'a {word} event that catches an error cannot have {attribute}="false": the {what} has '
+        "already failed",
+        "make it interrupting, or throw and catch an escalation",
+    )
 
 
 def _definitions(

@@ -56,8 +56,15 @@ def _check_processes(reading: Reading) -> None:
 
 def _check_start(reading: Reading, container: Container) -> None:
     if isinstance(container, SubProcess) and container.triggered_by_event:
-        return  # a rule says that it needs a start event
-    if not container.entries and reading.self_starting.isdisjoint(container.nodes):
+        if not container.starts:
+            reading.report.error(
+                container.line,
+                container.id,
+                "no-start",
+                "an event subprocess begins with its start event, and it has none",
+                "add a start event that says what it waits for",
+            )
+    elif not container.entries and reading.self_starting.isdisjoint(container.nodes):
         reading.report.error(
             container.line,
             container.id,

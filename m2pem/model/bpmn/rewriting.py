@@ -54,19 +54,19 @@ def value_remedy(text: str) -> str:
     return expression_remedy(text)
 
 
-def script_remedy(text: str) -> str:
-    """What to write for a script in another language."""
+def script_remedy(text: str, attribute: str = "scriptFormat") -> str:
+    """What to write for a script in another language, which `attribute` names."""
     statements = _statements(text) if len(text) <= _MAX_CHARACTERS else None
     if statements is None or len(statements) > _MAX_STATEMENTS:
         return (
-            'write statements (scriptFormat="m2pem"), a behavior (scriptFormat="application/xml"), '
+            f'write statements ({attribute}="m2pem"), a behavior ({attribute}="application/xml"), '
             "or make it a service task, whose class a plugin provides"
         )
     if not statements:
         return "it only prints: delete it, or make it a plain task"
     written = ", ".join(f"'{shorten(statement)}'" for statement in statements)
     lines = "lines" if len(statements) > 1 else "line"
-    return f'write the {lines} {written} (scriptFormat="m2pem")'
+    return f'write the {lines} {written} ({attribute}="m2pem")'
 
 
 def statement_remedy(line: str) -> str:

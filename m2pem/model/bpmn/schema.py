@@ -89,7 +89,7 @@ _TABLE: dict[str, tuple[str, str]] = {
     "businessRuleTask": (f"{_ACTIVITY_ATTRIBUTES} implementation", _ACTIVITY),
     "callActivity": (f"{_ACTIVITY_ATTRIBUTES} calledElement", _ACTIVITY),
     "globalTask": ("id name", _GLOBAL),
-    "globalBusinessRuleTask": ("id name implementation class", _GLOBAL),
+    "globalBusinessRuleTask": ("id name implementation", _GLOBAL),
     "globalManualTask": ("id name", _GLOBAL),
     "globalScriptTask": ("id name scriptLanguage", f"{_GLOBAL} script"),
     "globalUserTask": ("id name implementation", f"{_GLOBAL} rendering"),

@@ -76,7 +76,7 @@ def _script(
             found.id,
             "script-language",
             f"m2pem does not run scripts in '{written}'",
-            script_remedy(text),
+            script_remedy(text, _language(found)),
         )
         return None, None
     if len(script):
