@@ -107,7 +107,10 @@ def _by(record: Any) -> str:
 
 
 def _entered(story: Story, run: RunId, record: r.TokenEntered) -> Told | None:
-    return (story.label(run, record.element), "") if story.is_shown(run, record.element) else None
+    if not story.is_shown(run, record.element):
+        return None
+    number = f", instance {record.instance}" if record.instance is not None else ""
+    return f"{story.label(run, record.element)}{number}", ""
 
 
 def _left(story: Story, run: RunId, record: r.TokenLeft) -> Told | None:

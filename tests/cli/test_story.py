@@ -130,6 +130,13 @@ def test_a_run_whose_diagram_is_not_known_is_told_by_ids() -> None:
     assert story.tell(StampedRecord("r1", 1, 0.0, entered)) == "      0.0 s  Unknown"
 
 
+def test_an_instance_says_which_it_is() -> None:
+    story = Story(lambda _: None)
+    entered = r.TokenEntered(2, "P", "Survey", 2, instance=0)
+    told = story.tell(StampedRecord("r1", 1, 0.0, entered))
+    assert told == "      0.0 s  Survey, instance 0"
+
+
 def test_colour_is_for_terminals() -> None:
     story = Story(lambda _: VIGNETTE, colour=True)
     line = story.tell(StampedRecord("r1", 1, 0.0, r.RunPaused(0)))

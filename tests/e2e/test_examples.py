@@ -379,6 +379,19 @@ EXPECTED = {
             never={"at End"},
         ),
     ],
+    "t20": [
+        Course(
+            [
+                *("at SearchField", "field = north_field", "Survey: uav1 area_survey"),
+                *("field = east_field", "AnythingFound: found by answers file"),
+                *("TakePicture: uav1/camera take_picture", "Sharp: again by answers file"),
+                *("TakePicture: uav1/camera take_picture", "Sharp: sharp by answers file"),
+                *("finds = 1", "field = south_field", "TakePicture: SUCCEEDED", "finds = 2"),
+                *("reports = [None, 'east_field', 'south_field', None]", "at FlyHome"),
+                *("FlyHome: uav1 return_to_launch", "at End", "completed"),
+            ],
+        )
+    ],
     "t21": [
         Course(
             [

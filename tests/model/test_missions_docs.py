@@ -8,6 +8,7 @@ from bpmn_text import definitions, flow, load
 
 from m2pem.model.elements import Activity, CallActivity, ServiceTask
 from m2pem.model.lint import lint
+from m2pem.model.loops import MultiInstance, StandardLoop
 
 DOCS = (Path(__file__).parent.parent.parent / "docs" / "missions.md").read_text()
 CODE = r'"([A-Z]{2,}(?:_[A-Z]+)+|EXPRESSION|RECURSION)"'
@@ -62,14 +63,28 @@ def test_the_event_subprocess_has_no_warning() -> None:
     task = (
         '<startEvent id="S"/><endEvent id="E"/><sequenceFlow id="f" sourceRef="S" targetRef="E"/>'
     )
-    text = f'<process id="P">{example("<subProcess")}{task}</process>'
+    handler = example('<subProcess id="TooManyFinds"')
+    text = f'<process id="P">{handler}{task}</process>'
     mission = load(definitions(text))
     assert mission.warnings == ()
     assert [each.id for each in mission.processes[0].event_subprocesses] == ["TooManyFinds"]
 
 
+def test_the_examples_of_loops_have_no_warning() -> None:
+    instances = example('<subProcess id="SurveyField"').replace("...", '<task id="t"/>')
+    body = f"{example('<userTask')}{instances}"
+    mission = load(definitions(f'<process id="P">{body}</process>'))
+    assert mission.warnings == ()
+    ask, survey = mission.elements["Ask"], mission.elements["SurveyField"]
+    assert isinstance(ask, Activity)
+    assert isinstance(survey, Activity)
+    assert isinstance(ask.loop, StandardLoop)
+    assert isinstance(survey.loop, MultiInstance)
+    assert survey.loop.output_collection == "reports"
+
+
 def test_every_example_is_tested() -> None:
-    assert len(EXAMPLES) == 7
+    assert len(EXAMPLES) == 9
 
 
 def test_every_error_that_the_program_throws_is_documented() -> None:
