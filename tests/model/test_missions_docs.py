@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from bpmn_text import definitions, flow, load
+from bpmn_text import definitions, load
 
 from m2pem.model.elements import Activity, CallActivity, ServiceTask
 from m2pem.model.lint import lint
