@@ -181,7 +181,7 @@ class Tree:
 def place(element: etree._Element) -> str:
     """The id that a finding about an element shows: that of what is drawn, or of a root element.
 
-    "" for a node or flow without one: the readers make one up.
+    Where that has none (the readers make one up), the element's own, or "".
     """
     found: etree._Element | None = element
     while found is not None:
@@ -191,7 +191,8 @@ def place(element: etree._Element) -> str:
         if outside and named and found.tag not in _PARTS:
             break
         found = parent
-    return (element if found is None else found).get("id", "")
+    drawn = "" if found is None else found.get("id", "")
+    return drawn or element.get("id", "")
 
 
 def children(element: etree._Element, text: str) -> Iterator[etree._Element]:
