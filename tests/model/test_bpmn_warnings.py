@@ -33,8 +33,8 @@ WARNINGS = {
     ),
     "assignment of nothing": (
         around(
-            '<task id="T"><ioSpecification><dataInput id="i"/><inputSet/><outputSet/>'
-            "</ioSpecification>"
+            '<task id="T"><ioSpecification><dataInput id="i"/>'
+            "<inputSet><dataInputRefs>i</dataInputRefs></inputSet><outputSet/></ioSpecification>"
             '<dataInputAssociation id="a"><targetRef>i</targetRef><assignment>\n<from/><to>i</to>'
             "</assignment></dataInputAssociation></task>"
         ),
