@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from m2pem.api.service import Service
     from m2pem.engine.records import Record
     from m2pem.findings import Finding
-    from m2pem.model.elements import Mission
+    from m2pem.model.mission import Mission
     from m2pem.resources.fleet import Fleet
 
 hookspec = pluggy.HookspecMarker("m2pem")

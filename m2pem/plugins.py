@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from m2pem.api.ocu import Ocu
     from m2pem.api.service import Service
     from m2pem.engine.records import Record
-    from m2pem.model.elements import Mission
+    from m2pem.model.mission import Mission
     from m2pem.resources.fleet import Fleet
 
 __all__ = ["DEFAULT_PLUGINS", "PluginFailure", "PluginInfo", "PluginManager"]

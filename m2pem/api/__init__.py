@@ -54,8 +54,8 @@ if TYPE_CHECKING:
         ResourceId,
         ResumePolicy,
     )
-    from m2pem.model.elements import Mission
     from m2pem.model.geometry import Area, Point, Route, VehiclePosition
+    from m2pem.model.mission import Mission
     from m2pem.model.values import Value
     from m2pem.resources.behaviors import SHARED
     from m2pem.resources.fleet import Fleet

@@ -14,7 +14,7 @@ from m2pem.model.catalogue import BehaviorSpec, ResourceId
 from m2pem.model.values import Value
 
 if TYPE_CHECKING:
-    from m2pem.model.elements import Mission
+    from m2pem.model.mission import Mission
     from m2pem.resources.fleet import Fleet
 
 RunId: TypeAlias = str

@@ -19,7 +19,7 @@ from m2pem.errors import FleetError, MissionError
 from m2pem.findings import Finding, Severity, has_errors
 
 if TYPE_CHECKING:
-    from m2pem.model.elements import Mission
+    from m2pem.model.mission import Mission
     from m2pem.model.values import Value
 
 UNUSABLE = 2

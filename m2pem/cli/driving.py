@@ -15,7 +15,7 @@ from m2pem.cli.ocus import PLAIN, Operators
 from m2pem.cli.output import Output
 from m2pem.control_socket.server import ControlSocket
 from m2pem.executive.executive import Executive
-from m2pem.model.elements import Mission
+from m2pem.model.mission import Mission
 from m2pem.sim.answers import Answers
 
 log = logging.getLogger("m2pem.cli")

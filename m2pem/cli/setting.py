@@ -14,7 +14,7 @@ from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.findings import has_errors
 from m2pem.journal.base import Journal
-from m2pem.model.elements import Mission
+from m2pem.model.mission import Mission
 from m2pem.plugins import PluginManager
 from m2pem.resources.fleet import Fleet, Payload, Vehicle
 from m2pem.resources.fleet_file import load_fleet

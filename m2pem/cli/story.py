@@ -9,7 +9,8 @@ from m2pem.api.control import RunId, StampedRecord
 from m2pem.engine import records as r
 from m2pem.engine.state import RunState
 from m2pem.model.catalogue import BehaviorState
-from m2pem.model.elements import Activity, Event, Mission
+from m2pem.model.elements import Activity, Event
+from m2pem.model.mission import Mission
 
 Told: TypeAlias = tuple[str, str]
 """A line, and the colour of it ("" for none)."""

@@ -25,8 +25,8 @@ from m2pem.errors import OperatorError
 from m2pem.findings import Finding
 from m2pem.model.bpmn import parse_mission
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
-from m2pem.model.elements import Mission
 from m2pem.model.library import KeptLibrary, Source
+from m2pem.model.mission import Mission
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
 from m2pem.resources.snapshot import restore

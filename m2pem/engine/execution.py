@@ -21,12 +21,12 @@ from m2pem.model.elements import (
     EventBasedGateway,
     FlowNode,
     IntermediateThrowEvent,
-    Mission,
     ReceiveTask,
     SequenceFlow,
     StartEvent,
 )
 from m2pem.model.events import EventDefinition, MessageEventDefinition
+from m2pem.model.mission import Mission
 from m2pem.model.upstream import upstream
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet

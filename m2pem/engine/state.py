@@ -11,7 +11,13 @@ from enum import StrEnum
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import RunOutcome, Trigger
 from m2pem.model.catalogue import BehaviorState
-from m2pem.model.elements import Activity, Container, FlowNode, Mission, SequenceFlow
+from m2pem.model.elements import (
+    Activity,
+    Container,
+    FlowNode,
+    SequenceFlow,
+)
+from m2pem.model.mission import Mission
 from m2pem.model.values import Value
 
 

@@ -26,6 +26,7 @@ from m2pem.model.events import (
     TimerKind,
 )
 from m2pem.model.expression import Expression
+from m2pem.model.expression.literals import describe
 
 
 class _NotATimeError(Exception):
@@ -110,7 +111,9 @@ def due_after(x: Execution, holder: Place, expression: Expression) -> int:
     """
     text = expression.evaluate(reader(holder))
     if not isinstance(text, str):
-        raise ExpressionError(f"{expression.text!r} gives {text!r}, not an ISO 8601 duration")
+        raise ExpressionError(
+            f"{expression.text!r} gives {describe(text)}, not an ISO 8601 duration"
+        )
     return x.state.mission_time_us(x.now_us) + duration_us(text, x.now_us)
 
 
@@ -123,7 +126,9 @@ def _arm_timer(
         return
     text = definition.expression.evaluate(reader(holder))
     if not isinstance(text, str):
-        raise _NotATimeError(f"{definition.expression.text!r} gives {text!r}, not an ISO 8601 time")
+        raise _NotATimeError(
+            f"{definition.expression.text!r} gives {describe(text)}, not an ISO 8601 time"
+        )
     if definition.kind is TimerKind.DATE:
         await_event(x, holder, node, Trigger.TIMER, due_us=date_us(text), calendar=True)
         return

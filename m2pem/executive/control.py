@@ -25,8 +25,8 @@ from m2pem.findings import Finding
 from m2pem.journal.base import RunLine
 from m2pem.journal.mission import mission_of
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
-from m2pem.model.elements import Mission
 from m2pem.model.events import Signal
+from m2pem.model.mission import Mission
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
 

@@ -40,8 +40,8 @@ from m2pem.gateway.watch import Watch, watch
 from m2pem.journal.base import Journal, RunHeader
 from m2pem.journal.mission import mission_of
 from m2pem.model.catalogue import ResourceId
-from m2pem.model.elements import Mission
 from m2pem.model.geometry import Geometry
+from m2pem.model.mission import Mission
 from m2pem.model.values import Value
 from m2pem.plugins import PluginManager
 from m2pem.resources.allocation import spelled_out

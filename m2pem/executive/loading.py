@@ -12,8 +12,9 @@ from m2pem.executive.arbiters import FleetArbiters
 from m2pem.findings import Finding, Severity, has_errors
 from m2pem.model.bpmn import parse_mission
 from m2pem.model.bpmn.search_path import SearchPath
-from m2pem.model.elements import Mission, ServiceTask
+from m2pem.model.elements import ServiceTask
 from m2pem.model.lint import by_file, lint
+from m2pem.model.mission import Mission
 from m2pem.model.near import did_you_mean
 from m2pem.resources.check import check_mission
 

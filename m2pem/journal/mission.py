@@ -2,8 +2,8 @@
 
 from m2pem.journal.base import RunHeader
 from m2pem.model.bpmn import parse_mission
-from m2pem.model.elements import Mission
 from m2pem.model.library import KeptLibrary
+from m2pem.model.mission import Mission
 
 
 def mission_of(header: RunHeader) -> Mission:

@@ -20,7 +20,6 @@ from m2pem.model.elements import (
     FlowNode,
     InclusiveGateway,
     IntermediateThrowEvent,
-    Mission,
     Process,
     ReceiveTask,
     SendTask,
@@ -34,6 +33,7 @@ from m2pem.model.events import (
     SignalEventDefinition,
 )
 from m2pem.model.loops import MultiInstance
+from m2pem.model.mission import Mission
 from m2pem.model.names import unwritten
 from m2pem.model.reach import unreached
 

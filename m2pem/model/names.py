@@ -14,7 +14,6 @@ from m2pem.model.elements import (
     ComplexGateway,
     Event,
     FlowNode,
-    Mission,
     Process,
     ScriptTask,
     SendTask,
@@ -25,6 +24,7 @@ from m2pem.model.elements import (
 from m2pem.model.events import ConditionalEventDefinition, TimerEventDefinition
 from m2pem.model.expression import Expression
 from m2pem.model.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
+from m2pem.model.mission import Mission
 from m2pem.model.near import did_you_mean
 
 

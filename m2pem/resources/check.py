@@ -6,7 +6,13 @@ from dataclasses import dataclass
 from m2pem.findings import Finding, Severity
 from m2pem.model.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
-from m2pem.model.elements import Activity, Mission, ScriptTask, SendTask, ServiceTask
+from m2pem.model.elements import (
+    Activity,
+    ScriptTask,
+    SendTask,
+    ServiceTask,
+)
+from m2pem.model.mission import Mission
 from m2pem.resources.allocation import resources_of
 from m2pem.resources.behaviors import SHARED
 from m2pem.resources.check_roles import TaskFindings, check_roles, place

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 
 from m2pem.model.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.model.catalogue import ParameterKind, ResourceId
-from m2pem.model.elements import Mission, ScriptTask, SendTask, ServiceTask
+from m2pem.model.elements import ScriptTask, SendTask, ServiceTask
 from m2pem.model.geometry import Area, Coordinate, Geometry, Point, Route
+from m2pem.model.mission import Mission
 from m2pem.resources.behaviors import SHARED
 from m2pem.resources.check import DETECTOR_SERVICE
 from m2pem.resources.fleet import Domain, Fleet, Payload, Team, Vehicle

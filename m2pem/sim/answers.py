@@ -28,7 +28,7 @@ from m2pem.engine.records import (
 from m2pem.errors import OperatorError
 from m2pem.executive.script import ScriptedBehavior, ScriptedService
 from m2pem.findings import Finding
-from m2pem.model.elements import Mission
+from m2pem.model.mission import Mission
 from m2pem.resources.yaml_source import YamlSource
 from m2pem.sim.answers_check import check
 from m2pem.sim.answers_file import AnswersModel, TimedEntry, read_answers

@@ -9,12 +9,12 @@ from m2pem.model.elements import (
     Activity,
     AdHocSubProcess,
     FlowNode,
-    Mission,
     ScriptTask,
     SendTask,
     ServiceTask,
     UserTask,
 )
+from m2pem.model.mission import Mission
 from m2pem.resources.nearmiss import suggest
 from m2pem.resources.yaml_source import YamlSource
 from m2pem.sim.answers_file import AnswersModel, TimedEntry

@@ -5,7 +5,13 @@ from collections.abc import Iterator
 from m2pem.errors import MissionError
 from m2pem.findings import Finding, Severity
 from m2pem.model.behavior import Behavior, ServiceCall
-from m2pem.model.elements import Activity, Mission, ScriptTask, SendTask, ServiceTask
+from m2pem.model.elements import (
+    Activity,
+    ScriptTask,
+    SendTask,
+    ServiceTask,
+)
+from m2pem.model.mission import Mission
 from m2pem.resources.fleet import Fleet
 
 NO_FLEET = Fleet("", "no fleet", {})

@@ -24,7 +24,7 @@ from m2pem.executive.script import ScriptedBehavior, ScriptedService
 from m2pem.findings import has_errors
 from m2pem.journal.base import Entry
 from m2pem.journal.memory import MemoryJournal
-from m2pem.model.elements import Mission
+from m2pem.model.mission import Mission
 from m2pem.model.values import Value
 from m2pem.plugins import PluginManager
 from m2pem.resources.check import DETECTOR_SERVICE

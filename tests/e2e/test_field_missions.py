@@ -19,7 +19,8 @@ from m2pem.findings import Finding
 from m2pem.gateway.bus import Bus
 from m2pem.model.bpmn import parse_mission
 from m2pem.model.catalogue import BehaviorState
-from m2pem.model.elements import EndEvent, Mission
+from m2pem.model.elements import EndEvent
+from m2pem.model.mission import Mission
 from m2pem.plugins import PluginManager
 from m2pem.resources.fleet import Fleet
 from m2pem.sim.answers import check_answers, load_answers

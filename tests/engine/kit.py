@@ -11,7 +11,7 @@ from m2pem.engine.state import Behavior, BehaviorPhase, RunStatus
 from m2pem.journal.base import Entry
 from m2pem.journal.codec import decode_body, encode_body
 from m2pem.model.catalogue import BehaviorState
-from m2pem.model.elements import Mission
+from m2pem.model.mission import Mission
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
 from m2pem.resources.madeup import fleet_for

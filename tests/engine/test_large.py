@@ -7,7 +7,7 @@ import pytest
 from m2pem.engine.inputs import Continue, StartRun
 from m2pem.engine.nodes import joins
 from m2pem.engine.run import MissionRun
-from m2pem.model.elements import Mission
+from m2pem.model.mission import Mission
 from tests.engine.kit import Play
 from tests.engine.notation import mission
 

@@ -13,7 +13,7 @@ from m2pem.errors import FleetError, MissionError
 from m2pem.executive.loading import findings_for, load_source
 from m2pem.findings import Finding, Severity, has_errors
 from m2pem.model.bpmn import NO_BPMN_RULES
-from m2pem.model.elements import Mission
+from m2pem.model.mission import Mission
 from m2pem.plugins import PluginManager
 from m2pem.resources.madeup import fleet_for
 from m2pem.sim.rehearsal import rehearse

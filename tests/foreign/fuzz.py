@@ -19,7 +19,7 @@ from m2pem.errors import FleetError, MissionError
 from m2pem.executive.loading import findings_for
 from m2pem.findings import has_errors
 from m2pem.model.bpmn import parse_mission
-from m2pem.model.elements import Mission
+from m2pem.model.mission import Mission
 from m2pem.resources.madeup import fleet_for
 from m2pem.sim.rehearsal import rehearse
 from tests.engine.kit import Play

@@ -12,7 +12,7 @@ from tests.foreign.fuzz import ROOT, case, seeds, survive
 from tests.foreign.models import models
 
 CASES = 250
-MANY_CASES = 20_000
+MANY_CASES = 6_000
 CORPORA = os.environ.get("M2PEM_CORPORA", "")
 
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 from m2pem.errors import MissionError
 from m2pem.findings import Finding
 from m2pem.model.bpmn import parse_mission
-from m2pem.model.elements import Mission
+from m2pem.model.mission import Mission
 
 HEAD = (
     '<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"'

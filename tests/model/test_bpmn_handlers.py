@@ -3,9 +3,10 @@
 import pytest
 from bpmn_text import around, findings, flow, line_of, load, process, summary
 
-from m2pem.model.elements import Event, IntermediateCatchEvent, Mission, SubProcess
+from m2pem.model.elements import Event, IntermediateCatchEvent, SubProcess
 from m2pem.model.events import ConditionalEventDefinition
 from m2pem.model.lint import lint
+from m2pem.model.mission import Mission
 
 TASK = '<task id="T"/>'
 SIGNAL = '<signal id="go"/>'

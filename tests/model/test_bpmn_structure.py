@@ -19,7 +19,6 @@ from m2pem.model.elements import (
     IntermediateCatchEvent,
     IntermediateThrowEvent,
     ManualTask,
-    Mission,
     ParallelGateway,
     ReceiveTask,
     SendTask,
@@ -38,6 +37,7 @@ from m2pem.model.events import (
     TimerEventDefinition,
     TimerKind,
 )
+from m2pem.model.mission import Mission
 
 EVERY = Path(__file__).parent.parent / "data" / "model" / "every_element.bpmn"
 

@@ -6,12 +6,12 @@ from bpmn_text import around, definitions, findings, line_of, load, process, sum
 from m2pem.model.behavior import Decision, RoleKind
 from m2pem.model.elements import (
     CallActivity,
-    Mission,
     ReceiveTask,
     SendTask,
     ServiceTask,
     UserTask,
 )
+from m2pem.model.mission import Mission
 
 
 def task(mission: Mission) -> UserTask:

@@ -31,6 +31,15 @@ WARNINGS = {
         process(f'{TASK}{line_of("T")}\n<laneSet id="L"/>'),
         [("element-order", 4, "P")],
     ),
+    "assignment of nothing": (
+        around(
+            '<task id="T"><ioSpecification><dataInput id="i"/>'
+            "<inputSet><dataInputRefs>i</dataInputRefs></inputSet><outputSet/></ioSpecification>"
+            '<dataInputAssociation id="a"><targetRef>i</targetRef><assignment>\n<from/><to>i</to>'
+            "</assignment></dataInputAssociation></task>"
+        ),
+        [("empty-assignment", 4, "T")],
+    ),
     "misplaced extension": (
         around(
             '<task id="T"><extensionElements>\n<m2pem:prompt>x</m2pem:prompt>'

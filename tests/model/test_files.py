@@ -7,9 +7,10 @@ import pytest
 from m2pem.errors import MissionError
 from m2pem.findings import Severity
 from m2pem.model.bpmn import parse_mission
-from m2pem.model.elements import CallActivity, Mission
+from m2pem.model.elements import CallActivity
 from m2pem.model.library import KeptLibrary, LibraryError, Source
 from m2pem.model.lint import lint
+from m2pem.model.mission import Mission
 from tests.model.bpmn_text import around, definitions, line_of
 
 MODEL = "http://www.omg.org/spec/BPMN/20100524/MODEL"

@@ -3,7 +3,7 @@
 import pytest
 
 from m2pem.model import elements as e
-from m2pem.model.elements import Mission
+from m2pem.model.mission import Mission
 from m2pem.resources.madeup import fleet_for
 from tests.model.bpmn_text import around, findings, load, summary
 

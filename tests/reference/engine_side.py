@@ -9,7 +9,7 @@ from m2pem.engine import records as r
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunState
 from m2pem.model.bpmn import parse_mission
-from m2pem.model.elements import Mission
+from m2pem.model.mission import Mission
 from tests.engine.invariants import check_state
 from tests.reference.diagram import Level
 from tests.reference.interpreter import Input, Seen

@@ -8,8 +8,14 @@ from m2pem.model.behavior import (
     RoleKind,
     ServiceCall,
 )
-from m2pem.model.elements import Activity, Mission, Process, ScriptTask, ServiceTask
+from m2pem.model.elements import (
+    Activity,
+    Process,
+    ScriptTask,
+    ServiceTask,
+)
 from m2pem.model.expression import Expression, template
+from m2pem.model.mission import Mission
 
 READ_LATER = template("${mission.value}")
 """A value that is read from the data store when the task starts."""

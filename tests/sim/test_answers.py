@@ -30,7 +30,7 @@ from m2pem.journal.base import Entry, RunHeader
 from m2pem.journal.memory import MemoryJournal
 from m2pem.model.behavior import Decision
 from m2pem.model.bpmn import parse_mission
-from m2pem.model.elements import Mission
+from m2pem.model.mission import Mission
 from m2pem.plugins import PluginManager
 from m2pem.resources.fleet import Fleet
 from m2pem.sim.answers import BY_DEFAULT, BY_SCRIPT, Answers, check_answers, load_answers

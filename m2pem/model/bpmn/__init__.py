@@ -27,8 +27,8 @@ from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.bpmn.search_path import SearchPath
 from m2pem.model.bpmn.targets import find_called
 from m2pem.model.bpmn.xml import MAX_BYTES
-from m2pem.model.elements import Mission
 from m2pem.model.library import Library
+from m2pem.model.mission import Mission
 
 __all__ = ["MAX_BYTES", "MAX_DEPTH", "NO_BPMN_RULES", "parse_mission", "read_mission"]
 

@@ -8,7 +8,8 @@ from m2pem.model.bpmn.compensation import read_association
 from m2pem.model.bpmn.names import BPMN, local
 from m2pem.model.bpmn.reading import Reading, reference
 from m2pem.model.bpmn.scan import scan
-from m2pem.model.elements import Element, MessageFlow, Participant
+from m2pem.model.elements import Element
+from m2pem.model.mission import MessageFlow, Participant
 from m2pem.model.near import did_you_mean
 
 

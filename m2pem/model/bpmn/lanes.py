@@ -5,7 +5,8 @@ from lxml import etree
 from m2pem.model.bpmn.names import BPMN
 from m2pem.model.bpmn.reading import Reading, text_of
 from m2pem.model.bpmn.scan import scan
-from m2pem.model.elements import Lane, Process
+from m2pem.model.elements import Process
+from m2pem.model.mission import Lane
 
 
 def read_lanes(reading: Reading, lane_set: etree._Element, process: Process) -> None:

@@ -10,8 +10,15 @@ from dataclasses import replace
 from typing import TypeVar
 
 from m2pem.model.bpmn.files import Files, Part
-from m2pem.model.elements import CallActivity, Element, FlowNode, Mission, Process, SequenceFlow
+from m2pem.model.elements import (
+    CallActivity,
+    Element,
+    FlowNode,
+    Process,
+    SequenceFlow,
+)
 from m2pem.model.events import CorrelationProperty, Message, RootElement, Signal
+from m2pem.model.mission import Mission
 
 Root = TypeVar("Root", bound=RootElement)
 Operated = TypeVar("Operated", Signal, Message)

@@ -18,9 +18,6 @@ from m2pem.model.elements import (
     DataObject,
     Event,
     FlowNode,
-    Lane,
-    MessageFlow,
-    Participant,
     Process,
     ReceiveTask,
     SendTask,
@@ -29,6 +26,7 @@ from m2pem.model.elements import (
 )
 from m2pem.model.events import Error, Escalation, Message, MessageEventDefinition, Signal
 from m2pem.model.expression import Expression, parse, template
+from m2pem.model.mission import Lane, MessageFlow, Participant
 from m2pem.model.near import did_you_mean
 
 KEY = re.compile(r"[^\W\d]\w*(?:\.\w+)*")

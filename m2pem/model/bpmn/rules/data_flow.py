@@ -13,6 +13,7 @@ TARGET = Rule(
     W,
     "the data association has no targetRef",
     "name the data that it writes",
+    same_as=("association-ignored",),
 )
 NOWHERE = Rule(
     10422,

@@ -1,0 +1,121 @@
+"""What records about data, and about what is awaited, do to the state."""
+
+from heapq import heapify, heappop, heappush
+
+from m2pem.engine import records as r
+from m2pem.engine.apply.appliers import Appliers
+from m2pem.engine.state import (
+    Letter,
+    RunState,
+    Scope,
+    Token,
+    Wait,
+)
+from m2pem.model.elements import (
+    FlowNode,
+)
+
+STALE_TIMERS = 64
+"""Timers that are over stay inside their heap until there are this many more than live ones."""
+
+
+def node_of(state: RunState, element: str) -> FlowNode:
+    """The flow node of an id."""
+    node = state.mission.elements[element]
+    assert isinstance(node, FlowNode)
+    return node
+
+
+def _data_written(state: RunState, record: r.DataWritten) -> None:
+    if not record.own:
+        store = state.scopes[record.store].data if record.store else state.shared.data
+        store[record.key] = record.value
+        return
+    token = state.tokens[record.own]
+    if token.own is None:
+        token.own = {}
+    token.own[record.key] = record.value
+
+
+def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
+    holder: Token | Scope
+    if record.token:
+        holder = token = state.tokens[record.token]
+        scope = token.scope
+    else:
+        holder, token, scope = state.scopes[record.scope], None, state.scopes[record.scope]
+    wait = Wait(
+        record.wait,
+        token,
+        scope,
+        node_of(state, record.element),
+        record.trigger,
+        record.ref,
+        record.due_us,
+        record.calendar,
+        record.left,
+        record.cycle,
+    )
+    state.last_wait = record.wait
+    state.waits[wait.id] = wait
+    if holder.waits is None:
+        holder.waits = {}
+    holder.waits[wait.id] = wait
+    if wait.trigger is r.Trigger.TIMER:
+        heappush(state.dates if wait.calendar else state.timers, (wait.due_us, wait.id))
+    elif wait.trigger is r.Trigger.CONDITION:
+        state.conditions[wait.id] = not record.spent
+    else:
+        state.catchers.setdefault((wait.trigger, wait.ref), {})[wait.id] = wait
+
+
+def end_wait(state: RunState, wait: Wait) -> None:
+    """It is over: it came, or nobody waits any more."""
+    del state.waits[wait.id]
+    waits = wait.token.waits if wait.token is not None else wait.scope.waits
+    assert waits is not None
+    del waits[wait.id]
+    if wait.trigger is r.Trigger.TIMER:
+        heap = state.dates if wait.calendar else state.timers
+        while heap and heap[0][1] not in state.waits:
+            heappop(heap)
+        if len(heap) > 2 * len(state.waits) + STALE_TIMERS:
+            heap[:] = [entry for entry in heap if entry[1] in state.waits]
+            heapify(heap)
+        return
+    if wait.trigger is r.Trigger.CONDITION:
+        del state.conditions[wait.id]
+        return
+    key = (wait.trigger, wait.ref)
+    catchers = state.catchers[key]
+    del catchers[wait.id]
+    if not catchers:
+        del state.catchers[key]
+
+
+def _event_triggered(state: RunState, record: r.EventTriggered) -> None:
+    wait = state.waits[record.wait]
+    end_wait(state, wait)
+    if record.kept:
+        letters = state.mailbox[wait.ref]
+        letters.pop(record.letter)
+        if not letters:
+            del state.mailbox[wait.ref]
+
+
+def _condition_reset(state: RunState, record: r.ConditionReset) -> None:
+    state.conditions[record.wait] = True
+
+
+def _message_thrown(state: RunState, record: r.MessageThrown) -> None:
+    if record.kept:
+        state.mailbox.setdefault(record.message, []).append(Letter(record.data, record.keys))
+
+
+APPLIERS: Appliers = {
+    r.DataWritten: _data_written,
+    r.EventAwaited: _event_awaited,
+    r.EventTriggered: _event_triggered,
+    r.ConditionReset: _condition_reset,
+    r.MessageThrown: _message_thrown,
+}

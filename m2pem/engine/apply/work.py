@@ -1,0 +1,122 @@
+"""What records about behaviors, prompts and services do to the state."""
+
+from m2pem.engine import records as r
+from m2pem.engine.apply.appliers import Appliers
+from m2pem.engine.state import (
+    Behavior,
+    BehaviorPhase,
+    Prompt,
+    RunState,
+    Service,
+)
+
+
+def _behavior_requested(state: RunState, record: r.BehaviorRequested) -> None:
+    state.last_behavior += 1
+    state.behaviors[record.behavior] = Behavior(
+        record.behavior,
+        record.token,
+        record.element,
+        record.process,
+        record.scope,
+        record.type,
+        record.name,
+        record.resources,
+        record.roles,
+        record.parameters,
+        record.preempts,
+    )
+    for resource in record.resources:
+        state.held.setdefault(resource, []).append(record.behavior)
+    state.tokens[record.token].behavior = record.behavior
+
+
+def _behavior_progressed(state: RunState, record: r.BehaviorProgressed) -> None:
+    behavior = state.behaviors[record.behavior]
+    behavior.number = record.number
+    behavior.state = record.state
+    if record.native_ref is not None:
+        behavior.native_ref = record.native_ref
+
+
+def _behavior_cancel_requested(state: RunState, record: r.BehaviorCancelRequested) -> None:
+    behavior = state.behaviors[record.behavior]
+    behavior.phase = BehaviorPhase.CANCELLING
+    _forget_behavior(state, behavior)
+
+
+def _behavior_unsettled(state: RunState, record: r.BehaviorUnsettled) -> None:
+    behavior = state.behaviors[record.behavior]
+    behavior.phase = BehaviorPhase.UNSETTLED
+    behavior.state = record.state
+
+
+def _behavior_continued(state: RunState, record: r.BehaviorContinued) -> None:
+    state.behaviors[record.behavior].phase = BehaviorPhase.ACTIVE
+
+
+def _behavior_restarted(state: RunState, record: r.BehaviorRestarted) -> None:
+    behavior = state.behaviors[record.behavior]
+    behavior.phase = BehaviorPhase.ACTIVE
+    behavior.state = None
+    behavior.number = 0
+    behavior.native_ref = None
+
+
+def _behavior_ended(state: RunState, record: r.BehaviorEnded) -> None:
+    behavior = state.behaviors.pop(record.behavior)
+    for resource in behavior.resources:
+        holders = state.held[resource]
+        holders.remove(behavior.id)
+        if not holders:
+            del state.held[resource]
+    _forget_behavior(state, behavior)
+
+
+def _forget_behavior(state: RunState, behavior: Behavior) -> None:
+    token = state.tokens.get(behavior.token)
+    if token is not None and token.behavior == behavior.id:
+        token.behavior = ""
+
+
+def _prompt_opened(state: RunState, record: r.PromptOpened) -> None:
+    token = state.tokens[record.token]
+    state.last_prompt += 1
+    state.prompts[record.prompt] = Prompt(
+        record.prompt, token, record.text, record.decisions, record.role, record.behavior
+    )
+    token.prompt = record.prompt
+
+
+def _prompt_ended(state: RunState, record: r.PromptAnswered | r.PromptWithdrawn) -> None:
+    state.prompts.pop(record.prompt).token.prompt = ""
+
+
+def _service_requested(state: RunState, record: r.ServiceRequested) -> None:
+    token = state.tokens[record.token]
+    state.last_service += 1
+    state.services[record.service] = Service(
+        record.service, token, record.name, record.roles, record.properties
+    )
+    token.service = record.service
+
+
+def _service_ended(state: RunState, record: r.ServiceEnded | r.ServiceWithdrawn) -> None:
+    state.services.pop(record.service).token.service = ""
+
+
+APPLIERS: Appliers = {
+    r.BehaviorRequested: _behavior_requested,
+    r.BehaviorProgressed: _behavior_progressed,
+    r.BehaviorCancelRequested: _behavior_cancel_requested,
+    r.BehaviorUnsettled: _behavior_unsettled,
+    r.BehaviorContinued: _behavior_continued,
+    r.BehaviorRestarted: _behavior_restarted,
+    r.BehaviorEnded: _behavior_ended,
+    r.PromptOpened: _prompt_opened,
+    r.PromptAnswered: _prompt_ended,
+    r.PromptWithdrawn: _prompt_ended,
+    r.ServiceRequested: _service_requested,
+    r.ServiceEnded: _service_ended,
+    r.ServiceWithdrawn: _service_ended,
+}
