@@ -94,6 +94,8 @@ def _line(inside: etree._Element, name: str, trigger: str | None, dice: Random) 
 
 
 def _repeat(activity: etree._Element, dice: Random) -> None:
+    if any(child.tag.endswith("LoopCharacteristics") for child in activity):
+        return
     sequential = dice.choice(("true", "false"))
     loop = etree.Element(f"{_B}multiInstanceLoopCharacteristics", isSequential=sequential)
     _add(loop, "loopCardinality").text = str(dice.randrange(3))

@@ -17,6 +17,17 @@ TRUE = ("conditional b == 1", "conditional a > b", "conditional c == null", "con
 CAUGHT = (*EVENTS, *TRUE, "error", "error E1", "escalation", "escalation X1")
 THROWN = ("signal s1", "signal s2", "message m1", "message m2", "escalation X1", "escalation X2")
 CODES = ("E1", "E2")
+LOOPS = (
+    '<loop loopMaximum="2"> </loop>',
+    '<loop loopMaximum="3">a < 2</loop>',
+    '<loop testBefore="true" loopMaximum="2">1 / b > 0</loop>',
+    "<each>2</each>",
+    '<each isSequential="true">2</each>',
+    "<each>a - 1</each>",
+    "<each>3 until loopCounter == 1 or b == 0</each>",
+    '<each isSequential="true" behavior="None">3 until 1 / b > 0</each>',
+    '<each behavior="One" m2pem:collection="[a, b]" m2pem:elementVariable="b"> </each>',
+)
 
 
 @dataclass
@@ -45,6 +56,10 @@ class _Draft:
     def chance(self, percent: int) -> bool:
         return self.dice.randrange(100) < percent
 
+    def loop(self) -> str:
+        """Perhaps a loop marker."""
+        return self.one_of(LOOPS) if self.chance(20) else ""
+
     # --- leaves ---------------------------------------------------------------------------------
 
     def leaf(self, *, inside: bool) -> _Block:
@@ -58,11 +73,13 @@ class _Draft:
         )
         name = self.name(tag[0])
         if tag in ("sendTask", "receiveTask"):
-            block = _Block([f'<{tag} id="{name}" messageRef="{text}"/>'], name, name)
+            line = f'<{tag} id="{name}" messageRef="{text}">{self.loop()}</{tag}>'
         elif text == "-":
-            block = _Block([f'<{tag} id="{name}"/>'], name, name)
+            line = f'<{tag} id="{name}">{self.loop()}</{tag}>'
         else:
-            block = _Block([f'<{tag} id="{name}">{text}</{tag}>'], name, name)
+            marker = self.loop() if tag.endswith("Task") else ""
+            line = f'<{tag} id="{name}">{text}{marker}</{tag}>'
+        block = _Block([line], name, name)
         if tag.endswith("Task") and self.chance(60):
             return self.guarded(block, ("error", *CAUGHT), depth=9)
         return block
@@ -155,10 +172,11 @@ class _Draft:
             process = self.name("P")
             self.processes.append(f'<process id="{process}">\n{inner}\n</process>')
             line = f'<callActivity id="{name}" calledElement="{process}">in a as a, out b as b'
-            block = _Block([f"{line}</callActivity>"], name, name)
+            block = _Block([f"{line}{self.loop()}</callActivity>"], name, name)
         else:
             declared = '<property id="{}" name="b"/>'.format(self.name("v"))
-            head = f'<subProcess id="{name}">{declared if self.chance(30) else ""}'
+            own = declared if self.chance(30) else ""
+            head = f'<subProcess id="{name}">{self.loop()}{own}'
             block = _Block([f"{head}\n{inner}\n</subProcess>"], name, name)
         return self.guarded(block, CAUGHT, depth) if self.chance(70) else block
 
@@ -301,11 +319,11 @@ def _flow(draft: _Draft, source: str, target: str, conditional: set[str]) -> str
 def _element(draft: _Draft, tag: str, text: str, name: str, depth: int) -> str:
     if tag == "subProcess":
         inside = _graph(draft, draft.dice.randint(0, 4), depth + 1)
-        return f'<subProcess id="{name}">\n{inside}\n</subProcess>'
+        return f'<subProcess id="{name}">{draft.loop()}\n{inside}\n</subProcess>'
     if tag == "callActivity":
         return f'<callActivity id="{name}" calledElement="MAIN"/>'
     if tag in ("sendTask", "receiveTask"):
-        return f'<{tag} id="{name}" messageRef="{text}"/>'
+        return f'<{tag} id="{name}" messageRef="{text}">{draft.loop()}</{tag}>'
     text = text.format(
         set=draft.one_of(ASSIGNMENTS),
         roles=draft.one_of(ROLES),
@@ -314,4 +332,5 @@ def _element(draft: _Draft, tag: str, text: str, name: str, depth: int) -> str:
         code=draft.one_of(CODES),
         condition=draft.one_of(TRUE),
     )
-    return f'<{tag} id="{name}">{"" if text == "-" else text}</{tag}>'
+    marker = draft.loop() if tag.endswith(("Task", "task")) else ""
+    return f'<{tag} id="{name}">{"" if text == "-" else text}{marker}</{tag}>'
