@@ -85,7 +85,7 @@ _MODULES = {
     "m2pem.model.catalogue": (
         "BehaviorSpec BehaviorState ParameterKind ParameterSpec ResourceId ResumePolicy"
     ),
-    "m2pem.model.elements": "Mission",
+    "m2pem.model.mission": "Mission",
     "m2pem.model.geometry": "Area Point Route VehiclePosition",
     "m2pem.model.values": "Value",
     "m2pem.resources.behaviors": "SHARED",

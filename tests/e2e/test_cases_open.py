@@ -29,6 +29,11 @@ def known(root: etree._Element) -> object:
     """The content, but for what bpmn-moddle writes under another name than it has read."""
     for path in [*root.iter(f"{BPMN}messagePath"), *root.iter(f"{BPMN}dataPath")]:
         path.tag = f"{BPMN}formalExpression"
+    names = {"condition": "formalExpression", "event": "implicitThrowEvent"}
+    for behavior in root.iter(f"{BPMN}complexBehaviorDefinition"):
+        for child in behavior:
+            name = str(child.tag).removeprefix(BPMN)
+            child.tag = BPMN + names.get(name, name)
     return content(root)
 
 

@@ -7,7 +7,7 @@ from tests.command_line import CommandLine
 
 from .test_field_missions import ANSWERS, FLEET, Story, every_story, mission
 
-SPEED = 200
+SPEED = 100
 INNER = {"DETECTION", "ADVANCE"}
 """Called processes, whose end events are not ends of the vignette."""
 
