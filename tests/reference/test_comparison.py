@@ -23,7 +23,7 @@ from tests.reference.traces import drawn
 from tests.reference.xml_of import xml_of
 
 FEW = 250
-MANY = 10_000
+MANY = 2_000
 QUICK = Bounds()
 THOROUGH = Bounds(inputs=7, nodes=60, states=10, orders=500, budget=10_000)
 BOTH = pytest.mark.parametrize("generate", [random_blocks, random_graph])
