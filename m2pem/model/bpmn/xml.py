@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from operator import attrgetter
 
-
 from lxml import etree
 
 MAX_BYTES = 20 * 1024 * 1024

@@ -191,7 +191,9 @@ def walk(node: Node) -> Iterator[tuple[Node, int]]:
     while waiting:
         current, depth = waiting.pop()
         yield current, depth
-        waiting.extend((child, depth + 1) for child in reversed(children(current)))
+        below = children(current)
+        if below:
+            waiting += [(child, depth + 1) for child in reversed(below)]
 
 
 _NO_NAMES: frozenset[str] = frozenset()
