@@ -14,4 +14,8 @@ def paused() -> Iterator[None]:
         yield
     finally:
         if was_on:
+            if not gc.get_freeze_count():
+                # To the oldest generation, unsearched: else its next search is of all that was read.
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()
