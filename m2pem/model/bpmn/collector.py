@@ -15,7 +15,7 @@ def paused() -> Iterator[None]:
     finally:
         if was_on:
             if not gc.get_freeze_count():
-                # To the oldest generation, unsearched: else its next search is of all that was read.
+                # To the oldest generation unsearched: else all is searched next time.
                 gc.freeze()
                 gc.unfreeze()
             gc.enable()
