@@ -93,21 +93,23 @@ def _check(
 def _against_fleet(
     mission: "Mission | None", fleet_file: str | None, process: str | None, data: "dict[str, Value]"
 ) -> list[Finding]:
-    from m2pem.cli.fleets import arbiters_of
     from m2pem.cli.options import MADE_UP
-    from m2pem.cli.setting import get_fleet
     from m2pem.executive.loading import findings_for
     from m2pem.plugins import PluginManager
-    from m2pem.resources.fleet_file import load_fleet
 
     if mission is None:
         if fleet_file is not None and fleet_file != MADE_UP:
+            from m2pem.resources.fleet_file import load_fleet
+
             load_fleet(fleet_file)
         return []
     plugins = PluginManager()
     arbiters = None
     failed: FleetError | None = None
     if fleet_file is not None:
+        from m2pem.cli.fleets import arbiters_of
+        from m2pem.cli.setting import get_fleet
+
         try:
             arbiters = arbiters_of(get_fleet(fleet_file, mission), plugins)
         except FleetError as error:

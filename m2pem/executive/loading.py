@@ -3,9 +3,7 @@
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.error import URLError
 from urllib.parse import unquote, urlsplit
-from urllib.request import urlopen
 
 from m2pem.errors import MissionError
 from m2pem.executive.arbiters import FleetArbiters
@@ -52,6 +50,9 @@ def load_source(mission: Path | str | bytes, search_path: Iterable[Path] = ()) -
 
 
 def _fetch(url: str) -> bytes:
+    from urllib.error import URLError  # noqa: PLC0415  # slow to load, and most missions are files
+    from urllib.request import urlopen  # noqa: PLC0415
+
     try:
         with urlopen(url, timeout=FETCH_TIMEOUT_S) as response:
             content: bytes = response.read(MAX_BYTES + 1)

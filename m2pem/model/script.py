@@ -59,6 +59,8 @@ def _statement(text: str, line: int) -> Assignment | ThrowError:
 
 def _without_comment(line: str) -> str:
     """The line up to a `#` that is not inside a quoted text."""
+    if "#" not in line:
+        return line
     quote = ""
     position = 0
     while position < len(line):

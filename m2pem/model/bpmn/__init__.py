@@ -8,6 +8,7 @@ from pathlib import Path
 
 from m2pem.errors import MissionError
 from m2pem.findings import Finding, Severity, has_errors
+from m2pem.model.bpmn import collector
 from m2pem.model.bpmn.calls import resolve_calls
 from m2pem.model.bpmn.collaboration import check_collaborations
 from m2pem.model.bpmn.compensation import link_compensation, note_compensation
@@ -74,6 +75,11 @@ def parse_mission(data: bytes, file: str, library: Library | None = None) -> Mis
         MissionError: it is no BPMN 2.0, or has something that m2pem cannot execute; it carries
             every finding, errors and warnings, by file and line.
     """
+    with collector.paused():
+        return _parse(data, file, library)
+
+
+def _parse(data: bytes, file: str, library: Library | None) -> Mission:
     files = Files(open_part(data, file), library)
     reached = find_called(files)
     parts = [part for part in files.parts if part.is_read]

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from lxml import etree
 
 from m2pem.model.behavior import Mapping, Mappings
-from m2pem.model.bpmn.names import local
+from m2pem.model.bpmn.names import BPMN, local
 from m2pem.model.bpmn.reading import (
     KEY,
     Association,
@@ -19,12 +19,18 @@ from m2pem.model.elements import Activity, Event
 from m2pem.model.expression import parse
 
 _PARAMETERS = frozenset({"dataInput", "dataOutput", "property"})
+_TAGS = frozenset(
+    BPMN + name
+    for name in (*_PARAMETERS, "ioSpecification", "dataInputAssociation", "dataOutputAssociation")
+)
 _PLACEHOLDER = "__targetRef_placeholder"
 """The property that Camunda's editor draws data associations to; it is none of the author's."""
 
 
 def read_data_flow(reading: Reading, found: Scan, node: Activity | Event) -> None:
     """Keep its data associations until all data objects are known."""
+    if _TAGS.isdisjoint(found.children):
+        return
     outputs = reading.note_outputs(found.of("dataOutputAssociation"))
     parameters = _parameters(found)
     if not parameters:

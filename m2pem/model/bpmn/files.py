@@ -45,6 +45,7 @@ class Part:
     is_read: bool = False
     _processes: dict[str, Process] = field(default_factory=dict)
     _drawn: list[etree._Element] = field(default_factory=list)
+    _drawn_ids: frozenset[str | None] = frozenset()
     _calls: dict[Process, list[PendingCall]] = field(default_factory=dict)
 
     @property
@@ -56,14 +57,14 @@ class Part:
         """Read the root elements but for the processes."""
         reading = self.reading
         self._drawn = read_roots(reading, self.document.root)
+        self._drawn_ids = frozenset(element.get("id") for element in self._drawn)
         for table in (reading.signals, reading.messages, reading.errors, reading.escalations):
             for root in table.values():
                 object.__setattr__(root, "file", self.name)
 
     def has(self, identifier: str) -> bool:
         """Whether a call activity can call that here: a process, or a global task."""
-        drawn = any(element.get("id") == identifier for element in self._drawn)
-        return drawn or identifier in self.reading.global_tasks
+        return identifier in self._drawn_ids or identifier in self.reading.global_tasks
 
     def read(self) -> tuple[Process, ...]:
         """Read what is in the processes, once; gives them back."""

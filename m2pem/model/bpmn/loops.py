@@ -18,6 +18,7 @@ from m2pem.model.near import did_you_mean
 _STANDARD = BPMN + "standardLoopCharacteristics"
 _MULTI_INSTANCE = BPMN + "multiInstanceLoopCharacteristics"
 LOOPS = (_STANDARD, _MULTI_INSTANCE, BPMN + "loopCharacteristics")
+_MARKERS = frozenset(LOOPS)
 
 _EDITORS = (M2PEM, CAMUNDA, FLOWABLE, ACTIVITI)
 """Whose attributes `collection` and `elementVariable` mean the same."""
@@ -31,9 +32,9 @@ _EVENT_REFS = {
 
 def read_loop(reading: Reading, found: Scan, node: Activity) -> None:
     """The marker of an activity, if it has any; `resolve_loops` adds what data objects say."""
-    markers = [each for tag in LOOPS for each in found.children.get(tag, [])]
-    if not markers:
+    if _MARKERS.isdisjoint(found.children):
         return
+    markers = [each for tag in LOOPS for each in found.children.get(tag, [])]
     element = markers[0]
     if len(markers) > 1:
         _error(

@@ -79,27 +79,30 @@ def read_node(reading: Reading, element: etree._Element, container: Container) -
     if tag in GATEWAYS:
         return read_gateway(reading, element)
     task = _TASKS.get(tag)
-    name = local(tag)
-    if task is None and tag not in SUBPROCESSES and name not in _REFUSED:
-        return None
-    if name in _REFUSED:
-        not_executed(reading, element, element.get("id", ""), kind(tag), _REFUSED[name])
+    if task is None and tag not in SUBPROCESSES:
+        return _refuse(reading, element)
     identifier = reading.claim(element)
-    node: FlowNode
-    if tag in SUBPROCESSES:
+    node: Activity
+    if task is None:
         # Its children are read with its content, by containers.py.
         node = _subprocess(reading, element, identifier)
-        _check_activity(reading, element, node)
-    elif task is not None:
+    else:
         found = scan(reading, element, identifier)
         node = task(reading, found)
         if tag != BPMN + "callActivity":
             read_data_flow(reading, found, node)
         read_loop(reading, found, node)
-        _check_activity(reading, element, node)
-    else:
-        node = FlowNode(identifier, element.get("name", ""), reading.report.line(element))
+    _check_activity(reading, element, node)
     return node
+
+
+def _refuse(reading: Reading, element: etree._Element) -> FlowNode | None:
+    instead = _REFUSED.get(local(element.tag))
+    if instead is None:
+        return None
+    not_executed(reading, element, element.get("id", ""), kind(element.tag), instead)
+    identifier = reading.claim(element)
+    return FlowNode(identifier, element.get("name", ""), reading.report.line(element))
 
 
 def _subprocess(reading: Reading, element: etree._Element, identifier: str) -> SubProcess:
@@ -129,12 +132,15 @@ def not_executed(
     )
 
 
-def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -> None:
+def _check_activity(reading: Reading, element: etree._Element, node: Activity) -> None:
     _note_default(reading, element, node)
     if reading.boolean(element, "isForCompensation", False, node.id):
         reading.undoing.add(node)
     for field, (name, rule) in _QUANTITIES.items():
-        object.__setattr__(node, field, _quantity(reading, element, name, rule))
+        text = element.get(name)
+        if text is not None:
+            quantity = _quantity(reading, element, name, text.strip(), rule)
+            object.__setattr__(node, field, quantity)
     if isinstance(node, SubProcess) and node.triggered_by_event and node.start_quantity > 1:
         reading.report.error(
             element,
@@ -145,9 +151,8 @@ def _check_activity(reading: Reading, element: etree._Element, node: FlowNode) -
         )
 
 
-def _quantity(reading: Reading, element: etree._Element, name: str, rule: str) -> int:
+def _quantity(reading: Reading, element: etree._Element, name: str, text: str, rule: str) -> int:
     """How many tokens begin, or leave, an activity (table 10.3)."""
-    text = element.get(name, "1").strip()
     if text.isascii() and text.isdecimal() and 1 <= int(text) <= MAX_QUANTITY:
         return int(text)
     # Some editors write 0 for what was not set.

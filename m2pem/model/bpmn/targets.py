@@ -42,7 +42,7 @@ def find_called(files: Files) -> set[Process]:
 def _target(files: Files, part: Part, pending: PendingCall) -> Part | None:
     """The file in which the called element is; None when a finding says why there is none."""
     name = pending.call.called_id
-    rule, remedy = "dangling-reference", _existing(files, part, name)
+    rule, remedy = "dangling-reference", ""
     if not name:
         rule, message = "no-called-element", "the call activity does not say what it calls"
     elif name.startswith("=") or "{" in name:
@@ -65,6 +65,7 @@ def _target(files: Files, part: Part, pending: PendingCall) -> Part | None:
             message += "this file" + (
                 f", nor of a BPMN file in {', '.join(places)}" if places else ""
             )
+    remedy = remedy or _existing(files, part, name)
     part.reading.report.error(pending.call.line, pending.call.id, rule, message, remedy)
     return None
 

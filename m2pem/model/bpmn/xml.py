@@ -10,7 +10,7 @@ import codecs
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import cast
+from operator import attrgetter
 
 from lxml import etree
 
@@ -25,7 +25,10 @@ _LAST_EXACT_LINE = 65_534  # libxml2 keeps an element's line in 16 bits
 _DECLARATION = re.compile(rb"""\s*<\?xml\s[^>]*?encoding\s*=\s*["']([A-Za-z][\w.:-]*)["']""")
 _PROLOG_PART = re.compile(r"\s+|<!--.*?-->|<\?.*?\?>", re.DOTALL)
 _WRAPPED_TAG = re.compile(rb"<[A-Za-z_][^<>]*\n")
-_MARKUP = re.compile(rb"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|(<[^\s!?/<>])|\n", re.DOTALL)
+_MARKUP = re.compile(rb"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<[^\s!?/<>]", re.DOTALL)
+_START_TAG = 2
+"""Bytes that `_MARKUP` matches of a start tag; of all else it matches more."""
+
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8"),
     (codecs.BOM_UTF32_LE, "utf-32-le"),
@@ -182,17 +185,14 @@ def _not_well_formed(error: etree.XMLSyntaxError) -> XmlError:
 def _line_finder(root: etree._Element, utf8: bytes) -> Callable[[etree._Element], int]:
     """libxml2's lines when they are exact: 16 bits, and the line on which a start tag *ends*."""
     if utf8.count(b"\n") < _LAST_EXACT_LINE and not _WRAPPED_TAG.search(utf8):
-        return _sourceline
+        return attrgetter("sourceline")
     starts: list[int] = []
-    line = 1
+    line, counted = 1, 0
     for markup in _MARKUP.finditer(utf8):
-        if markup.group(1):
+        start, end = markup.span()
+        if end - start == _START_TAG:
+            line += utf8.count(b"\n", counted, start)
+            counted = start
             starts.append(line)
-        else:
-            line += markup.group().count(b"\n")
     lines = dict(zip(root.iter(etree.Element), starts, strict=True))
     return lines.__getitem__
-
-
-def _sourceline(element: etree._Element) -> int:
-    return cast("int", element.sourceline)

@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.expression.literals import shorten
@@ -122,6 +123,7 @@ def _close(text: str, mark: int) -> Span:
     raise ExpressionSyntaxError(f"'{text[mark : mark + 2]}' is not closed by '}}'", text, mark)
 
 
+@lru_cache(maxsize=16)
 def _spoken(language: str | None) -> Dialect | None:
     if not language:
         return None

@@ -26,11 +26,11 @@ class Expression:
     dialect: Dialect
     tree: Node
     names: frozenset[str] = field(init=False)
-    _run: Run = field(init=False)
+    _run: Run | None = field(init=False, default=None)
+    """Compiled when it is evaluated for the first time: a check evaluates nothing."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "names", names(self.tree))
-        object.__setattr__(self, "_run", compile_tree(self.tree))
 
     @property
     def constant(self) -> bool:
@@ -44,7 +44,7 @@ class Expression:
             ExpressionError: a wrong type, a division by zero, or a result beyond the limits.
         """
         try:
-            return self._run(read)
+            return (self._run or self._compile())(read)
         except ExpressionError as error:
             self._explain(error)
 
@@ -55,10 +55,15 @@ class Expression:
             ExpressionError: as `evaluate`, and when the value is neither a boolean nor null.
         """
         try:
-            value = self._run(read)
+            value = (self._run or self._compile())(read)
             return value if value is True or value is False else truth(value, "a condition")
         except ExpressionError as error:
             self._explain(error)
+
+    def _compile(self) -> Run:
+        run = compile_tree(self.tree)
+        object.__setattr__(self, "_run", run)
+        return run
 
     def _explain(self, error: ExpressionError) -> NoReturn:
         raise ExpressionError(f"{error}, in {shorten(self.text.strip())!r}") from error

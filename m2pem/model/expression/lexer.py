@@ -1,9 +1,8 @@
 """Splits an expression into tokens. The operators of all dialects get one name each here."""
 
 import re
-from dataclasses import dataclass
 from enum import Enum, auto
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.expression.dialect import Dialect, Span
@@ -20,8 +19,7 @@ class Kind(Enum):
     END = auto()
 
 
-@dataclass(frozen=True, slots=True)
-class Token:
+class Token(NamedTuple):
     """`text` is the operator's name in the bare dialect, a name, or what was written.
 
     `value` is that of a CONSTANT; the parser reads a NUMBER, whose sign counts. `position` is the
@@ -66,6 +64,7 @@ WORDS = {
     },
     Dialect.XPATH: {"and": "and", "or": "or", "div": "/"},
 }
+_ASCII_NAME = re.compile(r"[A-Za-z_]\w*(?:\.\w+)*", re.ASCII)
 _FEEL_UNSUPPORTED = frozenset({"for", "function", "instance"})
 _HINTS = {
     "=": "'=' compares nothing here; write '==' (or a leading '=' for FEEL)",
@@ -105,6 +104,9 @@ def scan_name(text: str, position: int, end: int) -> int:
 
     Parts are letters, digits and `_` of any script; the first part begins with no digit.
     """
+    if text.isascii():
+        name = _ASCII_NAME.match(text, position, end)
+        return name.end() if name else position
     if position >= end or not text[position].isidentifier():
         return position
     while True:
@@ -137,6 +139,7 @@ class _Lexer:
         self._dialect = dialect
         self._symbols = SYMBOLS[dialect]
         self._words = WORDS[dialect]
+        self._called = _CALLED.get(dialect)
 
     def tokens(self) -> list[Token]:
         tokens: list[Token] = []
@@ -150,8 +153,7 @@ class _Lexer:
     def _token(self) -> Token:
         start = self._position
         character = self._text[start]
-        called = _CALLED.get(self._dialect)
-        name = called.match(self._text, start, self._end) if called else None
+        name = self._called.match(self._text, start, self._end) if self._called else None
         if name and name[0] not in self._words:
             self._position = name.end()
             return Token(Kind.NAME, name[0], start)

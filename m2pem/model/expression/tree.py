@@ -191,14 +191,21 @@ def walk(node: Node) -> Iterator[tuple[Node, int]]:
     while waiting:
         current, depth = waiting.pop()
         yield current, depth
-        waiting.extend((child, depth + 1) for child in reversed(children(current)))
+        below = children(current)
+        if below:
+            waiting += [(child, depth + 1) for child in reversed(below)]
+
+
+_NO_NAMES: frozenset[str] = frozenset()
 
 
 def names(node: Node) -> frozenset[str]:
     """The dotted names that the tree reads from the store."""
     if isinstance(node, Name):
         return frozenset({node.name})
-    found = frozenset[str]().union(*map(names, children(node)))
+    if isinstance(node, Literal):
+        return _NO_NAMES
+    found = _NO_NAMES.union(*map(names, children(node)))
     if isinstance(node, Some):
         inside = frozenset(name for name in names(node.condition) if binds(node.variable, name))
         return names(node.collection) | (found - inside)
