@@ -34,6 +34,8 @@ def test_many_mutated_files_are_refused_or_run() -> None:
 PROCESS = '<process id="P"><task id="T"/></process>'
 ONCE_BROKE = {
     "a cancel event definition beside the processes": f"<cancelEventDefinition/>{PROCESS}",
+    "a call of a global choreography task": '<globalChoreographyTask id="G"/>'
+    '<process id="P"><callActivity id="C" calledElement="G"/></process>',
     "timers in the far future": PROCESS.replace(
         "<task",
         '<intermediateCatchEvent id="C"><timerEventDefinition><timeDate>9999-12-31T23:59:59Z'

@@ -4,6 +4,7 @@ from lxml import etree
 
 from m2pem.model.bpmn.collaboration import read_collaboration
 from m2pem.model.bpmn.correlation import correlation_key, read_property
+from m2pem.model.bpmn.global_tasks import GLOBAL_TASKS
 from m2pem.model.bpmn.names import BPMN, M2PEM, a, kind, local
 from m2pem.model.bpmn.reading import DataEnd, Reading
 from m2pem.model.bpmn.scan import Order, scan
@@ -40,7 +41,7 @@ def read_roots(reading: Reading, definitions: etree._Element) -> list[etree._Ele
         elif name.endswith("EventDefinition"):
             if element.get("id"):
                 reading.event_definitions[reading.claim(element)] = element
-        elif name.startswith("global") and name.endswith("Task"):
+        elif tag in GLOBAL_TASKS:
             if element.get("id"):
                 reading.global_tasks[reading.claim(element)] = element
         elif name == "dataStore":
