@@ -1,4 +1,4 @@
-"""`python -m bench`: measure everything, print the table, write bench/results/ (docs/speed.md)."""
+"""`python -m bench`: measure everything, print the table, write bench/results/ and README.md."""
 
 import argparse
 import json
@@ -11,9 +11,11 @@ from pathlib import Path
 from bench.engines import M2PEM, REPOSITORY, Engine, Figure, graph, measure, own, peers, play
 from bench.machine import machine
 from bench.plots import plot
+from bench.readme import rewritten
 from bench.table import JOURNALS, STOCK, Results, table, wrongs
 from bench.targets import PROGRAMS, WORK
 
+README = REPOSITORY / "README.md"
 RESULTS = REPOSITORY / "bench" / "results"
 SPIFFWORKFLOW = REPOSITORY / ".conformance" / "bin" / "python"
 MODULES = REPOSITORY / "tests" / "js" / "node_modules"
@@ -104,6 +106,9 @@ def whole(others: Sequence[Engine], up_to: int, folder: Path) -> int:
     }
     text = json.dumps(figures, indent=1) + "\n"
     (folder / "figures.json").write_text(text, encoding="utf-8")
+    if folder == RESULTS:
+        old = README.read_text(encoding="utf-8")
+        README.write_text(rewritten(old, results, names), encoding="utf-8")
     mine = [each[M2PEM] for sizes in results.values() for each in sizes.values()]
     return any(figure.wrong for figure in [*mine, *programs.values()])
 

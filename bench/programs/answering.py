@@ -24,7 +24,7 @@ MISSION = file(
     f'<process id="BENCH" isExecutable="true"><startEvent id="start"/>{asking("u")}'
     f"{flows(['start', 'u', 'u'])}</process>"
 )
-TURNS = 5
+TURNS = 10
 
 
 async def answer(running: Executive, run: str, times: int) -> None:
