@@ -13,7 +13,7 @@ from bench.machine import machine
 from bench.plots import plot
 from bench.readme import rewritten
 from bench.table import JOURNALS, STOCK, Results, table, wrongs
-from bench.targets import PROGRAMS, WORK
+from bench.targets import PROGRAMS, WORK, Work
 
 README = REPOSITORY / "README.md"
 RESULTS = REPOSITORY / "bench" / "results"
@@ -62,39 +62,61 @@ def quick(others: Sequence[Engine]) -> int:
 
 
 def whole(others: Sequence[Engine], up_to: int, folder: Path) -> int:
-    """Measure, print, write."""
+    """Measure, print, and write after each step: an interrupted measurement is not lost."""
     described = machine(SPIFFWORKFLOW, MODULES)
+    names = [peer.name for peer in others]
     results: Results = {}
+    programs: dict[str, Figure] = {}
+    page = ""
     for work in WORK:
-        by_size = results[work.name] = {}
-        tired: set[str] = set()
-        for size in (size for size in work.sizes if size <= up_to):
-            engines = by_size[size] = {M2PEM: play(own(), work.name, size, OWN_RUNS)}
-            if JOURNALS_FROM <= size <= JOURNALS_UP_TO:
-                for name, kind in JOURNALS.items():
-                    engines[name] = play(own(kind), work.name, size, PEER_RUNS)
-            for peer in others:
-                stock = peer.name.endswith(STOCK)
-                if peer.name in tired or (stock and size not in work.sizes[:STOCK_SIZES]):
-                    continue
-                engines[peer.name] = play(peer, work.name, size, PEER_RUNS)
-                if engines[peer.name].wrong:
-                    tired.add(peer.name)
-            print(f"{work.title}, {size:,}: done", file=sys.stderr)
-            graph.cache_clear()
-    programs = {}
+        results[work.name] = play_all(work, [size for size in work.sizes if size <= up_to], others)
+        page = write(folder, described, results, programs, names)
     for program in PROGRAMS:
         programs[program.name] = measure(program.command, PEER_RUNS)
         print(f"{program.name}: done", file=sys.stderr)
-
-    names = [peer.name for peer in others]
-    page = _page(described, table(results, programs, names), wrongs(results, programs))
+        page = write(folder, described, results, programs, names)
     print(page)
+    mine = [each[M2PEM] for sizes in results.values() for each in sizes.values()]
+    return any(figure.wrong for figure in [*mine, *programs.values()])
+
+
+def play_all(
+    work: Work, sizes: Sequence[int], others: Sequence[Engine]
+) -> dict[int, dict[str, Figure]]:
+    """A graph at all sizes, with every engine up to the first size at which it fails."""
+    by_size: dict[int, dict[str, Figure]] = {}
+    failed: set[str] = set()
+    for size in sizes:
+        engines = by_size[size] = {M2PEM: play(own(), work.name, size, OWN_RUNS)}
+        if JOURNALS_FROM <= size <= JOURNALS_UP_TO:
+            for name, kind in JOURNALS.items():
+                engines[name] = play(own(kind), work.name, size, PEER_RUNS)
+        for peer in others:
+            stock = peer.name.endswith(STOCK)
+            if peer.name in failed or (stock and size not in work.sizes[:STOCK_SIZES]):
+                continue
+            engines[peer.name] = play(peer, work.name, size, PEER_RUNS)
+            if engines[peer.name].wrong:
+                failed.add(peer.name)
+        print(f"{work.title}, {size:,}: done", file=sys.stderr)
+        graph.cache_clear()
+    return by_size
+
+
+def write(
+    folder: Path,
+    described: dict[str, str],
+    results: Results,
+    programs: dict[str, Figure],
+    names: Sequence[str],
+) -> str:
+    """The files of a measurement, and the README if they are those that it shows; the page."""
     folder.mkdir(parents=True, exist_ok=True)
+    page = _page(described, table(results, programs, names), wrongs(results, programs))
     (folder / "table.md").write_text(page, encoding="utf-8")
     drawn = [M2PEM, *(name for name in names if not name.endswith(STOCK))]
     for work in WORK:
-        drawing = plot(work, results[work.name], drawn)
+        drawing = plot(work, results.get(work.name, {}), drawn)
         (folder / f"{work.name}.svg").write_text(drawing, encoding="utf-8")
     figures = {
         "machine": described,
@@ -109,8 +131,7 @@ def whole(others: Sequence[Engine], up_to: int, folder: Path) -> int:
     if folder == RESULTS:
         old = README.read_text(encoding="utf-8")
         README.write_text(rewritten(old, results, names), encoding="utf-8")
-    mine = [each[M2PEM] for sizes in results.values() for each in sizes.values()]
-    return any(figure.wrong for figure in [*mine, *programs.values()])
+    return page
 
 
 def _page(described: dict[str, str], figures: str, failures: str) -> str:

@@ -23,7 +23,7 @@ def _lines(results: Results, peers: Sequence[str]) -> Iterator[str]:
     yield f"| CPU time, in that of m2pem | {' | '.join(shown)} |"
     yield f"|{'---|' * (len(shown) + 1)}"
     for work in WORK:
-        cells = [_cell(work, name, results[work.name]) for name in shown]
+        cells = [_cell(work, name, results.get(work.name, {})) for name in shown]
         yield f"| {work.title} | {' | '.join(cells)} |"
     yield ""
     for work in WORK:

@@ -117,7 +117,7 @@ def _ratio(peer: Figure | None, mine: Figure) -> str:
     if peer.wrong:
         return "**wrong**" if peer.wrong.startswith("wrong") else f"**{_kind(peer.wrong)}**"
     if not mine.values:
-        return ""
+        return "right"
     times, memory = (peer.values[key] / mine.values[key] for key in ("cpu_s", "peak_kb"))
     return f"{_number(times, '')}x time, {_number(memory, '')}x memory"
 

@@ -47,7 +47,8 @@ def asking(name: str) -> str:
 def flows(*paths: Iterable[str]) -> str:
     """Sequence flows along each path."""
     return "".join(
-        f'<sequenceFlow id="{flow.source}_{flow.target}" sourceRef="{flow.source}" targetRef="{flow.target}"/>'
+        f'<sequenceFlow id="{flow.source}_{flow.target}"'
+        f' sourceRef="{flow.source}" targetRef="{flow.target}"/>'
         for names in paths
         for flow in path(*names)
     )
