@@ -133,7 +133,7 @@ def ask(command: Sequence[str], order: str, limit_s: float) -> dict[str, Any]:
     if done.returncode or not lines:
         words = done.stderr.strip().splitlines() or ["it ended without an answer or a word"]
         said = next((line for line in reversed(words) if "Error" in line), words[-1])
-        raise FailedError(f"{said.strip()[:100]} (exit status {done.returncode})")
+        raise FailedError(f"{said.strip()[:160]} (exit status {done.returncode})")
     answer: dict[str, Any] = json.loads(lines[-1])
     return answer
 

@@ -1,8 +1,8 @@
 """Plays a graph with SpiffWorkflow, by its own interface: JSON in, JSON out.
 
 Run by its own interpreter, which has SpiffWorkflow and not m2pem. Parsing and running recurse, so
-the limit of recursion is lifted, which its users must know to do, and so is the depth of 1,000 tasks
-after which it stops and says that all is completed. `"stock": true` leaves both.
+the limit of recursion is lifted, which its users must know to do, and so is the depth of 1,000
+tasks after which it stops and says that all is completed. `"stock": true` leaves both.
 """
 
 import io
