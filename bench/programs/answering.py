@@ -8,14 +8,13 @@ of what it adds to the log, in the same folder, in turns.
 
 import asyncio
 import json
+import os
 import sys
 import tempfile
 import time
 from pathlib import Path
-from statistics import median
 
 from bench.graphs import file
-from bench.journal import fsync_s
 from bench.programs.stage import asking, executive, flows
 from m2pem.executive.executive import Executive
 from m2pem.journal.sqlite import SqliteJournal
@@ -24,7 +23,31 @@ MISSION = file(
     f'<process id="BENCH" isExecutable="true"><startEvent id="start"/>{asking("u")}'
     f"{flows(['start', 'u', 'u'])}</process>"
 )
-TURNS = 10
+COMMIT_BYTES = 3 * 4096
+LOG_BYTES = 300 * COMMIT_BYTES
+
+
+class Disk:
+    """What an fsync takes after a write of what a small commit adds to the log.
+
+    SQLite writes its log from the beginning again and again: none of the time goes into making a
+    file longer.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+        self._pages = os.urandom(COMMIT_BYTES)
+        self._place = 0
+        os.pwrite(self._file, os.urandom(LOG_BYTES), 0)
+        os.fsync(self._file)
+
+    def fsync_s(self) -> float:
+        """Write and fsync once; seconds."""
+        began = time.perf_counter()
+        os.pwrite(self._file, self._pages, self._place)
+        os.fdatasync(self._file)
+        self._place = (self._place + COMMIT_BYTES) % LOG_BYTES
+        return time.perf_counter() - began
 
 
 async def answer(running: Executive, run: str, times: int) -> None:
@@ -35,29 +58,31 @@ async def answer(running: Executive, run: str, times: int) -> None:
 
 
 async def measure(runs: int, answers: int, folder: Path) -> dict[str, float]:
-    """In some turns, so that a disk that changes its pace does so for both."""
+    """A single run takes turns with the fsyncs: a disk that changes its pace does so for both."""
     journal = SqliteJournal.open(folder / "journal.db")
-    turns = min(TURNS, answers)
-    times, syncs = [], []
+    disk = Disk(folder / "log")
+    turns = answers if runs == 1 else 1
+    took_s = sync_s = 0.0
+    commits = 0
     async with executive(journal) as running:
         names = [await running.control.start(MISSION) for _ in range(runs)]
-        commits = 0
-        for turn in range(turns):
-            syncs.append(fsync_s(folder / f"fsync{turn}", max(10, answers // turns)))
+        for _ in range(turns):
+            sync_s += disk.fsync_s()
             before = journal.commits
             began = time.perf_counter()
             await asyncio.gather(*(answer(running, name, answers // turns) for name in names))
-            times.append((time.perf_counter() - began) / (runs * (answers // turns)))
+            took_s += time.perf_counter() - began
             commits += journal.commits - before
         for name in names:
-            assert running.runners[name].run.state.last_token == 1
-            assert len(running.runners[name].prompts) == 1
+            state = running.runners[name].run.state
+            assert (state.last_prompt, len(state.prompts)) == (answers + 1, 1)
     await journal.close()
+    inputs = runs * answers
     return {
-        "inputs_per_s": 1 / median(times),
-        "commits_per_input": commits / (runs * turns * (answers // turns)),
-        "fsync_ms": median(syncs) * 1000,
-        "fsyncs_per_input": median(times) / median(syncs),
+        "inputs_per_s": inputs / took_s,
+        "commits_per_input": commits / inputs,
+        "fsync_ms": sync_s / turns * 1000,
+        "fsyncs_per_input": took_s / inputs / (sync_s / turns),
     }
 
 
