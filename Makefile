@@ -20,7 +20,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 endif
 
 .PHONY: help setup python-packages npm-packages demo test test-long fuzz lint format docs pictures
-.PHONY: conformance clean
+.PHONY: bench bench-quick conformance clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 12
@@ -76,7 +76,7 @@ format: setup ## put the code into shape
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
-test: lint ## check all but the long tests
+test: lint bench-quick ## check all but the long tests
 	@$(BIN)/pytest -n 2 -m "not long"
 
 test-long: lint ## check everything: fuzzing, large random counts, foreign corpora too
@@ -98,6 +98,12 @@ PEERS := .conformance
 
 conformance: setup $(PEERS)/installed ## compare with other BPMN engines, and write the table into the docs
 	@$(BIN)/python -m tests.conformance --spiffworkflow $(PEERS)/bin/python
+
+bench: setup $(PEERS)/installed ## measure m2pem and other BPMN engines, and write bench/results (about half an hour)
+	@$(BIN)/python -m bench
+
+bench-quick: setup ## see that what `make bench` runs does run, and rightly
+	@$(BIN)/python -m bench --quick
 
 $(PEERS)/installed: tests/conformance/spiffworkflow.txt
 	@echo "Installing SpiffWorkflow into $(PEERS)"

@@ -24,7 +24,7 @@ PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
 EXAMPLES = sorted((REPOSITORY / "examples").rglob("README.md"))
 MAKE_TARGETS = {
     *("setup", "demo", "test", "test-long", "fuzz", "lint", "format", "docs", "pictures"),
-    *("conformance", "clean"),
+    *("conformance", "bench", "bench-quick", "clean"),
 }
 
 BLOCKS = {

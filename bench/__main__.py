@@ -1,0 +1,146 @@
+"""`python -m bench`: measure everything, print the table, write bench/results/ and README.md."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
+from pathlib import Path
+
+from bench.engines import M2PEM, REPOSITORY, Engine, Figure, graph, measure, own, peers, play
+from bench.machine import machine
+from bench.plots import plot
+from bench.readme import rewritten
+from bench.table import JOURNALS, STOCK, Results, table, wrongs
+from bench.targets import PROGRAMS, WORK, Work
+
+README = REPOSITORY / "README.md"
+RESULTS = REPOSITORY / "bench" / "results"
+SPIFFWORKFLOW = REPOSITORY / ".conformance" / "bin" / "python"
+MODULES = REPOSITORY / "tests" / "js" / "node_modules"
+OWN_RUNS, PEER_RUNS = 5, 3
+STOCK_SIZES = 2
+"""Enough to see where SpiffWorkflow gives up when its users do not lift the limit of recursion."""
+
+JOURNALS_FROM = 10_000
+JOURNALS_UP_TO = 100_000
+
+
+def main() -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="only: does all run, and rightly?")
+    parser.add_argument("--up-to", type=int, default=10**9, metavar="SIZE", help="of the graphs")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="where they are written")
+    asked = parser.parse_args()
+    others = peers(SPIFFWORKFLOW, MODULES)
+    return quick(others) if asked.quick else whole(others, asked.up_to, asked.results)
+
+
+def quick(others: Sequence[Engine]) -> int:
+    """Everything once, at its smallest; no time is looked at."""
+    names = {each.name for each in others}
+    for name in {"SpiffWorkflow", "bpmn-elements", "bpmn-engine"} - names:
+        print(f"bench: {name} is not installed, and left out")
+
+    engines = [each for each in others if not each.name.endswith(STOCK)]
+    engines += [own(), own("memory"), own("sqlite")]
+
+    def look(job: tuple[Engine, str, int]) -> tuple[str, Figure]:
+        engine, work, size = job
+        return f"{engine.name}, {work}, {size}", play(engine, work, size, 1, enough_s=0.0)
+
+    jobs = [(engine, work.name, work.sizes[0]) for work in WORK for engine in engines]
+    with ThreadPoolExecutor(2) as pool:
+        done = [*pool.map(look, jobs)]
+        done += pool.map(lambda each: (each.quick[0], measure(each.quick, 1)), PROGRAMS)
+    for name, figure in done:
+        if figure.wrong:
+            print(f"bench: {name}: {figure.wrong}", file=sys.stderr)
+    return any(figure.wrong for _, figure in done)
+
+
+def whole(others: Sequence[Engine], up_to: int, folder: Path) -> int:
+    """Measure, print, and write after each step: an interrupted measurement is not lost."""
+    described = machine(SPIFFWORKFLOW, MODULES)
+    names = [peer.name for peer in others]
+    results: Results = {}
+    programs: dict[str, Figure] = {}
+    page = ""
+    for work in WORK:
+        results[work.name] = play_all(work, [size for size in work.sizes if size <= up_to], others)
+        page = write(folder, described, results, programs, names)
+    for program in PROGRAMS:
+        programs[program.name] = measure(program.command, PEER_RUNS)
+        print(f"{program.name}: done", file=sys.stderr)
+        page = write(folder, described, results, programs, names)
+    print(page)
+    mine = [each[M2PEM] for sizes in results.values() for each in sizes.values()]
+    return any(figure.wrong for figure in [*mine, *programs.values()])
+
+
+def play_all(
+    work: Work, sizes: Sequence[int], others: Sequence[Engine]
+) -> dict[int, dict[str, Figure]]:
+    """A graph at all sizes, with every engine up to the first size at which it fails."""
+    by_size: dict[int, dict[str, Figure]] = {}
+    failed: set[str] = set()
+    for size in sizes:
+        engines = by_size[size] = {M2PEM: play(own(), work.name, size, OWN_RUNS)}
+        if JOURNALS_FROM <= size <= JOURNALS_UP_TO:
+            for name, kind in JOURNALS.items():
+                engines[name] = play(own(kind), work.name, size, PEER_RUNS)
+        for peer in others:
+            stock = peer.name.endswith(STOCK)
+            if peer.name in failed or (stock and size not in work.sizes[:STOCK_SIZES]):
+                continue
+            engines[peer.name] = play(peer, work.name, size, PEER_RUNS)
+            if engines[peer.name].wrong:
+                failed.add(peer.name)
+        print(f"{work.title}, {size:,}: done", file=sys.stderr)
+        graph.cache_clear()
+    return by_size
+
+
+def write(
+    folder: Path,
+    described: dict[str, str],
+    results: Results,
+    programs: dict[str, Figure],
+    names: Sequence[str],
+) -> str:
+    """The files of a measurement, and the README if they are those that it shows; the page."""
+    folder.mkdir(parents=True, exist_ok=True)
+    page = _page(described, table(results, programs, names), wrongs(results, programs))
+    (folder / "table.md").write_text(page, encoding="utf-8")
+    drawn = [M2PEM, *(name for name in names if not name.endswith(STOCK))]
+    for work in WORK:
+        drawing = plot(work, results.get(work.name, {}), drawn)
+        (folder / f"{work.name}.svg").write_text(drawing, encoding="utf-8")
+    figures = {
+        "machine": described,
+        "graphs": {
+            work: {size: {n: asdict(f) for n, f in each.items()} for size, each in sizes.items()}
+            for work, sizes in results.items()
+        },
+        "programs": {name: asdict(figure) for name, figure in programs.items()},
+    }
+    text = json.dumps(figures, indent=1) + "\n"
+    (folder / "figures.json").write_text(text, encoding="utf-8")
+    if folder == RESULTS:
+        old = README.read_text(encoding="utf-8")
+        README.write_text(rewritten(old, results, names), encoding="utf-8")
+    return page
+
+
+def _page(described: dict[str, str], figures: str, failures: str) -> str:
+    words = ", ".join(f"{name}: {value}" for name, value in described.items())
+    page = f"# Measured\n\n{words}.\n\n{figures}"
+    if failures:
+        page += f"\n## What did not end with the right result\n\n{failures}"
+    return page
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,45 @@
+"""CPU seconds of commands, from the start of the process to its end.
+
+python -m bench.programs.starting <times>
+"""
+
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from statistics import median
+
+from bench.graphs import instances
+
+
+def children_s() -> float:
+    """CPU seconds of all processes that were waited for."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+def command_s(*arguments: str) -> float:
+    """CPU seconds of a command of m2pem."""
+    times = []
+    for _ in range(int(sys.argv[1])):
+        before = children_s()
+        subprocess.run(
+            [sys.executable, "-m", "m2pem", *arguments], check=True, stdout=subprocess.DEVNULL
+        )
+        times.append(children_s() - before)
+    return median(times)
+
+
+def main() -> None:
+    """Help, and the check of a 20-element file."""
+    with tempfile.TemporaryDirectory() as scratch:
+        file = Path(scratch, "small.bpmn")
+        file.write_bytes(instances(1).xml)
+        figures = {"help_s": command_s("--help"), "check_s": command_s("check", str(file))}
+    print(json.dumps(figures))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""The work that is measured, at which sizes, and what it must reach."""
+
+from dataclasses import dataclass
+
+ELEMENTS_PER_S = 100_000
+BRANCHES_PER_S = 60_000
+SQLITE_PER_S = 50_000
+LINEAR = 1.3
+MEMORY_GROWTH = 1.05
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """A graph that all engines play. `sizes`: the first is for a quick look; `targets` count from
+    `measured_from` on."""
+
+    name: str
+    title: str
+    unit: str
+    sizes: tuple[int, ...]
+    measured_from: int
+    elements_per_s: int = ELEMENTS_PER_S
+
+
+WORK = (
+    Work("row", "tasks in a row", "tasks", (100, 1_000, 10_000, 100_000), 1_000),
+    Work("loop", "a loop", "rounds", (100, 1_000, 10_000, 100_000, 1_000_000), 10_000),
+    Work("branches", "a parallel gateway", "branches", (100, 1_000, 10_000), 1_000, BRANCHES_PER_S),
+    Work("instances", "a 20-element process", "instances", (10, 100, 1_000, 10_000), 1_000),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """A bound on a figure of one program; `at_least`, or else at most."""
+
+    key: str
+    title: str
+    unit: str
+    bound: float | None = None
+    at_least: bool = False
+
+    def met(self, value: float) -> bool | None:
+        """Whether the bound is kept; None: there is none."""
+        if self.bound is None:
+            return None
+        return value >= self.bound if self.at_least else value <= self.bound
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """A program of m2pem alone: the words of its command, and those of its quick look."""
+
+    size: str
+    command: tuple[str, ...]
+    quick: tuple[str, ...]
+    goals: tuple[Goal, ...]
+
+    @property
+    def name(self) -> str:
+        """Its command."""
+        return " ".join(self.command)
+
+
+def _reading(size: int, bound: float | None) -> Program:
+    goals = (
+        Goal("cpu_s", "reading and checking a file", "s", bound),
+        Goal("us_per_element", "the same, for an element", "us"),
+    )
+    command = ("reading", str(size))
+    return Program(f"{size:,} elements", command, ("reading", "200"), goals)
+
+
+def _reaction(journal: str, bound_ms: float) -> Program:
+    title = f"signal thrown to Arbiter.start, {journal} journal"
+    goals = (Goal("p50_ms", f"{title}, p50", "ms"), Goal("p99_ms", f"{title}, p99", "ms", bound_ms))
+    size = "1,000 other tokens waiting"
+    command = ("reaction", journal, "1000", "1000")
+    return Program(size, command, ("reaction", journal, "20", "5"), goals)
+
+
+PROGRAMS = (
+    Program(
+        "100 runs",
+        ("answering", "100", "100"),
+        ("answering", "5", "5"),
+        (
+            Goal("inputs_per_s", "SQLite, an input an element", "/s", 5_000, at_least=True),
+            Goal("commits_per_input", "commits an input", "", 0.05),
+        ),
+    ),
+    Program(
+        "1 run",
+        ("answering", "1", "500"),
+        ("answering", "1", "5"),
+        (
+            Goal("fsync_ms", "an fsync, in the same place", "ms"),
+            Goal("fsyncs_per_input", "SQLite, time of an input, in fsyncs", "", 1.2),
+        ),
+    ),
+    Program(
+        "100,000 instances",
+        ("waiting", "100000"),
+        ("waiting", "100"),
+        (Goal("bytes", "memory of a waiting 20-element instance", "bytes", 6_000),),
+    ),
+    _reading(5_000, 0.15),
+    _reading(20_000, None),
+    _reading(100_000, None),
+    _reaction("memory", 5),
+    _reaction("sqlite", 15),
+    Program(
+        "100,000 rounds",
+        ("replaying", "100000"),
+        ("replaying", "100"),
+        (
+            Goal("records_per_s", "replay, records in memory", "/s", 200_000, at_least=True),
+            Goal("from_sqlite_per_s", "replay, out of SQLite", "/s", 200_000, at_least=True),
+        ),
+    ),
+    Program(
+        "",
+        ("starting", "5"),
+        ("starting", "1"),
+        (
+            Goal("help_s", "CPU of m2pem --help", "s", 0.25),
+            Goal("check_s", "CPU of m2pem check, a small file", "s", 0.5),
+        ),
+    ),
+    Program(
+        "1,000 tokens waiting",
+        ("idle", "1000", "10"),
+        ("idle", "20", "0.2"),
+        (Goal("percent", "an idle executive, of a core", "%", 0.1),),
+    ),
+)
