@@ -133,3 +133,24 @@ def test_as_a_split_it_works_like_an_inclusive_gateway() -> None:
     """).start({"x": 2})
     assert play.entered() == "start split a b"
     assert play.ended == "completed"
+
+
+def test_several_reset_at_one_moment() -> None:
+    play = Play("""
+        <startEvent id="start"/> <parallelGateway id="fork"/> <userTask id="u" default="on"/>
+        <userTask id="v"/> <task id="after"/>
+        <complexGateway id="g1"><activationCondition>activationCount &gt;= 1</activationCondition>
+        </complexGateway>
+        <complexGateway id="g2"><activationCondition>activationCount &gt;= 1</activationCondition>
+        </complexGateway>
+        start -> fork
+        fork -> g1
+        fork -> g2
+        fork -> u
+        fork -> v -> g2
+        u -> g1 if x
+        u -> g2 if x
+        on: u -> after
+    """).start({"x": False})
+    assert play.answer(prompt="v").at == "u g2"
+    assert play.answer(prompt="u").ended == "completed"

@@ -138,8 +138,9 @@ def throw_outwards(marking: Marking, thrower: Work, thrown: Event) -> None:
     """An error or escalation goes from scope to scope until one catches it.
 
     First the boundary events of the activity that threw it are asked, then the event subprocesses
-    of the scope it is in, then the boundary events of what contains that scope, and so on. An error
-    that nothing catches fails the run; such an escalation is forgotten (10.5.1).
+    of the scope it is in, but for the one that it is thrown in (docs/missions.md), then the
+    boundary events of what contains that scope, and so on. An error that nothing catches fails the
+    run; such an escalation is forgotten (10.5.1).
     """
     activity: Work | None = thrower
     while activity is not None:
@@ -151,7 +152,7 @@ def throw_outwards(marking: Marking, thrower: Work, thrown: Event) -> None:
                 return
         if scope.handles_events():
             for handler in scope.level.handlers:
-                if _matches(start_of(handler).event, thrown):
+                if handler is not activity.node and _matches(start_of(handler).event, thrown):
                     begin_handler(marking, scope, handler)
                     return
         activity = scope.owner

@@ -23,8 +23,9 @@ def fire_joins(x: Execution) -> bool:
     fired = False
     for number in moved:
         scope = x.state.scopes.get(number)
-        if scope is not None and (scope.joins or scope.activated):
-            fired = _fire_one(x, scope) or fired
+        if scope is not None and (scope.joins or scope.activated) and _fire_one(x, scope):
+            x.moved.add(number)  # what one has done may be what another waited for
+            fired = True
     return fired
 
 
