@@ -123,7 +123,10 @@ def _ratio(peer: Figure | None, mine: Figure) -> str:
 
 
 def _kind(words: str) -> str:
-    return "over 60 s" if words.startswith("no answer") else "crash"
+    if words.startswith("no answer"):
+        return "over 60 s"
+    # Node's word for it: nothing is left to do, and what was awaited has not come.
+    return "never ends" if words.endswith("(exit status 13)") else "crash"
 
 
 def _program_lines(programs: dict[str, Figure]) -> Iterator[Line]:

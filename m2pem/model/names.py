@@ -62,10 +62,15 @@ def unwritten(
     everywhere = {*known_names, *mission.associated}
     for store in stores.values():
         store.written |= everywhere
+    main = mission.process()
+    called = {node.called for node in mission.nodes if isinstance(node, CallActivity)}
     for node in mission.nodes:
         store = stores[node.container.process]
         store.reads += _reads(node)
-        stores[_seen_from(mission, node)].reads += _conditions(node)
+        begins = isinstance(node, StartEvent) and isinstance(node.container, Process)
+        # A condition that begins a process reads the data of the main one.
+        of_main = begins and node.container not in called
+        (stores[main] if of_main else store).reads += _conditions(node)
         for mapping in _data_mappings(node):
             store.written.add(mapping.target)
         _note_writes(node, store, service_writes)
@@ -147,15 +152,6 @@ def _conditions(node: FlowNode) -> Iterator[Read]:
     for definition in node.definitions if isinstance(node, Event) else ():
         if isinstance(definition, ConditionalEventDefinition):
             yield Read(definition.condition, node.id, definition.line)
-
-
-def _seen_from(mission: Mission, node: FlowNode) -> Process:
-    """The process whose data a condition reads: one that begins a process, the main one's."""
-    process = node.container.process
-    if not isinstance(node, StartEvent) or not isinstance(node.container, Process):
-        return process
-    called = any(isinstance(n, CallActivity) and n.called is process for n in mission.nodes)
-    return process if called else mission.process()
 
 
 def _loop_reads(node: Activity) -> Iterator[Read]:
