@@ -1,19 +1,18 @@
 """`python -m bench`: measure everything, print the table, write bench/results/ and README.md."""
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
 from pathlib import Path
 
 from bench.engines import M2PEM, REPOSITORY, Engine, Figure, graph, measure, own, peers, play
+from bench.figures import Figures, OtherError, kept
 from bench.machine import machine
 from bench.plots import plot
 from bench.readme import rewritten
-from bench.table import JOURNALS, STOCK, Results, table, wrongs
-from bench.targets import PROGRAMS, WORK, Work
+from bench.table import JOURNALS, STOCK, table, wrongs
+from bench.targets import PROGRAMS, WORK, Program, Work
 
 README = REPOSITORY / "README.md"
 RESULTS = REPOSITORY / "bench" / "results"
@@ -23,22 +22,49 @@ OWN_RUNS, PEER_RUNS = 5, 3
 STOCK_SIZES = 2
 """Enough to see where SpiffWorkflow gives up when its users do not lift the limit of recursion."""
 
+NAMES = [*dict.fromkeys([*(w.name for w in WORK), *(p.command[0] for p in PROGRAMS)])]
+FIGURES = "figures.json"
+
 JOURNALS_FROM = 10_000
 JOURNALS_UP_TO = 100_000
 
 
-def main() -> int:
-    """The command."""
+def main(words: Sequence[str] | None = None) -> int:
+    """The command; `words`: those of the process, unless others are given."""
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="only: does all run, and rightly?")
     parser.add_argument("--up-to", type=int, default=10**9, metavar="SIZE", help="of the graphs")
     parser.add_argument("--results", type=Path, default=RESULTS, help="where they are written")
-    asked = parser.parse_args()
+    parser.add_argument(
+        "--only",
+        type=_names,
+        metavar="NAME[,NAME]",
+        help=f"measure these again and keep the other figures: {', '.join(NAMES)}",
+    )
+    asked = parser.parse_args(words)
     others = peers(SPIFFWORKFLOW, MODULES)
-    return quick(others) if asked.quick else whole(others, asked.up_to, asked.results)
+    names: Sequence[str] = asked.only or NAMES
+    works = [work for work in WORK if work.name in names]
+    programs = [program for program in PROGRAMS if program.command[0] in names]
+    if asked.quick:
+        return quick(others, works, programs)
+    found = machine(SPIFFWORKFLOW, MODULES)
+    try:
+        figures = kept(asked.results / FIGURES, found, names) if asked.only else Figures(found)
+    except OtherError as error:
+        parser.error(str(error))
+    return measure_all(figures, others, works, programs, asked.up_to, asked.results)
 
 
-def quick(others: Sequence[Engine]) -> int:
+def _names(text: str) -> list[str]:
+    names = text.split(",")
+    unknown = [name for name in names if name not in NAMES]
+    if unknown:
+        raise argparse.ArgumentTypeError(f"there is no {unknown[0]!r}; known: {', '.join(NAMES)}")
+    return names
+
+
+def quick(others: Sequence[Engine], works: Sequence[Work], programs: Sequence[Program]) -> int:
     """Everything once, at its smallest; no time is looked at."""
     names = {each.name for each in others}
     for name in {"SpiffWorkflow", "bpmn-elements", "bpmn-engine"} - names:
@@ -51,33 +77,39 @@ def quick(others: Sequence[Engine]) -> int:
         engine, work, size = job
         return f"{engine.name}, {work}, {size}", play(engine, work, size, 1, enough_s=0.0)
 
-    jobs = [(engine, work.name, work.sizes[0]) for work in WORK for engine in engines]
+    jobs = [(engine, work.name, work.sizes[0]) for work in works for engine in engines]
+    commands = dict.fromkeys(program.quick for program in programs)
     with ThreadPoolExecutor(2) as pool:
         done = [*pool.map(look, jobs)]
-        done += pool.map(lambda each: (each.quick[0], measure(each.quick, 1)), PROGRAMS)
+        done += pool.map(lambda each: (" ".join(each), measure(each, 1)), commands)
     for name, figure in done:
         if figure.wrong:
             print(f"bench: {name}: {figure.wrong}", file=sys.stderr)
     return any(figure.wrong for _, figure in done)
 
 
-def whole(others: Sequence[Engine], up_to: int, folder: Path) -> int:
+def measure_all(
+    figures: Figures,
+    others: Sequence[Engine],
+    works: Sequence[Work],
+    programs: Sequence[Program],
+    up_to: int,
+    folder: Path,
+) -> int:
     """Measure, print, and write after each step: an interrupted measurement is not lost."""
-    described = machine(SPIFFWORKFLOW, MODULES)
-    names = [peer.name for peer in others]
-    results: Results = {}
-    programs: dict[str, Figure] = {}
+    installed = [peer.name for peer in others]
     page = ""
-    for work in WORK:
-        results[work.name] = play_all(work, [size for size in work.sizes if size <= up_to], others)
-        page = write(folder, described, results, programs, names)
-    for program in PROGRAMS:
-        programs[program.name] = measure(program.command, PEER_RUNS)
+    for work in works:
+        played = play_all(work, [size for size in work.sizes if size <= up_to], others)
+        figures.add(work.name, played, installed)
+        page = write(folder, figures, installed)
+    for program in programs:
+        figures.programs[program.name] = measure(program.command, PEER_RUNS)
         print(f"{program.name}: done", file=sys.stderr)
-        page = write(folder, described, results, programs, names)
+        page = write(folder, figures, installed)
     print(page)
-    mine = [each[M2PEM] for sizes in results.values() for each in sizes.values()]
-    return any(figure.wrong for figure in [*mine, *programs.values()])
+    mine = [each[M2PEM] for sizes in figures.graphs.values() for each in sizes.values()]
+    return any(figure.wrong for figure in [*mine, *figures.programs.values()])
 
 
 def play_all(
@@ -103,31 +135,18 @@ def play_all(
     return by_size
 
 
-def write(
-    folder: Path,
-    described: dict[str, str],
-    results: Results,
-    programs: dict[str, Figure],
-    names: Sequence[str],
-) -> str:
+def write(folder: Path, figures: Figures, installed: Sequence[str]) -> str:
     """The files of a measurement, and the README if they are those that it shows; the page."""
     folder.mkdir(parents=True, exist_ok=True)
-    page = _page(described, table(results, programs, names), wrongs(results, programs))
+    results, names = figures.graphs, figures.peers(installed)
+    drawn_table = table(results, figures.programs, names)
+    page = _page(figures.machine, drawn_table, wrongs(results, figures.programs))
     (folder / "table.md").write_text(page, encoding="utf-8")
     drawn = [M2PEM, *(name for name in names if not name.endswith(STOCK))]
     for work in WORK:
         drawing = plot(work, results.get(work.name, {}), drawn)
         (folder / f"{work.name}.svg").write_text(drawing, encoding="utf-8")
-    figures = {
-        "machine": described,
-        "graphs": {
-            work: {size: {n: asdict(f) for n, f in each.items()} for size, each in sizes.items()}
-            for work, sizes in results.items()
-        },
-        "programs": {name: asdict(figure) for name, figure in programs.items()},
-    }
-    text = json.dumps(figures, indent=1) + "\n"
-    (folder / "figures.json").write_text(text, encoding="utf-8")
+    figures.save(folder / FIGURES)
     if folder == RESULTS:
         old = README.read_text(encoding="utf-8")
         README.write_text(rewritten(old, results, names), encoding="utf-8")

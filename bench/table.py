@@ -135,4 +135,6 @@ def _program_lines(programs: dict[str, Figure]) -> Iterator[Line]:
         if figure is None:
             continue
         for goal in program.goals:
+            if figure.values and goal.key not in figure.values:
+                continue  # kept from a time when it was not measured yet
             yield Line(goal.title, program.size, figure.values.get(goal.key), goal, {})

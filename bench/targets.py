@@ -72,8 +72,14 @@ def _reading(size: int, bound: float | None) -> Program:
 
 
 def _reaction(journal: str, bound_ms: float) -> Program:
-    title = f"signal thrown to Arbiter.start, {journal} journal"
-    goals = (Goal("p50_ms", f"{title}, p50", "ms"), Goal("p99_ms", f"{title}, p99", "ms", bound_ms))
+    sent = f"signal from outside to Arbiter.start, {journal} journal"
+    thrown = f"signal thrown in the mission to Arbiter.start, {journal} journal"
+    goals = (
+        Goal("p50_ms", f"{sent}, p50", "ms"),
+        Goal("p99_ms", f"{sent}, p99", "ms", bound_ms),
+        Goal("thrown_p50_ms", f"{thrown}, p50", "ms"),
+        Goal("thrown_p99_ms", f"{thrown}, p99", "ms", bound_ms),
+    )
     size = "1,000 other tokens waiting"
     command = ("reaction", journal, "1000", "1000")
     return Program(size, command, ("reaction", journal, "20", "5"), goals)
@@ -96,6 +102,7 @@ PROGRAMS = (
         (
             Goal("fsync_ms", "an fsync, in the same place", "ms"),
             Goal("fsyncs_per_input", "SQLite, time of an input, in fsyncs", "", 1.2),
+            Goal("beyond_fsync_ms", "SQLite, time of an input beyond an fsync", "ms"),
         ),
     ),
     Program(
@@ -125,6 +132,8 @@ PROGRAMS = (
         (
             Goal("help_s", "CPU of m2pem --help", "s", 0.25),
             Goal("check_s", "CPU of m2pem check, a small file", "s", 0.5),
+            Goal("check_fleet_s", "CPU of m2pem check with a fleet, a small file", "s", 0.5),
+            Goal("simulate_s", "CPU of m2pem simulate, a small file", "s"),
         ),
     ),
     Program(

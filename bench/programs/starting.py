@@ -11,7 +11,10 @@ import tempfile
 from pathlib import Path
 from statistics import median
 
+from bench.engines import REPOSITORY
 from bench.graphs import instances
+
+FLEET = REPOSITORY / "fleet_configs" / "vignette1.yaml"
 
 
 def children_s() -> float:
@@ -33,11 +36,16 @@ def command_s(*arguments: str) -> float:
 
 
 def main() -> None:
-    """Help, and the check of a 20-element file."""
+    """Help, and what is done with a 20-element file."""
     with tempfile.TemporaryDirectory() as scratch:
         file = Path(scratch, "small.bpmn")
         file.write_bytes(instances(1).xml)
-        figures = {"help_s": command_s("--help"), "check_s": command_s("check", str(file))}
+        figures = {
+            "help_s": command_s("--help"),
+            "check_s": command_s("check", str(file)),
+            "check_fleet_s": command_s("check", str(file), "--fleet", str(FLEET)),
+            "simulate_s": command_s("simulate", str(file)),
+        }
     print(json.dumps(figures))
 
 

@@ -108,7 +108,7 @@ def _against_fleet(
     failed: FleetError | None = None
     if fleet_file is not None:
         from m2pem.cli.fleets import arbiters_of
-        from m2pem.cli.setting import get_fleet
+        from m2pem.cli.given import get_fleet
 
         try:
             arbiters = arbiters_of(get_fleet(fleet_file, mission), plugins)

@@ -5,6 +5,7 @@ import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,7 +17,9 @@ from m2pem.cli.output import Output
 from m2pem.control_socket.server import ControlSocket
 from m2pem.executive.executive import Executive
 from m2pem.model.mission import Mission
-from m2pem.sim.answers import Answers
+
+if TYPE_CHECKING:
+    from m2pem.sim.answers import Answers
 
 log = logging.getLogger("m2pem.cli")
 
@@ -85,7 +88,7 @@ async def drive_run(
     executive: Executive,
     output: Output,
     operators: Operators,
-    answers: Answers | None,
+    answers: "Answers | None",
     journal: Path | None,
     begin: Callable[[], Awaitable[RunId]],
 ) -> int:
@@ -114,7 +117,7 @@ async def drive_run(
     return EXIT_STATUS[summary.status]
 
 
-async def _act(answers: Answers | None, executive: Executive, run: RunId) -> None:
+async def _act(answers: "Answers | None", executive: Executive, run: RunId) -> None:
     if answers is None:
         return
     try:

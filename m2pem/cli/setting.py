@@ -7,43 +7,15 @@ from typing import Any
 import click
 
 from m2pem.api.control import SimulationResult
-from m2pem.cli.options import MADE_UP, UnusableError
-from m2pem.errors import AnswersError, PluginError
+from m2pem.cli.options import UnusableError
+from m2pem.errors import PluginError
 from m2pem.executive.arbiters import SIMULATED
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
-from m2pem.findings import has_errors
+from m2pem.executive.script import Script
 from m2pem.journal.base import Journal
-from m2pem.model.mission import Mission
 from m2pem.plugins import PluginManager
 from m2pem.resources.fleet import Fleet, Payload, Vehicle
-from m2pem.resources.fleet_file import load_fleet
-from m2pem.resources.madeup import fleet_for
-from m2pem.sim.answers import Answers, check_answers, load_answers
-
-
-def get_fleet(name: str, mission: Mission) -> Fleet:
-    """The fleet of a file, or one that is made up for the mission.
-
-    Raises:
-        FleetError: with every finding.
-    """
-    return fleet_for(mission) if name == MADE_UP else load_fleet(name)
-
-
-def get_answers(file: Path | None, mission: Mission) -> Answers | None:
-    """The answers for a mission; None without a file.
-
-    Raises:
-        AnswersError: with every finding.
-    """
-    if file is None:
-        return None
-    answers = load_answers(file)
-    findings = check_answers(answers, mission)
-    if has_errors(findings):
-        raise AnswersError(f"{file} does not fit {mission.file}", findings)
-    return answers
 
 
 def refuse_speed(fleet: Fleet, speed: float, *, simulated: bool) -> None:
@@ -69,7 +41,7 @@ def make_executive(
     clock: SystemClock,
     *,
     simulated: bool,
-    answers: Answers | None = None,
+    answers: Script | None = None,
     search_path: Sequence[Path] = (),
 ) -> Executive:
     """An executive that has not connected yet.

@@ -1,5 +1,6 @@
 """The SQLite file of a journal: making and opening it, and its errors in plain words."""
 
+import logging
 import sqlite3
 import time
 from pathlib import Path
@@ -8,7 +9,11 @@ from urllib.parse import quote
 from m2pem.errors import JournalError
 from m2pem.journal.migrations import check, migrate
 
+_logger = logging.getLogger(__name__)
+
 BUSY_TIMEOUT_S = 5.0
+LOG_BYTES = 4_000_000
+"""About where SQLite begins to write its log from the start again."""
 
 
 def open_for_writing(path: Path) -> sqlite3.Connection:
@@ -53,6 +58,27 @@ def _prepare(connection: sqlite3.Connection, path: Path) -> None:
         raise JournalError(f"{path}: its file system can't carry a write-ahead log; use another")
     connection.execute("PRAGMA synchronous = FULL")
     migrate(connection, path)
+    if path.with_name(f"{path.name}-wal").stat().st_size < LOG_BYTES:
+        _lengthen_log(connection)
+
+
+def _lengthen_log(connection: sqlite3.Connection) -> None:
+    """Give the log its size at once: a flush that makes a file longer takes about twice as long.
+
+    A small cache lets SQLite write to the log before it is rolled back; nothing of it counts.
+    """
+    (cache_size,) = connection.execute("PRAGMA cache_size").fetchone()
+    connection.execute("PRAGMA cache_size = 10")
+    try:
+        connection.execute("BEGIN IMMEDIATE")
+        connection.execute("CREATE TABLE filling (content BLOB)")
+        connection.execute("INSERT INTO filling VALUES (zeroblob(?))", (LOG_BYTES,))
+    except sqlite3.Error:
+        # It is a matter of speed alone: where the disk is too full for it, it may do for a mission.
+        _logger.debug("the log of the journal stays short", exc_info=True)
+    if connection.in_transaction:
+        connection.execute("ROLLBACK")
+    connection.execute(f"PRAGMA cache_size = {cache_size}")
 
 
 def _turn_wal_on(connection: sqlite3.Connection) -> str:

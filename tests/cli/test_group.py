@@ -1,14 +1,19 @@
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 
 from m2pem.cli.group import COMMANDS, built_in, cli
 from tests.cli.conftest import Invoke
-from tests.command_line import REPOSITORY, CommandLine, install_plugin
+from tests.command_line import FLEET, REPOSITORY, CommandLine, install_plugin
 
 SLOW = ("asyncio", "lxml", "pydantic", "ruamel", "msgspec", "rustworkx")
+WAIT = """<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targetNamespace="x">
+  <process id="P" isExecutable="true"><startEvent id="Start"/></process>
+</definitions>
+"""
 
 BOAT = """
 @hookimpl
@@ -24,15 +29,37 @@ def m2pem_register_commands(cli):
     ("words", "may"), [(["--help"], []), (["--version"], []), (["run", "--help"], ["asyncio"])]
 )
 def test_help_imports_nothing_slow(words: list[str], may: list[str]) -> None:
+    assert imported(words, SLOW) == may
+
+
+@pytest.mark.parametrize(
+    ("words", "unneeded"),
+    [
+        (["check"], ["asyncio", "m2pem.sim.arbiters", "pydantic"]),
+        (["check", "--fleet", str(FLEET)], ["m2pem.executive.executive", "numpy"]),
+        (["simulate"], ["m2pem.resources.fleet_file", "numpy"]),
+        (["run", "--fleet", "sim", "--ocu", "none", "--journal", "memory:"], ["numpy", "pydantic"]),
+    ],
+)
+def test_a_command_imports_nothing_slow_that_it_does_not_use(
+    words: list[str], unneeded: list[str], tmp_path: Path
+) -> None:
+    mission = tmp_path / "wait.bpmn"
+    mission.write_text(WAIT, encoding="utf-8")
+    assert imported([words[0], str(mission), *words[1:]], unneeded) == []
+
+
+def imported(words: list[str], names: Iterable[str]) -> list[str]:
+    """Those of the modules that a command imports."""
     code = (
         "import sys\nfrom m2pem.cli.entry import run_command_line\n"
-        f"run_command_line({words!r})\n"
-        f"print([name for name in {SLOW!r} if name in sys.modules])"
+        f"assert run_command_line({words!r}) == 0\n"
+        f"print(*(name for name in {tuple(names)!r} if name in sys.modules))"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=REPOSITORY, capture_output=True, text=True, check=True
     )
-    assert done.stdout.splitlines()[-1] == str(may)
+    return done.stdout.splitlines()[-1].split()
 
 
 def test_the_list_of_commands_says_what_each_says_of_itself() -> None:

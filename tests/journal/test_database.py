@@ -1,6 +1,7 @@
 """Files that are no journal, or no longer a good one, are refused in plain words, and unharmed."""
 
 import os
+import resource
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from m2pem.errors import JournalError
-from m2pem.journal.database import open_for_reading, open_for_writing
+from m2pem.journal.database import LOG_BYTES, open_for_reading, open_for_writing
 from m2pem.journal.migrations import MIGRATIONS
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.testing.contracts.journal import HEADER, entry, opened
@@ -33,6 +34,33 @@ def test_every_commit_is_synced_to_a_write_ahead_log(path):
     with closing(open_for_writing(path)) as connection:
         assert connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
         assert connection.execute("PRAGMA synchronous").fetchone() == (2,)
+
+
+async def test_small_commits_do_not_make_the_log_longer(path):
+    async with opened(lambda: SqliteJournal.open(path)) as journal:
+        log = path.with_name("journal.db-wal")
+        length = log.stat().st_size
+        assert length >= LOG_BYTES
+        run = await journal.create(HEADER)
+        for seq in range(1, 21):
+            await journal.append([entry(run, seq)])
+        assert log.stat().st_size == length
+    assert path.stat().st_size < LOG_BYTES / 10
+
+
+def test_a_journal_on_a_disk_without_room_for_a_long_log_is_opened(path):
+    open_for_writing(path).close()
+    unlimited = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, unlimited[1]))
+    try:
+        with closing(open_for_writing(path)) as connection:
+            assert not connection.in_transaction
+            connection.execute("INSERT INTO runs VALUES (1, '', '', '', '', 0, 1, 0, '[]')")
+            assert path.with_name("journal.db-wal").stat().st_size < LOG_BYTES
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, unlimited)
+    with closing(open_for_reading(path)) as connection:
+        assert connection.execute("SELECT run FROM runs").fetchall() == [(1,)]
 
 
 def test_a_new_file_is_its_owners_alone(path):
