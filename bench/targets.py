@@ -132,7 +132,7 @@ PROGRAMS = (
         (
             Goal("help_s", "CPU of m2pem --help", "s", 0.25),
             Goal("check_s", "CPU of m2pem check, a small file", "s", 0.5),
-            Goal("check_fleet_s", "CPU of m2pem check with a fleet, a small file", "s", 0.5),
+            Goal("check_fleet_s", "CPU of m2pem check with a fleet, a small file", "s"),
             Goal("simulate_s", "CPU of m2pem simulate, a small file", "s"),
         ),
     ),

@@ -1,4 +1,3 @@
-import pymap3d
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -6,25 +5,6 @@ from hypothesis import strategies as st
 from m2pem.sim.frame import Frame
 
 FRAME = Frame((38.1075, -77.3192, 60.0))
-
-
-WORLD = st.tuples(st.floats(-89, 89), st.floats(-180, 180), st.floats(-100, 9000))
-METRES = st.floats(-50_000, 50_000)
-
-
-@given(WORLD, METRES, METRES)
-def test_it_is_the_plane_of_the_geodesists_all_over_the_world(
-    origin: tuple[float, float, float], east: float, north: float
-) -> None:
-    frame = Frame(origin)
-    geo = frame.geo((east, north, 0.0))
-    sunk = -(east**2 + north**2) / (2 * 6_371_000)
-    latitude, longitude, _ = pymap3d.enu2geodetic(east, north, sunk, *origin)
-    assert geo.latitude_deg == pytest.approx(latitude, abs=1e-10)
-    turn = (geo.longitude_deg - longitude + 180) % 360 - 180
-    assert turn == pytest.approx(0, abs=1e-8)
-    there = pymap3d.geodetic2enu(geo.latitude_deg, geo.longitude_deg, origin[2], *origin)
-    assert frame.level(geo.latitude_deg, geo.longitude_deg) == pytest.approx(there[:2], abs=1e-6)
 
 
 @given(st.floats(37.2, 39.0), st.floats(-78.3, -76.3), st.floats(-50, 3000))
