@@ -27,10 +27,16 @@ def refuse_speed(fleet: Fleet, speed: float, *, simulated: bool) -> None:
     if speed == 1.0 or simulated:
         return
     everything: list[Vehicle | Payload] = [*fleet.vehicles.values(), *fleet.payloads.values()]
-    real = [each.id for each in everything if each.arbiter != SIMULATED]
+    sitl = {vehicle.id for vehicle in fleet.vehicles.values() if vehicle.sitl}
+    real = [
+        each.id
+        for each in everything
+        if each.arbiter != SIMULATED and each.id.partition("/")[0] not in sitl
+    ]
     if real:
         raise click.UsageError(
-            f"--speed {speed:g}: {', '.join(real)} of {fleet.file} would be real; add --simulate"
+            f"--speed {speed:g}: {', '.join(real)} of {fleet.file} would be real; add --simulate, or "
+            "mark what is software in the loop with `sitl: true`"
         )
 
 

@@ -53,6 +53,7 @@ class Vehicle:
     behaviors: tuple[str, ...] | None = None
     payloads: tuple[ResourceId, ...] = ()
     manned: bool = False
+    sitl: bool = False
     lost_after_s: float | None = None
     failsafe: str = ""
     line: int = 0

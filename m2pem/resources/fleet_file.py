@@ -131,6 +131,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
             behaviors=_names(vehicle.behaviors),
             payloads=tuple(payload.id for payload in own),
             manned=vehicle.manned,
+            sitl=vehicle.sitl,
             lost_after_s=vehicle.lost_after,
             failsafe=vehicle.failsafe or "",
             line=source.line(("vehicles", name)),

@@ -97,6 +97,9 @@ class VehicleModel(_Model):
         dict[Name, PayloadModel], Field(description="Missions call a payload vehicle/payload.")
     ] = {}
     manned: Annotated[bool, Field(description="A person drives it: it is never commanded.")] = False
+    sitl: Annotated[
+        bool, Field(description="Software in the loop: not real, so that it may run at --speed.")
+    ] = False
     lost_after: Annotated[
         Duration | None, Field(description="Silence after which the link counts as lost.")
     ] = None
