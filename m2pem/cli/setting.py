@@ -35,8 +35,8 @@ def refuse_speed(fleet: Fleet, speed: float, *, simulated: bool) -> None:
     ]
     if real:
         raise click.UsageError(
-            f"--speed {speed:g}: {', '.join(real)} of {fleet.file} would be real; add --simulate, or "
-            "mark what is software in the loop with `sitl: true`"
+            f"--speed {speed:g}: {', '.join(real)} of {fleet.file} would be real; add --simulate, "
+            "or mark what is software in the loop with `sitl: true`"
         )
 
 
