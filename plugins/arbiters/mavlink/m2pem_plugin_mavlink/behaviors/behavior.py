@@ -32,8 +32,8 @@ class Job:
 
 class Behavior(ABC):
     """One behavior. The arbiter calls `begin` once; then `finished` whenever something is heard of
-    the vehicle; `go_on` after a hold. `steps`, if it has any, run beside that and are cancelled with
-    it (a setpoint that must be repeated).
+    the vehicle; `go_on` after a hold. `steps`, if it has any, run beside that and are cancelled
+    with it (a setpoint that must be repeated).
 
     `modes`: those in which it goes on; another one, that nobody here asked for, says that somebody
     else has taken the vehicle over.
@@ -66,7 +66,7 @@ class Behavior(ABC):
     async def go_on(self) -> None:
         """Have the vehicle go on after it was held."""
 
-    async def steps(self) -> None:
+    async def steps(self) -> None:  # noqa: B027  # most have none
         """What must be done over and over while it goes on and is not held."""
 
     @abstractmethod

@@ -123,7 +123,7 @@ def _message_type(source: Any) -> MessageType:
         else:
             spans.append(start)
             defaults.append(0)
-    made = cast("Any", namedtuple(source.msgname, fields, defaults=defaults))  # type: ignore[misc]
+    made = cast("Any", namedtuple(source.msgname, fields, defaults=defaults))
     made.TYPE = MessageType(
         source.id,
         source.msgname,

@@ -56,8 +56,8 @@ class Vehicle(Protocol):
         ...
 
     async def until(self, true: Callable[[], bool], within_s: float | None = None) -> bool:
-        """Wait until something is true; it is looked at whenever the vehicle is heard. False: it was
-        not within so many seconds of the arbiter's clock."""
+        """Wait until something is true; it is looked at whenever the vehicle is heard. False: it
+        was not within so many seconds of the arbiter's clock."""
         ...
 
     async def sleep(self, seconds: float) -> None:

@@ -1,0 +1,17 @@
+"""MAVLink vehicles: ArduPilot and PX4, in the air, on land and on water (docs/mavlink.md)."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from m2pem import hookimpl
+
+if TYPE_CHECKING:
+    from m2pem.api import Arbiter
+
+
+@hookimpl
+def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], None]") -> None:
+    """Register `mavlink`."""
+    from m2pem_plugin_mavlink.arbiter import MavlinkArbiter  # noqa: PLC0415  # starting up must be fast
+
+    register("mavlink", MavlinkArbiter)
