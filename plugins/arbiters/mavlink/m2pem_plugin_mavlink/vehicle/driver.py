@@ -92,6 +92,10 @@ class Driver(Protocol):
         """The speed over ground of what follows."""
         ...
 
+    async def command(self, command: int, *params: float) -> None:
+        """Any command (a MAV_CMD with up to seven parameters) that has no method of its own."""
+        ...
+
     async def move(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
         """One velocity setpoint; it must be repeated twice a second, or the vehicle stops."""
         ...
