@@ -1,7 +1,7 @@
 """What a vehicle does for one request."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, TypeAlias
 
@@ -31,7 +31,7 @@ class Job:
     """What is to be done, by whom, and where: the fleet's bus (positions of other vehicles) and the
     origin of its ENU frame (latitude and longitude in degrees, altitude in metres).
 
-    `fence`: what the vehicle may not leave. `cruise_m_s`: the speed that `set_speed` has set.
+    `now_s`: seconds of the arbiter's clock, which goes on over a restart. `fence`: what the vehicle may not leave. `cruise_m_s`: the speed that `set_speed` has set.
     `actuators`: names that the fleet gives to actuators ("servo 9").
     """
 
@@ -39,6 +39,7 @@ class Job:
     parameters: Mapping[str, ResolvedValue]
     bus: FleetBus
     origin: tuple[float, float, float]
+    now_s: Callable[[], float]
     fence: Fence | None = None
     cruise_m_s: float | None = None
     actuators: Mapping[str, str] = field(default_factory=dict)
