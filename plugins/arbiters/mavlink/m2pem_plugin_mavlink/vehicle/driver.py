@@ -51,6 +51,8 @@ class Driver(Protocol):
     """
 
     name: str
+    home_items: int
+    """How many items of a stored mission stand before the first real one."""
 
     def mode_name(self, custom_mode: int) -> str:
         """The autopilot's own name of a mode: "GUIDED", "AUTO.MISSION"."""
