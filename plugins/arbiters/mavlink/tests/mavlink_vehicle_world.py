@@ -4,13 +4,13 @@ import asyncio
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
-from m2pem.api import Clock, ResourceId
 from m2pem_plugin_mavlink.link.vehicle_link import Listener
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import Transaction
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import Clock, ResourceId
 
 T = TypeVar("T")
 
@@ -206,9 +206,7 @@ def fly(link: ScriptedLink, height_m: float = 10.0) -> None:
 
 
 def copter(clock: Clock) -> tuple[ScriptedLink, Vehicle]:
-    return _vehicle(
-        clock, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, dialect.MAV_TYPE_QUADROTOR, "air"
-    )
+    return _vehicle(clock, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, dialect.MAV_TYPE_QUADROTOR, "air")
 
 
 def rover(clock: Clock) -> tuple[ScriptedLink, Vehicle]:
@@ -218,18 +216,14 @@ def rover(clock: Clock) -> tuple[ScriptedLink, Vehicle]:
 
 
 def plane(clock: Clock) -> tuple[ScriptedLink, Vehicle]:
-    return _vehicle(
-        clock, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, dialect.MAV_TYPE_FIXED_WING, "air"
-    )
+    return _vehicle(clock, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, dialect.MAV_TYPE_FIXED_WING, "air")
 
 
 def px4(clock: Clock) -> tuple[ScriptedLink, Vehicle]:
     return _vehicle(clock, dialect.MAV_AUTOPILOT_PX4, dialect.MAV_TYPE_QUADROTOR, "air")
 
 
-def _vehicle(
-    clock: Clock, autopilot: int, type_: int, domain: str
-) -> tuple[ScriptedLink, Vehicle]:
+def _vehicle(clock: Clock, autopilot: int, type_: int, domain: str) -> tuple[ScriptedLink, Vehicle]:
     link = ScriptedLink(clock, autopilot, type_)
     ready_to_fly(link)
     return link, Vehicle(UAV1, domain, link, clock)
