@@ -108,7 +108,11 @@ def test_a_mode_that_comes_without_an_acknowledgement_is_a_success(virtual: Run)
     async def main(clock: Clock) -> None:
         async with Playing(copter(clock)) as (link, vehicle):
             accept = link.obey[SET_MODE]
-            link.obey[SET_MODE] = lambda message: None if accept(message) == ACCEPTED else None
+
+            def obey(message: Any) -> None:
+                assert accept(message) == ACCEPTED
+
+            link.obey[SET_MODE] = obey
             await vehicle.driver.set_mode(FlightMode.GUIDED)
             assert vehicle.heard.mode is FlightMode.GUIDED
 

@@ -135,6 +135,16 @@ def test_silence_degrades_and_loses_the_link_and_wakes_who_waits_for_it(virtual:
     virtual(main)
 
 
+def test_a_link_that_loses_much_is_degraded(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            assert vehicle.state().link is LinkState.CONNECTED
+            link.loss = 0.4
+            assert vehicle.state().link is LinkState.DEGRADED
+
+    virtual(main)
+
+
 def test_a_wait_ends_by_the_clock(virtual: Run) -> None:
     async def main(clock: Clock) -> None:
         async with Playing(copter(clock)) as (_, vehicle):

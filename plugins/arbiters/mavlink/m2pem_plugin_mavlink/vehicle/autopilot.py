@@ -287,12 +287,6 @@ class Autopilot(ABC):
         finally:
             self.ours.exchanging -= 1
 
-    # --- anything else --------------------------------------------------------------------------
-
-    async def command(self, command: int, *params: float) -> None:
-        """Any command (a MAV_CMD with up to seven parameters) that has no method of its own."""
-        await exchanges.command(self.link, command, *params)
-
     # --- speed ----------------------------------------------------------------------------------
 
     async def set_speed(self, speed_m_s: float) -> None:
