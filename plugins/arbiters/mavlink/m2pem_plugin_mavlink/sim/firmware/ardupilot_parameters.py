@@ -121,14 +121,14 @@ PARAMETERS: Mapping[Kind, Mapping[str, float]] = {
     Kind.PLANE: {**EVERY, **PLANE},
 }
 
+_WHOLE_ENDINGS = """
+_ACT _ACTION _ACTN _ALT _BEHAVE _CHECK _CLASS _ENABL _ENABLE _FUNCTION _MONITOR _OPTIONS _RATE
+_RESTART SYSID _TOTAL _TYPE
+""".split()
 WHOLE_NUMBERS: frozenset[str] = frozenset(
     name
     for values in PARAMETERS.values()
     for name, value in values.items()
-    if float(value).is_integer()
-    and name.endswith(
-        ("_ENABLE", "_ENABL", "_ACT", "_ACTN", "_ACTION", "_TYPE", "_TOTAL", "SYSID", "_CLASS")
-        + ("_FUNCTION", "_CHECK", "_RATE", "_OPTIONS", "_MONITOR", "_RESTART", "_BEHAVE", "_ALT")
-    )
+    if float(value).is_integer() and name.endswith(tuple(_WHOLE_ENDINGS))
 )
 """Those that ArduPilot keeps as whole numbers."""
