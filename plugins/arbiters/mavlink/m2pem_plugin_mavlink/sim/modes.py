@@ -84,6 +84,8 @@ class ModeSwitch(Part):
         return None if harmless else "requires position"
 
     def _enter(self, mode: Mode, maneuver: Maneuver | None = None, announce: bool = True) -> None:
+        if announce:
+            self.maneuver.end()
         self.mode = mode
         self._speed_mps, self.reverse = None, False
         self.maneuver = maneuver or mode.maneuver(self.autopilot)

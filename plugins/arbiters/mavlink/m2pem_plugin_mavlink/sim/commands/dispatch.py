@@ -34,7 +34,7 @@ class CommandServer(Part):
         command = command_of(message, sender)
         result = self._repeated(command)
         if result is None:
-            result = self._perform(command)
+            result = self.perform(command)
             if len(self._answers) > 200:
                 self._answers.clear()
             told = (self.autopilot.now_s, self._content(command), result)
@@ -46,7 +46,8 @@ class CommandServer(Part):
             sender.peer,
         )
 
-    def _perform(self, command: Command) -> Result:
+    def perform(self, command: Command) -> Result:
+        """Let the handler do it."""
         handler = self.handlers.get(command.id)
         if handler is None:
             return Result.UNSUPPORTED

@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from m2pem_plugin_mavlink.sim.command import Command, Result
 from m2pem_plugin_mavlink.sim.geometry import wrapped_rad
 from m2pem_plugin_mavlink.sim.maneuvers.guided import Guided
+from m2pem_plugin_mavlink.sim.missions.execution import Auto
 from m2pem_plugin_mavlink.sim.part import CommandHandler, Part
 from m2pem_plugin_mavlink.sim.specification import Kind
 
@@ -105,7 +106,7 @@ class MotionCommands(Part):
         if command.param1 not in (0, 1):
             return Result.DENIED
         maneuver = self.autopilot.modes.maneuver
-        if not hasattr(maneuver, "paused"):
+        if not isinstance(maneuver, Guided | Auto):
             return Result.FAILED
         maneuver.paused = command.param1 == 0
         return Result.ACCEPTED
@@ -118,4 +119,7 @@ class MotionCommands(Part):
         pilot = self.autopilot
         if command.param1 or command.param2:
             return Result.DENIED
-        return self._enter(pilot.firmware.roles.mission)
+        result = self._enter(pilot.firmware.roles.mission)
+        if result is Result.ACCEPTED:
+            pilot.mission.released = True
+        return result

@@ -1,5 +1,6 @@
 """Parameters of ArduPilot that a ground station looks for, with ArduPilot's defaults."""
 
+import re
 from collections.abc import Mapping
 
 from m2pem_plugin_mavlink.sim.specification import Kind
@@ -121,14 +122,15 @@ PARAMETERS: Mapping[Kind, Mapping[str, float]] = {
     Kind.PLANE: {**EVERY, **PLANE},
 }
 
-_WHOLE_ENDINGS = """
-_ACT _ACTION _ACTN _ALT _BEHAVE _CHECK _CLASS _ENABL _ENABLE _FUNCTION _MONITOR _OPTIONS _RATE
-_RESTART SYSID _TOTAL _TYPE
-""".split()
 WHOLE_NUMBERS: frozenset[str] = frozenset(
     name
     for values in PARAMETERS.values()
     for name, value in values.items()
-    if float(value).is_integer() and name.endswith(tuple(_WHOLE_ENDINGS))
+    if float(value).is_integer()
+    and re.search(
+        "_(ACT|ACTION|ACTN|ALT|BEHAVE|CHECK|CLASS|ENABLE?|FUNCTION|MONITOR|OPTIONS|RATE|RESTART"
+        "|SYSID|TOTAL|TYPE)$",
+        name,
+    )
 )
 """Those that ArduPilot keeps as whole numbers."""

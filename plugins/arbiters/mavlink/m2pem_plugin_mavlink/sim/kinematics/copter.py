@@ -59,8 +59,6 @@ class CopterKinematics:
             case Reach(point=point):
                 distance_m = body.point.distance_m(point)
                 speed = min(demand.speed_mps, approach_mps(distance_m, self.acceleration_mps2 / 2))
-                if demand.through:
-                    speed = demand.speed_mps
                 bearing = body.point.bearing_rad(point)
                 rise_m = point.up_m - body.up_m
                 vertical = approach_mps(abs(rise_m), self.climb_mps2 / 2)
