@@ -1,4 +1,5 @@
 import pytest
+from m2pem_plugin_mavlink.sim.geometry import Point
 from m2pem_plugin_mavlink.sim.specification import Kind
 from mavlink_bench import Bench
 
@@ -25,12 +26,10 @@ def test_in_guided_a_plane_circles_the_place_it_was_sent_to() -> None:
     bench = flying()
     assert bench.command_int(192, -1, 1, at=(*bench.offset(500, 400), 90)) == 0
     bench.run(90)
-    body, home = bench.autopilot.body, bench.autopilot.home.point
-    away_m = (
-        (body.north_m - home.north_m - 500) ** 2 + (body.east_m - home.east_m - 400) ** 2
-    ) ** 0.5
-    assert away_m == pytest.approx(60, abs=6)
-    assert body.up_m == pytest.approx(90, abs=2)
+    home = bench.autopilot.home.point
+    there = Point(home.north_m + 500, home.east_m + 400, 90)
+    assert bench.autopilot.position.distance_m(there) == pytest.approx(60, abs=6)
+    assert bench.autopilot.body.up_m == pytest.approx(90, abs=2)
 
 
 def test_rtl_brings_a_plane_home_where_it_circles() -> None:
