@@ -1,0 +1,33 @@
+"""MAVLink vehicles: ArduPilot and PX4, in the air, on land and on water (docs/mavlink.md)."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from m2pem import hookimpl
+
+if TYPE_CHECKING:
+    import click
+
+    from m2pem.api import Arbiter
+
+
+@hookimpl
+def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], None]") -> None:
+    """Register `mavlink`."""
+    from m2pem_plugin_mavlink.arbiter import MavlinkArbiter  # noqa: PLC0415  # starting up must be fast
+
+    register("mavlink", MavlinkArbiter)
+
+
+@hookimpl
+def m2pem_register_commands(cli: "click.Group") -> None:
+    """Add `sim mavlink`; the group `sim` may be there already, of another plugin."""
+    import click  # noqa: PLC0415  # starting up must be fast
+
+    from m2pem_plugin_mavlink.sim.command_line import mavlink  # noqa: PLC0415
+
+    group = cli.commands.get("sim")
+    if not isinstance(group, click.Group):
+        group = click.Group("sim", help="Simulate vehicles that speak as real ones do.")
+        cli.add_command(group)
+    group.add_command(mavlink)

@@ -1,0 +1,1 @@
+"""MAVLink over sockets and serial lines, in asyncio."""

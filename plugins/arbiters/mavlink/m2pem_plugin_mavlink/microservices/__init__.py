@@ -1,0 +1,1 @@
+"""The microservices of MAVLink (mavlink.io, "Microservices"), each without I/O."""

@@ -1,0 +1,1 @@
+"""MAVLink without I/O: messages, frames, exchanges. Knows no vehicle and no clock."""

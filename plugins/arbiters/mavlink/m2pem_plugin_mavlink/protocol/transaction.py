@@ -1,0 +1,97 @@
+"""An exchange with one vehicle, as a machine without I/O: messages and time in, messages out.
+
+`link.perform` runs it: it calls `begin` once, `receive` for each message that the exchange wants
+from its vehicle, and `expire` when `deadline_s` has passed; after each of them it sends what is in
+`outbox`. All times are seconds of one clock that never goes back.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Hashable
+from typing import Generic, TypeVar
+
+from m2pem_plugin_mavlink.protocol.messages import Address, Message
+
+T = TypeVar("T")
+
+
+class ExchangeError(Exception):
+    """The vehicle did not do what it was asked. `reason` is for people."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+class NoAnswerError(ExchangeError):
+    """It did not answer, however often it was asked; whether it has heard is not known."""
+
+
+class RefusedError(ExchangeError):
+    """It answered, and will not. `result`: MAV_RESULT or MAV_MISSION_RESULT, as the exchange says;
+    `temporary`: asking again later may help."""
+
+    def __init__(self, reason: str, result: int, *, temporary: bool = False) -> None:
+        super().__init__(reason)
+        self.result = result
+        self.temporary = temporary
+
+
+class Transaction(ABC, Generic[T]):
+    """One exchange. It ends by `succeed` or `fail`, once; what comes after that changes nothing.
+
+    `wants`: ids of the messages that it is to be handed. `key`: of two exchanges with the same key
+    with one vehicle, the second waits for the first to end. `source`: who we are, set by whoever
+    runs it, before `begin`; None: nobody else is there to be answered.
+    """
+
+    wants: frozenset[int]
+
+    def __init__(self, key: Hashable) -> None:
+        self.key = key
+        self.source: Address | None = None
+        self.outbox: list[Message] = []
+        self.deadline_s: float | None = None
+        self.done = False
+        self._result: T | None = None
+        self._error: ExchangeError | None = None
+
+    @abstractmethod
+    def begin(self, now_s: float) -> None:
+        """Ask."""
+
+    @abstractmethod
+    def receive(self, message: Message, sender: Address, now_s: float) -> None:
+        """A message that is wanted has come; it may be somebody else's answer, late or doubled."""
+
+    @abstractmethod
+    def expire(self, now_s: float) -> None:
+        """`deadline_s` has passed: ask again, or `fail`."""
+
+    def for_us(self, message: Message) -> bool:
+        """Whether it is addressed to us or to everybody, and not to another ground station
+        (mavlink.io, "Routing")."""
+        if self.source is None:
+            return True
+        system = getattr(message, "target_system", 0)
+        component = getattr(message, "target_component", 0)
+        return system in (0, self.source.system) and component in (0, self.source.component)
+
+    def succeed(self, result: T) -> None:
+        """It is done."""
+        if not self.done:
+            self.done, self._result, self.deadline_s = True, result, None
+
+    def fail(self, error: ExchangeError) -> None:
+        """It cannot be done."""
+        if not self.done:
+            self.done, self._error, self.deadline_s = True, error, None
+
+    def outcome(self) -> T:
+        """The result of an exchange that is done.
+
+        Raises:
+            ExchangeError: it failed.
+        """
+        if self._error is not None:
+            raise self._error
+        return self._result  # type: ignore[return-value]  # `succeed` has set it
