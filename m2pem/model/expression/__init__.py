@@ -1,7 +1,7 @@
 """The expression language of conditions, parameters and assignments (docs/conditions.md).
 
 `parse` reads one of three dialects (bare, Camunda 7 `${...}`, FEEL) to one syntax tree, which is
-compiled to closures. There is no way out of it: no attribute access on objects, no calls but the
+walked to evaluate it. There is no way out of it: no attribute access on objects, no calls but the
 listed functions, bounded length, depth and number size.
 """
 

@@ -1,12 +1,11 @@
 """A parsed expression, and the ways to get one from text."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
 from m2pem.errors import ExpressionError
-from m2pem.model.expression.compile import Run, compile_tree
 from m2pem.model.expression.dialect import Dialect, Span, locate, split
+from m2pem.model.expression.evaluate import evaluate
 from m2pem.model.expression.feel import FeelParser
 from m2pem.model.expression.literals import shorten, show_scalar
 from m2pem.model.expression.operators import truth
@@ -26,8 +25,6 @@ class Expression:
     dialect: Dialect
     tree: Node
     names: frozenset[str] = field(init=False)
-    _run: Run | None = field(init=False, default=None)
-    """Compiled when it is evaluated for the first time: a check evaluates nothing."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "names", names(self.tree))
@@ -44,7 +41,7 @@ class Expression:
             ExpressionError: a wrong type, a division by zero, or a result beyond the limits.
         """
         try:
-            return (self._run or self._compile())(read)
+            return evaluate(self.tree, read)
         except ExpressionError as error:
             self._explain(error)
 
@@ -55,15 +52,10 @@ class Expression:
             ExpressionError: as `evaluate`, and when the value is neither a boolean nor null.
         """
         try:
-            value = (self._run or self._compile())(read)
+            value = evaluate(self.tree, read)
             return value if value is True or value is False else truth(value, "a condition")
         except ExpressionError as error:
             self._explain(error)
-
-    def _compile(self) -> Run:
-        run = compile_tree(self.tree)
-        object.__setattr__(self, "_run", run)
-        return run
 
     def _explain(self, error: ExpressionError) -> NoReturn:
         raise ExpressionError(f"{error}, in {shorten(self.text.strip())!r}") from error
@@ -81,10 +73,6 @@ class Expression:
 
     def __str__(self) -> str:
         return self.text
-
-    def __reduce__(self) -> "tuple[Callable[..., Expression], tuple[str, Dialect, Node]]":
-        # Closures cannot be pickled or copied: they are compiled again from the tree.
-        return Expression, (self.text, self.dialect, self.tree)
 
 
 def parse(text: str, language: str | None = None) -> Expression:

@@ -23,6 +23,8 @@ class Comparison(StrEnum):
     GREATER = ">"
     GREATER_EQUAL = ">="
 
+    __hash__ = str.__hash__  # an enum's own is slow, and each evaluation asks for it
+
 
 class Operation(StrEnum):
     """Arithmetic. `+` also joins two texts."""
@@ -31,6 +33,8 @@ class Operation(StrEnum):
     SUBTRACT = "-"
     MULTIPLY = "*"
     DIVIDE = "/"
+
+    __hash__ = str.__hash__
 
 
 @dataclass(frozen=True, slots=True)
