@@ -1,0 +1,143 @@
+"""The contract of arbiters on real autopilots, in the loop with their makers' simulations."""
+
+import asyncio
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import mavlink_sitl as sitl
+import pytest
+from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
+from m2pem_plugin_mavlink.link.routed_link import open_link
+from m2pem_plugin_mavlink.plane import offset
+from m2pem_plugin_mavlink.protocol.messages import Address
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+from m2pem.api import Arbiter, ArbiterContext, Connection, Point, ResourceId
+from m2pem.executive.clock import SystemClock
+from m2pem.testing import ArbiterCase, ArbiterContract
+
+pytestmark = pytest.mark.sitl
+
+A, B = ResourceId("a"), ResourceId("b")
+READY_WITHIN_S = 120.0
+HEIGHT_M = 20.0
+
+
+def needs(variable: str) -> pytest.MarkDecorator:
+    return pytest.mark.skipif(
+        sitl.program(variable) is None, reason=f"{variable} names no program (docs/mavlink.md)"
+    )
+
+
+class _RealAutopilot(ArbiterContract):
+    unsupported = {
+        "virtual clock": "vehicles are told over real sockets",
+        "effects": "only the autopilot itself knows what it has begun",
+    }
+    speed = float(sitl.SPEED)
+    domain = "air"
+    variable = ""
+
+    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[list[str]]:
+        raise NotImplementedError
+
+    def urls(self, ports: list[int]) -> list[str]:
+        return [f"udpin://127.0.0.1:{port}" for port in ports]
+
+    def ports(self) -> list[int]:
+        return [sitl.free_port(), sitl.free_port()]
+
+    @pytest.fixture
+    def autopilots(self, tmp_path: Path) -> Iterator[list]:
+        binary = sitl.program(self.variable)
+        assert binary is not None
+        ports = self.ports()
+        with sitl.running(self.commands(binary, ports, tmp_path), tmp_path) as programs:
+            urls = self.urls(ports)
+            asyncio.run(self.prepared(urls))
+            yield list(zip(programs, urls, strict=True))
+
+    async def prepared(self, urls: list[str]) -> None:
+        """Both are ready, and what flies is in the air."""
+        await asyncio.gather(*(self._prepare(url, number) for number, url in enumerate(urls, 1)))
+
+    async def _prepare(self, url: str, number: int) -> None:
+        clock = SystemClock(self.speed)
+        link = await open_link(Address(number, 1), [url], clock)
+        vehicle = Vehicle(ResourceId("x"), self.domain, link, clock, lost_after_s=10.0)
+        vehicle.open()
+        assert await vehicle.identified(READY_WITHIN_S)
+        assert await vehicle.until(lambda: vehicle.driver.readiness().ready, READY_WITHIN_S)
+        if self.domain == "air":
+            await vehicle.driver.take_off(HEIGHT_M)
+            high = await vehicle.until(
+                lambda: (vehicle.heard.altitude_above_home_m or 0.0) > HEIGHT_M - 2, READY_WITHIN_S
+            )
+            assert high, vehicle.recent_texts(60.0)
+        else:
+            await vehicle.driver.arm()
+        await vehicle.close()
+        await link.close()
+
+    @pytest.fixture
+    def make_arbiter(self, autopilots: list) -> Callable[[ArbiterContext], Arbiter]:
+        def make(context: ArbiterContext) -> Arbiter:
+            connections = {
+                resource: Connection(resource, self.domain, {"url": url, "system_id": number})
+                for number, (resource, (_, url)) in enumerate(
+                    zip((A, B), autopilots, strict=True), 1
+                )
+            }
+            return MavlinkArbiter(connections, context)
+
+        return make
+
+    @pytest.fixture
+    def cut_link(self, autopilots: list) -> Callable[[Arbiter, ResourceId], None]:
+        def cut(_arbiter: Arbiter, vehicle: ResourceId) -> None:
+            autopilots[0 if vehicle == A else 1][0].send_signal(signal.SIGSTOP)
+
+        return cut
+
+    @pytest.fixture
+    def case(self) -> ArbiterCase:
+        def at(east_m: float, north_m: float) -> Point:
+            return Point((*offset(sitl.HOME[:2], east_m, north_m), None))
+
+        return ArbiterCase(
+            vehicle=A,
+            other=B,
+            long=("goto", {"target": at(400.0, 0.0), "speed": 3.0}),
+            short=("goto", {"target": at(15.0, 15.0), "speed": 3.0}),
+            bad=("speed", -1.0),
+        )
+
+
+@needs("M2PEM_ARDUCOPTER")
+class TestArduCopter(_RealAutopilot):
+    variable = "M2PEM_ARDUCOPTER"
+
+    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[list[str]]:
+        return [sitl.ardupilot(binary, "quad", n, port) for n, port in enumerate(ports)]
+
+
+@needs("M2PEM_ARDUROVER")
+class TestArduRover(_RealAutopilot):
+    variable = "M2PEM_ARDUROVER"
+    domain = "ground"
+
+    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[list[str]]:
+        return [sitl.ardupilot(binary, "rover", n, port) for n, port in enumerate(ports)]
+
+
+@needs("M2PEM_PX4")
+class TestPx4(_RealAutopilot):
+    variable = "M2PEM_PX4"
+
+    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[list[str]]:
+        return [sitl.px4(binary, instance, folder / f"px4-{instance}") for instance in (0, 1)]
+
+    def ports(self) -> list[int]:
+        # PX4 sends to 14540 and its instance's number, wherever else somebody would like it to.
+        return [14540, 14541]
