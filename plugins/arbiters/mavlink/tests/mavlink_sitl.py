@@ -1,7 +1,7 @@
 """Real autopilots, simulated in the loop by their own makers' programs (docs/mavlink.md).
 
-The programs are named by M2PEM_ARDUCOPTER, M2PEM_ARDUROVER and M2PEM_PX4. Each is started in a folder
-of its own and speaks to a UDP port of this machine.
+The programs are named by M2PEM_ARDUCOPTER, M2PEM_ARDUROVER and M2PEM_PX4. Each is started in a
+folder of its own and speaks to a UDP port of this machine.
 """
 
 import os

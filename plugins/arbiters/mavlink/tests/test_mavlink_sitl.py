@@ -4,6 +4,7 @@ import asyncio
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import ClassVar
 
 import mavlink_sitl as sitl
 import pytest
@@ -17,21 +18,13 @@ from m2pem.api import Arbiter, ArbiterContext, Connection, Point, ResourceId
 from m2pem.executive.clock import SystemClock
 from m2pem.testing import ArbiterCase, ArbiterContract
 
-pytestmark = pytest.mark.sitl
-
 A, B = ResourceId("a"), ResourceId("b")
 READY_WITHIN_S = 120.0
 HEIGHT_M = 20.0
 
 
-def needs(variable: str) -> pytest.MarkDecorator:
-    return pytest.mark.skipif(
-        sitl.program(variable) is None, reason=f"{variable} names no program (docs/mavlink.md)"
-    )
-
-
 class _RealAutopilot(ArbiterContract):
-    unsupported = {
+    unsupported: ClassVar[dict[str, str]] = {
         "virtual clock": "vehicles are told over real sockets",
         "effects": "only the autopilot itself knows what it has begun",
     }
@@ -114,7 +107,7 @@ class _RealAutopilot(ArbiterContract):
         )
 
 
-@needs("M2PEM_ARDUCOPTER")
+@pytest.mark.sitl("M2PEM_ARDUCOPTER")
 class TestArduCopter(_RealAutopilot):
     variable = "M2PEM_ARDUCOPTER"
 
@@ -122,7 +115,7 @@ class TestArduCopter(_RealAutopilot):
         return [sitl.ardupilot(binary, "quad", n, port) for n, port in enumerate(ports)]
 
 
-@needs("M2PEM_ARDUROVER")
+@pytest.mark.sitl("M2PEM_ARDUROVER")
 class TestArduRover(_RealAutopilot):
     variable = "M2PEM_ARDUROVER"
     domain = "ground"
@@ -131,7 +124,7 @@ class TestArduRover(_RealAutopilot):
         return [sitl.ardupilot(binary, "rover", n, port) for n, port in enumerate(ports)]
 
 
-@needs("M2PEM_PX4")
+@pytest.mark.sitl("M2PEM_PX4")
 class TestPx4(_RealAutopilot):
     variable = "M2PEM_PX4"
 
