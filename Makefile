@@ -19,7 +19,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages demo test test-long fuzz lint format docs pictures
+.PHONY: help setup python-packages npm-packages demo demo-air test test-long fuzz lint format docs pictures
 .PHONY: bench bench-quick conformance clean
 
 help: ## list the targets
@@ -64,6 +64,14 @@ demo: python-packages ## run the paper's mission on simulated vehicles, in two w
 	echo; \
 	echo "The second way: nothing is detected. Continue, and the route is driven to its end."; \
 	$(DEMO) --answers $(ANSWERS)_route$$operator.yaml
+
+AUTOPILOTS := $(BIN)/m2pem sim mavlink --copters 2 --rovers 1 --speed 10 --home 38.1075,-77.3192,60
+LINK_LOST := 1: cut link at 80 s for 600 s
+
+demo-air: python-packages ## survey a field with simulated MAVLink vehicles, one of which falls silent
+	@echo "Two copters and a rover over MAVLink, ten times as fast as real ones. uav1 will fall silent."
+	@$(AUTOPILOTS) --fault "$(LINK_LOST)" & autopilots=$$!; trap 'kill $$autopilots' EXIT; \
+	$(BIN)/m2pem run missions/survey_pair.bpmn --fleet fleet_configs/survey_pair.yaml --speed 10
 
 lint: setup ## check style, types and layers
 	@$(BIN)/ruff check .
