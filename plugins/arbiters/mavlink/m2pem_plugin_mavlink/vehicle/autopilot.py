@@ -13,7 +13,7 @@ from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Readiness
 from m2pem_plugin_mavlink.vehicle.identity import Identity, Kind
 from m2pem_plugin_mavlink.vehicle.modes import modes_of
-from m2pem_plugin_mavlink.vehicle.readiness import TEXTS_WITHIN_S, readiness
+from m2pem_plugin_mavlink.vehicle.readiness import PREARM, TEXTS_WITHIN_S, readiness
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 READY_WITHIN_S = 90.0
 """An ArduPilot has a position some 41 s after it was switched on."""
 
-CHECKED_WITHIN_S = 10.0
+CHECKED_WITHIN_S = 30.0
 """Pre-arm checks are made again, after a change of mode, and heard of."""
 
 MODE_WITHIN_S = 10.0
@@ -198,14 +198,19 @@ class Autopilot(ABC):
         """
         if self.heard.armed:
             return
-        await self._ready(READY_WITHIN_S)
+        # The checks before arming fail in a mode that cannot be armed, such as BRAKE.
+        await self._ready(READY_WITHIN_S, but=PREARM)
         await self._enter_arming_mode()
         await self._ready(CHECKED_WITHIN_S)
         await self._arm()
 
-    async def _ready(self, within_s: float) -> None:
-        if not await self.vehicle.until(lambda: self.readiness().ready, within_s):
-            raise not_now("not ready: " + "; ".join(self.readiness().reasons))
+    async def _ready(self, within_s: float, but: str | None = None) -> None:
+        def reasons() -> list[str]:
+            found = self.readiness().reasons
+            return [each for each in found if but is None or not each.startswith(but)]
+
+        if not await self.vehicle.until(lambda: not reasons(), within_s):
+            raise not_now("not ready: " + "; ".join(reasons()))
 
     @abstractmethod
     async def _enter_arming_mode(self) -> None: ...
