@@ -148,9 +148,7 @@ class MavlinkArbiter:
             watch.open()
             self._watches.append(watch)
             limits = self.limits(resource)
-            self._helms[resource] = Helm(
-                vehicle, watch, self._ledger, limits, self._context.logger
-            )
+            self._helms[resource] = Helm(vehicle, watch, self._ledger, limits, self._context.logger)
             area = self._connections[resource].fence
             if area is not None:
                 self._fences[resource] = fences.setdefault(id(area), Fence(area))

@@ -2,12 +2,9 @@
 
 import asyncio
 import threading
+from typing import ClassVar
 
 import pytest
-
-from m2pem.api import Connection, Point, ResourceId
-from m2pem.executive.clock import SystemClock
-from m2pem.testing import ArbiterCase, ArbiterContract
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
 from m2pem_plugin_mavlink.link.routed_link import open_link
 from m2pem_plugin_mavlink.plane import offset
@@ -16,6 +13,10 @@ from m2pem_plugin_mavlink.sim.geometry import Location
 from m2pem_plugin_mavlink.sim.simulator import Simulator
 from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+from m2pem.api import Connection, Point, ResourceId
+from m2pem.executive.clock import SystemClock
+from m2pem.testing import ArbiterCase, ArbiterContract
 
 A, B = ResourceId("a"), ResourceId("b")
 HOME = (47.397742, 8.545594)
@@ -27,7 +28,7 @@ def at(east: float, north: float) -> tuple[float, float]:
 
 
 class _Simulated(ArbiterContract):
-    unsupported = {"virtual clock": "vehicles are told over real sockets"}
+    unsupported: ClassVar = {"virtual clock": "vehicles are told over real sockets"}
     speed = SPEED
     kind = Kind.ROVER
     domain = "ground"
@@ -58,7 +59,9 @@ class _Simulated(ArbiterContract):
                 started.set()
                 await stop.wait()
 
-        thread = threading.Thread(target=loop.run_until_complete, args=(main(),), name="asyncio_sim")
+        thread = threading.Thread(
+            target=loop.run_until_complete, args=(main(),), name="asyncio_sim"
+        )
         thread.start()
         assert started.wait(20)
         yield simulator

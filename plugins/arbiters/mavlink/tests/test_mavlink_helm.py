@@ -1,11 +1,11 @@
 """Taking over, being taken over, falling silent: who steers a vehicle."""
 
 import pytest
-
-from m2pem.api import BehaviorState, LinkState, Point, Route
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from mavlink_double import Body, at
 from mavlink_play import V, after_a_restart, play
+
+from m2pem.api import BehaviorState, LinkState, Point, Route
 
 FAILED, CANCELLED, RUNNING = BehaviorState.FAILED, BehaviorState.CANCELLED, BehaviorState.RUNNING
 FAR = Point((*at(800, 0), 20.0))
@@ -86,9 +86,7 @@ def test_what_preempts_a_cancel_in_flight_takes_over() -> None:
         (FlightMode.GUIDED, True),
     ],
 )
-def test_a_mode_that_nobody_here_asked_for_fails_the_behavior_and_is_not_fought(
-    mode, held
-) -> None:
+def test_a_mode_that_nobody_here_asked_for_fails_the_behavior_and_is_not_fought(mode, held) -> None:
     async def main(bench) -> None:
         await flying(bench)
         if held:
