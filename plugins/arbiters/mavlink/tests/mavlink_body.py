@@ -37,6 +37,7 @@ class Body:
     stuck: set = field(default_factory=set)
     refuses: dict = field(default_factory=dict)
     circles: bool = False
+    findings: list = field(default_factory=list)
     firmware: Firmware = Firmware.ARDUPILOT
 
     @property

@@ -267,6 +267,10 @@ class DoubleStation:
     def watch(self, vehicle):
         return TakeoverWatch(vehicle)
 
+    async def findings(self, vehicle):
+        await vehicle.sleep(1.0)
+        return vehicle.body.findings
+
     async def _move(self) -> None:
         while True:
             await self._clock.sleep(STEP_S)

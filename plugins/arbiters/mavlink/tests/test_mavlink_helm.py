@@ -234,3 +234,14 @@ def test_what_is_held_on_the_ground_and_disarms_itself_takes_off_after_the_hold(
         assert (await bench.ended("r1.b1", 60)).state is BehaviorState.SUCCEEDED
 
     play(Body(), main)
+
+
+@pytest.mark.parametrize("failsafe", ["return_to_launch", ""])
+def test_a_failsafe_that_is_not_the_fleets_is_told_at_connect(failsafe, caplog) -> None:
+    async def main(bench) -> None:
+        await bench.clock.sleep(2)
+
+    caplog.set_level("WARNING")
+    body = Body(findings=["v: FS_GCS_ENABLE is 0"])
+    play(body, main, failsafe=failsafe)
+    assert ("FS_GCS_ENABLE is 0" in caplog.text) is bool(failsafe)

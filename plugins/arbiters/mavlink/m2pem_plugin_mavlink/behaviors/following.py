@@ -14,8 +14,9 @@ BEHIND_RAD = math.pi
 REPEAT_S = 0.5
 STALE_S = 3.0
 MOVED_M = 0.5
-LEAD_S = 1.0
-"""It is sent where its station will be by then; a place is reached later than it is told."""
+LEAD_S = 2.0
+"""It is sent where its station will be by then: told twice a second, and slowing down before each
+place that it is told, it lags so much behind."""
 
 COURSE_ABOVE_M_S = 1.0
 """Who moves faster points where it moves; its bow counts only if that is not known."""
