@@ -108,5 +108,5 @@ class Auto(Maneuver):
         progress.current = following
         pilot.say(f"Mission: {following} {NAVIGATION[item.command]}")
         self._leg = leg_of(pilot, item)
-        if item.command == NAV_TAKEOFF:
+        if item.command == NAV_TAKEOFF and pilot.body.on_ground:
             pilot.note("takeoff", f"item {following}")
