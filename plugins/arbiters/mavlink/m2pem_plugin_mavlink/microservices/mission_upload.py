@@ -8,6 +8,7 @@ if it fails, what the vehicle has must be looked at before it is used.
 """
 
 from collections.abc import Sequence
+from math import inf
 
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType, item_message
 from m2pem_plugin_mavlink.microservices.mission_results import (
@@ -34,6 +35,10 @@ COUNT_PATIENCE = Patience(tries=5, answer_s=1.5)
 SILENCE_S = 5.0
 """Autopilots ask again after 0.25 to 1 s. What is silent for so long has heard no item any more, or
 its acknowledgement was lost."""
+
+TOO_SOON_S = 0.1
+"""What asks again for an item sooner than that has not waited for it: it was sent something twice.
+If that is answered, and the answer doubled again, they multiply."""
 
 PASSES = 3
 """So often is it begun."""
@@ -76,6 +81,7 @@ class UploadMission(Transaction[None]):
         self._counts_sent = 0
         self._last: int | None = None
         self._sent = [0] * len(self.items)
+        self._sent_s = [-inf] * len(self.items)
         self._never_sent = set(range(len(self.items)))
         self._oddity = ""
 
@@ -115,6 +121,7 @@ class UploadMission(Transaction[None]):
         self._passes_left -= 1
         self._counts_sent, self._last = 0, None
         self._sent = [0] * len(self.items)
+        self._sent_s = [-inf] * len(self.items)
         self._send_count(now_s)
 
     def _send_count(self, now_s: float) -> None:
@@ -133,7 +140,10 @@ class UploadMission(Transaction[None]):
         if sequence >= len(self.items):
             self._oddity = f"it asked for item {sequence} of {len(self.items)}"
             return
+        if now_s - self._sent_s[sequence] < TOO_SOON_S:
+            return
         self._sent[sequence] += 1
+        self._sent_s[sequence] = now_s
         if self._sent[sequence] > REPEATS:
             self._give_up(f"item {sequence} does not arrive, though sent {REPEATS} times")
             return

@@ -58,7 +58,7 @@ class _Pieces:
         for n in sorted(self.chunks):
             said += (b"" if n == expected else GAP.encode()) + self.chunks[n]
             expected = n + 1
-        return _decoded(said) + ("" if end is not None and expected >= end else GAP)
+        return _decoded(said if end is not None and expected >= end else said + GAP.encode())
 
 
 class StatusTexts:

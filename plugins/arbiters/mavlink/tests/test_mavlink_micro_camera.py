@@ -1,0 +1,105 @@
+"""The basics of cameras, on links that lose, double, delay and reorder."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+from m2pem_plugin_mavlink.microservices.camera import (
+    FindCamera,
+    ReadCaptureStatus,
+    ReadStorage,
+    camera_mode,
+    start_video,
+    stop_images,
+    stop_video,
+    take_image,
+    take_images,
+    zoom,
+)
+from m2pem_plugin_mavlink.microservices.patience import PATIENCE
+from m2pem_plugin_mavlink.protocol.messages import Message, message_type
+from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError
+from mavlink_lossy import VEHICLE, Played, Silent, play_table, run
+from mavlink_peers import Commanded, ack
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+
+def photographs(command: Any, vehicle: Commanded) -> Sequence[Message]:
+    """One image for each sequence number, as the specification says."""
+    if command.param4 not in vehicle.effects:
+        vehicle.effects.append(command.param4)
+    return (ack(command.command),)
+
+
+def tells(command: Any, vehicle: Commanded) -> Sequence[Message]:
+    name = {259: "CAMERA_INFORMATION", 262: "CAMERA_CAPTURE_STATUS", 261: "STORAGE_INFORMATION"}
+    type_ = message_type(name[int(command.param1)])
+    fields: dict[str, Any] = {
+        "CAMERA_INFORMATION": {
+            "vendor_name": tuple(b"Maker".ljust(32, b"\0")),
+            "model_name": tuple(b"Eye".ljust(32, b"\0")),
+            "flags": dialect.CAMERA_CAP_FLAGS_CAPTURE_IMAGE,
+        },
+        "CAMERA_CAPTURE_STATUS": {"video_status": 1, "recording_time_ms": 2500, "image_count": 9},
+        "STORAGE_INFORMATION": {
+            "storage_id": int(command.param2),
+            "status": dialect.STORAGE_STATUS_READY,
+            "available_capacity": 100.5,
+        },
+    }[type_.name]
+    return ack(command.command), type_.make(**fields)
+
+
+def test_one_image_is_taken_or_it_fails_clearly_whatever_the_link_does() -> None:
+    def check(played: Played, camera: Commanded) -> None:
+        assert camera.effects in ([], [5])
+        assert isinstance(played.error, NoAnswerError) or camera.effects == [5]
+
+    play_table(
+        lambda: (take_image(VEHICLE, 5), Commanded(photographs)),
+        check,
+        lambda _: PATIENCE.bound_s,
+    )
+
+
+def test_several_images_are_asked_for_only_once_as_they_would_be_taken_again() -> None:
+    assert len(run(take_images(VEHICLE, 2.0, count=3), Silent()).sent) == 1
+    assert len(run(take_images(VEHICLE, 2.0), Silent()).sent) == PATIENCE.tries
+
+
+@pytest.mark.parametrize(
+    ("command", "id_", "params"),
+    [
+        (take_image(VEHICLE, 5, 2), dialect.MAV_CMD_IMAGE_START_CAPTURE, (2, 0, 1, 5)),
+        (take_images(VEHICLE, 2.5, 3), dialect.MAV_CMD_IMAGE_START_CAPTURE, (0, 2.5, 3, 0)),
+        (stop_images(VEHICLE, 2), dialect.MAV_CMD_IMAGE_STOP_CAPTURE, (2,)),
+        (start_video(VEHICLE, 1.0, 2), dialect.MAV_CMD_VIDEO_START_CAPTURE, (0, 1.0, 2)),
+        (stop_video(VEHICLE, 2), dialect.MAV_CMD_VIDEO_STOP_CAPTURE, (0, 2)),
+        (zoom(VEHICLE, 0.25), dialect.MAV_CMD_SET_CAMERA_ZOOM, (2, 25.0, 0)),
+        (camera_mode(VEHICLE, 1), dialect.MAV_CMD_SET_CAMERA_MODE, (0, 1)),
+    ],
+)
+def test_what_is_sent_to_cameras(command: Any, id_: int, params: tuple[float, ...]) -> None:
+    camera = Commanded(lambda heard, _: (ack(heard.command),))
+    assert run(command, camera).error is None
+    (heard,) = camera.heard
+    assert heard.command == id_
+    assert tuple(heard)[: len(params)] == params
+
+
+def test_what_cameras_tell_of_themselves() -> None:
+    camera = run(FindCamera(VEHICLE), Commanded(tells)).result
+    assert (camera.vendor, camera.model, camera.device) == ("Maker", "Eye", 0)
+    assert camera.has(dialect.CAMERA_CAP_FLAGS_CAPTURE_IMAGE)
+    assert not camera.has(dialect.CAMERA_CAP_FLAGS_CAPTURE_VIDEO)
+
+    status = run(ReadCaptureStatus(VEHICLE), Commanded(tells)).result
+    assert (status.takes_images, status.records, status.recorded_s) == (False, True, 2.5)
+    assert status.images == 9
+
+    storage = run(ReadStorage(VEHICLE, 2), Commanded(tells)).result
+    assert (storage.storage, storage.is_ready, storage.free_mib) == (2, True, 100.5)
+
+
+def test_another_camera_behind_the_same_autopilot_is_not_meant() -> None:
+    assert isinstance(run(FindCamera(VEHICLE, 2), Commanded(tells)).error, NoAnswerError)
