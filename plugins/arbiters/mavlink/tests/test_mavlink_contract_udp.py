@@ -89,16 +89,38 @@ class _Simulated(ArbiterContract):
         )
 
 
-class TestSimulatedRovers(_Simulated):
-    pass
+class _Airborne(_Simulated):
+    kind = Kind.COPTER
+
+    async def prepare(self, simulator) -> None:
+        await asyncio.gather(*(take_off(simulator[number], number) for number in (1, 2)))
 
 
-class TestSimulatedRoversOnARoute(_Simulated):
+class _OnARoute(_Simulated):
     @pytest.fixture
     def case(self):
         return on_a_route()
 
 
+class TestSimulatedRovers(_Simulated):
+    pass
+
+
+class TestSimulatedCoptersOnARoute(_OnARoute, _Airborne):
+    pass
+
+
+@pytest.mark.long
+class TestSimulatedRoversOnARoute(_OnARoute):
+    pass
+
+
+@pytest.mark.long
+class TestSimulatedCopters(_Airborne):
+    pass
+
+
+@pytest.mark.long
 class TestSimulatedCoptersTakingOff(_Simulated):
     kind = Kind.COPTER
 
@@ -112,19 +134,6 @@ class TestSimulatedCoptersTakingOff(_Simulated):
             bad=("altitude", "high"),
             short_s=25.0,
         )
-
-
-class TestSimulatedCopters(_Simulated):
-    kind = Kind.COPTER
-
-    async def prepare(self, simulator) -> None:
-        await asyncio.gather(*(take_off(simulator[number], number) for number in (1, 2)))
-
-
-class TestSimulatedCoptersOnARoute(TestSimulatedCopters):
-    @pytest.fixture
-    def case(self):
-        return on_a_route()
 
 
 def on_a_route() -> ArbiterCase:
