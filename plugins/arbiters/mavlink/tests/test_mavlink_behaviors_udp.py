@@ -1,12 +1,27 @@
 """Behaviors on simulated autopilots, over real UDP: judged by where the vehicles really are."""
 
+import asyncio
 import math
+from contextlib import asynccontextmanager
+from itertools import count, pairwise
 
 import pytest
+from m2pem_plugin_mavlink.link.routed_link import open_link
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from mavlink_simulated import at, fly
 
-from m2pem.api import BehaviorState, Point, VehiclePosition, VehicleState
+from m2pem.api import (
+    Area,
+    BehaviorState,
+    Point,
+    ResourceId,
+    Route,
+    VehiclePosition,
+    VehicleState,
+)
 
 COPTER, ROVER = Kind.COPTER, Kind.ROVER
 
@@ -97,3 +112,207 @@ def test_an_actuator_is_worked() -> None:
         assert "servo" in kinds
 
     fly(main, COPTER)
+
+
+def route(*places: tuple[float, float], altitude: float = 15.0) -> Route:
+    return Route(tuple((*at(*place), altitude) for place in places))
+
+
+def field(east: float, north: float, side: float) -> Area:
+    corners = [(0, 0), (side, 0), (side, side), (0, side), (0, 0)]
+    return Area((tuple((*at(east + e, north + n), None) for e, n in corners),))
+
+
+class Track:
+    """Where a vehicle really is, over and over, until it is told to stop."""
+
+    def __init__(self, bench, number: int = 1) -> None:
+        self.bench, self.number, self.places = bench, number, []
+
+    async def __aenter__(self):
+        self._task = asyncio.create_task(self._look())
+        return self
+
+    async def __aexit__(self, *_) -> None:
+        self._task.cancel()
+
+    async def _look(self) -> None:
+        while True:
+            self.places.append(self.bench.level(self.number))
+            await self.bench.clock.sleep(0.2)
+
+    def nearest_m(self, place: tuple[float, float]) -> float:
+        return min(math.dist(place, each) for each in self.places)
+
+
+def test_a_copter_flies_a_route_in_its_order_and_at_its_speed() -> None:
+    async def main(bench) -> None:
+        await bench.do("r1.b1", "takeoff", altitude=15.0)
+        async with Track(bench) as track:
+            places = [(40, 0), (40, 40), (0, 40)]
+            began_us = bench.clock.now_us()
+            await bench.do("r1.b2", "single_vehicle_routing", route=route(*places), speed=4.0)
+            took_s = (bench.clock.now_us() - began_us) / 1e6
+        assert all(track.nearest_m(place) < 2.5 for place in places)
+        assert bench.level() == pytest.approx((0, 40), abs=2.5)
+        assert 120 / 4.0 < took_s < 2 * 120 / 4.0
+        assert bench.truth().missions_begun == 1
+
+    fly(main, COPTER)
+
+
+def test_a_route_goes_on_after_a_hold() -> None:
+    async def main(bench) -> None:
+        await bench.start(
+            "r1.b1", "single_vehicle_routing", "v1", route=route((25, 0), (25, 25)), speed=3.0
+        )
+        await bench.until(lambda: bench.level()[0] > 10, 60)
+        await bench.arbiter.hold("v1")
+        await bench.clock.sleep(6)
+        stood = bench.level()
+        await bench.clock.sleep(6)
+        assert math.dist(stood, bench.level()) < 0.2
+        await bench.arbiter.resume("v1")
+        assert (await bench.ended("r1.b1", 120)).state is BehaviorState.SUCCEEDED
+        assert bench.level() == pytest.approx((25, 25), abs=2.6)
+
+    fly(main, ROVER)
+
+
+def test_a_route_with_hundreds_of_waypoints_is_driven() -> None:
+    places = [(0.15 * i, 3 * math.sin(i / 20)) for i in range(400)]
+
+    async def main(bench) -> None:
+        await bench.do("r1.b1", "single_vehicle_routing", route=route(*places))
+        assert bench.level() == pytest.approx(places[-1], abs=2.6)
+
+    fly(main, ROVER)
+
+
+def test_a_loop_is_driven_again_and_again() -> None:
+    async def main(bench) -> None:
+        way = route((12, 0), (12, 12), (0, 0))
+        await bench.start("r1.b1", "single_vehicle_routing", "v1", route=way, loop=True, speed=4.0)
+        async with Track(bench) as track:
+            await bench.clock.sleep(60)
+        turns = sum(a[0] < 6 <= b[0] and b[1] < 4 for a, b in pairwise(track.places))
+        assert turns >= 3
+        await bench.arbiter.cancel("r1.b1", 1)
+        assert (await bench.ended("r1.b1", 10)).state is BehaviorState.CANCELLED
+
+    fly(main, ROVER)
+
+
+def test_a_survey_covers_its_area() -> None:
+    async def main(bench) -> None:
+        await bench.do("r1.b1", "takeoff", altitude=20.0)
+        async with Track(bench) as track:
+            await bench.do(
+                "r1.b2",
+                "area_survey",
+                area=field(20, 20, 45),
+                spacing=15.1,
+                altitude=20.0,
+                speed=7.0,
+            )
+        looks = [(20 + e, 20 + n) for e in range(0, 46, 5) for n in range(0, 46, 5)]
+        assert max(track.nearest_m(look) for look in looks) < 15.1 / 2 + 2.5
+
+    fly(main, COPTER)
+
+
+def test_an_orbit_goes_round_at_its_radius() -> None:
+    async def main(bench) -> None:
+        await bench.do("r1.b1", "takeoff", altitude=15.0)
+        await bench.do("r1.b2", "goto", target=point(30, 0))
+        async with Track(bench) as track:
+            await bench.do("r1.b3", "orbit", target=point(50, 0, 15.0), radius=20.0, speed=5.0)
+        radii = [math.dist(place, (50, 0)) for place in track.places[5:]]
+        assert all(radius == pytest.approx(20.0, abs=3.0) for radius in radii)
+        for place in ((30, 0), (50, 20), (70, 0), (50, -20)):
+            assert track.nearest_m(place) < 3.0
+
+    fly(main, COPTER)
+
+
+@pytest.mark.parametrize("every", [3, 7])
+def test_over_a_link_that_loses_frames_all_is_begun_once(every: int) -> None:
+    async def main(bench) -> None:
+        lose(bench.truth().port, every)
+        await bench.do("r1.b1", "takeoff", altitude=10.0)
+        await bench.do("r1.b2", "single_vehicle_routing", route=route((20, 0), (20, 20)))
+        assert bench.level() == pytest.approx((20, 20), abs=2.5)
+        await bench.do("r1.b3", "return_to_launch")
+        assert (bench.truth().takeoffs, bench.truth().missions_begun) == (1, 1)
+
+    fly(main, COPTER, speed=15.0, lost_after_s=10.0)
+
+
+def lose(port, every: int) -> None:
+    """Every so-many-th frame is lost, to and fro."""
+    for wire in (port.outward, port.inward):
+        carry, numbers = wire.carry, count(1)
+
+        def lossy(*frame, carry=carry, numbers=numbers) -> None:
+            if next(numbers) % every:
+                carry(*frame)
+
+        wire.carry = lossy
+
+
+def test_a_stored_mission_is_run() -> None:
+    async def main(bench) -> None:
+        await bench.do("r1.b1", "single_vehicle_routing", route=route((10, 0), (10, 10), (0, 10)))
+        await bench.do("r1.b2", "run_onboard_mission", first=1)
+        assert bench.level() == pytest.approx((0, 10), abs=2.6)
+
+    fly(main, ROVER)
+
+
+def test_another_ground_station_that_replaces_the_mission_is_reported_and_not_fought() -> None:
+    async def main(bench) -> None:
+        way = route((200, 0), (200, 200))
+        await bench.start("r1.b1", "single_vehicle_routing", "v1", route=way)
+        await bench.running("r1.b1")
+        await bench.clock.sleep(5)
+        async with another_station(bench) as other:
+            await other.driver.upload(
+                [MissionItem(16, 3, (0.0,) * 4, *at(0, 50), 0.0) for _ in range(4)]
+            )
+            end = await bench.ended("r1.b1", 20)
+        assert (end.state, end.code) == (BehaviorState.FAILED, "TAKEN_OVER"), end
+        assert "mission" in end.reason
+        assert bench.truth().mode == "AUTO", "it is left to who has it now"
+
+    fly(main, ROVER)
+
+
+def test_another_ground_station_that_changes_the_mode_is_reported_and_not_fought() -> None:
+    async def main(bench) -> None:
+        await bench.do("r1.b1", "takeoff", altitude=15.0)
+        await bench.start("r1.b2", "goto", "v1", target=point(300, 0))
+        await bench.running("r1.b2")
+        async with another_station(bench) as other:
+            await other.driver.land()
+            end = await bench.ended("r1.b2", 20)
+        assert (end.state, end.code) == (BehaviorState.FAILED, "TAKEN_OVER"), end
+        assert "LAND" in end.reason
+        await bench.clock.sleep(5)
+        assert bench.truth().mode == "LAND"
+
+    fly(main, COPTER)
+
+
+@asynccontextmanager
+async def another_station(bench):
+    host, port = bench.truth().address
+    url = f"udpout://{host}:{port}"
+    link = await open_link(Address(1, 1), [url], bench.clock, Address(201, 190))
+    vehicle = Vehicle(ResourceId("seen"), "ground", link, bench.clock)
+    vehicle.open()
+    assert await vehicle.identified(10)
+    try:
+        yield vehicle
+    finally:
+        await vehicle.close()
+        await link.close()

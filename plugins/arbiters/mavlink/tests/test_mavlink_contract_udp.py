@@ -13,7 +13,7 @@ from m2pem_plugin_mavlink.sim.specification import Kind
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from mavlink_simulated import at, connections, specs
 
-from m2pem.api import Point, ResourceId
+from m2pem.api import Point, ResourceId, Route
 from m2pem.executive.clock import SystemClock
 from m2pem.testing import ArbiterCase, ArbiterContract
 
@@ -89,10 +89,38 @@ class _Simulated(ArbiterContract):
         )
 
 
+class _Airborne(_Simulated):
+    kind = Kind.COPTER
+
+    async def prepare(self, simulator) -> None:
+        await asyncio.gather(*(take_off(simulator[number], number) for number in (1, 2)))
+
+
+class _OnARoute(_Simulated):
+    @pytest.fixture
+    def case(self):
+        return on_a_route()
+
+
 class TestSimulatedRovers(_Simulated):
     pass
 
 
+class TestSimulatedCoptersOnARoute(_OnARoute, _Airborne):
+    pass
+
+
+@pytest.mark.long
+class TestSimulatedRoversOnARoute(_OnARoute):
+    pass
+
+
+@pytest.mark.long
+class TestSimulatedCopters(_Airborne):
+    pass
+
+
+@pytest.mark.long
 class TestSimulatedCoptersTakingOff(_Simulated):
     kind = Kind.COPTER
 
@@ -108,11 +136,18 @@ class TestSimulatedCoptersTakingOff(_Simulated):
         )
 
 
-class TestSimulatedCopters(_Simulated):
-    kind = Kind.COPTER
+def on_a_route() -> ArbiterCase:
+    def way(*places: tuple[float, float]) -> dict:
+        return {"route": Route(tuple((*at(*place), 10.0) for place in places)), "speed": 4.0}
 
-    async def prepare(self, simulator) -> None:
-        await asyncio.gather(*(take_off(simulator[number], number) for number in (1, 2)))
+    return ArbiterCase(
+        vehicle=A,
+        other=B,
+        long=("single_vehicle_routing", way((60.0, 0.0), (400.0, 0.0))),
+        short=("single_vehicle_routing", way((15.0, 5.0), (20.0, 15.0))),
+        bad=("speed", -1.0),
+        short_s=30.0,
+    )
 
 
 async def take_off(truth, number: int) -> None:
