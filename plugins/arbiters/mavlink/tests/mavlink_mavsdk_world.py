@@ -10,11 +10,12 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
-from m2pem_plugin_mavlink.mavsdk_driver.station import Station
+from m2pem_plugin_mavlink.mavsdk_driver.ground_station import GroundStation
 from m2pem_plugin_mavlink.protocol.messages import Address
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 GROUND = Address(255, 190)
+ONE = Address(1, 1)
 LOGGER = logging.getLogger("test-mavsdk")
 
 
@@ -97,8 +98,8 @@ async def scripted(port: int, system: int = 1) -> AsyncIterator[Scripted]:
 
 
 @asynccontextmanager
-async def stationed(url: str) -> AsyncIterator[Station]:
-    station = Station(url, GROUND, WallClock(), LOGGER)
+async def stationed(url: str) -> AsyncIterator[GroundStation]:
+    station = GroundStation(url, GROUND, WallClock(), LOGGER)
     await station.open()
     try:
         yield station

@@ -40,6 +40,11 @@ def _missing() -> str:
     return f"version {found} is installed; {INSTALL}, or leave `driver` out"
 
 
+def plugin(name: str) -> ModuleType:
+    """One of its plugins."""
+    return require(f"mavsdk.asyncio.plugins.{name}")
+
+
 def failure() -> type[Exception]:
     """What its calls raise."""
     error: type[Exception] = require("mavsdk.exceptions").MavsdkError

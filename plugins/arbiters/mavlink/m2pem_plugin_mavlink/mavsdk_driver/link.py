@@ -4,77 +4,80 @@ import asyncio
 import contextlib
 import logging
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable
-from typing import Any, TypeVar
+from collections.abc import Callable, Coroutine, Iterable
+from typing import Any, TypeAlias, TypeVar
 
 from m2pem.api import Clock
+from m2pem_plugin_mavlink.link.exchange import Exchange
+from m2pem_plugin_mavlink.link.turns import Turns
 from m2pem_plugin_mavlink.link.vehicle_link import Listener
 from m2pem_plugin_mavlink.mavsdk_driver import json_fields, library
 from m2pem_plugin_mavlink.mavsdk_driver.calls import Calls
-from m2pem_plugin_mavlink.mavsdk_driver.exchange import exchange
-from m2pem_plugin_mavlink.protocol.messages import Address, Message, types_by_id
-from m2pem_plugin_mavlink.protocol.transaction import Transaction
+from m2pem_plugin_mavlink.mavsdk_driver.missions import carried
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type, types_by_id
+from m2pem_plugin_mavlink.protocol.quality import LinkQuality
+from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError, Transaction
 
 T = TypeVar("T")
 
+_Call: TypeAlias = Callable[[Any], Coroutine[Any, Any, Any]]
+
 US_PER_S = 1_000_000
-AUTOPILOT_COMPONENT = 1
 UNSENT = 50
 """So many messages wait to be sent; of more, the oldest are dropped."""
+
+_COMMAND_LONG = message_type("COMMAND_LONG")
+_COMMANDS = frozenset({_COMMAND_LONG, message_type("COMMAND_INT")})
 
 
 class MavsdkLink:
     """The link of a vehicle, from when MAVSDK has found its system id (`attach`) to `close`.
 
-    What is sent before that is dropped. Messages are handed to listeners in the event loop.
+    What is sent before that is dropped. Commands and missions are carried by MAVSDK, with its own
+    ways of asking again. Messages are handed to listeners in the event loop.
     """
 
-    def __init__(self, system_id: int, clock: Clock, logger: logging.Logger) -> None:
-        self.address = Address(system_id, AUTOPILOT_COMPONENT)
+    def __init__(self, address: Address, clock: Clock, logger: logging.Logger) -> None:
+        self.address = address
         self.calls = Calls()
-        self.direct: Any = None
         self.missions: Any = None
+        self._direct: Any = None
         self._clock = clock
         self._logger = logger
         self._listeners: dict[int, list[Listener]] = {}
         self._readers: dict[int, asyncio.Task[None]] = {}
         self._unsent: deque[Message] = deque(maxlen=UNSENT)
         self._sender: asyncio.Task[None] | None = None
-        self._turns: dict[Hashable, asyncio.Lock] = {}
-
-    def now_s(self) -> float:
-        """The clock that was lent, in seconds."""
-        return self._clock.now_us() / US_PER_S
-
-    async def sleep(self, seconds: float) -> None:
-        """Wait, by the clock that was lent."""
-        await self._clock.sleep(seconds)
+        self._carrying: dict[str, asyncio.Task[None]] = {}
+        self._turns = Turns()
 
     # --- life -----------------------------------------------------------------------------------
 
     @property
     def attached(self) -> bool:
         """Whether MAVSDK has found it."""
-        return self.direct is not None
+        return self._direct is not None
 
     def attach(self, system: Any) -> None:
         """MAVSDK has found it: begin to listen."""
-        direct = library.require("mavsdk.asyncio.plugins.mavlink_direct")
-        mission_raw = library.require("mavsdk.asyncio.plugins.mission_raw")
-        self.direct = direct.MavlinkDirectAsync(system)
-        self.missions = mission_raw.MissionRawAsync(system)
+        self._direct = library.plugin("mavlink_direct").MavlinkDirectAsync(system)
+        self.missions = library.plugin("mission_raw").MissionRawAsync(system)
         for id_ in self._listeners:
             self._read(id_)
 
     async def close(self) -> None:
         """Listen no more, and let what is on its way come back."""
-        tasks = [*self._readers.values(), *([self._sender] if self._sender else [])]
+        tasks = [*self._readers.values(), *self._carrying.values()]
+        if self._sender is not None:
+            tasks.append(self._sender)
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         self._readers.clear()
         self._listeners.clear()
-        if self.missions is not None and self.calls.pending:
+        if not self.attached:
+            return
+        if self.calls.pending:
             for cancel in (
                 self.missions.cancel_mission_upload,
                 self.missions.cancel_mission_download,
@@ -82,22 +85,28 @@ class MavsdkLink:
                 with contextlib.suppress(library.failure()):  # there is none to cancel
                     await self.calls.make(cancel())
         await self.calls.finish()
-        for plugin in (self.direct, self.missions):
-            if plugin is not None:
-                plugin.destroy()
+        self._direct.destroy()
+        self.missions.destroy()
 
     # --- VehicleLink ----------------------------------------------------------------------------
 
+    def now_s(self) -> float:
+        """See `VehicleLink.now_s`."""
+        return self._clock.now_us() / US_PER_S
+
     def send(self, message: Message) -> None:
-        """Send a message; nothing is said of its arrival."""
+        """See `VehicleLink.send`. A command that MAVSDK is still sending is not sent twice."""
         if not self.attached:
+            return
+        if message.TYPE in _COMMANDS:
+            self._carry(message)
             return
         self._unsent.append(message)
         if self._sender is None or self._sender.done():
-            self._sender = asyncio.get_running_loop().create_task(self._send_all())
+            self._sender = _begin(self._send_all())
 
     def listen(self, ids: Iterable[int], listener: Listener) -> Callable[[], None]:
-        """Hand over all messages with these ids of this system, any component."""
+        """See `VehicleLink.listen`."""
         ids = tuple(ids)
         for id_ in ids:
             self._listeners.setdefault(id_, []).append(listener)
@@ -112,24 +121,27 @@ class MavsdkLink:
         return end
 
     async def perform(self, transaction: Transaction[T]) -> T:
-        """Run an exchange to its end, after those with the same key.
+        """See `VehicleLink.perform`."""
+        async with self._turns.turn(transaction.key):
+            if not self.attached:
+                raise NoAnswerError(f"system {self.address.system} was not heard yet")
+            if not await carried(self, transaction):
+                await Exchange(transaction, self, self._clock).run()
+        return transaction.outcome()
 
-        Raises:
-            ExchangeError: it failed.
-        """
-        async with self._turns.setdefault(transaction.key, asyncio.Lock()):
-            return await exchange(self, transaction)
+    def quality(self) -> LinkQuality | None:
+        """None: MAVSDK does not say how many frames get lost."""
+        return None
 
-    # --- inside ---------------------------------------------------------------------------------
+    # --- hearing --------------------------------------------------------------------------------
 
     def _read(self, id_: int) -> None:
         if id_ not in self._readers:
-            task = asyncio.get_running_loop().create_task(self._hand_over(id_))
-            self._readers[id_] = task
+            self._readers[id_] = _begin(self._hand_over(id_))
 
     async def _hand_over(self, id_: int) -> None:
         type_ = types_by_id()[id_]
-        async with contextlib.aclosing(self.direct.subscribe_message(type_.name)) as messages:
+        async with contextlib.aclosing(self._direct.subscribe_message(type_.name)) as messages:
             async for each in messages:
                 listeners = self._listeners.get(id_)
                 if not listeners:
@@ -143,16 +155,34 @@ class MavsdkLink:
                 for listener in tuple(listeners):
                     listener(message, sender)
 
+    # --- sending --------------------------------------------------------------------------------
+
     async def _send_all(self) -> None:
-        direct = library.require("mavsdk.asyncio.plugins.mavlink_direct")
         while self._unsent:
-            message = self._unsent.popleft()
-            try:
-                await self.calls.make(self.direct.send_message(wrapped(direct, message)))
-            except library.failure() as error:
-                self._logger.debug("MAVSDK does not send a %s: %s", message.TYPE.name, error)
+            await self._call(self._direct.send_message, self._unsent.popleft())
+
+    def _carry(self, command: Message) -> None:
+        fields: Any = command
+        if command.TYPE is _COMMAND_LONG:  # of what is the same, it counts the attempts
+            fields = fields._replace(confirmation=0)
+        same = f"{command.TYPE.name} {json_fields.written(fields)}"
+        if same not in self._carrying:
+            self._carrying[same] = task = _begin(self._carry_one(command))
+            task.add_done_callback(lambda _: self._carrying.pop(same, None))
+
+    async def _carry_one(self, command: Message) -> None:
+        # Of two with the same number, MAVSDK would refuse the second one.
+        async with self._turns.turn(("carried", command.command)):
+            await self._call(self._direct.send_command, command)
+
+    async def _call(self, call: _Call, message: Message) -> None:
+        name, fields = message.TYPE.name, json_fields.written(message)
+        wrapped = library.plugin("mavlink_direct").MavlinkMessage(name, fields_json=fields)
+        try:
+            await self.calls.make(call(wrapped))
+        except library.failure() as error:
+            self._logger.debug("MAVSDK: %s: %s", name, library.reason(error))
 
 
-def wrapped(direct: Any, message: Message) -> Any:
-    """A message as MAVSDK takes it; `direct`: its module."""
-    return direct.MavlinkMessage(message.TYPE.name, fields_json=json_fields.written(message))
+def _begin(work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
+    return asyncio.get_running_loop().create_task(work)

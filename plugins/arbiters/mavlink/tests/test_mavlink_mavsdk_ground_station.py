@@ -1,0 +1,113 @@
+"""A ground station that MAVSDK runs, over real UDP."""
+
+import asyncio
+import socket
+
+import pytest
+from m2pem_plugin_mavlink.protocol.messages import Address, message_type
+from mavlink_mavsdk_world import (
+    GROUND,
+    ONE,
+    free_port,
+    native_threads,
+    open_files,
+    scripted,
+    stationed,
+    until,
+)
+
+from m2pem.errors import PluginError
+
+HEARTBEAT = message_type("HEARTBEAT").id
+COMMAND = message_type("COMMAND_LONG")
+TEXT = message_type("STATUSTEXT")
+
+
+async def test_each_vehicle_of_a_station_hears_its_own():
+    port, heard = free_port(), {1: set(), 7: set()}
+    async with (
+        stationed(f"udpin://127.0.0.1:{port}") as station,
+        scripted(port, 1),
+        scripted(port, 7),
+    ):
+        for system, senders in heard.items():
+            link = station.link(Address(system, 1))
+            link.listen((HEARTBEAT,), lambda _, sender, to=senders: to.add(sender))
+        await until(lambda: all(heard.values()))
+        await asyncio.sleep(0.2)
+    assert heard == {1: {Address(1, 1)}, 7: {Address(7, 1)}}
+
+
+async def test_a_vehicle_that_was_heard_before_anybody_asked_for_it_is_reached():
+    port, heard = free_port(), []
+    async with stationed(f"udpin://127.0.0.1:{port}") as station, scripted(port):
+        await until(lambda: bool(station._systems))
+        station.link(ONE).listen((HEARTBEAT,), lambda *each: heard.append(each))
+        await until(lambda: bool(heard))
+
+
+async def test_it_sends_heartbeats_of_a_ground_station():
+    port = free_port()
+    async with stationed(f"udpin://127.0.0.1:{port}"), scripted(port) as vehicle:
+        beat = await vehicle.hears(lambda each: each.get_type() == "HEARTBEAT")
+    assert (beat.get_srcSystem(), beat.get_srcComponent(), beat.type) == (*GROUND, 6)
+
+
+async def test_no_thread_and_no_socket_is_left_after_close():
+    async def once():
+        port = free_port()
+        async with stationed(f"udpin://127.0.0.1:{port}") as station, scripted(port) as vehicle:
+            link = station.link(ONE)
+            link.listen((HEARTBEAT, TEXT.id), lambda *_: None)
+            await until(lambda: link.attached)
+            link.send(TEXT.make(text=b"hello"))
+            await vehicle.hears(lambda each: each.get_type() == "STATUSTEXT")
+        await asyncio.sleep(0.1)  # transports close a turn of the loop later
+
+    await once()
+    threads, files, tasks = native_threads(), open_files(), len(asyncio.all_tasks())
+    await once()
+    assert (native_threads(), open_files(), len(asyncio.all_tasks())) == (threads, files, tasks)
+
+
+async def test_closing_waits_for_a_command_that_is_on_its_way():
+    port = free_port()
+    async with stationed(f"udpin://127.0.0.1:{port}") as station, scripted(port) as vehicle:
+        vehicle.answers.clear()  # it says nothing
+        link = station.link(ONE)
+        await until(lambda: link.attached)
+        link.send(COMMAND.make(target_system=1, target_component=1, command=400))
+        await vehicle.hears(lambda each: getattr(each, "command", None) == 400)
+        assert link.calls.pending
+    assert not link.calls.pending
+
+
+async def test_its_log_does_not_go_to_the_terminal(capfd):
+    port = free_port()
+    async with stationed(f"udpin://127.0.0.1:{port}") as station, scripted(port):
+        await until(lambda: station.link(ONE).attached)
+    assert capfd.readouterr() == ("", "")
+
+
+async def test_a_port_that_is_taken_is_an_error_that_says_so():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        url = f"udpin://127.0.0.1:{other.getsockname()[1]}"
+        with pytest.raises(PluginError, match=f"{url}: cannot listen there: Address"):
+            async with stationed(url):
+                pass
+
+
+async def test_what_mavsdk_cannot_open_is_an_error_and_leaves_nothing():
+    url, before = "serial:///dev/nothing-is-here:57600", native_threads()
+    with pytest.raises(PluginError, match=f"{url}: MAVSDK cannot open it: Connection failed: "):
+        async with stationed(url):
+            pass
+    assert native_threads() == before
+
+
+def test_a_url_that_is_wrong_is_not_even_tried():
+    from m2pem_plugin_mavlink.mavsdk_driver.ground_station import GroundStation
+
+    with pytest.raises(PluginError, match="did you mean udpin://"):
+        GroundStation("udp://127.0.0.1:14550", GROUND, None, None)
