@@ -4,13 +4,14 @@ import asyncio
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
+from m2pem_plugin_mavlink.link.vehicle_link import Listener
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+from m2pem_plugin_mavlink.protocol.quality import LinkQuality
+from m2pem_plugin_mavlink.protocol.transaction import Transaction
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import Clock, ResourceId
-from m2pem_plugin_mavlink.link.vehicle_link import Listener
-from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import Transaction
-from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 T = TypeVar("T")
 
@@ -40,6 +41,7 @@ class ScriptedLink:
         self.address = Address(1, 1)
         self.autopilot, self.type = autopilot, type_
         self.sent: list[Any] = []
+        self.loss = 0.0
         self.obey: dict[int, Callable[[Any], int | None]] = {
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
             dialect.MAV_CMD_DO_SET_MODE: self._set_mode,
@@ -98,6 +100,9 @@ class ScriptedLink:
             if not transaction.done:
                 transaction.expire(max(self.now_s(), deadline_s or 0.0))
         news.clear()
+
+    def quality(self) -> LinkQuality | None:
+        return LinkQuality(self.loss, 20.0, 0.0)
 
     def listen(self, ids: Iterable[int], listener: Listener) -> Callable[[], None]:
         entry = (frozenset(ids), listener)
@@ -206,9 +211,7 @@ def fly(link: ScriptedLink, height_m: float = 10.0) -> None:
 
 
 def copter(clock: Clock) -> tuple[ScriptedLink, Vehicle]:
-    return _vehicle(
-        clock, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, dialect.MAV_TYPE_QUADROTOR, "air"
-    )
+    return _vehicle(clock, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, dialect.MAV_TYPE_QUADROTOR, "air")
 
 
 def rover(clock: Clock) -> tuple[ScriptedLink, Vehicle]:
@@ -218,18 +221,14 @@ def rover(clock: Clock) -> tuple[ScriptedLink, Vehicle]:
 
 
 def plane(clock: Clock) -> tuple[ScriptedLink, Vehicle]:
-    return _vehicle(
-        clock, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, dialect.MAV_TYPE_FIXED_WING, "air"
-    )
+    return _vehicle(clock, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, dialect.MAV_TYPE_FIXED_WING, "air")
 
 
 def px4(clock: Clock) -> tuple[ScriptedLink, Vehicle]:
     return _vehicle(clock, dialect.MAV_AUTOPILOT_PX4, dialect.MAV_TYPE_QUADROTOR, "air")
 
 
-def _vehicle(
-    clock: Clock, autopilot: int, type_: int, domain: str
-) -> tuple[ScriptedLink, Vehicle]:
+def _vehicle(clock: Clock, autopilot: int, type_: int, domain: str) -> tuple[ScriptedLink, Vehicle]:
     link = ScriptedLink(clock, autopilot, type_)
     ready_to_fly(link)
     return link, Vehicle(UAV1, domain, link, clock)

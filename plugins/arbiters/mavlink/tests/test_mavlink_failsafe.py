@@ -1,8 +1,8 @@
 import pytest
-
-from m2pem.api import ResourceId
 from m2pem_plugin_mavlink.failsafe import findings, parameters_of_interest
 from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind
+
+from m2pem.api import ResourceId
 
 UAV1 = ResourceId("uav1")
 COPTER = Identity(Firmware.ARDUPILOT, Kind.COPTER)

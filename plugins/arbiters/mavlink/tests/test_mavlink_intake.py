@@ -2,14 +2,14 @@ import math
 from typing import Any
 
 import pytest
-from mavlink_vehicle_world import HOME, make
-
-from m2pem.api import GeoPosition
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.heard import Heard
 from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind
 from m2pem_plugin_mavlink.vehicle.intake import Intake, enu_yaw, heading
 from m2pem_plugin_mavlink.vehicle.modes import modes_of
+from mavlink_vehicle_world import HOME, make
+
+from m2pem.api import GeoPosition
 
 LATITUDE, LONGITUDE, ALTITUDE = HOME
 

@@ -1,5 +1,4 @@
 import pytest
-
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind, identity
 from m2pem_plugin_mavlink.vehicle.modes import modes_of
@@ -45,7 +44,9 @@ def test_every_mode_with_a_purpose_has_a_number(firmware: Firmware, kind: Kind) 
 
 def test_of_two_modes_for_one_purpose_the_better_one_is_commanded() -> None:
     held = {
-        kind: modes_of(ardupilot(kind)).name(modes_of(ardupilot(kind)).for_purpose(FlightMode.HOLD) or 0)
+        kind: modes_of(ardupilot(kind)).name(
+            modes_of(ardupilot(kind)).for_purpose(FlightMode.HOLD) or 0
+        )
         for kind in (Kind.COPTER, Kind.ROVER, Kind.BOAT, Kind.PLANE)
     }
     assert held == {"copter": "BRAKE", "rover": "HOLD", "boat": "LOITER", "plane": "LOITER"}

@@ -1,11 +1,11 @@
 from dataclasses import replace
 
 import pytest
-
-from m2pem.api import GeoPosition
 from m2pem_plugin_mavlink.vehicle.heard import Heard
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
 from m2pem_plugin_mavlink.vehicle.readiness import readiness
+
+from m2pem.api import GeoPosition
 
 ARDUPILOT, PX4 = Firmware.ARDUPILOT, Firmware.PX4
 READY = Heard(

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 
-_LAST_NAVIGATION_COMMAND = dialect.MAV_CMD_NAV_LAST
+_LAST_NAVIGATION_COMMAND: int = dialect.MAV_CMD_NAV_LAST
 _SAME_FRAMES = {5: 0, 6: 3, 11: 10}
 """The frames with integer coordinates, by those without; autopilots send back either."""
 

@@ -296,3 +296,7 @@ class Autopilot(ABC):
         await exchanges.command(
             self.link, dialect.MAV_CMD_DO_CHANGE_SPEED, float(type_), speed_m_s, -1.0
         )
+
+    async def command(self, command: int, *params: float) -> None:
+        """Any command that has no method of its own."""
+        await exchanges.command(self.link, command, *params)

@@ -110,7 +110,8 @@ class Vehicle:
     @property
     def link_state(self) -> LinkState:
         """Whether it is heard."""
-        return link_state(self.silent_s, self.lost_after_s)
+        quality = self.link.quality()
+        return link_state(self.silent_s, self.lost_after_s, quality.loss if quality else 0.0)
 
     def state(self) -> VehicleState:
         """Its telemetry now."""
