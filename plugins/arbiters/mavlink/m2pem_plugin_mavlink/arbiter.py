@@ -63,18 +63,26 @@ class Station(Protocol):
 
 
 MakeStation = Callable[
-    [Mapping[ResourceId, Connection], Mapping[ResourceId, Settings], ArbiterContext], Station
+    [
+        Mapping[ResourceId, Connection],
+        Mapping[ResourceId, Settings],
+        ArbiterContext,
+        Mapping[ResourceId, float],
+    ],
+    Station,
 ]
+"""Of connections, their settings, the context, and after how many seconds each vehicle is lost."""
 
 
 def _station(
     connections: Mapping[ResourceId, Connection],
     settings: Mapping[ResourceId, Settings],
     context: ArbiterContext,
+    lost_after_s: Mapping[ResourceId, float],
 ) -> Station:
     from m2pem_plugin_mavlink.station import LinkedStation  # noqa: PLC0415  # it needs pymavlink
 
-    return LinkedStation(connections, settings, context)
+    return LinkedStation(connections, settings, context, lost_after_s)
 
 
 class MavlinkArbiter:
@@ -128,7 +136,10 @@ class MavlinkArbiter:
         from m2pem_plugin_mavlink.fence import Fence  # noqa: PLC0415  # it needs pymap3d
         from m2pem_plugin_mavlink.helm import Helm  # noqa: PLC0415  # it needs pymavlink
 
-        self._station = self._make_station(self._connections, self._settings, self._context)
+        lost_after_s = {resource: self.limits(resource).lost_after_s for resource in self._settings}
+        self._station = self._make_station(
+            self._connections, self._settings, self._context, lost_after_s
+        )
         vehicles = await self._station.open()
         create = asyncio.get_running_loop().create_task
         fences: dict[int, Fence] = {}

@@ -148,14 +148,19 @@ class Hub:
     async def _beat(self) -> None:
         at_us = self._clock.now_us()
         while True:
+            at_us += HEARTBEAT_US
+            now_us = self._clock.now_us()
+            if (
+                at_us <= now_us
+            ):  # the machine was asleep: beats that were missed are not made up for
+                at_us = now_us + HEARTBEAT_US
+            await self._clock.sleep_until(at_us)
             for opened in list(self._opened.values()):
                 opened.endpoint.look_after()
                 for number, peer in enumerate(list(opened.endpoint.peers.values())):
                     self._greet(peer)
                     if number % PEERS_AT_ONCE == PEERS_AT_ONCE - 1:
                         await asyncio.sleep(0)
-            at_us = max(at_us + HEARTBEAT_US, self._clock.now_us())
-            await self._clock.sleep_until(at_us)
 
 
 def _heartbeat() -> Message:

@@ -102,8 +102,8 @@ def read(frame: bytes) -> Frame | None:
 
 
 def scan(data: bytes, unfinished: bool = False) -> tuple[list[Frame], int, int]:
-    """All frames among other bytes: those with a right checksum; and those whose message is not
-    known, where another frame or nothing follows them.
+    """All frames among other bytes: those with a right checksum; and those that cannot be checked,
+    if another frame or nothing follows them and no right frame is inside of them.
 
     Then the number of bytes that belong to none; and where a frame begins whose end is not there
     yet, if `unfinished` says that more may come (else: the size of `data`).
@@ -111,49 +111,50 @@ def scan(data: bytes, unfinished: bool = False) -> tuple[list[Frame], int, int]:
     found: list[Frame] = []
     junk = position = 0
     size = len(data)
-    while position < size:
+    doubt: Frame | None = None  # cannot be checked, and ends at `doubt_end` if that is not 0
+    doubt_end = junk_before = 0
+    while True:
+        if doubt_end and position >= doubt_end:
+            if doubt is not None:
+                found.append(doubt)
+            junk, doubt_end = junk_before, 0
+        if position >= size:
+            break
         magic = data[position]
+        # Of the payload; this stays if not even the header is whole.
+        begin, length, flags = size, 1, 0
         if magic == V2:
             if size - position >= AROUND_V2:
                 length, flags, sequence, sender, low, high = HEADER_V2.unpack_from(data, position)
-                id_ = low | high << 16
+                id_ = low | high << 16 if high else low
                 begin = position + 10
-                after = begin + length + (15 if flags & SIGNED else 2)
-                known = not flags & ~SIGNED
-            else:
-                after = size + 1
         elif magic == V1:
             if size - position >= AROUND_V1:
                 length, sequence, sender, id_ = HEADER_V1.unpack_from(data, position)
                 begin = position + 6
-                after = begin + length + 2
-                known = True
-            else:
-                after = size + 1
         else:
             next_ = _MAGIC.search(data, position)
             start = next_.start() if next_ else size
             junk += start - position
             position = start
             continue
-        if after > size:
-            if unfinished:
-                break
-        else:
-            end = begin + length
-            extra = EXTRA.get(id_)
-            if extra is None or not known:
-                if after == size or data[after] in (V1, V2):
-                    if known:
-                        found.append(Frame(sequence, sender, id_, data[begin:end], False))
-                    position = after
-                    continue
-            else:
+        end = begin + length
+        after = end + 15 if flags & SIGNED else end + 2
+        if after <= size:
+            extra = None if flags & ~SIGNED else EXTRA.get(id_)
+            if extra is not None:
                 sum_ = mcrf4xx(extra, mcrf4xx(data[position + 1 : end], CRC_START))
                 if data[end] == sum_ & 255 and data[end + 1] == sum_ >> 8:
                     found.append(Frame(sequence, sender, id_, data[begin:end], True))
                     position = after
+                    doubt_end = 0
                     continue
+            elif not doubt_end and (after == size or data[after] in (V1, V2)):
+                payload = data[begin:end]
+                doubt = None if flags & ~SIGNED else Frame(sequence, sender, id_, payload, False)
+                doubt_end, junk_before = after, junk
+        elif unfinished and not doubt_end:
+            break
         junk += 1
         position += 1
     return found, junk, position

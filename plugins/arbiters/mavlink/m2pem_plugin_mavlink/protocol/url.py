@@ -64,7 +64,7 @@ _PARTS = re.compile(
     r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*):(?P<slashes>/{0,2})(?P<rest>.*)", re.DOTALL
 )
 _PLACE = re.compile(
-    r"(?P<host>\[[0-9A-Fa-f:.%\w]+\]|[^:/?#\s\[\]]*)(?::(?P<port>[^/]*))?(?P<more>/?)"
+    r"(?P<host>\[[0-9A-Fa-f:.%\w]+\]|[^:/?#\s\[\]]*)(?::(?P<port>[^/:]*))?(?P<more>/?)"
 )
 _DEVICE = re.compile(r"(?P<path>/dev/[^,:\s]+|COM\d+)(?:[,:](?P<baudrate>\d+))?")
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.sim.command import Command
+from m2pem_plugin_mavlink.sim.command import Command, Result
 from m2pem_plugin_mavlink.sim.part import CommandHandler, Part
 from m2pem_plugin_mavlink.sim.specification import Kind
 
@@ -99,19 +99,19 @@ class Arming(Part):
             dialect.MAV_CMD_RUN_PREARM_CHECKS: self._check,
         }
 
-    def _command(self, command: Command) -> int:
+    def _command(self, command: Command) -> Result:
         force = command.param2 in (FORCE, FORCE_ARM)
         if command.param1 == 1:
             done = self.arm(force=force)
         elif command.param1 == 0:
             done = self.disarm(force=command.param2 == FORCE)
         else:
-            return dialect.MAV_RESULT_UNSUPPORTED
-        return dialect.MAV_RESULT_ACCEPTED if done else dialect.MAV_RESULT_FAILED
+            return Result.UNSUPPORTED
+        return Result.ACCEPTED if done else Result.FAILED
 
-    def _check(self, command: Command) -> int:
+    def _check(self, command: Command) -> Result:
         if self.armed:
-            return dialect.MAV_RESULT_TEMPORARILY_REJECTED
+            return Result.TEMPORARILY_REJECTED
         for reason in self.reasons():
             self.autopilot.warn(f"PreArm: {reason}")
-        return dialect.MAV_RESULT_ACCEPTED
+        return Result.ACCEPTED

@@ -19,6 +19,7 @@ from m2pem_plugin_mavlink.sim.arming import Arming
 from m2pem_plugin_mavlink.sim.battery import Battery
 from m2pem_plugin_mavlink.sim.body import Body
 from m2pem_plugin_mavlink.sim.chronicle import Chronicle
+from m2pem_plugin_mavlink.sim.command import Command, Result
 from m2pem_plugin_mavlink.sim.commands.dispatch import CommandServer
 from m2pem_plugin_mavlink.sim.commands.motion import MotionCommands
 from m2pem_plugin_mavlink.sim.commands.payload import Payload
@@ -103,11 +104,11 @@ class Autopilot:
             Reports(self),
         ]
         self.parts.extend(part(self) for part in self.firmware.parts())
-        commands = CommandServer(self)
-        self.parts += [commands, self.streams]
+        self._commands = CommandServer(self)
+        self.parts += [self._commands, self.streams]
         self._handlers: dict[str, list[MessageHandler]] = {}
         for part in self.parts:
-            commands.handlers.update(part.commands())
+            self._commands.handlers.update(part.commands())
             self.streams.makers.update(part.reports())
             for name, handler in part.messages().items():
                 self._handlers.setdefault(name, []).append(handler)
@@ -151,6 +152,10 @@ class Autopilot:
     def position(self) -> Point:
         """Where it is, from the origin of its frame."""
         return self.body.point
+
+    def obey(self, command: Command) -> Result:
+        """Do what a command says, whoever sends it."""
+        return self._commands.perform(command)
 
     def meet(self, peer: Peer) -> None:
         """There is somebody to talk to. Knowing him already is well."""

@@ -2,11 +2,25 @@
 
 import math
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.sim.peers import Heard
+
+
+class Result(IntEnum):
+    """How a command ended (MAV_RESULT)."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+    IN_PROGRESS = 5
+    CANCELLED = 6
+
 
 GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})
 """MAV_FRAME: latitude and longitude, in degrees or in 1e-7 degrees."""

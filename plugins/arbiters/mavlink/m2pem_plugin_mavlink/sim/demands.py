@@ -12,10 +12,10 @@ class Rest:
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """Be at a point. A plane circles there with `radius_m` (negative: counterclockwise).
+    """Be at a point. A plane flies over it, and comes back.
 
     `climb_mps` and `descent_mps` bound the vertical speed; `yaw_rad` None: face the way it goes;
-    `reverse`: a rover drives there backwards; `through`: don't slow down for it.
+    `reverse`: a rover drives there backwards.
     """
 
     point: Point
@@ -23,9 +23,7 @@ class Reach:
     climb_mps: float = 2.5
     descent_mps: float = 1.5
     yaw_rad: float | None = None
-    radius_m: float = 60.0
     reverse: bool = False
-    through: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.sim.command import Command
+from m2pem_plugin_mavlink.sim.command import Command, Result
 from m2pem_plugin_mavlink.sim.geometry import Location, Point
 from m2pem_plugin_mavlink.sim.part import CommandHandler, Part, ReportMaker
 
@@ -52,11 +52,11 @@ class Home(Part):
             dialect.MAV_CMD_GET_HOME_POSITION: self._get,
         }
 
-    def _set(self, command: Command) -> int:
+    def _set(self, command: Command) -> Result:
         pilot = self.autopilot
         if command.param1 == 1:
             if not pilot.estimator.ready:
-                return dialect.MAV_RESULT_FAILED
+                return Result.FAILED
             self.set(pilot.position)
         elif command.has_position:
             origin_m = pilot.frame.origin.altitude_amsl_m
@@ -66,16 +66,16 @@ class Home(Part):
                 pilot.frame.to_point(Location(command.latitude_deg, command.longitude_deg, z_m))
             )
         else:
-            return dialect.MAV_RESULT_DENIED
+            return Result.DENIED
         self._locked = True
-        return dialect.MAV_RESULT_ACCEPTED
+        return Result.ACCEPTED
 
-    def _get(self, command: Command) -> int:
+    def _get(self, command: Command) -> Result:
         message = self._home()
         if message is None:
-            return dialect.MAV_RESULT_FAILED
+            return Result.FAILED
         self.autopilot.send(message, command.sender.peer)
-        return dialect.MAV_RESULT_ACCEPTED
+        return Result.ACCEPTED
 
     def _home(self) -> Any:
         if not self.known:

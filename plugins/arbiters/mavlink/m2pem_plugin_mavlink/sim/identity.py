@@ -1,11 +1,11 @@
-"""Who the autopilot is and what time it has: HEARTBEAT, AUTOPILOT_VERSION, SYSTEM_TIME, TIMESYNC."""
+"""Who the autopilot is (HEARTBEAT, AUTOPILOT_VERSION) and what time it has."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.sim.command import Command
+from m2pem_plugin_mavlink.sim.command import Command, Result
 from m2pem_plugin_mavlink.sim.part import CommandHandler, MessageHandler, Part, ReportMaker
 from m2pem_plugin_mavlink.sim.peers import Heard
 
@@ -91,12 +91,12 @@ class Identity(Part):
             )
             self.autopilot.send(answer, sender.peer)
 
-    def _tell_version(self, command: Command) -> int:
+    def _tell_version(self, command: Command) -> Result:
         self.autopilot.send(self._version(), command.sender.peer)
-        return dialect.MAV_RESULT_ACCEPTED
+        return Result.ACCEPTED
 
-    def _tell_protocol(self, command: Command) -> int:
+    def _tell_protocol(self, command: Command) -> Result:
         nothing = [0] * 8
         answer = dialect.MAVLink_protocol_version_message(200, 100, 200, nothing, nothing)
         self.autopilot.send(answer, command.sender.peer)
-        return dialect.MAV_RESULT_ACCEPTED
+        return Result.ACCEPTED

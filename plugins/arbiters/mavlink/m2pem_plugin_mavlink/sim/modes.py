@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.sim.command import Command
+from m2pem_plugin_mavlink.sim.command import Command, Result
 from m2pem_plugin_mavlink.sim.demands import Rest
 from m2pem_plugin_mavlink.sim.maneuvers.maneuver import Maneuver
 from m2pem_plugin_mavlink.sim.part import CommandHandler, MessageHandler, Part
@@ -77,13 +77,15 @@ class ModeSwitch(Part):
 
     def _refusal(self, mode: Mode) -> str | None:
         estimator = self.autopilot.estimator
-        if mode.needs_position and not estimator.ready:
-            # As long as nothing is armed, no harm is done, once it knows its attitude.
-            if self.autopilot.arming.armed or not estimator.levelled:
-                return "requires position"
-        return None
+        if not mode.needs_position or estimator.ready:
+            return None
+        # As long as nothing is armed, no harm is done, once it knows its attitude.
+        harmless = estimator.levelled and not self.autopilot.arming.armed
+        return None if harmless else "requires position"
 
     def _enter(self, mode: Mode, maneuver: Maneuver | None = None, announce: bool = True) -> None:
+        if announce:
+            self.maneuver.end()
         self.mode = mode
         self._speed_mps, self.reverse = None, False
         self.maneuver = maneuver or mode.maneuver(self.autopilot)
@@ -105,7 +107,7 @@ class ModeSwitch(Part):
         """The old SET_MODE."""
         return {"SET_MODE": self._message}
 
-    def _command(self, command: Command) -> int:
+    def _command(self, command: Command) -> Result:
         number = self.autopilot.firmware.mode_number(
             int(command.param1), int(command.param2), int(command.param3)
         )
@@ -120,8 +122,8 @@ class ModeSwitch(Part):
         )
         self.autopilot.send(ack, sender.peer)
 
-    def _asked(self, number: int | None) -> int:
+    def _asked(self, number: int | None) -> Result:
         if number is None:
-            return dialect.MAV_RESULT_DENIED
+            return Result.DENIED
         switched = self.switch(number)
-        return dialect.MAV_RESULT_ACCEPTED if switched else dialect.MAV_RESULT_FAILED
+        return Result.ACCEPTED if switched else Result.FAILED

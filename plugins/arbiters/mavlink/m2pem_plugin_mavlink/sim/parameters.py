@@ -1,6 +1,7 @@
 """Parameters: named numbers that set the vehicle up, and their protocol (mavlink.io, "Parameter
 Protocol"). As with ArduPilot, an unknown name gets no answer at all."""
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -89,7 +90,7 @@ class ParameterServer(Part):
         if name not in parameters:
             return
         value = message.param_value
-        if value == value and abs(value) != float("inf"):
+        if math.isfinite(value):
             parameters[name] = value
         self._send(name, None, 0xFFFF)
 

@@ -8,15 +8,15 @@ may be streamed or asked for.
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from m2pem_plugin_mavlink.sim.command import Command
+from m2pem_plugin_mavlink.sim.command import Command, Result
 from m2pem_plugin_mavlink.sim.geometry import Point
 from m2pem_plugin_mavlink.sim.peers import Heard
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.sim.autopilot import Autopilot
 
-CommandHandler = Callable[[Command], int]
-"""Does it and gives a MAV_RESULT, which is sent as the acknowledgement."""
+CommandHandler = Callable[[Command], Result]
+"""Does it; the result is sent as the acknowledgement."""
 MessageHandler = Callable[[Any, Heard], None]
 ReportMaker = Callable[[], Any]
 """Makes the message as of now; None: there is nothing to tell."""

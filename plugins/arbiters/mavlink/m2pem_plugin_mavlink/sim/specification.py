@@ -7,6 +7,9 @@ from enum import StrEnum
 
 from m2pem_plugin_mavlink.sim.geometry import Location
 
+ZURICH = Location(47.397742, 8.545594, 488.0)
+"""A meadow in Zurich."""
+
 
 class Kind(StrEnum):
     """What moves, and in which way."""
@@ -29,7 +32,7 @@ class VehicleSpec:
 
     kind: Kind = Kind.COPTER
     system: int = 1
-    home: Location = Location(47.397742, 8.545594, 488.0)
+    home: Location = ZURICH
     heading_deg: float = 0.0
     firmware: str = "ardupilot"
     estimator_s: float = 6.0

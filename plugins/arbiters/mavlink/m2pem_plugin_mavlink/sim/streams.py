@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.sim.command import Command
+from m2pem_plugin_mavlink.sim.command import Command, Result
 from m2pem_plugin_mavlink.sim.part import CommandHandler, MessageHandler, Part, ReportMaker
 from m2pem_plugin_mavlink.sim.peers import Heard, Peer
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.sim.autopilot import Autopilot
 
-ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
-FAILED = dialect.MAV_RESULT_FAILED
 
 STREAM_GROUPS: Mapping[int, tuple[int, ...]] = {
     dialect.MAV_DATA_STREAM_RAW_SENSORS: (27, 116, 129, 29),
@@ -85,11 +83,11 @@ class Streams(Part):
         """The old way to ask."""
         return {"REQUEST_DATA_STREAM": self._request_stream}
 
-    def _set_interval(self, command: Command) -> int:
+    def _set_interval(self, command: Command) -> Result:
         id_, interval_us = int(command.param1), command.param2
         peer = command.sender.peer
         if id_ not in self.makers:
-            return DENIED
+            return Result.DENIED
         if interval_us < 0:
             self._due[peer].pop(id_, None)
         elif interval_us == 0:
@@ -99,39 +97,38 @@ class Streams(Part):
                 self._set(peer, id_, default_s)
         elif interval_us <= 1e6 / self.autopilot.firmware.loop_hz:
             self.autopilot.warn("Message interval too short")
-            return DENIED
+            return Result.DENIED
         else:
             self._set(peer, id_, interval_us * 1e-6)
-        return ACCEPTED
+        return Result.ACCEPTED
 
-    def _get_interval(self, command: Command) -> int:
+    def _get_interval(self, command: Command) -> Result:
         id_, peer = int(command.param1), command.sender.peer
         if id_ not in self.makers:
-            return FAILED
+            return Result.FAILED
         interval_s = self.interval_s(peer, id_)
         interval_us = -1 if interval_s is None else round(interval_s * 1e6)
         self.autopilot.send(dialect.MAVLink_message_interval_message(id_, interval_us), peer)
-        return ACCEPTED
+        return Result.ACCEPTED
 
-    def _request(self, command: Command) -> int:
+    def _request(self, command: Command) -> Result:
         maker = self.makers.get(int(command.param1))
         message = maker() if maker else None
         if message is None:
-            return FAILED
+            return Result.FAILED
         self.autopilot.send(message, command.sender.peer)
-        return ACCEPTED
+        return Result.ACCEPTED
 
     def _request_stream(self, message: Any, sender: Heard) -> None:
         group = message.req_stream_id
         groups = STREAM_GROUPS if group == dialect.MAV_DATA_STREAM_ALL else (group,)
         rate_hz = message.req_message_rate if message.start_stop else 0
+        fastest_s = 1 / self.autopilot.firmware.loop_hz
         for each in groups:
             for id_ in STREAM_GROUPS.get(each, ()):
                 if id_ not in self.makers:
                     continue
                 if rate_hz:
-                    self._set(
-                        sender.peer, id_, max(1 / rate_hz, 1 / self.autopilot.firmware.loop_hz)
-                    )
+                    self._set(sender.peer, id_, max(1 / rate_hz, fastest_s))
                 else:
                     self._due[sender.peer].pop(id_, None)

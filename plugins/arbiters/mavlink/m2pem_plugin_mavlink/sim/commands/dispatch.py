@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.sim.command import Command, command_of
+from m2pem_plugin_mavlink.sim.command import Command, Result, command_of
 from m2pem_plugin_mavlink.sim.part import CommandHandler, MessageHandler, Part
 from m2pem_plugin_mavlink.sim.peers import Heard
 
@@ -24,7 +24,7 @@ class CommandServer(Part):
     def __init__(self, autopilot: "Autopilot") -> None:
         super().__init__(autopilot)
         self.handlers: dict[int, CommandHandler] = {}
-        self._answers: dict[Told, tuple[float, tuple[Any, ...], int]] = {}
+        self._answers: dict[Told, tuple[float, tuple[Any, ...], Result]] = {}
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """Both kinds of commands."""
@@ -34,7 +34,7 @@ class CommandServer(Part):
         command = command_of(message, sender)
         result = self._repeated(command)
         if result is None:
-            result = self._perform(command)
+            result = self.perform(command)
             if len(self._answers) > 200:
                 self._answers.clear()
             told = (self.autopilot.now_s, self._content(command), result)
@@ -46,24 +46,25 @@ class CommandServer(Part):
             sender.peer,
         )
 
-    def _perform(self, command: Command) -> int:
+    def perform(self, command: Command) -> Result:
+        """Let the handler do it."""
         handler = self.handlers.get(command.id)
         if handler is None:
-            return dialect.MAV_RESULT_UNSUPPORTED
+            return Result.UNSUPPORTED
         try:
             return handler(command)
         except (ValueError, OverflowError):
             # Whole numbers were expected where there is NaN or infinity.
-            return dialect.MAV_RESULT_DENIED
+            return Result.DENIED
 
-    def _repeated(self, command: Command) -> int | None:
+    def _repeated(self, command: Command) -> Result | None:
         """The answer that the same command got just now, if it comes once more."""
         before = self._answers.get((command.sender, command.id))
         if not command.confirmation or before is None:
             return None
         at_s, content, result = before
         recent = self.autopilot.now_s - at_s <= REPEAT_S
-        accepted = result == dialect.MAV_RESULT_ACCEPTED
+        accepted = result == Result.ACCEPTED
         return result if recent and accepted and content == self._content(command) else None
 
     @staticmethod

@@ -5,14 +5,12 @@ from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.sim.command import Command
+from m2pem_plugin_mavlink.sim.command import Command, Result
 from m2pem_plugin_mavlink.sim.geometry import wrapped_rad
 from m2pem_plugin_mavlink.sim.maneuvers.guided import Guided
+from m2pem_plugin_mavlink.sim.missions.execution import Auto
 from m2pem_plugin_mavlink.sim.part import CommandHandler, Part
 from m2pem_plugin_mavlink.sim.specification import Kind
-
-ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
-FAILED, UNSUPPORTED = dialect.MAV_RESULT_FAILED, dialect.MAV_RESULT_UNSUPPORTED
 
 CHANGE_MODE = 1
 """Parameter 2 of DO_REPOSITION: enter GUIDED if it is in another mode."""
@@ -42,83 +40,86 @@ class MotionCommands(Part):
             handlers[dialect.MAV_CMD_DO_SET_REVERSE] = self._reverse
         return handlers
 
-    def _enter(self, mode: int) -> int:
-        return ACCEPTED if self.autopilot.modes.switch(mode) else FAILED
+    def _enter(self, mode: int) -> Result:
+        return Result.ACCEPTED if self.autopilot.modes.switch(mode) else Result.FAILED
 
     def _guided(self) -> Guided | None:
         maneuver = self.autopilot.modes.maneuver
         return maneuver if isinstance(maneuver, Guided) else None
 
-    def _take_off(self, command: Command) -> int:
+    def _take_off(self, command: Command) -> Result:
         """In GUIDED only, and armed; while it climbs already, or has, nothing is begun anew."""
         pilot, guided = self.autopilot, self._guided()
         up_m = pilot.home.point.up_m + command.z
         if guided is None or not pilot.arming.armed or not math.isfinite(command.z):
-            return FAILED
+            return Result.FAILED
         if not pilot.body.on_ground:
             again = guided.takeoff_up_m is not None and guided.destination is None
-            return ACCEPTED if again else FAILED
+            return Result.ACCEPTED if again else Result.FAILED
         if up_m <= pilot.body.up_m + 0.1 or not pilot.estimator.ready:
-            return FAILED
+            return Result.FAILED
         if not guided.taking_off:
             guided.take_off(up_m)
-        return ACCEPTED
+        return Result.ACCEPTED
 
-    def _reposition(self, command: Command) -> int:
+    def _reposition(self, command: Command) -> Result:
         pilot = self.autopilot
         if not command.has_position or not math.isfinite(command.z):
-            return DENIED
+            return Result.DENIED
         if self._guided() is None:
             if not int(command.param2) & CHANGE_MODE:
-                return DENIED
+                return Result.DENIED
             if not pilot.modes.switch(pilot.firmware.roles.guided):
-                return FAILED
+                return Result.FAILED
         guided = self._guided()
         point = pilot.guided.point_of(command)
         if guided is None or point is None:
-            return DENIED
+            return Result.DENIED
         reason = pilot.guided.refusal(point)
         if reason is not None:
             pilot.warn(reason)
-            return FAILED
+            return Result.FAILED
         if command.param1 > 0:
             pilot.modes.set_speed(command.param1)
         guided.go_to(point)
-        return ACCEPTED
+        return Result.ACCEPTED
 
-    def _change_speed(self, command: Command) -> int:
+    def _change_speed(self, command: Command) -> Result:
         if not math.isfinite(command.param2) or command.param2 <= 0:
-            return FAILED
+            return Result.FAILED
         if command.param1 in (0, 1):
             self.autopilot.modes.set_speed(command.param2)
-        return ACCEPTED
+        return Result.ACCEPTED
 
-    def _yaw(self, command: Command) -> int:
+    def _yaw(self, command: Command) -> Result:
         guided = self._guided()
         if guided is None or not 0 <= command.param1 <= 360 or command.param4 not in (0, 1):
-            return FAILED
+            return Result.FAILED
         angle = math.radians(command.param1)
         if command.param4 == 1:
             sign = -1 if command.param3 < 0 else 1
             angle = self.autopilot.body.yaw_rad + sign * angle
         guided.yaw_rad = wrapped_rad(angle)
-        return ACCEPTED
+        return Result.ACCEPTED
 
-    def _pause(self, command: Command) -> int:
+    def _pause(self, command: Command) -> Result:
         if command.param1 not in (0, 1):
-            return DENIED
+            return Result.DENIED
         maneuver = self.autopilot.modes.maneuver
-        if not hasattr(maneuver, "paused"):
-            return FAILED
+        if not isinstance(maneuver, Guided | Auto):
+            return Result.FAILED
         maneuver.paused = command.param1 == 0
-        return ACCEPTED
+        return Result.ACCEPTED
 
-    def _reverse(self, command: Command) -> int:
+    def _reverse(self, command: Command) -> Result:
         self.autopilot.modes.reverse = command.param1 == 1
-        return ACCEPTED
+        return Result.ACCEPTED
 
-    def _start_mission(self, command: Command) -> int:
+    def _start_mission(self, command: Command) -> Result:
         pilot = self.autopilot
         if command.param1 or command.param2:
-            return DENIED
-        return self._enter(pilot.firmware.roles.mission)
+            return Result.DENIED
+        result = self._enter(pilot.firmware.roles.mission)
+        if result is Result.ACCEPTED:
+            pilot.mission.released = True
+        return result

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.sim.command import Command
+from m2pem_plugin_mavlink.sim.command import Command, Result
 from m2pem_plugin_mavlink.sim.part import CommandHandler, Part, ReportMaker
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ RESERVED_SERVOS = 4
 
 
 class Payload(Part):
-    """`servos_us`: pulse widths by output; `relays`: on or off; `gripped`: the gripper is closed."""
+    """`servos_us`: pulse widths by output; `relays`: on or off; `gripped`: gripper closed."""
 
     def __init__(self, autopilot: "Autopilot") -> None:
         super().__init__(autopilot)
@@ -61,9 +61,9 @@ class Payload(Part):
             dialect.MAV_CMD_DO_GRIPPER: self._gripper,
         }
 
-    def _gripper(self, command: Command) -> int:
+    def _gripper(self, command: Command) -> Result:
         if command.param2 not in (0, 1):
-            return dialect.MAV_RESULT_DENIED
+            return Result.DENIED
         return _result(self.set_gripper(command.param2 == 1))
 
     def reports(self) -> Mapping[int, ReportMaker]:
@@ -78,6 +78,6 @@ class Payload(Part):
         return dialect.MAVLink_servo_output_raw_message(time_us, 0, *pulses)
 
 
-def _result(done: bool) -> int:
-    result: int = dialect.MAV_RESULT_ACCEPTED if done else dialect.MAV_RESULT_FAILED
+def _result(done: bool) -> Result:
+    result = Result.ACCEPTED if done else Result.FAILED
     return result

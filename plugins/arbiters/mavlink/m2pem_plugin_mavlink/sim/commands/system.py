@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.sim.command import Command
+from m2pem_plugin_mavlink.sim.command import Command, Result
 from m2pem_plugin_mavlink.sim.part import CommandHandler, Part
 
 REBOOTS = (1, 3)
@@ -20,13 +20,13 @@ class SystemCommands(Part):
         """Reboot."""
         return {dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot}
 
-    def _reboot(self, command: Command) -> int:
+    def _reboot(self, command: Command) -> Result:
         if command.param1 not in REBOOTS:
-            return dialect.MAV_RESULT_UNSUPPORTED
+            return Result.UNSUPPORTED
         if self.autopilot.arming.armed:
-            return dialect.MAV_RESULT_FAILED
+            return Result.FAILED
         self.rebooting = True
-        return dialect.MAV_RESULT_ACCEPTED
+        return Result.ACCEPTED
 
     def step(self, dt_s: float) -> None:
         """The answer goes out first."""

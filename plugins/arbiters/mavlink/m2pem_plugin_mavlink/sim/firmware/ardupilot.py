@@ -54,7 +54,8 @@ class ArduPilot(Firmware):
     @property
     def vehicle_type(self) -> int:
         """MAV_TYPE."""
-        return TYPES[self.spec.kind]
+        type_: int = TYPES[self.spec.kind]
+        return type_
 
     def modes(self) -> Sequence[Mode]:
         """The modes of the vehicle."""
@@ -66,9 +67,9 @@ class ArduPilot(Firmware):
 
     def parameter_type(self, name: str) -> int:
         """Values travel as floats, whatever their type."""
-        if name in WHOLE_NUMBERS:
-            return dialect.MAV_PARAM_TYPE_INT32
-        return dialect.MAV_PARAM_TYPE_REAL32
+        whole, real = dialect.MAV_PARAM_TYPE_INT32, dialect.MAV_PARAM_TYPE_REAL32
+        type_: int = whole if name in WHOLE_NUMBERS else real
+        return type_
 
     def tuning(self, parameters: Parameters) -> Tuning:
         """ArduPilot has centimetres in a copter's, metres in the others' parameters."""

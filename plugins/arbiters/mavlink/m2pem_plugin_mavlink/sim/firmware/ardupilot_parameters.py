@@ -1,5 +1,6 @@
 """Parameters of ArduPilot that a ground station looks for, with ArduPilot's defaults."""
 
+import re
 from collections.abc import Mapping
 
 from m2pem_plugin_mavlink.sim.specification import Kind
@@ -126,9 +127,10 @@ WHOLE_NUMBERS: frozenset[str] = frozenset(
     for values in PARAMETERS.values()
     for name, value in values.items()
     if float(value).is_integer()
-    and name.endswith(
-        ("_ENABLE", "_ENABL", "_ACT", "_ACTN", "_ACTION", "_TYPE", "_TOTAL", "SYSID", "_CLASS")
-        + ("_FUNCTION", "_CHECK", "_RATE", "_OPTIONS", "_MONITOR", "_RESTART", "_BEHAVE", "_ALT")
+    and re.search(
+        "_(ACT|ACTION|ACTN|ALT|BEHAVE|CHECK|CLASS|ENABLE?|FUNCTION|MONITOR|OPTIONS|RATE|RESTART"
+        "|SYSID|TOTAL|TYPE)$",
+        name,
     )
 )
 """Those that ArduPilot keeps as whole numbers."""

@@ -59,8 +59,6 @@ class CopterKinematics:
             case Reach(point=point):
                 distance_m = body.point.distance_m(point)
                 speed = min(demand.speed_mps, approach_mps(distance_m, self.acceleration_mps2 / 2))
-                if demand.through:
-                    speed = demand.speed_mps
                 bearing = body.point.bearing_rad(point)
                 rise_m = point.up_m - body.up_m
                 vertical = approach_mps(abs(rise_m), self.climb_mps2 / 2)
@@ -106,15 +104,11 @@ class CopterKinematics:
         radius_m = max(1.0, abs(demand.radius_m))
         side = 1 if demand.radius_m >= 0 else -1
         speed = min(demand.speed_mps, math.sqrt(self.acceleration_mps2 * radius_m))
-        ahead = center.bearing_rad(body.point) + side * speed / radius_m * 0.5
         inward = body.point.bearing_rad(center)
         outside_m = body.point.distance_m(center) - radius_m
         closing = math.copysign(min(speed, approach_mps(abs(outside_m), 1.0)), outside_m)
         tangent = center.bearing_rad(body.point) + side * math.pi / 2
-        # Turning with the circle ahead of time makes up for the lag of the acceleration.
-        tangent += side * speed / radius_m * dt_s
         slow = 1.0 if abs(outside_m) < radius_m / 4 else 0.2
-        del ahead
         rise_m = center.up_m - body.up_m
         up = math.copysign(min(1.5, abs(rise_m)), rise_m)
         return (

@@ -46,8 +46,6 @@ class RoverKinematics:
             case Reach(point=point, reverse=reverse):
                 distance_m = body.point.distance_m(point)
                 speed = min(demand.speed_mps, approach_mps(distance_m, self.acceleration_mps2 / 2))
-                if demand.through:
-                    speed = demand.speed_mps
                 bearing = body.point.bearing_rad(point) + (math.pi if reverse else 0.0)
                 return self._along(body, bearing, speed, -1 if reverse else 1, dt_s)
             case Go():

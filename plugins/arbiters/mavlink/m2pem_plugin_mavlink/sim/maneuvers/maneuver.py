@@ -23,6 +23,9 @@ class Maneuver:
     def begin(self) -> None:
         """Its mode has been entered; it may be armed or not."""
 
+    def end(self) -> None:
+        """Its mode has been left."""
+
     def step(self, dt_s: float) -> Demand:
         """What the body is to do now. Asked only while armed."""
         raise NotImplementedError
@@ -41,7 +44,7 @@ class Maneuver:
                     return Drive(0.0)
         return self.reach(point, yaw_rad=self.autopilot.body.yaw_rad)
 
-    def reach(self, point: Point, *, yaw_rad: float | None = None, through: bool = False) -> Reach:
+    def reach(self, point: Point, *, yaw_rad: float | None = None) -> Reach:
         """Go to a point at the speed that is set."""
         tuning = self.autopilot.tuning
         return Reach(
@@ -50,7 +53,5 @@ class Maneuver:
             tuning.climb_mps,
             tuning.descent_mps,
             yaw_rad,
-            tuning.loiter_radius_m,
             self.autopilot.modes.reverse,
-            through,
         )

@@ -12,7 +12,7 @@ WAIT_S = 5.0
 
 
 class ReturnToLaunch(Maneuver):
-    """Home."""
+    """Home. `arrived`: it is there, or above."""
 
     def begin(self) -> None:
         """At which height, is decided once."""
@@ -26,7 +26,7 @@ class ReturnToLaunch(Maneuver):
         self._above_home = home.at_height(up_m)
         self._climb_to: Point | None = pilot.position.at_height(up_m)
         self._waited_s = 0.0
-        self._arrived = False
+        self.arrived = False
         if pilot.body.on_ground and pilot.spec.kind is Kind.COPTER and pilot.arming.armed:
             pilot.arming.disarm_after_landing()
 
@@ -39,10 +39,10 @@ class ReturnToLaunch(Maneuver):
             case Kind.PLANE:
                 return self.stay(self._above_home)
         near_m = max(pilot.tuning.acceptance_m, CLOSE_M)
-        if not self._arrived and pilot.position.distance_m(self._above_home) <= near_m:
-            self._arrived = True
+        if not self.arrived and pilot.position.distance_m(self._above_home) <= near_m:
+            self.arrived = True
             pilot.say("Reached destination")
-        return self.stay(self._above_home) if self._arrived else self.reach(self._above_home)
+        return self.stay(self._above_home) if self.arrived else self.reach(self._above_home)
 
     def _copter(self, dt_s: float) -> Demand:
         pilot = self.autopilot
@@ -53,10 +53,10 @@ class ReturnToLaunch(Maneuver):
             if self._climb_to.up_m - pilot.body.up_m > CLOSE_M:
                 return self.reach(self._climb_to, yaw_rad=pilot.body.yaw_rad)
             self._climb_to = None
-        if not self._arrived:
+        if not self.arrived:
             if pilot.position.distance_m(self._above_home) > CLOSE_M:
                 return self.reach(self._above_home)
-            self._arrived = True
+            self.arrived = True
         self._waited_s += dt_s
         if self._waited_s < WAIT_S:
             return self.reach(self._above_home, yaw_rad=pilot.body.yaw_rad)
