@@ -1,7 +1,6 @@
 """A scripted vehicle that MAVSDK hears over UDP, and what is around it."""
 
 import asyncio
-import logging
 import socket
 import threading
 import time
@@ -10,13 +9,13 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
-from m2pem_plugin_mavlink.mavsdk_driver.ground_station import GroundStation
+from m2pem_plugin_mavlink.mavsdk_driver.link import MavsdkLink
+from m2pem_plugin_mavlink.mavsdk_driver.opening import open_mavsdk_link
 from m2pem_plugin_mavlink.protocol.messages import Address
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 GROUND = Address(255, 190)
 ONE = Address(1, 1)
-LOGGER = logging.getLogger("test-mavsdk")
 
 
 class WallClock:
@@ -98,13 +97,15 @@ async def scripted(port: int, system: int = 1) -> AsyncIterator[Scripted]:
 
 
 @asynccontextmanager
-async def stationed(url: str) -> AsyncIterator[GroundStation]:
-    station = GroundStation(url, GROUND, WallClock(), LOGGER)
-    await station.open()
+async def linked(url: str, *addresses: Address) -> AsyncIterator[list[MavsdkLink]]:
+    links: list[MavsdkLink] = []
     try:
-        yield station
+        for address in addresses or (ONE,):
+            links.append(await open_mavsdk_link(address, [url], WallClock(), GROUND))
+        yield links
     finally:
-        await station.close()
+        for link in links:
+            await link.close()
 
 
 async def until(true: Callable[[], bool], within_s: float = 10.0) -> None:

@@ -48,14 +48,13 @@ def test_an_import_error_of_something_else_is_not_blamed_on_it(monkeypatch):
 
 
 async def test_its_log_is_handed_to_the_loop_at_the_right_level(caplog):
-    logger = logging.getLogger("somewhere")
-    caplog.set_level(logging.DEBUG, logger.name)
-    library.read_log(logger)
+    caplog.set_level(logging.DEBUG, library.__name__)
+    library.read_log()
     try:
         assert await asyncio.to_thread(library._take, 2, "a warning", None, 0)
         assert await asyncio.to_thread(library._take, 1, "an info", None, 0)
     finally:
-        library.leave_log(logger)
+        library.leave_log()
     library._take(3, "nobody reads this", None, 0)
     await asyncio.sleep(0)
     assert [(each.levelname, each.message) for each in caplog.records] == [

@@ -6,11 +6,12 @@ import threading
 import pytest
 from m2pem_plugin_mavlink.protocol.messages import Address, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
+    ExchangeError,
     NoAnswerError,
     RefusedError,
     Transaction,
 )
-from mavlink_mavsdk_world import GROUND, ONE, free_port, scripted, stationed, until
+from mavlink_mavsdk_world import GROUND, free_port, linked, scripted, until
 
 ACK = message_type("COMMAND_ACK")
 COMMAND = message_type("COMMAND_LONG")
@@ -24,8 +25,7 @@ PING = message_type("PING")
 async def world():
     """A link that is attached, and its vehicle."""
     port = free_port()
-    async with stationed(f"udpin://127.0.0.1:{port}") as station, scripted(port) as vehicle:
-        link = station.link(ONE)
+    async with linked(f"udpin://127.0.0.1:{port}") as (link,), scripted(port) as vehicle:
         await until(lambda: link.attached)
         yield link, vehicle
 
@@ -73,8 +73,7 @@ async def test_what_is_sent_arrives_in_its_order_and_from_us(world):
 
 async def test_before_the_vehicle_is_heard_nothing_is_sent_or_performed():
     port = free_port()
-    async with stationed(f"udpin://127.0.0.1:{port}") as station:
-        link = station.link(ONE)
+    async with linked(f"udpin://127.0.0.1:{port}") as (link,):
         link.send(PING.make())
         with pytest.raises(NoAnswerError, match="system 1 was not heard yet"):
             await link.perform(Ask())
@@ -166,3 +165,16 @@ async def test_a_silent_vehicle_ends_an_exchange_by_its_own_deadline(world):
     ask = Ask(within_s=0.3)
     with pytest.raises(NoAnswerError, match="no answer"):
         await link.perform(ask)
+
+
+async def test_an_exchange_fails_when_the_link_is_closed(world):
+    link, vehicle = world
+    vehicle.answers.clear()
+    asking = asyncio.create_task(link.perform(Ask()))
+    await vehicle.hears(lambda each: getattr(each, "command", None) == 400)
+    await link.close()
+    for attempt in (asking, link.perform(Ask())):
+        with pytest.raises(ExchangeError, match="the link was closed"):
+            await attempt
+    link.send(PING.make())
+    assert not link.calls.pending

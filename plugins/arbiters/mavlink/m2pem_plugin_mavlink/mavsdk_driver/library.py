@@ -1,8 +1,10 @@
 """The package mavsdk: whether it is there, and where its log goes."""
 
 import asyncio
+import contextlib
 import importlib
 import logging
+from collections import Counter
 from importlib.metadata import PackageNotFoundError, version
 from types import ModuleType
 
@@ -13,7 +15,8 @@ INSTALL = "pip install 'm2pem-plugin-mavlink[mavsdk]'"
 _LEVELS = (logging.DEBUG, logging.DEBUG, logging.WARNING, logging.ERROR)
 """Of its levels debug, info, warning and error; its info is of interest to its makers."""
 
-_readers: dict[logging.Logger, asyncio.AbstractEventLoop] = {}
+_readers: Counter[asyncio.AbstractEventLoop] = Counter()
+_logger = logging.getLogger(__name__)
 
 
 def require(module: str = "mavsdk.asyncio") -> ModuleType:
@@ -57,24 +60,26 @@ def reason(error: Exception) -> str:
     return str(error) if result is None else result.name.lower().replace("_", " ")
 
 
-def read_log(logger: logging.Logger) -> None:
-    """From now on its log goes to this logger, in this event loop, and not to the terminal."""
-    log = require("mavsdk.logging")
+def read_log() -> None:
+    """From now on its log goes to the logger of this module, in this event loop, and no more to the
+    terminal; to be undone by `leave_log`."""
     if not _readers:
-        log.log_subscribe(_take)
-    _readers[logger] = asyncio.get_running_loop()
+        require("mavsdk.logging").log_subscribe(_take)
+    _readers[asyncio.get_running_loop()] += 1
 
 
-def leave_log(logger: logging.Logger) -> None:
-    """Its log goes to this logger no more."""
-    _readers.pop(logger, None)
+def leave_log() -> None:
+    """Undo one `read_log`."""
+    loop = asyncio.get_running_loop()
+    _readers[loop] -= 1
+    if not _readers[loop]:
+        del _readers[loop]
 
 
 def _take(level: int, message: str, file: str | None, line: int) -> bool:
     # Called in MAVSDK's threads: logging there would make threads of Python of them.
-    for logger, loop in tuple(_readers.items()):
-        try:
-            loop.call_soon_threadsafe(logger.log, _LEVELS[level], "MAVSDK: %s", message)
-        except RuntimeError:  # the loop is closed
-            _readers.pop(logger, None)
+    for loop in tuple(_readers):
+        with contextlib.suppress(RuntimeError):  # the loop is closed
+            loop.call_soon_threadsafe(_logger.log, _LEVELS[level], "MAVSDK: %s", message)
+            break
     return True

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import logging
 from collections import deque
-from collections.abc import Callable, Coroutine, Iterable
+from collections.abc import Awaitable, Callable, Coroutine, Iterable
 from typing import Any, TypeAlias, TypeVar
 
 from m2pem.api import Clock
@@ -16,13 +16,15 @@ from m2pem_plugin_mavlink.mavsdk_driver.calls import Calls
 from m2pem_plugin_mavlink.mavsdk_driver.missions import carried
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type, types_by_id
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
-from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError, Transaction
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, Transaction
 
 T = TypeVar("T")
 
 _Call: TypeAlias = Callable[[Any], Coroutine[Any, Any, Any]]
 
 US_PER_S = 1_000_000
+_logger = logging.getLogger(__name__)
+
 UNSENT = 50
 """So many messages wait to be sent; of more, the oldest are dropped."""
 
@@ -31,24 +33,29 @@ _COMMANDS = frozenset({_COMMAND_LONG, message_type("COMMAND_INT")})
 
 
 class MavsdkLink:
-    """The link of a vehicle, from when MAVSDK has found its system id (`attach`) to `close`.
+    """The link of a vehicle, from when MAVSDK has found its system id (`attach`) to `close`, which
+    calls `leave` at last.
 
     What is sent before that is dropped. Commands and missions are carried by MAVSDK, with its own
     ways of asking again. Messages are handed to listeners in the event loop.
     """
 
-    def __init__(self, address: Address, clock: Clock, logger: logging.Logger) -> None:
+    def __init__(
+        self, address: Address, clock: Clock, leave: Callable[[], Awaitable[None]]
+    ) -> None:
         self.address = address
         self.calls = Calls()
         self.missions: Any = None
         self._direct: Any = None
         self._clock = clock
-        self._logger = logger
+        self._leave = leave
+        self._closed = False
         self._listeners: dict[int, list[Listener]] = {}
         self._readers: dict[int, asyncio.Task[None]] = {}
         self._unsent: deque[Message] = deque(maxlen=UNSENT)
         self._sender: asyncio.Task[None] | None = None
         self._carrying: dict[str, asyncio.Task[None]] = {}
+        self._exchanges: set[Exchange] = set()
         self._turns = Turns()
 
     # --- life -----------------------------------------------------------------------------------
@@ -66,7 +73,12 @@ class MavsdkLink:
             self._read(id_)
 
     async def close(self) -> None:
-        """Listen no more, and let what is on its way come back."""
+        """Listen no more, and let what is on its way come back. Exchanges fail."""
+        if self._closed:
+            return
+        self._closed = True
+        for exchange in list(self._exchanges):
+            exchange.abort(ExchangeError("the link was closed"))
         tasks = [*self._readers.values(), *self._carrying.values()]
         if self._sender is not None:
             tasks.append(self._sender)
@@ -75,8 +87,11 @@ class MavsdkLink:
         await asyncio.gather(*tasks, return_exceptions=True)
         self._readers.clear()
         self._listeners.clear()
-        if not self.attached:
-            return
+        if self.attached:
+            await self._let_go()
+        await self._leave()
+
+    async def _let_go(self) -> None:
         if self.calls.pending:
             for cancel in (
                 self.missions.cancel_mission_upload,
@@ -96,7 +111,7 @@ class MavsdkLink:
 
     def send(self, message: Message) -> None:
         """See `VehicleLink.send`. A command that MAVSDK is still sending is not sent twice."""
-        if not self.attached:
+        if self._closed or not self.attached:
             return
         if message.TYPE in _COMMANDS:
             self._carry(message)
@@ -123,10 +138,17 @@ class MavsdkLink:
     async def perform(self, transaction: Transaction[T]) -> T:
         """See `VehicleLink.perform`."""
         async with self._turns.turn(transaction.key):
+            if self._closed:
+                raise ExchangeError("the link was closed")
             if not self.attached:
                 raise NoAnswerError(f"system {self.address.system} was not heard yet")
             if not await carried(self, transaction):
-                await Exchange(transaction, self, self._clock).run()
+                exchange = Exchange(transaction, self, self._clock)
+                self._exchanges.add(exchange)
+                try:
+                    await exchange.run()
+                finally:
+                    self._exchanges.discard(exchange)
         return transaction.outcome()
 
     def quality(self) -> LinkQuality | None:
@@ -149,7 +171,7 @@ class MavsdkLink:
                 try:
                     message = json_fields.read(type_, each.fields_json)
                 except (TypeError, ValueError) as error:
-                    self._logger.debug("MAVSDK handed over a %s: %s", type_.name, error)
+                    _logger.debug("MAVSDK handed over a %s: %s", type_.name, error)
                     continue
                 sender = Address(each.system_id, each.component_id)
                 for listener in tuple(listeners):
@@ -181,7 +203,7 @@ class MavsdkLink:
         try:
             await self.calls.make(call(wrapped))
         except library.failure() as error:
-            self._logger.debug("MAVSDK: %s: %s", name, library.reason(error))
+            _logger.debug("MAVSDK: %s: %s", name, library.reason(error))
 
 
 def _begin(work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":

@@ -1,37 +1,34 @@
-"""A ground station that MAVSDK runs, over real UDP."""
+"""Links that share a ground station of MAVSDK, over real UDP."""
 
 import asyncio
 import socket
 
 import pytest
+from m2pem_plugin_mavlink.mavsdk_driver.opening import open_mavsdk_link
 from m2pem_plugin_mavlink.protocol.messages import Address, message_type
 from mavlink_mavsdk_world import (
     GROUND,
     ONE,
     free_port,
+    linked,
     native_threads,
     open_files,
     scripted,
-    stationed,
     until,
 )
 
 from m2pem.errors import PluginError
 
-HEARTBEAT = message_type("HEARTBEAT").id
 COMMAND = message_type("COMMAND_LONG")
+HEARTBEAT = message_type("HEARTBEAT").id
 TEXT = message_type("STATUSTEXT")
 
 
-async def test_each_vehicle_of_a_station_hears_its_own():
+async def test_each_vehicle_at_a_url_hears_its_own_and_they_share_mavsdk():
     port, heard = free_port(), {1: set(), 7: set()}
-    async with (
-        stationed(f"udpin://127.0.0.1:{port}") as station,
-        scripted(port, 1),
-        scripted(port, 7),
-    ):
-        for system, senders in heard.items():
-            link = station.link(Address(system, 1))
+    url, addresses = f"udpin://127.0.0.1:{port}", [Address(system, 1) for system in heard]
+    async with linked(url, *addresses) as links, scripted(port, 1), scripted(port, 7):
+        for link, senders in zip(links, heard.values(), strict=True):
             link.listen((HEARTBEAT,), lambda _, sender, to=senders: to.add(sender))
         await until(lambda: all(heard.values()))
         await asyncio.sleep(0.2)
@@ -40,15 +37,20 @@ async def test_each_vehicle_of_a_station_hears_its_own():
 
 async def test_a_vehicle_that_was_heard_before_anybody_asked_for_it_is_reached():
     port, heard = free_port(), []
-    async with stationed(f"udpin://127.0.0.1:{port}") as station, scripted(port):
-        await until(lambda: bool(station._systems))
-        station.link(ONE).listen((HEARTBEAT,), lambda *each: heard.append(each))
-        await until(lambda: bool(heard))
+    url = f"udpin://127.0.0.1:{port}"
+    async with linked(url) as (first,), scripted(port):
+        await until(lambda: first.attached)
+        async with linked(url) as (second,):
+            second.listen((HEARTBEAT,), lambda *each: heard.append(each))
+            await until(lambda: bool(heard))
+        first.listen((HEARTBEAT,), lambda *each: heard.append(each))
+        before = len(heard)
+        await until(lambda: len(heard) > before)  # the first goes on without the second
 
 
 async def test_it_sends_heartbeats_of_a_ground_station():
     port = free_port()
-    async with stationed(f"udpin://127.0.0.1:{port}"), scripted(port) as vehicle:
+    async with linked(f"udpin://127.0.0.1:{port}"), scripted(port) as vehicle:
         beat = await vehicle.hears(lambda each: each.get_type() == "HEARTBEAT")
     assert (beat.get_srcSystem(), beat.get_srcComponent(), beat.type) == (*GROUND, 6)
 
@@ -56,8 +58,7 @@ async def test_it_sends_heartbeats_of_a_ground_station():
 async def test_no_thread_and_no_socket_is_left_after_close():
     async def once():
         port = free_port()
-        async with stationed(f"udpin://127.0.0.1:{port}") as station, scripted(port) as vehicle:
-            link = station.link(ONE)
+        async with linked(f"udpin://127.0.0.1:{port}") as (link,), scripted(port) as vehicle:
             link.listen((HEARTBEAT, TEXT.id), lambda *_: None)
             await until(lambda: link.attached)
             link.send(TEXT.make(text=b"hello"))
@@ -72,9 +73,8 @@ async def test_no_thread_and_no_socket_is_left_after_close():
 
 async def test_closing_waits_for_a_command_that_is_on_its_way():
     port = free_port()
-    async with stationed(f"udpin://127.0.0.1:{port}") as station, scripted(port) as vehicle:
+    async with linked(f"udpin://127.0.0.1:{port}") as (link,), scripted(port) as vehicle:
         vehicle.answers.clear()  # it says nothing
-        link = station.link(ONE)
         await until(lambda: link.attached)
         link.send(COMMAND.make(target_system=1, target_component=1, command=400))
         await vehicle.hears(lambda each: getattr(each, "command", None) == 400)
@@ -84,8 +84,8 @@ async def test_closing_waits_for_a_command_that_is_on_its_way():
 
 async def test_its_log_does_not_go_to_the_terminal(capfd):
     port = free_port()
-    async with stationed(f"udpin://127.0.0.1:{port}") as station, scripted(port):
-        await until(lambda: station.link(ONE).attached)
+    async with linked(f"udpin://127.0.0.1:{port}") as (link,), scripted(port):
+        await until(lambda: link.attached)
     assert capfd.readouterr() == ("", "")
 
 
@@ -94,20 +94,22 @@ async def test_a_port_that_is_taken_is_an_error_that_says_so():
         other.bind(("127.0.0.1", 0))
         url = f"udpin://127.0.0.1:{other.getsockname()[1]}"
         with pytest.raises(PluginError, match=f"{url}: cannot listen there: Address"):
-            async with stationed(url):
-                pass
+            await open_mavsdk_link(ONE, [url], None)
 
 
 async def test_what_mavsdk_cannot_open_is_an_error_and_leaves_nothing():
     url, before = "serial:///dev/nothing-is-here:57600", native_threads()
-    with pytest.raises(PluginError, match=f"{url}: MAVSDK cannot open it: Connection failed: "):
-        async with stationed(url):
-            pass
+    for _ in range(2):
+        with pytest.raises(PluginError, match=f"{url}: MAVSDK cannot open it: Connection failed: "):
+            await open_mavsdk_link(ONE, [url], None)
     assert native_threads() == before
 
 
-def test_a_url_that_is_wrong_is_not_even_tried():
-    from m2pem_plugin_mavlink.mavsdk_driver.ground_station import GroundStation
-
+async def test_a_url_that_is_wrong_is_not_even_tried():
     with pytest.raises(PluginError, match="did you mean udpin://"):
-        GroundStation("udp://127.0.0.1:14550", GROUND, None, None)
+        await open_mavsdk_link(ONE, ["udp://127.0.0.1:14550"], None)
+
+
+async def test_there_is_one_url():
+    with pytest.raises(PluginError, match="`driver: mavsdk` takes one URL, and has 2"):
+        await open_mavsdk_link(ONE, ["udpin://127.0.0.1:1", "udpin://127.0.0.1:2"], None)
