@@ -155,11 +155,10 @@ class MavlinkArbiter:
             if area is not None:
                 self._fences[resource] = fences.setdefault(id(area), Fence(area))
             self._tasks.append(create(self._attend(resource)))
-        waits = [vehicle.identified(HEARD_WITHIN_S) for vehicle in vehicles.values()]
-        heard = await asyncio.gather(*waits)
+        heard = await asyncio.gather(*(helm.knows(HEARD_WITHIN_S) for helm in self._helms.values()))
         for resource, is_heard in zip(vehicles, heard, strict=True):
             if not is_heard:
-                self._context.logger.warning("%s: not heard yet", resource)
+                self._context.logger.warning("%s: where it is was not heard yet", resource)
 
     async def close(self) -> None:
         """Listen no more. Vehicles keep doing what they do."""
@@ -283,14 +282,14 @@ class MavlinkArbiter:
         )
         from m2pem_plugin_mavlink.protocol.transaction import ExchangeError  # noqa: PLC0415
 
-        vehicle = self._helms[kept.resource].vehicle
+        helm = self._helms[kept.resource]
+        vehicle = helm.vehicle
         unknown = BehaviorReport(id_, 0, BehaviorState.UNKNOWN, native_ref=reference)
         if kept.behavior not in BEHAVIORS:
             return replace(unknown, reason=f"there is no behavior '{kept.behavior}' any more")
-        if not await vehicle.identified(HEARD_WITHIN_S):
-            return replace(unknown, reason=f"{kept.resource} is not heard")
+        if not await helm.knows(HEARD_WITHIN_S):
+            return replace(unknown, reason=f"where {kept.resource} is was not heard")
         try:
-            await vehicle.until(lambda: vehicle.heard.position is not None, HEARD_WITHIN_S)
             behavior = self._make(kept)
             behavior.recall(kept.memory)
             state = await behavior.recognised()
@@ -298,7 +297,7 @@ class MavlinkArbiter:
             return replace(unknown, reason=str(error))
         if state is BehaviorState.RUNNING:
             self._ledger.adopt(id_, [kept.resource], reference)
-            self._helms[kept.resource].adopt(id_, behavior)
+            helm.adopt(id_, behavior)
             return self._ledger.last(id_)
         if state is BehaviorState.SUCCEEDED:
             return replace(unknown, number=3, state=state)

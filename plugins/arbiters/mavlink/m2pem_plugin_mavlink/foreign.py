@@ -29,7 +29,8 @@ TEXTS_BEFORE_S = 3.0
 
 _FAILSAFE = re.compile(
     r"failsafe|fail-safe|fence|battery.*(low|critical|emergency)|low battery|EKF variance|"
-    r"glitch|crash|terrain data|dead reckon|vibration",
+    r"glitch|crash|terrain data|dead reckon|vibration|"
+    r"(link|connection|control|signal|position).*lost",
     re.IGNORECASE,
 )
 _PILOT = re.compile(r"pilot took over|manual control|sticks|RC override|taking over", re.IGNORECASE)

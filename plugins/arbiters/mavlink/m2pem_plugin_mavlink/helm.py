@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from m2pem.api import BehaviorId, BehaviorState, Ledger, Limits
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError
 from m2pem_plugin_mavlink.behaviors.flight import SetSpeed
-from m2pem_plugin_mavlink.behaviors.looking import modes_of
+from m2pem_plugin_mavlink.behaviors.looking import modes_of, on_the_ground
 from m2pem_plugin_mavlink.foreign import Cause, TakeoverWatch
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
@@ -21,7 +21,7 @@ from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 LOOK_EVERY_S = 0.2
 """So often is a behavior asked whether it is finished."""
 
-IDENTIFIED_WITHIN_S = 3.0
+KNOWN_WITHIN_S = 5.0
 STOP_SHARE = 0.8
 """Of the time in which a cancelled vehicle must be free: a stop that takes longer has failed."""
 
@@ -65,6 +65,14 @@ class Helm:
     def behavior(self) -> str:
         """The name of what it does now, or ""."""
         return self._flight.behavior.name if self._flight is not None else ""
+
+    async def knows(self, within_s: float) -> bool:
+        """Wait until it is known what the vehicle is, where it is and whether it flies; False: it
+        was not within so many seconds."""
+        heard = self.vehicle.heard
+        return await self.vehicle.identified(within_s) and await self.vehicle.until(
+            lambda: heard.position is not None and heard.landed is not None, within_s
+        )
 
     # --- what may be asked ----------------------------------------------------------------------
 
@@ -146,7 +154,7 @@ class Helm:
         self, flight: _Flight, before: Behavior | None = None, look_first: bool = False
     ) -> None:
         try:
-            await self._identified()
+            await self._heard()
             if before is not None:
                 await self._make_way(before, flight.behavior)
             if look_first and await flight.behavior.recognised() is BehaviorState.RUNNING:
@@ -169,9 +177,11 @@ class Helm:
                 self.cruise_m_s = flight.behavior.speed_m_s
             self._over(flight, BehaviorState.SUCCEEDED)
 
-    async def _identified(self) -> None:
-        while not await self.vehicle.identified(IDENTIFIED_WITHIN_S):
-            pass  # one that is never heard is LOST
+    async def _heard(self) -> None:
+        """Wait for a vehicle that was not heard yet; one that is never heard is LOST. One that
+        knows no position yet is asked all the same: its driver says why it is not ready."""
+        if not await self.knows(KNOWN_WITHIN_S):
+            await self.vehicle.until(lambda: self.vehicle.identity is not None)
 
     async def _make_way(self, before: Behavior, after: Behavior) -> None:
         """What takes over without steering must not let the old motion go on."""
@@ -213,7 +223,9 @@ class Helm:
         try:
             await self._stop()
             while flight is not None:
-                self._look(_HELD)
+                # One that is held before it has left the ground disarms itself after a while.
+                if not on_the_ground(self.vehicle):
+                    self._look(_HELD)
                 await self.vehicle.sleep(LOOK_EVERY_S)
         except _TakenOverError as error:
             if flight is not None:

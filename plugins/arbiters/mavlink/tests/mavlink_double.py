@@ -285,7 +285,7 @@ class DoubleVehicle:
     def __init__(self, resource: ResourceId, body: Body, clock) -> None:
         self.resource, self.body, self.domain = resource, body, body.domain
         kind = Kind.COPTER if body.domain == "air" else Kind.ROVER
-        self.identity = Identity(body.firmware, kind)
+        self._is = Identity(body.firmware, kind)
         self.link = DoubleLink(clock)
         self.heard, self.ours = Heard(), Ours()
         self.driver = DoubleDriver(self)
@@ -314,6 +314,10 @@ class DoubleVehicle:
         self._waiters.look()
         for watcher in tuple(self._watchers):
             watcher()
+
+    @property
+    def identity(self) -> Identity | None:
+        return None if self.heard.at_s is None else self._is
 
     @property
     def silent_s(self) -> float | None:

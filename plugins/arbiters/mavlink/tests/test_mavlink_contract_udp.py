@@ -6,16 +6,20 @@ import threading
 import pytest
 
 from m2pem.api import Connection, Point, ResourceId
+from m2pem.executive.clock import SystemClock
 from m2pem.testing import ArbiterCase, ArbiterContract
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
+from m2pem_plugin_mavlink.link.routed_link import open_link
 from m2pem_plugin_mavlink.plane import offset
+from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.sim.geometry import Location
 from m2pem_plugin_mavlink.sim.simulator import Simulator
 from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 A, B = ResourceId("a"), ResourceId("b")
 HOME = (47.397742, 8.545594)
-SPEED = 10.0
+SPEED = 20.0
 
 
 def at(east: float, north: float) -> tuple[float, float]:
@@ -63,7 +67,7 @@ class _Simulated(ArbiterContract):
         loop.close()
 
     async def prepare(self, simulator) -> None:
-        pass
+        """Have the vehicles ready to move."""
 
     @pytest.fixture
     def make_arbiter(self, simulator):
@@ -101,8 +105,46 @@ class _Simulated(ArbiterContract):
             long=("goto", {"target": Point((*at(400.0, 0.0), None)), "speed": 4.0}),
             short=("goto", {"target": Point((*at(20.0, 20.0), None)), "speed": 4.0}),
             bad=("speed", -1.0),
+            short_s=25.0,
         )
 
 
 class TestSimulatedRovers(_Simulated):
     pass
+
+
+class TestSimulatedCoptersTakingOff(_Simulated):
+    kind = Kind.COPTER
+    domain = "air"
+
+    @pytest.fixture
+    def case(self):
+        return ArbiterCase(
+            vehicle=A,
+            other=B,
+            long=("takeoff", {"altitude": 150.0}),
+            short=("takeoff", {"altitude": 6.0}),
+            bad=("altitude", "high"),
+            short_s=25.0,
+        )
+
+
+class TestSimulatedCopters(_Simulated):
+    kind = Kind.COPTER
+    domain = "air"
+
+    async def prepare(self, simulator) -> None:
+        await asyncio.gather(*(take_off(simulator[number], number) for number in (1, 2)))
+
+
+async def take_off(truth, number: int) -> None:
+    host, port = truth.address
+    clock = SystemClock(SPEED)
+    link = await open_link(Address(number, 1), [f"udpout://{host}:{port}"], clock)
+    vehicle = Vehicle(ResourceId("v"), "air", link, clock)
+    vehicle.open()
+    assert await vehicle.identified(20.0)
+    await vehicle.driver.take_off(10.0)
+    assert await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0.0) > 9.5, 60.0)
+    await vehicle.close()
+    await link.close()

@@ -221,3 +221,18 @@ def test_a_reference_of_somebody_else_is_not_known(reference) -> None:
         assert bench.told == []
 
     play(Body().fly(), main)
+
+
+def test_what_is_held_on_the_ground_and_disarms_itself_takes_off_after_the_hold() -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "takeoff", V, altitude=20.0)
+        await bench.running("r1.b1")
+        await bench.arbiter.hold(V)
+        await bench.clock.sleep(1)
+        bench.body.up, bench.body.armed = 0.0, False
+        await bench.clock.sleep(20)
+        assert bench.states_of("r1.b1")[-1] is RUNNING
+        await bench.arbiter.resume(V)
+        assert (await bench.ended("r1.b1", 60)).state is BehaviorState.SUCCEEDED
+
+    play(Body(), main)

@@ -8,6 +8,7 @@ from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from mavlink_vehicle_world import (
+    ACCEPTED,
     DENIED,
     UAV1,
     Playing,
@@ -65,6 +66,20 @@ def test_others_are_not_taken_for_it(virtual: Run, sender: Address, fields: Any)
         await vehicle.close()
 
     virtual(main)
+
+
+def test_an_autopilot_that_cannot_be_driven_is_told_of_once(
+    virtual: Run, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        vehicle.open()
+        for _ in range(3):
+            link.hear(make("HEARTBEAT", autopilot=8, type=6))
+        await vehicle.close()
+
+    virtual(main)
+    assert caplog.text.count("system id 1 is no vehicle with ArduPilot or PX4") == 1
 
 
 def test_a_second_vehicle_with_the_same_id_is_told_of(
@@ -210,6 +225,30 @@ def test_what_is_refused_is_not_asked_for_again_and_what_is_not_answered_is(virt
             await vehicle.sleep(60.0)
             assert (times[refused], times[lost]) == (1, 8)
             assert vehicle.heard.home is not None
+
+    virtual(main)
+
+
+def test_a_home_that_is_not_streamed_is_asked_for_until_it_is_told(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        home, grant = link.says.pop("HOME_POSITION"), link.obey[SET_INTERVAL]
+        refused = dialect.MAVLINK_MSG_ID_HOME_POSITION
+        link.obey[SET_INTERVAL] = lambda each: DENIED if each.param1 == refused else grant(each)
+        asked: list[Any] = []
+
+        def tell(message: Any) -> int:
+            asked.append(message)
+            if len(asked) < 3:
+                return DENIED  # it has none yet
+            link.hear(make("HOME_POSITION", **home))
+            return ACCEPTED
+
+        link.obey[dialect.MAV_CMD_REQUEST_MESSAGE] = tell
+        async with Playing((link, vehicle)):
+            assert await vehicle.until(lambda: vehicle.heard.home is not None, 30.0)
+            await vehicle.sleep(30.0)
+            assert [each.param1 for each in asked] == [refused] * 3
 
     virtual(main)
 

@@ -4,9 +4,6 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 import pytest
-
-from m2pem.api import LinkState, ResourceId
-from m2pem.executive.clock import SystemClock
 from m2pem_plugin_mavlink.foreign import Cause, TakeoverWatch
 from m2pem_plugin_mavlink.link.routed_link import open_link
 from m2pem_plugin_mavlink.protocol.messages import Address
@@ -15,6 +12,9 @@ from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
 from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+from m2pem.api import LinkState, ResourceId
+from m2pem.executive.clock import SystemClock
 
 SPEED = 20.0
 OWN = Address(245, 190)
@@ -55,7 +55,7 @@ async def test_a_copter_waits_for_its_estimator_takes_off_goes_and_returns() -> 
         assert truth.location.latitude_deg == pytest.approx(47.3982, abs=1e-5)
         await driver.return_home()
         assert await vehicle.until(lambda: vehicle.heard.armed is False, 120.0)
-        assert vehicle.heard.landed is True
+        assert await vehicle.until(lambda: vehicle.heard.landed is True, 2.0)
 
 
 async def test_a_copter_stands_soon_after_a_stop() -> None:

@@ -81,6 +81,11 @@ async def message_interval(link: VehicleLink, message_id: int, interval_s: float
     )
 
 
+async def request_message(link: VehicleLink, message_id: int) -> None:
+    """Have a message sent once."""
+    await command(link, dialect.MAV_CMD_REQUEST_MESSAGE, float(message_id))
+
+
 async def upload(link: VehicleLink, items: Sequence[MissionItem]) -> None:
     """Store a mission, as it is to be stored."""
     raise NotImplementedError

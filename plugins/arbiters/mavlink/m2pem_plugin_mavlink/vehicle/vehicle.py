@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import math
 from collections.abc import Callable, Coroutine
 from typing import Any
 
@@ -24,6 +25,10 @@ from m2pem_plugin_mavlink.vehicle.waiters import Waiters
 
 _HEARTBEAT = message_type("HEARTBEAT").id
 _STATUSTEXT = message_type("STATUSTEXT").id
+_HOME = message_type("HOME_POSITION").id
+
+HOME_EVERY_S = 5.0
+"""A home position that is not sent by itself is asked for so often, until it is there."""
 
 __all__ = ["Heard", "Vehicle"]
 
@@ -64,6 +69,8 @@ class Vehicle:
         self._tasks: set[asyncio.Task[None]] = set()
         self._asking = False
         self._boots = 0
+        self._stranger = False
+        self._home_asked_s = -math.inf
 
     # --- life -----------------------------------------------------------------------------------
 
@@ -165,6 +172,7 @@ class Vehicle:
                 )  # fmt: skip
             return
         if found is None:
+            self._tell_of_stranger(message.autopilot, message.type)
             return
         self._logger.info("%s: %s, system id %d", self.resource, found, sender.system)
         self.identity = found
@@ -178,6 +186,14 @@ class Vehicle:
         self._intake = Intake(self.heard, modes_of(found), flies=flies)
         self._hear(message, sender)
         self._deafen.append(self.link.listen(self._intake.wants, self._hear))
+
+    def _tell_of_stranger(self, autopilot: int, type_: int) -> None:
+        if not self._stranger:
+            self._stranger = True
+            self._logger.warning(
+                "%s: system id %d is no vehicle with ArduPilot or PX4: autopilot %d, type %d",
+                self.resource, self.link.address.system, autopilot, type_,
+            )  # fmt: skip
 
     def _hear(self, message: Message, sender: Address) -> None:
         if sender != self.link.address or self._intake is None or self._streams is None:
@@ -221,9 +237,17 @@ class Vehicle:
         if self._asking:
             return
         due = self._streams.due(self.heard.messages_s, self.link.now_s())
+        now_s = self.link.now_s()
         if due:
             self._asking = True
             self._go(self._ask(self._streams, due))
+        elif (
+            _HOME in self._streams.refused
+            and self.heard.home is None
+            and now_s - self._home_asked_s >= HOME_EVERY_S
+        ):
+            self._home_asked_s, self._asking = now_s, True
+            self._go(self._ask_for_home())
 
     async def _ask(self, streams: Streams, due: list[int]) -> None:
         try:
@@ -239,6 +263,14 @@ class Vehicle:
                     self._logger.debug("%s: message %d: %s", self.resource, id_, error)
                 else:
                     streams.asked(id_, self.link.now_s())
+        finally:
+            self._asking = False
+
+    async def _ask_for_home(self) -> None:
+        try:
+            await exchanges.request_message(self.link, _HOME)
+        except ExchangeError as error:
+            self._logger.debug("%s: does not tell its home: %s", self.resource, error)
         finally:
             self._asking = False
 
