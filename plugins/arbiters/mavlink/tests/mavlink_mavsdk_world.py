@@ -120,5 +120,13 @@ def native_threads() -> int:
     return sum(1 for _ in Path("/proc/self/task").iterdir()) - own
 
 
+def threads_fall_to(number: int) -> bool:
+    """Whether no more than so many are left; those of executors take a moment to end."""
+    end_s = time.monotonic() + 2.0
+    while native_threads() > number and time.monotonic() < end_s:
+        time.sleep(0.01)
+    return native_threads() <= number
+
+
 def open_files() -> int:
     return sum(1 for _ in Path("/proc/self/fd").iterdir())
