@@ -77,6 +77,55 @@ def test_a_vehicle_that_does_not_become_ready_is_not_armed_and_says_why(virtual:
     virtual(main)
 
 
+def test_a_check_that_fails_in_a_mode_that_cannot_be_armed_is_no_obstacle(virtual: Run) -> None:
+    """A copter that was held on the ground is in BRAKE, disarms itself, and must take off."""
+
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        bit = 0x10000000
+        used = {
+            "onboard_control_sensors_present": bit,
+            "onboard_control_sensors_enabled": bit,
+            "battery_remaining": 90,
+        }
+        accept = link.obey[SET_MODE]
+
+        def obey(message: Any) -> int | None:
+            link.says["SYS_STATUS"] = {**used, "onboard_control_sensors_health": bit}
+            return accept(message)
+
+        link.custom_mode, link.says["SYS_STATUS"], link.obey[SET_MODE] = BRAKE, used, obey
+        async with Playing((link, vehicle)):
+            assert vehicle.state().ready is False
+            await vehicle.driver.arm()
+            assert (link.custom_mode, vehicle.heard.armed) == (GUIDED, True)
+
+    virtual(main)
+
+
+def test_a_vehicle_whose_checks_fail_is_made_to_say_why(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        bit = 0x10000000
+        link.says["SYS_STATUS"] = {
+            "onboard_control_sensors_present": bit,
+            "onboard_control_sensors_enabled": bit,
+            "battery_remaining": 90,
+        }
+
+        def say(_: Any) -> int:
+            link.say("PreArm: Compass not calibrated")
+            return ACCEPTED
+
+        link.obey[dialect.MAV_CMD_RUN_PREARM_CHECKS] = say
+        async with Playing((link, vehicle)):
+            with pytest.raises(RefusedError, match="not ready: prearm: Compass not calibrated"):
+                await vehicle.driver.arm()
+            assert ARM not in commands(link)
+
+    virtual(main)
+
+
 def test_guided_is_repeated_until_the_heartbeat_shows_it(virtual: Run) -> None:
     async def main(clock: Clock) -> None:
         async with Playing(copter(clock)) as (link, vehicle):

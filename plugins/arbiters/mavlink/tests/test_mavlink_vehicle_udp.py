@@ -58,6 +58,16 @@ async def test_a_copter_waits_for_its_estimator_takes_off_goes_and_returns() -> 
         assert await vehicle.until(lambda: vehicle.heard.landed is True, 2.0)
 
 
+async def test_a_takeoff_that_was_stopped_on_the_ground_can_be_begun_again() -> None:
+    async with flying() as (truth, vehicle):
+        await vehicle.driver.take_off(6.0)
+        await vehicle.driver.stop()
+        assert await vehicle.until(lambda: vehicle.heard.armed is False, 60.0)
+        assert truth.mode == "BRAKE"
+        await vehicle.driver.take_off(6.0)
+        assert await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0) > 5.0, 60.0)
+
+
 async def test_a_copter_stands_soon_after_a_stop() -> None:
     async with flying() as (truth, vehicle):
         await vehicle.driver.take_off(10.0)

@@ -1,14 +1,43 @@
-"""The items of a mission, as they are uploaded and downloaded (MISSION_ITEM_INT)."""
+"""The items of a mission, as they are uploaded and downloaded (mavlink.io, "Mission Protocol",
+services/mission.html): MISSION_ITEM_INT, and MISSION_ITEM from autopilots that know no better."""
 
 import math
 from dataclasses import dataclass
+from enum import IntEnum
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+
+ITEM_INT = message_type("MISSION_ITEM_INT")
+ITEM_FLOAT = message_type("MISSION_ITEM")
+
+_NO_FRAME: int = dialect.MAV_FRAME_MISSION
+_DEG_TO_1E7 = 1e7
+_SAME_FRAME: dict[int, int] = {
+    dialect.MAV_FRAME_GLOBAL_INT: dialect.MAV_FRAME_GLOBAL,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT: dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+}
+"""Frames that autopilots give back for others."""
+
+_GLOBAL = frozenset({*_SAME_FRAME, *_SAME_FRAME.values()})
+
+
+class MissionType(IntEnum):
+    """What is stored apart from each other: MAV_MISSION_TYPE."""
+
+    MISSION = dialect.MAV_MISSION_TYPE_MISSION
+    FENCE = dialect.MAV_MISSION_TYPE_FENCE
+    RALLY = dialect.MAV_MISSION_TYPE_RALLY
 
 
 @dataclass(frozen=True, slots=True)
 class MissionItem:
     """One item. `frame`: a MAV_FRAME; `command`: a MAV_CMD; `params`: its param1..param4, NaN for
     "as it is"; `latitude_deg`, `longitude_deg` (WGS-84), `altitude_m`: its x, y, z where it has a
-    place. `autocontinue`: go on by itself afterwards."""
+    place, and its param5..param7 as they are where `frame` is MAV_FRAME_MISSION. `autocontinue`: go
+    on by itself afterwards."""
 
     command: int
     frame: int
@@ -20,10 +49,69 @@ class MissionItem:
 
     def same_as(self, other: "MissionItem") -> bool:
         """Whether they say the same, but for what storing them may change: an autopilot keeps
-        coordinates in 1e-7 degrees and altitudes as floats of 32 or fewer bits."""
+        coordinates in 1e-7 degrees and altitudes as floats of 32 or fewer bits, and gives back a
+        frame that means the same."""
         return (
-            (self.command, self.frame) == (other.command, other.frame)
+            self.command == other.command
+            and _SAME_FRAME.get(self.frame, self.frame) == _SAME_FRAME.get(other.frame, other.frame)
             and abs(self.latitude_deg - other.latitude_deg) < 2.5e-7
             and abs(self.longitude_deg - other.longitude_deg) < 2.5e-7
             and math.isclose(self.altitude_m, other.altitude_m, rel_tol=1e-6, abs_tol=0.01)
         )
+
+    def problem(self) -> str:
+        """Why it cannot be uploaded; "" if it can."""
+        if not 0 <= self.command <= 0xFFFF:
+            return f"there is no command {self.command}"
+        if any(math.isinf(each) for each in self.params):
+            return "a parameter is infinite"
+        if not math.isfinite(self.altitude_m):
+            return f"altitude {self.altitude_m} m"
+        x, y = self.latitude_deg, self.longitude_deg
+        if self.frame in _GLOBAL:
+            sound = abs(x) <= 90.0 and abs(y) <= 180.0  # False for NaN
+            return "" if sound else f"there is no place {x}, {y}"
+        if self.frame != _NO_FRAME:
+            return f"frame {self.frame} is not a global one"
+        whole = math.isfinite(x) and math.isfinite(y) and max(abs(x), abs(y)) < 2**31
+        return "" if whole else f"param5 {x}, param6 {y}"
+
+
+def item_message(
+    item: MissionItem, sequence: int, target: Address, mission_type: MissionType
+) -> Message:
+    """MISSION_ITEM_INT. The first item of a mission is its current one: PX4 begins there, and some
+    ground stations insist on exactly one."""
+    scale = 1.0 if item.frame == _NO_FRAME else _DEG_TO_1E7
+    named = {f"param{number}": float(each) for number, each in enumerate(item.params, 1)}
+    message: Message = ITEM_INT.make(
+        **named,
+        x=round(item.latitude_deg * scale),
+        y=round(item.longitude_deg * scale),
+        z=item.altitude_m,
+        seq=sequence,
+        command=item.command,
+        target_system=target.system,
+        target_component=target.component,
+        frame=item.frame,
+        current=int(sequence == 0 and mission_type is MissionType.MISSION),
+        autocontinue=int(item.autocontinue),
+        mission_type=mission_type,
+    )
+    return message
+
+
+def item_of(message: Message) -> MissionItem:
+    """What a MISSION_ITEM_INT or MISSION_ITEM says. What it says need not make sense: see
+    `MissionItem.problem`."""
+    is_scaled = message.TYPE is ITEM_INT and message.frame != _NO_FRAME
+    scale = _DEG_TO_1E7 if is_scaled else 1.0
+    return MissionItem(
+        command=message.command,
+        frame=message.frame,
+        params=(message.param1, message.param2, message.param3, message.param4),
+        latitude_deg=message.x / scale,
+        longitude_deg=message.y / scale,
+        altitude_m=message.z,
+        autocontinue=bool(message.autocontinue),
+    )

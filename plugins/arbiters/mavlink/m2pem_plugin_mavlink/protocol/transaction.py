@@ -7,7 +7,7 @@ from its vehicle, and `expire` when `deadline_s` has passed; after each of them 
 
 from abc import ABC, abstractmethod
 from collections.abc import Hashable
-from typing import ClassVar, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
 
@@ -40,13 +40,15 @@ class Transaction(ABC, Generic[T]):
     """One exchange. It ends by `succeed` or `fail`, once; what comes after that changes nothing.
 
     `wants`: ids of the messages that it is to be handed. `key`: of two exchanges with the same key
-    with one vehicle, the second waits for the first to end.
+    with one vehicle, the second waits for the first to end. `source`: who we are, set by whoever
+    runs it, before `begin`; None: nobody else is there to be answered.
     """
 
-    wants: ClassVar[frozenset[int]]
+    wants: frozenset[int]
 
     def __init__(self, key: Hashable) -> None:
         self.key = key
+        self.source: Address | None = None
         self.outbox: list[Message] = []
         self.deadline_s: float | None = None
         self.done = False
@@ -64,6 +66,15 @@ class Transaction(ABC, Generic[T]):
     @abstractmethod
     def expire(self, now_s: float) -> None:
         """`deadline_s` has passed: ask again, or `fail`."""
+
+    def for_us(self, message: Message) -> bool:
+        """Whether it is addressed to us or to everybody, and not to another ground station
+        (mavlink.io, "Routing")."""
+        if self.source is None:
+            return True
+        system = getattr(message, "target_system", 0)
+        component = getattr(message, "target_component", 0)
+        return system in (0, self.source.system) and component in (0, self.source.component)
 
     def succeed(self, result: T) -> None:
         """It is done."""

@@ -13,16 +13,16 @@ from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Readiness
 from m2pem_plugin_mavlink.vehicle.identity import Identity, Kind
 from m2pem_plugin_mavlink.vehicle.modes import modes_of
-from m2pem_plugin_mavlink.vehicle.readiness import TEXTS_WITHIN_S, readiness
+from m2pem_plugin_mavlink.vehicle.readiness import TEXTS_WITHIN_S, readiness, unlocated
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
-READY_WITHIN_S = 90.0
+LOCATED_WITHIN_S = 90.0
 """An ArduPilot has a position some 41 s after it was switched on."""
 
-CHECKED_WITHIN_S = 10.0
-"""Pre-arm checks are made again, after a change of mode, and heard of."""
+CHECKED_WITHIN_S = 20.0
+"""Pre-arm checks may fail for a while: gyros warm up, a change of mode is not yet looked at."""
 
 MODE_WITHIN_S = 10.0
 ARM_WITHIN_S = 20.0
@@ -190,22 +190,33 @@ class Autopilot(ABC):
     # --- arming ---------------------------------------------------------------------------------
 
     async def arm(self) -> None:
-        """Wait until it is ready, within `READY_WITHIN_S`, and arm it, until its heartbeat shows
-        it. An armed vehicle is left as it is.
+        """Wait until it knows where it is and its checks pass, within `LOCATED_WITHIN_S` and
+        `CHECKED_WITHIN_S`, and arm it, until its heartbeat shows it. An armed vehicle is left as it
+        is.
 
         Raises:
             ExchangeError: it is not ready (and why), or refuses.
         """
         if self.heard.armed:
             return
-        await self._ready(READY_WITHIN_S)
+        if not await self.vehicle.until(self._is_located, LOCATED_WITHIN_S):
+            raise self._not_ready()
+        # What its other checks say may be of the mode that it is in: some cannot be armed.
         await self._enter_arming_mode()
-        await self._ready(CHECKED_WITHIN_S)
+        if not self.readiness().ready:
+            await self._have_it_checked()
+        if not await self.vehicle.until(lambda: self.readiness().ready, CHECKED_WITHIN_S):
+            raise self._not_ready()
         await self._arm()
 
-    async def _ready(self, within_s: float) -> None:
-        if not await self.vehicle.until(lambda: self.readiness().ready, within_s):
-            raise not_now("not ready: " + "; ".join(self.readiness().reasons))
+    def _is_located(self) -> bool:
+        return not unlocated(self.identity.firmware, self.heard, self.link.now_s())
+
+    def _not_ready(self) -> RefusedError:
+        return not_now("not ready: " + "; ".join(self.readiness().reasons))
+
+    async def _have_it_checked(self) -> None:  # noqa: B027  # only ArduPilot can be asked
+        """Have it say now why it cannot be armed; else it does that every 30 s."""
 
     @abstractmethod
     async def _enter_arming_mode(self) -> None: ...

@@ -34,17 +34,20 @@ def readiness(firmware: Firmware, heard: Heard, texts: Iterable[str], now_s: flo
     """
     if heard.armed:
         return Readiness(True)
-    reasons = tuple(_reasons(firmware, heard, texts, now_s))
+    if heard.heartbeat_s is None:
+        return Readiness(False, ("link: no heartbeat yet",))
+    reasons = (*unlocated(firmware, heard, now_s), *_reasons(firmware, heard, texts))
     return Readiness(not reasons, reasons)
 
 
-def _reasons(firmware: Firmware, heard: Heard, texts: Iterable[str], now_s: float) -> Iterator[str]:
-    if heard.heartbeat_s is None:
-        yield "link: no heartbeat yet"
-        return
-    if heard.gps_fix is not None and heard.gps_fix < _FIX_3D:
-        yield "GPS: no 3D fix"
-    yield from _position_reasons(firmware, heard, now_s)
+def unlocated(firmware: Firmware, heard: Heard, now_s: float) -> tuple[str, ...]:
+    """Why it does not know where it is; none: it does. Unlike the rest that does not depend on the
+    mode that it is in."""
+    gps = heard.gps_fix is not None and heard.gps_fix < _FIX_3D
+    return (*(("GPS: no 3D fix",) if gps else ()), *_position_reasons(firmware, heard, now_s))
+
+
+def _reasons(firmware: Firmware, heard: Heard, texts: Iterable[str]) -> Iterator[str]:
     if heard.prearm_passed is False:
         said = list(dict.fromkeys(_refusals(firmware, texts)))
         yield from (f"prearm: {text}" for text in said)

@@ -1,0 +1,276 @@
+"""Commands and their acknowledgements (mavlink.io, "Command Protocol", services/command.html).
+
+An acknowledgement names the command and not the request: a late one of an earlier request for the
+same command cannot be told from the answer. Whoever must be sure looks at what the vehicle says
+anyway (HEARTBEAT for a mode or for being armed).
+"""
+
+import math
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.microservices.patience import PATIENCE, Patience
+from m2pem_plugin_mavlink.microservices.refusals import command_name, result_words, with_reason
+from m2pem_plugin_mavlink.microservices.texts import StatusTexts
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+from m2pem_plugin_mavlink.protocol.transaction import (
+    ExchangeError,
+    NoAnswerError,
+    RefusedError,
+    Transaction,
+)
+
+T = TypeVar("T")
+
+PROGRESS_S = 10.0
+"""What was in progress and says nothing for so long is not heard of any more."""
+
+LONGEST_S = 120.0
+"""A command may be in progress for so long."""
+
+REASON_S = 0.5
+"""A refusal is followed by a text that says why, and some autopilots send it a little later."""
+
+WORSE_THAN: int = dialect.MAV_SEVERITY_INFO
+"""Only such texts are taken for the reason of a refusal."""
+
+DEG_TO_1E7 = 1e7
+
+_LONG = message_type("COMMAND_LONG")
+_INT = message_type("COMMAND_INT")
+_ACK = message_type("COMMAND_ACK").id
+_TEXT = message_type("STATUSTEXT").id
+_OTHER_FORM = (dialect.MAV_RESULT_COMMAND_LONG_ONLY, dialect.MAV_RESULT_COMMAND_INT_ONLY)
+_CLEAR = (dialect.MAV_RESULT_UNSUPPORTED, *_OTHER_FORM)
+"""Refusals that no text explains."""
+
+
+@dataclass(frozen=True, slots=True)
+class CommandPlace:
+    """Param 5 to 7 of a command that has a place: WGS-84 degrees, and an altitude in a MAV_FRAME;
+    an altitude that is NaN stays as it is."""
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+    frame: int = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
+
+
+class CommandExchange(Transaction[T]):
+    """Sends a command until it is acknowledged; what that means is for subclasses to say.
+
+    Args:
+        target: the component that is to do it.
+        command: a MAV_CMD.
+        params: its param1 and so on, as many as matter; the others are 0.
+        place: its param5 to param7, which are then sent as whole numbers (COMMAND_INT).
+        once: never sent again, as it would be done again; silence then says nothing.
+        progress: is told how far it is, in percent, or None where the vehicle does not say.
+
+    Fails with `RefusedError` (a MAV_RESULT; with the texts that the vehicle sent meanwhile) or
+    `NoAnswerError`, at the latest after `LONGEST_S`, and without progress after `patience`.
+    """
+
+    wants = frozenset({_ACK, _TEXT})
+
+    def __init__(
+        self,
+        target: Address,
+        command: int,
+        params: Sequence[float] = (),
+        *,
+        place: CommandPlace | None = None,
+        once: bool = False,
+        patience: Patience = PATIENCE,
+        progress: Callable[[int | None], None] | None = None,
+    ) -> None:
+        super().__init__(("command", target, command))
+        self.target, self.command = target, command
+        self.name = command_name(command)
+        self.patience = Patience(1, patience.bound_s) if once else patience
+        self._params = tuple(float(each) for each in params) + (0.0,) * (7 - len(params))
+        self._place = place
+        self._as_int = place is not None
+        self._form_changed = False
+        self._progress = progress
+        self._texts = StatusTexts()
+        self._asked = 0
+        self._began_s = 0.0
+        self._in_progress = False
+        self._refused: RefusedError | None = None
+
+    def begin(self, now_s: float) -> None:
+        """Send it, if it can be sent."""
+        self._began_s = now_s
+        problem = self._problem()
+        if problem:
+            self.fail(ExchangeError(f"{self.name}: {problem}"))
+        else:
+            self._ask(now_s)
+
+    def receive(self, message: Message, sender: Address, now_s: float) -> None:
+        """An acknowledgement or a text; those of other commands and for others are not ours."""
+        if message.TYPE.id == _TEXT:
+            self._texts.take(message, sender, now_s)
+        elif message.TYPE.id == _ACK and not self.done and self._refused is None:
+            is_ours = (message.command, sender) == (self.command, self.target)
+            if is_ours and self.for_us(message):
+                self._acknowledged(message, now_s)
+
+    def expire(self, now_s: float) -> None:
+        """Ask again, or give up."""
+        if self._refused is not None:
+            self._texts.give_up(now_s)
+            texts = self._texts.recent(now_s, worse_than=WORSE_THAN)
+            refused = self._refused
+            reason = with_reason(refused.reason, texts)
+            self.fail(RefusedError(reason, refused.result, temporary=refused.temporary))
+        elif self._in_progress:  # asking again might begin it again
+            self.fail(NoAnswerError(f"{self.name}: was begun, but not heard of again"))
+        elif self._asked < self.patience.tries:
+            self._ask(now_s)
+        else:
+            self.fail(NoAnswerError(self._silence()))
+
+    @abstractmethod
+    def accepted(self, ack: Message, now_s: float) -> None:
+        """It was accepted."""
+
+    def refused(self, result: int, now_s: float) -> None:
+        """It was not. Unless a subclass knows better, it fails as soon as the reason is here."""
+        temporary = result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        words = f"{self.name}: {result_words(result)}"
+        self._refused = RefusedError(words, result, temporary=temporary)
+        self.deadline_s = now_s + REASON_S
+        if result in _CLEAR:
+            self.fail(self._refused)
+
+    def ask_anew(self, params: Sequence[float], now_s: float) -> None:
+        """Send it with other parameters, as a command of its own."""
+        self._params = tuple(float(each) for each in params) + (0.0,) * (7 - len(params))
+        self._asked = 0
+        self._ask(now_s)
+
+    def _acknowledged(self, ack: Message, now_s: float) -> None:
+        result = ack.result
+        if result == dialect.MAV_RESULT_ACCEPTED:
+            self.accepted(ack, now_s)
+        elif result == dialect.MAV_RESULT_IN_PROGRESS:
+            self._in_progress = True
+            self.deadline_s = min(now_s + PROGRESS_S, self._began_s + LONGEST_S)
+            if self._progress is not None:
+                self._progress(ack.progress if ack.progress <= 100 else None)
+        elif result in _OTHER_FORM and not self._form_changed and self._has_other_form(result):
+            self._form_changed = True
+            self._as_int = not self._as_int
+            self._asked = 0
+            self._ask(now_s)
+        else:
+            self.refused(result, now_s)
+
+    def _has_other_form(self, result: int) -> bool:
+        """Whether it can be said as COMMAND_INT, which cannot say NaN."""
+        if self._as_int:
+            return bool(result == dialect.MAV_RESULT_COMMAND_LONG_ONLY)
+        whole = all(math.isfinite(each) for each in self._params[4:6])
+        return whole and bool(result == dialect.MAV_RESULT_COMMAND_INT_ONLY)
+
+    def _ask(self, now_s: float) -> None:
+        self.outbox.append(self._message(self._asked))
+        self._asked += 1
+        self.deadline_s = now_s + self.patience.answer_s
+
+    def _message(self, confirmation: int) -> Message:
+        system, component = self.target
+        places = self._params[4:]
+        if self._place is not None:
+            place = self._place
+            places = (place.latitude_deg, place.longitude_deg, place.altitude_m)
+        named = {f"param{number}": each for number, each in enumerate(self._params[:4], 1)}
+        named |= {"target_system": system, "target_component": component, "command": self.command}
+        made: Message
+        if self._as_int:
+            scale = DEG_TO_1E7 if self._place is not None else 1.0
+            made = _INT.make(
+                **named,
+                frame=self._place.frame if self._place is not None else dialect.MAV_FRAME_MISSION,
+                x=round(places[0] * scale),
+                y=round(places[1] * scale),
+                z=places[2],
+            )
+        else:
+            named |= {f"param{number}": each for number, each in enumerate(places, 5)}
+            made = _LONG.make(**named, confirmation=min(confirmation, 255))
+        return made
+
+    def _problem(self) -> str:
+        """Why it cannot be sent; "" if it can."""
+        if len(self._params) > 7:
+            return f"has seven parameters, not {len(self._params)}"
+        if any(math.isinf(each) for each in self._params):
+            return "a parameter is infinite"
+        place = self._place
+        if place is None:
+            return ""
+        if not (abs(place.latitude_deg) <= 90.0 and abs(place.longitude_deg) <= 180.0):
+            return f"there is no place {place.latitude_deg}, {place.longitude_deg}"
+        return "the altitude is infinite" if math.isinf(place.altitude_m) else ""
+
+    def _silence(self) -> str:
+        often = "once" if self._asked == 1 else f"{self._asked} times"
+        return f"{self.name}: no answer, though sent {often} in {self.patience.bound_s:g} s"
+
+
+class Command(CommandExchange[Message]):
+    """A command; its result is the COMMAND_ACK that accepted it."""
+
+    def accepted(self, ack: Message, now_s: float) -> None:
+        """It is done, or what it begins has begun."""
+        self.succeed(ack)
+
+
+class Request(CommandExchange[T]):
+    """A command that is answered with a message, which is the result (REQUEST_MESSAGE and the
+    like). The message counts even if the acknowledgement is lost.
+
+    Args:
+        answer: the id of the message.
+        read: makes the result of the message; None: it is not the one that was meant.
+    """
+
+    def __init__(
+        self,
+        target: Address,
+        command: int,
+        params: Sequence[float],
+        answer: int,
+        read: Callable[[Message], T | None],
+        *,
+        patience: Patience = PATIENCE,
+    ) -> None:
+        super().__init__(target, command, params, patience=patience)
+        self.wants = frozenset({_ACK, _TEXT, answer})
+        self._answer, self._read = answer, read
+        self._accepted_s: float | None = None
+
+    def receive(self, message: Message, sender: Address, now_s: float) -> None:
+        """The message, or what any command is told."""
+        if message.TYPE.id == self._answer and sender == self.target:
+            result = self._read(message) if self.for_us(message) else None
+            if result is not None:
+                self.succeed(result)
+        else:
+            super().receive(message, sender, now_s)
+
+    def accepted(self, ack: Message, now_s: float) -> None:
+        """The message should follow; if it does not, it is asked for again."""
+        self._accepted_s = now_s
+
+    def _silence(self) -> str:
+        if self._accepted_s is None:
+            return super()._silence()
+        return f"{self.name}: accepted, but the answer does not come"

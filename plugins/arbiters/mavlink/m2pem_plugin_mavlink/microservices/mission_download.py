@@ -1,0 +1,188 @@
+"""Downloading a mission, a fence or rally points (mavlink.io, "Mission Protocol",
+services/mission.html, "Download a Mission from the Vehicle"): one item after the other, each asked
+for until it comes."""
+
+from m2pem_plugin_mavlink.microservices.mission_items import (
+    ITEM_FLOAT,
+    ITEM_INT,
+    MissionItem,
+    MissionType,
+    item_of,
+)
+from m2pem_plugin_mavlink.microservices.mission_results import (
+    ACCEPTED,
+    CANCELLED,
+    is_temporary,
+    mission_result_words,
+)
+from m2pem_plugin_mavlink.microservices.patience import Patience
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+from m2pem_plugin_mavlink.protocol.transaction import (
+    ExchangeError,
+    NoAnswerError,
+    RefusedError,
+    Transaction,
+)
+
+COUNT_PATIENCE = Patience(tries=5, answer_s=1.5)
+ITEM_PATIENCE = Patience(tries=8, answer_s=0.75)
+"""mavlink.io has 0.25 s and five times, which is too short for most radios."""
+
+PASSES = 3
+"""So often is it begun, when the vehicle's mission changes or the vehicle cancels."""
+
+BASE_S = 60.0
+PER_ITEM_S = 3.0
+MOST_ITEMS = 5000
+"""What says that it has more is not believed; autopilots have room for some hundreds."""
+
+_LIST = message_type("MISSION_REQUEST_LIST")
+_COUNT = message_type("MISSION_COUNT")
+_REQUEST_INT = message_type("MISSION_REQUEST_INT")
+_ACK = message_type("MISSION_ACK")
+
+
+class DownloadMission(Transaction[tuple[MissionItem, ...]]):
+    """The items that a vehicle has stored, as it has stored them (ArduPilot: item 0 is home).
+
+    Fails with `RefusedError` (a MAV_MISSION_RESULT), `NoAnswerError`, or `ExchangeError` for a
+    count that cannot be; at the latest after `BASE_S` and `PER_ITEM_S` for each item.
+    """
+
+    wants = frozenset({_COUNT.id, ITEM_INT.id, ITEM_FLOAT.id, _ACK.id})
+
+    def __init__(self, target: Address, mission_type: MissionType = MissionType.MISSION) -> None:
+        super().__init__(("mission", target))
+        self.target, self.mission_type = target, mission_type
+        self._what = mission_type.name.lower()
+        self._began_s = 0.0
+        self._passes_left = PASSES
+        self._tries = 0
+        self._count: int | None = None
+        self._items: dict[int, MissionItem] = {}
+
+    def begin(self, now_s: float) -> None:
+        """Ask how many items there are."""
+        self._began_s = now_s
+        self._pass(now_s)
+
+    def receive(self, message: Message, sender: Address, now_s: float) -> None:
+        """The count, an item, or a refusal."""
+        is_ours = sender == self.target and message.mission_type == self.mission_type
+        if self.done or not is_ours or not self.for_us(message):
+            return
+        if message.TYPE is _COUNT:
+            self._counted(message.count, now_s)
+        elif message.TYPE is _ACK:
+            self._acknowledged(message.type, now_s)
+        elif self._count is not None and message.seq < self._count:
+            self._items.setdefault(message.seq, item_of(message))
+            if message.seq == self._next:
+                self._tries = 0
+                self._go_on(now_s)
+
+    def expire(self, now_s: float) -> None:
+        """Ask again, or give up."""
+        if now_s >= self._ends_s:
+            self._stop(NoAnswerError(f"{self._title}: not done in time"))
+        elif self._count is None and self._tries >= COUNT_PATIENCE.tries:
+            asked = f"no answer, though asked {self._tries} times"
+            self._stop(NoAnswerError(f"{self._title}: {asked}"))
+        elif self._count is None:
+            self._ask_count(now_s)
+        elif self._tries >= ITEM_PATIENCE.tries:
+            asked = f"item {self._next} of {self._count} does not come"
+            self._stop(NoAnswerError(f"{self._title}: {asked}, though asked {self._tries} times"))
+        else:
+            self._ask_item(now_s)
+
+    @property
+    def _title(self) -> str:
+        return f"download of the {self._what}"
+
+    @property
+    def _ends_s(self) -> float:
+        return self._began_s + BASE_S + PER_ITEM_S * (self._count or 0)
+
+    def _pass(self, now_s: float) -> None:
+        self._passes_left -= 1
+        self._count, self._tries = None, 0
+        self._items.clear()
+        self._next = 0
+        self._ask_count(now_s)
+
+    def _counted(self, count: int, now_s: float) -> None:
+        if count == self._count:
+            return
+        if count > MOST_ITEMS:
+            self._stop(ExchangeError(f"{self._title}: {count} items cannot be"))
+        elif self._count is not None and not self._passes_left:
+            changed = f"{self._count} items, then {count}"
+            self._stop(ExchangeError(f"{self._title}: it changes while it is read: {changed}"))
+        else:
+            if self._count is not None:  # the first count may have been a late one
+                self._passes_left -= 1
+            self._count, self._tries, self._next = count, 0, 0
+            self._items.clear()
+            self._go_on(now_s)
+
+    def _acknowledged(self, result: int, now_s: float) -> None:
+        if result == ACCEPTED:  # a late one, of an upload
+            return
+        if result == CANCELLED and self._passes_left:
+            self._pass(now_s)
+            return
+        at = "" if self._count is None else f", at item {self._next} of {self._count}"
+        reason = f"{self._title}: {mission_result_words(result)}{at}"
+        self.fail(RefusedError(reason, result, temporary=is_temporary(result)))
+
+    def _go_on(self, now_s: float) -> None:
+        while self._next in self._items:
+            self._next += 1
+        if self._next != self._count:
+            self._ask_item(now_s)
+            return
+        self._end(ACCEPTED)
+        self.succeed(tuple(self._items[sequence] for sequence in range(self._next)))
+
+    def _ask_count(self, now_s: float) -> None:
+        self._tries += 1
+        self.outbox.append(
+            _LIST.make(
+                target_system=self.target.system,
+                target_component=self.target.component,
+                mission_type=self.mission_type,
+            )
+        )
+        self.deadline_s = min(now_s + COUNT_PATIENCE.answer_s, self._ends_s)
+
+    def _ask_item(self, now_s: float) -> None:
+        self._tries += 1
+        self.outbox.append(item_request(self.target, self._next, self.mission_type))
+        self.deadline_s = min(now_s + ITEM_PATIENCE.answer_s, self._ends_s)
+
+    def _stop(self, error: ExchangeError) -> None:
+        self._end(CANCELLED)
+        self.fail(error)
+
+    def _end(self, result: int) -> None:
+        """Have the vehicle stop waiting for requests."""
+        self.outbox.append(
+            _ACK.make(
+                target_system=self.target.system,
+                target_component=self.target.component,
+                type=result,
+                mission_type=self.mission_type,
+            )
+        )
+
+
+def item_request(target: Address, sequence: int, mission_type: MissionType) -> Message:
+    """MISSION_REQUEST_INT."""
+    message: Message = _REQUEST_INT.make(
+        seq=sequence,
+        target_system=target.system,
+        target_component=target.component,
+        mission_type=mission_type,
+    )
+    return message

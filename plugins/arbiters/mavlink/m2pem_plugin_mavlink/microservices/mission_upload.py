@@ -1,0 +1,188 @@
+"""Uploading a mission, a fence or rally points (mavlink.io, "Mission Protocol",
+services/mission.html, "Upload a Mission to the Vehicle").
+
+The vehicle asks for the items, and asks again for one that is lost. When it falls silent before it
+has acknowledged all of them, nobody here knows what it has stored; the upload is then begun anew,
+which stores the same again. It succeeds by an acknowledgement after all items, and in no other way;
+if it fails, what the vehicle has must be looked at before it is used.
+"""
+
+from collections.abc import Sequence
+
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType, item_message
+from m2pem_plugin_mavlink.microservices.mission_results import (
+    ACCEPTED,
+    CANCELLED,
+    OUT_OF_SEQUENCE,
+    is_of_one_item,
+    is_temporary,
+    mission_result_words,
+)
+from m2pem_plugin_mavlink.microservices.patience import Patience
+from m2pem_plugin_mavlink.microservices.refusals import command_name
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+from m2pem_plugin_mavlink.protocol.transaction import (
+    ExchangeError,
+    NoAnswerError,
+    RefusedError,
+    Transaction,
+)
+
+COUNT_PATIENCE = Patience(tries=5, answer_s=1.5)
+"""For the first request; mavlink.io: 1.5 s, five times."""
+
+SILENCE_S = 5.0
+"""Autopilots ask again after 0.25 to 1 s. What is silent for so long has heard no item any more, or
+its acknowledgement was lost."""
+
+PASSES = 3
+"""So often is it begun."""
+
+REPEATS = 20
+"""So often is one item sent in one pass."""
+
+BASE_S = 60.0
+PER_ITEM_S = 3.0
+MOST_ITEMS = 0xFFFF
+
+_COUNT = message_type("MISSION_COUNT")
+_REQUEST = message_type("MISSION_REQUEST")
+_REQUEST_INT = message_type("MISSION_REQUEST_INT")
+_ACK = message_type("MISSION_ACK")
+
+
+class UploadMission(Transaction[None]):
+    """Store these items, in place of what is stored there.
+
+    Fails with `RefusedError` (a MAV_MISSION_RESULT, and which item; `temporary` where it is busy or
+    has cancelled) or `NoAnswerError`, at the latest after `bound_s`. Items that cannot be sent fail
+    before anything is.
+    """
+
+    wants = frozenset({_REQUEST.id, _REQUEST_INT.id, _ACK.id})
+
+    def __init__(
+        self,
+        target: Address,
+        items: Sequence[MissionItem],
+        mission_type: MissionType = MissionType.MISSION,
+    ) -> None:
+        super().__init__(("mission", target))
+        self.target, self.items, self.mission_type = target, tuple(items), mission_type
+        self.bound_s = BASE_S + PER_ITEM_S * len(self.items)
+        self._what = mission_type.name.lower()
+        self._ends_s = 0.0
+        self._passes_left = PASSES
+        self._counts_sent = 0
+        self._last: int | None = None
+        self._sent = [0] * len(self.items)
+        self._never_sent = set(range(len(self.items)))
+        self._oddity = ""
+
+    def begin(self, now_s: float) -> None:
+        """Say how many items there are, if all can be sent."""
+        self._ends_s = now_s + self.bound_s
+        problem = self._problem()
+        if problem:
+            self.fail(ExchangeError(f"{self._what} not sent: {problem}"))
+        else:
+            self._pass(now_s)
+
+    def receive(self, message: Message, sender: Address, now_s: float) -> None:
+        """The vehicle wants an item, or it has them all, or does not want them."""
+        is_ours = sender == self.target and message.mission_type == self.mission_type
+        if self.done or not is_ours or not self.for_us(message):
+            return
+        if message.TYPE is _ACK:
+            self._acknowledged(message.type, now_s)
+        else:
+            self._wanted(message.seq, now_s)
+
+    def expire(self, now_s: float) -> None:
+        """Say again how many there are; begin anew; or give up."""
+        if now_s >= self._ends_s:
+            self._give_up(f"not done within {self.bound_s:g} s")
+        elif self._last is None and self._counts_sent < COUNT_PATIENCE.tries:
+            self._send_count(now_s)
+        elif self._last is None:
+            self._give_up(f"no answer, though asked {self._counts_sent} times")
+        elif self._passes_left:
+            self._pass(now_s)
+        else:
+            self._give_up(f"silent after item {self._last}; what it has stored is not known")
+
+    def _pass(self, now_s: float) -> None:
+        self._passes_left -= 1
+        self._counts_sent, self._last = 0, None
+        self._sent = [0] * len(self.items)
+        self._send_count(now_s)
+
+    def _send_count(self, now_s: float) -> None:
+        self._counts_sent += 1
+        self.outbox.append(
+            _COUNT.make(
+                count=len(self.items),
+                target_system=self.target.system,
+                target_component=self.target.component,
+                mission_type=self.mission_type,
+            )
+        )
+        self._wait(COUNT_PATIENCE.answer_s, now_s)
+
+    def _wanted(self, sequence: int, now_s: float) -> None:
+        if sequence >= len(self.items):
+            self._oddity = f"it asked for item {sequence} of {len(self.items)}"
+            return
+        self._sent[sequence] += 1
+        if self._sent[sequence] > REPEATS:
+            self._give_up(f"item {sequence} does not arrive, though sent {REPEATS} times")
+            return
+        self._last = sequence
+        self._never_sent.discard(sequence)
+        item = self.items[sequence]
+        self.outbox.append(item_message(item, sequence, self.target, self.mission_type))
+        self._wait(SILENCE_S, now_s)
+
+    def _acknowledged(self, result: int, now_s: float) -> None:
+        if result == ACCEPTED:
+            if not self._never_sent:  # or it is a late one, of an earlier upload
+                self.succeed(None)
+        elif result == OUT_OF_SEQUENCE:  # an item came twice, or too late; it will say which
+            self._oddity = "it said that an item was out of sequence"
+        elif result == CANCELLED and self._passes_left:
+            self._oddity = "it cancelled the upload"
+            self._pass(now_s)
+        else:
+            self._refuse(result)
+
+    def _refuse(self, result: int) -> None:
+        reason = mission_result_words(result)
+        if self._last is not None and is_of_one_item(result):
+            name = command_name(self.items[self._last].command)
+            reason = f"item {self._last} ({name}): {reason}"
+        elif self._last is not None:
+            reason = f"{reason}, at item {self._last}"
+        error = f"{self._what} refused: {reason}"
+        self.fail(RefusedError(error, result, temporary=is_temporary(result)))
+
+    def _give_up(self, reason: str) -> None:
+        """Have the vehicle stop waiting for items, and say that it is over."""
+        self.outbox.append(
+            _ACK.make(
+                target_system=self.target.system,
+                target_component=self.target.component,
+                type=CANCELLED,
+                mission_type=self.mission_type,
+            )
+        )
+        odd = f" ({self._oddity})" if self._oddity else ""
+        self.fail(NoAnswerError(f"upload of the {self._what}: {reason}{odd}"))
+
+    def _wait(self, seconds: float, now_s: float) -> None:
+        self.deadline_s = min(now_s + seconds, self._ends_s)
+
+    def _problem(self) -> str:
+        if len(self.items) > MOST_ITEMS:
+            return f"{len(self.items)} items, and {MOST_ITEMS} are possible"
+        problems = ((n, item.problem()) for n, item in enumerate(self.items))
+        return next((f"item {n}: {problem}" for n, problem in problems if problem), "")

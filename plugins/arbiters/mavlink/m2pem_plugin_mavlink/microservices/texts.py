@@ -1,0 +1,121 @@
+"""What a vehicle says in words (STATUSTEXT; mavlink.io, "STATUSTEXT", messages/common.html).
+
+Long texts come in chunks with an id of their own, which may be lost, doubled or out of order. What
+is not whole after `GIVE_UP_S` is shown with "..." where something is missing.
+"""
+
+from collections import deque
+from dataclasses import dataclass, field
+from math import inf
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.protocol.messages import Address, Message
+
+CHUNK_BYTES = 50
+KEPT_S = 60.0
+KEPT = 100
+GIVE_UP_S = 1.0
+LATE_S = 5.0
+"""Chunks of a text that is complete, or given up, may come so much later; after that an id is used
+anew (by a vehicle that was switched off and on)."""
+AT_ONCE = 16
+"""Texts that come in chunks at one time; with one more, the oldest is given up."""
+MOST_CHUNKS = 20
+GAP = "..."
+ANY: int = dialect.MAV_SEVERITY_ENUM_END
+"""For `worse_than`: texts of all severities."""
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """What was said. `severity`: a MAV_SEVERITY, 0 is the worst; `at_s`: when it began to come."""
+
+    text: str
+    severity: int
+    sender: Address
+    at_s: float
+
+
+@dataclass(slots=True)
+class _Pieces:
+    severity: int
+    at_s: float
+    chunks: dict[int, bytes] = field(default_factory=dict)
+
+    def end(self) -> int | None:
+        """How many chunks there are; the last one is not full."""
+        return next((n + 1 for n, each in self.chunks.items() if len(each) < CHUNK_BYTES), None)
+
+    def whole(self) -> bool:
+        end = self.end()
+        return end is not None and all(n in self.chunks for n in range(end))
+
+    def text(self) -> str:
+        """All that has come, with "..." for what has not."""
+        end = self.end()
+        said, expected = b"", 0
+        for n in sorted(self.chunks):
+            said += (b"" if n == expected else GAP.encode()) + self.chunks[n]
+            expected = n + 1
+        return _decoded(said) + ("" if end is not None and expected >= end else GAP)
+
+
+class StatusTexts:
+    """Collects the texts of one vehicle. Give it each STATUSTEXT that is heard."""
+
+    def __init__(self) -> None:
+        self._texts: deque[Text] = deque(maxlen=KEPT)
+        self._coming: dict[tuple[Address, int], _Pieces] = {}
+        self._closed_s: dict[tuple[Address, int], float] = {}
+
+    def take(self, message: Message, sender: Address, now_s: float) -> None:
+        """A STATUSTEXT has come."""
+        self.give_up(now_s - GIVE_UP_S)
+        if message.id == 0:
+            self._texts.append(Text(_decoded(message.text), message.severity, sender, now_s))
+            return
+        key = sender, message.id
+        if message.chunk_seq >= MOST_CHUNKS or now_s - self._closed_s.get(key, -inf) < LATE_S:
+            return
+        if key not in self._coming:
+            if len(self._coming) >= AT_ONCE:
+                self._close(next(iter(self._coming)))
+            self._coming[key] = _Pieces(message.severity, now_s)
+        pieces = self._coming[key]
+        pieces.chunks.setdefault(message.chunk_seq, message.text)
+        if pieces.whole():
+            self._close(key)
+
+    def give_up(self, begun_before_s: float) -> None:
+        """Wait no longer for the missing chunks of texts that began to come before then."""
+        late = [key for key, each in self._coming.items() if each.at_s <= begun_before_s]
+        for key in late:
+            self._close(key)
+
+    def recent(
+        self, now_s: float, within_s: float = KEPT_S, worse_than: int = ANY
+    ) -> tuple[Text, ...]:
+        """What was said within the last seconds with a severity worse than a MAV_SEVERITY, the
+        newest last."""
+        self.give_up(now_s - GIVE_UP_S)
+        kept_s = min(within_s, KEPT_S)
+        found = (
+            each
+            for each in self._texts
+            if now_s - each.at_s <= kept_s and each.severity < worse_than
+        )
+        return tuple(sorted(found, key=lambda each: each.at_s))
+
+    def _close(self, key: tuple[Address, int]) -> None:
+        pieces = self._coming.pop(key)
+        self._texts.append(Text(pieces.text(), pieces.severity, key[0], pieces.at_s))
+        self._closed_s.pop(key, None)
+        self._closed_s[key] = pieces.at_s
+        if len(self._closed_s) > KEPT:
+            del self._closed_s[next(iter(self._closed_s))]
+
+
+def _decoded(said: bytes) -> str:
+    text = said.decode("utf-8", "replace").strip()
+    return "".join(each if each.isprintable() else " " for each in text)
