@@ -133,4 +133,35 @@ PROGRAMS = (
         ("idle", "20", "0.2"),
         (Goal("percent", "an idle executive, of a core", "%", 0.1),),
     ),
+    Program(
+        "20,000 frames",
+        ("mavlink_frames", "20000"),
+        ("mavlink_frames", "500"),
+        (
+            Goal("frames_per_s", "MAVLink datagrams routed, 11 kinds decoded", "/s"),
+            Goal("times", "the same, times pymavlink's speed", "", 6, at_least=True),
+            Goal("stream_frames_per_s", "MAVLink frames of a stream, the same", "/s"),
+            Goal("stream_times", "the same, times pymavlink's speed", "", 3, at_least=True),
+        ),
+    ),
+    Program(
+        "300 vehicles, 50 messages/s each, 60 s",
+        ("mavlink_gateway", "load", "300", "50", "60"),
+        ("mavlink_gateway", "load", "300", "50", "1"),
+        (
+            Goal("lost", "MAVLink over UDP, lost messages", "", 0),
+            Goal("messages_per_s", "MAVLink over UDP, messages", "/s"),
+            Goal("cpu_percent", "MAVLink over UDP, of a core", "%", 25),
+            Goal("peak_mb", "MAVLink over UDP, memory", "MB", 64),
+        ),
+    ),
+    Program(
+        "100 vehicles, 50 messages/s each",
+        ("mavlink_gateway", "latency", "100", "50", "10"),
+        ("mavlink_gateway", "latency", "20", "50", "1"),
+        (
+            Goal("p50_ms", "MAVLink command to the vehicle's socket, p50", "ms"),
+            Goal("p99_ms", "MAVLink command to the vehicle's socket, p99", "ms", 5),
+        ),
+    ),
 )

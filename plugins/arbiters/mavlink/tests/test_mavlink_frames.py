@@ -182,7 +182,7 @@ def test_a_damaged_frame_in_a_stream_does_not_hide_the_next(damaged: int) -> Non
 def test_a_frame_cut_short_does_not_hide_the_next() -> None:
     whole = text(6, b"the reason of a refusal")
     for size in range(len(whole)):
-        found, _, end = scan(whole[:size] + heartbeat(3), unfinished=False)
+        found, _, end = scan(whole[:size] + heartbeat(3))
         assert [each.sequence for each in found if each.checked] == [3]
         assert end == size + 21
 
@@ -206,8 +206,8 @@ def test_a_datagram_with_junk_is_not_clean_and_its_frames_are_found(junk: bytes)
 def test_a_stream_may_be_cut_anywhere() -> None:
     sent = text(1, b"a") + UNKNOWN + heartbeat(8) + signed(text(2, b"b"))
     for cut in range(len(sent) + 1):
-        found, junk, end = scan(sent[:cut], unfinished=True)
-        rest, more_junk, _ = scan(sent[end:], unfinished=True)
+        found, junk, end = scan(sent[:cut], 0)
+        rest, more_junk, _ = scan(sent[end:], 0)
         assert [each.id for each in found + rest] == [253, 0x7FFFFF, 0, 253]
         assert junk + more_junk == 0
 
@@ -222,7 +222,7 @@ def test_random_streams_give_what_was_sent() -> None:
     cuts = sorted(rng.sample(range(len(sent)), 300))
     rest, got = b"", []
     for start, end in pairwise([0, *cuts, len(sent)]):
-        found, junk, after = scan(rest + sent[start:end], unfinished=True)
+        found, junk, after = scan(rest + sent[start:end], 0)
         rest = (rest + sent[start:end])[after:]
         assert junk == 0
         got += found

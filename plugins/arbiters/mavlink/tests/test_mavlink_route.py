@@ -4,7 +4,7 @@ import logging
 
 import pytest
 from m2pem_plugin_mavlink.link.peer import Peer
-from m2pem_plugin_mavlink.link.route import MOST_RIVALS, TAKEOVER_S, Route
+from m2pem_plugin_mavlink.link.route import FORGOTTEN_S, MOST_RIVALS, TAKEOVER_S, Route
 from m2pem_plugin_mavlink.protocol.frames import encode
 from m2pem_plugin_mavlink.protocol.inbound import Sender
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
@@ -20,6 +20,7 @@ class World:
 
     def __init__(self) -> None:
         self.route = Route(5, parse_url("udpin://127.0.0.1:14550"))
+        self.route.autopilots.add(1)
         self.now_s = 0.0
         self.heard: list[int] = []
         self.route.listen([0], self._listen)
@@ -98,6 +99,19 @@ def test_a_rival_is_believed_when_the_first_has_long_been_silent() -> None:
     assert world.heard == [8]
 
 
+def test_places_may_change_again_and_again() -> None:
+    world = World()
+    peers = [world.peer(name) for name in ("a", "b", "c")]
+    for turn in range(9):
+        speaking = peers[turn % 3]
+        for _ in range(8):
+            world.beat(speaking, mode=turn)
+            world.now_s += 1.0
+            world.route.judge(world.now_s)
+        assert world.reached() == speaking.name
+        assert world.heard[-1] == turn
+
+
 def test_who_is_heard_first_after_a_silence_is_believed_at_once() -> None:
     world = World()
     world.beat(world.peer("old"))
@@ -132,6 +146,19 @@ def test_rivals_do_not_pile_up() -> None:
     for number in range(100):
         world.beat(world.peer(str(number)))
     assert len(world.route._seats[1].rivals) == MOST_RIVALS
+
+
+def test_a_component_that_is_long_silent_is_forgotten_and_met_anew_but_no_autopilot() -> None:
+    world = World()
+    autopilot, gimbal = world.peer("autopilot"), world.peer("gimbal")
+    world.beat(autopilot)
+    world.beat(gimbal, GIMBAL)
+    world.now_s = FORGOTTEN_S + 1
+    world.route.judge(world.now_s)
+    assert [world.reached(each) for each in (1, 154)] == ["autopilot", "autopilot"]
+    assert not world.route.holds(gimbal)
+    world.beat(gimbal, GIMBAL)
+    assert world.reached(154) == "gimbal"
 
 
 def test_a_message_is_wanted_as_often_as_it_is_listened_to() -> None:

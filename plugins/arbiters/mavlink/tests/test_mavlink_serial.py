@@ -4,14 +4,19 @@ import asyncio
 import os
 import subprocess
 import sys
+import termios
 import tty
 from pathlib import Path
+from typing import Any
 
 import pytest
+import serial_asyncio_fast
 from m2pem_plugin_mavlink.link import routed_link, streams
 from m2pem_plugin_mavlink.link.routed_link import open_link
 from m2pem_plugin_mavlink.protocol.messages import Address, message_type
 from mavlink_wire import GROUND_STATION, FarEnd, HandClock, until
+
+from m2pem.errors import PluginError
 
 
 class Line:
@@ -96,6 +101,32 @@ async def test_a_line_that_is_not_there_yet_is_waited_for(tmp_path: Path) -> Non
     await until(line.end.beats)
     await link.close()
     line.cut()
+
+
+@pytest.mark.parametrize("problem", [termios.error(22, "Invalid argument"), ValueError("baudrate")])
+async def test_whatever_is_wrong_with_a_line_it_is_tried_again(
+    problem: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = serial_asyncio_fast.create_serial_connection
+    problems = [problem] * 3
+
+    async def fails_at_first(*args: Any, **settings: Any) -> Any:
+        if problems:
+            raise problems.pop()
+        return await opened(*args, **settings)
+
+    monkeypatch.setattr(serial_asyncio_fast, "create_serial_connection", fails_at_first)
+    line = Line()
+    link = await open_link(Address(1, 1), [f"serial://{line.path}:57600"], HandClock())
+    await until(line.end.beats)
+    await link.close()
+    line.cut()
+
+
+async def test_a_missing_library_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "serial_asyncio_fast", None)
+    with pytest.raises(PluginError, match=r"pip install 'm2pem-plugin-mavlink\[serial\]'"):
+        await open_link(Address(1, 1), ["serial:///dev/ttyACM0:57600"], HandClock())
 
 
 def test_who_has_no_serial_line_does_not_load_what_reads_it() -> None:

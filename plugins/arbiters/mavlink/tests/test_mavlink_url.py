@@ -51,6 +51,7 @@ def test_a_url_is_read_and_written_again(text: str, url: SocketUrl | SerialUrl) 
         ("udpin://127.0.0.1:mavlink", "its port must be a number"),
         ("udpin://127.0.0.1:65536", "from 0 to 65535"),
         ("udpout://127.0.0.1:0", "from 1 to 65535"),
+        ("udpout://rover..local:1", "'rover..local' is no name of a machine"),
         ("udpin://a b:1", "a host and a port"),
         ("udpin://::1:14550", "a host and a port"),
         ("serial:///dev/ttyACM0:fast", "its baudrate must be a number"),

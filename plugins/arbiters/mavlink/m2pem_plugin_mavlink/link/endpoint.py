@@ -11,6 +11,9 @@ from m2pem_plugin_mavlink.protocol.url import Url
 
 logger = logging.getLogger(__name__)
 
+MOST_STRANGERS = 64
+"""Senders at one peer that nobody asked for, of which something is kept."""
+
 
 class Endpoint(ABC):
     """`own_systems`: ids that are ours; what says to come from them is not heard. `now_s`: seconds
@@ -60,9 +63,9 @@ class Endpoint(ABC):
     def forget(self, system: int) -> None:
         """Meet its senders anew when they are heard next."""
         for peer in self.peers.values():
-            senders = peer.inbound.senders
-            for key in [key for key, each in senders.items() if each.address.system == system]:
-                del senders[key]
+            for sender in list(peer.inbound.senders.values()):
+                if sender.address.system == system:
+                    peer.inbound.forget(sender)
 
     def meet(self, peer: Peer, sender: Sender) -> bool:
         """See `link.peer.Meet`."""
@@ -70,8 +73,8 @@ class Endpoint(ABC):
             return False
         route = self._routes.get(sender.address.system)
         if route is not None:
-            route.claim(peer, sender, self.now_s())
-        return True
+            return route.claim(peer, sender, self.now_s())
+        return len(peer.inbound.senders) < MOST_STRANGERS
 
     def leads_to(self, system: int) -> bool:
         """Whether somebody reaches a vehicle with this system id here."""

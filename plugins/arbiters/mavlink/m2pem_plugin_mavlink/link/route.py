@@ -19,6 +19,7 @@ from m2pem_plugin_mavlink.protocol.url import Url
 _logger = logging.getLogger(__name__)
 
 TAKEOVER_S = 5.0
+FORGOTTEN_S = 60.0
 MOST_RIVALS = 8
 
 
@@ -29,6 +30,9 @@ class _Claim:
 
     def live(self, now_s: float) -> bool:
         return self.peer.open and now_s - self.sender.heard_s <= TAKEOVER_S
+
+    def forget(self) -> None:
+        self.peer.inbound.forget(self.sender)
 
 
 @dataclass(slots=True)
@@ -41,12 +45,14 @@ class _Seat:
 
 
 class Route:
-    """`users`: links that use it; `turns`: of the exchanges with this vehicle."""
+    """`users`: links that use it; `autopilots`: the components that they command, of which there is
+    mostly one; `turns`: of the exchanges with this vehicle."""
 
     def __init__(self, system: int, url: Url) -> None:
         self.system = system
         self.url = url
         self.users = 0
+        self.autopilots: set[int] = set()
         self.turns = Turns()
         self._wanted: dict[int, Wanted] = {}
         self._seats: dict[int, _Seat] = {}
@@ -74,8 +80,9 @@ class Route:
             else:
                 del self._wanted[id_]
 
-    def claim(self, peer: Peer, sender: Sender, now_s: float) -> None:
-        """A sender of this system is heard at a peer for the first time."""
+    def claim(self, peer: Peer, sender: Sender, now_s: float) -> bool:
+        """A sender of this system is heard at a peer for the first time, or again after it was
+        forgotten; False: it is one of too many that say to be the same."""
         claim = _Claim(peer, sender)
         seat = self._seats.get(sender.address.component)
         if seat is None:
@@ -84,29 +91,30 @@ class Route:
         elif seat.holder.peer is peer or not seat.holder.live(now_s):
             self._give(seat, claim)
         else:
-            seat.rivals = [rival for rival in seat.rivals if rival.peer is not peer][
-                1 - MOST_RIVALS :
-            ]
+            for rival in list(seat.rivals):
+                if rival.peer is peer or not rival.live(now_s):
+                    seat.rivals.remove(rival)
+                    rival.forget()
+            if len(seat.rivals) == MOST_RIVALS:
+                return False
             seat.rivals.append(claim)
-            if not seat.warned:
-                seat.warned = True
-                _logger.warning(
-                    "%s: %s says to be component %d of system %d, as %s does, which is believed; "
-                    "do two vehicles have the same system id?",
-                    self.url,
-                    peer.name,
-                    sender.address.component,
-                    self.system,
-                    seat.holder.peer.name,
-                )
+            self._warn(seat, claim)
+        return True
 
     def judge(self, now_s: float) -> None:
-        """Let who has been silent for too long lose its place to somebody who is heard."""
-        for seat in self._seats.values():
-            if seat.rivals and not seat.holder.live(now_s):
-                live = [rival for rival in seat.rivals if rival.live(now_s)]
-                if live:
-                    self._give(seat, max(live, key=lambda rival: rival.sender.heard_s))
+        """Let who has been silent for too long lose its place to somebody who is heard; and forget
+        components, but not autopilots: they may hear us though we don't hear them."""
+        for component, seat in list(self._seats.items()):
+            holder = seat.holder
+            if holder.live(now_s):
+                continue
+            live = [rival for rival in seat.rivals if rival.live(now_s)]
+            if live:
+                self._give(seat, max(live, key=lambda rival: rival.sender.heard_s))
+            elif component not in self.autopilots and now_s - holder.sender.heard_s > FORGOTTEN_S:
+                for claim in (holder, *seat.rivals):
+                    claim.forget()
+                del self._seats[component]
 
     def holds(self, peer: Peer) -> bool:
         """Whether the vehicle, or a part of it, is reached at this peer."""
@@ -135,7 +143,11 @@ class Route:
 
     def _give(self, seat: _Seat, claim: _Claim) -> None:
         before = seat.holder
-        before.sender.wanted = NOTHING
+        # Who is not believed is met anew when it is heard next: it may be believed another time.
+        for other in (before, *seat.rivals):
+            if other is not claim:
+                other.sender.wanted = NOTHING
+                other.forget()
         claim.sender.wanted = self._wanted
         seat.holder, seat.rivals, seat.warned = claim, [], False
         if before.peer is not claim.peer:
@@ -146,4 +158,18 @@ class Route:
                 self.system,
                 before.peer.name,
                 claim.peer.name,
+            )
+
+    def _warn(self, seat: _Seat, claim: _Claim) -> None:
+        component = claim.sender.address.component
+        if not seat.warned and component in self.autopilots:
+            seat.warned = True
+            _logger.warning(
+                "%s: %s says to be component %d of system %d, as %s does, which is believed; "
+                "do two vehicles have the same system id?",
+                self.url,
+                claim.peer.name,
+                component,
+                self.system,
+                seat.holder.peer.name,
             )

@@ -62,6 +62,8 @@ class RoutedLink:
         self._routes = list(routes)
         self._clock = clock
         self._used = self._routes[0]
+        for route in routes:
+            route.autopilots.add(address.component)
         self._listening: list[tuple[frozenset[int], Listener]] = []
         self._exchanges: set[Exchange] = set()
         self._closed = False

@@ -134,15 +134,29 @@ class SerialEndpoint(ConnectingEndpoint):
 
     url: SerialUrl
 
+    async def open(self) -> None:
+        """See `Endpoint.open`."""
+        try:
+            import serial_asyncio_fast  # noqa: PLC0415  # few have a serial line
+        except ImportError:
+            raise PluginError(
+                f"{self.url}: serial lines need pyserial-asyncio-fast: "
+                "pip install 'm2pem-plugin-mavlink[serial]'"
+            ) from None
+        self._connect = serial_asyncio_fast.create_serial_connection
+        await super().open()
+
     async def connect(self, make: Callable[[], Connection]) -> Connection:
         """See `ConnectingEndpoint.connect`."""
-        from serial_asyncio_fast import create_serial_connection  # noqa: PLC0415  # few have a serial line
-
-        loop = asyncio.get_running_loop()
-        url = self.url
-        transport, connection = await create_serial_connection(
-            loop, make, url.path, baudrate=url.baudrate, exclusive=True
-        )
+        loop, url = asyncio.get_running_loop(), self.url
+        try:
+            transport, connection = await self._connect(
+                loop, make, url.path, baudrate=url.baudrate, exclusive=True
+            )
+        except OSError:
+            raise
+        except Exception as error:  # pyserial lets some of termios through
+            raise OSError(str(error)) from error
         assert isinstance(connection, Connection)
         try:
             await connection.made

@@ -21,7 +21,7 @@ LARGEST_DATAGRAM = 65_535
 AT_ONCE = 256
 """Datagrams that are read before others get their turn: about a millisecond's work."""
 
-MOST_PEERS = 2_048
+MOST_PEERS = 1_024
 FORGOTTEN_S = 60.0
 
 

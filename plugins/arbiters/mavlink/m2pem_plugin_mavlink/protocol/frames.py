@@ -6,6 +6,7 @@ a datagram with anything else in it, has a right checksum.
 """
 
 import re
+import sys
 from struct import Struct
 from typing import NamedTuple
 
@@ -26,6 +27,7 @@ AROUND_V2 = 12
 SIGNATURE = 13
 LONGEST = 255 + AROUND_V2 + SIGNATURE
 CRC_START = 0xFFFF
+NEVER = sys.maxsize
 
 EXTRA: dict[int, bytes] = {
     id_: bytes((each.crc_extra,)) for id_, each in dialect.mavlink_map.items()
@@ -101,12 +103,12 @@ def read(frame: bytes) -> Frame | None:
     return Frame(sequence, sender, low | high << 16, frame[10:-2], False)
 
 
-def scan(data: bytes, unfinished: bool = False) -> tuple[list[Frame], int, int]:
+def scan(data: bytes, unfinished_from: int = NEVER) -> tuple[list[Frame], int, int]:
     """All frames among other bytes: those with a right checksum; and those that cannot be checked,
     if another frame or nothing follows them and no right frame is inside of them.
 
     Then the number of bytes that belong to none; and where a frame begins whose end is not there
-    yet, if `unfinished` says that more may come (else: the size of `data`).
+    yet. What begins before `unfinished_from` and does not end is none.
     """
     found: list[Frame] = []
     junk = position = 0
@@ -153,7 +155,7 @@ def scan(data: bytes, unfinished: bool = False) -> tuple[list[Frame], int, int]:
                 payload = data[begin:end]
                 doubt = None if flags & ~SIGNED else Frame(sequence, sender, id_, payload, False)
                 doubt_end, junk_before = after, junk
-        elif unfinished and not doubt_end:
+        elif position >= unfinished_from and not doubt_end:
             break
         junk += 1
         position += 1

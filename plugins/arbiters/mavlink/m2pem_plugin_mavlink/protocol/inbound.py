@@ -25,9 +25,9 @@ from m2pem_plugin_mavlink.protocol.quality import Reception
 _logger = logging.getLogger(__name__)
 
 UNFINISHED_S = 1.0
-"""A frame in a stream whose end has not come after so long is none."""
+"""A frame in a stream whose end has not come after so long, or up to twice as long, is none."""
 
-MOST_SENDERS = 512
+MOST_SENDERS = 1_024
 """Of one peer; those that were silent for longest are forgotten first."""
 
 Listener: TypeAlias = Callable[[Message, Address], None]
@@ -70,12 +70,13 @@ class Inbound:
     sender that nobody knows and that cannot be checked.
     """
 
-    __slots__ = ("_began_s", "_meet", "_rest", "bad_frames", "junk_bytes", "senders")
+    __slots__ = ("_marked", "_marked_s", "_meet", "_rest", "bad_frames", "junk_bytes", "senders")
 
     def __init__(self, meet: Meet) -> None:
         self._meet = meet
         self._rest = b""
-        self._began_s = 0.0
+        self._marked = 0  # so many bytes of the rest were there at `_marked_s`
+        self._marked_s = 0.0
         self.senders: dict[int, Sender] = {}
         self.junk_bytes = 0
         self.bad_frames = 0
@@ -120,19 +121,14 @@ class Inbound:
 
     def stream(self, data: bytes, now_s: float) -> None:
         """More of a stream has come."""
-        rest = self._rest
-        if rest:
-            data = rest + data
-        found, junk, end = scan(data, unfinished=True)
-        if rest and not end and now_s - self._began_s > UNFINISHED_S:
-            # It was no frame, but some may be inside what was taken for one.
-            data = data[1:]
-            found, junk, end = scan(data, unfinished=True)
-            self._began_s = now_s
-            junk += 1
-        elif end or not rest:
-            self._began_s = now_s
+        if self._rest:
+            data = self._rest + data
+        given_up = self._marked if now_s - self._marked_s > UNFINISHED_S else 0
+        found, junk, end = scan(data, given_up)
         self._rest = data[end:]
+        self._marked -= end
+        if given_up or self._marked <= 0:
+            self._marked, self._marked_s = len(self._rest), now_s
         self.junk_bytes += junk
         for frame in found:
             self._frame(frame, b"", now_s)
@@ -156,6 +152,12 @@ class Inbound:
         sender.count(sequence, now_s)
         if wanted is not None:
             self._hand_over(wanted, payload, sender.address)
+
+    def forget(self, sender: Sender) -> None:
+        """Meet it anew when it is heard next."""
+        key = sender.address.system | sender.address.component << 8
+        if self.senders.get(key) is sender:
+            del self.senders[key]
 
     def _met(self, source: int, sequence: int, now_s: float) -> Sender | None:
         sender = Sender(Address(source & 255, source >> 8), sequence, now_s)

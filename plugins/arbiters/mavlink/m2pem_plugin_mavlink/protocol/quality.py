@@ -4,7 +4,6 @@ Each sender numbers its frames 0..255, over and over, on each of its links (mavl
 Serialization").
 """
 
-from collections import deque
 from dataclasses import dataclass
 
 WINDOW_S = 5.0
@@ -15,6 +14,8 @@ RESTART_S = 1.0
 
 LATE = 128
 """So far back a number is late; farther, it is ahead."""
+
+_LATE_BITS = (1 << LATE) - 1
 
 RESTART_FRAMES = 32
 """A sender began anew if so many frames on end seem to be late."""
@@ -39,6 +40,7 @@ class Reception:
 
     __slots__ = (
         "_late",
+        "_marked",
         "_missing",
         "_samples",
         "_start",
@@ -55,8 +57,9 @@ class Reception:
         self.doubled = 0
         self._start = sequence
         self._late = 0
-        self._missing: set[int] = set()
-        self._samples = deque([(now_s, 0, 0)])
+        self._missing = 0  # bit n: the frame n + 1 before `_marked` is
+        self._marked = sequence
+        self._samples = [(now_s, 0, 0)]
 
     @property
     def sent(self) -> int:
@@ -74,10 +77,12 @@ class Reception:
     def astray(self, sequence: int, now_s: float) -> None:
         """A frame that was not expected next: some are missing, or it is late or doubled."""
         ahead = (sequence - self.expected) & 255
+        missing = self._missing << min(self.expected - self._marked, LATE)
+        self._marked = self.expected
         if ahead >= LATE and now_s - self.heard_s < RESTART_S:
-            number = self.expected + ahead - 256
-            if number in self._missing:
-                self._missing.remove(number)
+            bit = 1 << 255 - ahead
+            self._missing = missing & ~bit & _LATE_BITS
+            if missing & bit:
                 self.lost -= 1
                 self._late = 0
                 return
@@ -86,21 +91,21 @@ class Reception:
                 self.doubled += 1
                 return
             self._start += ahead  # it skipped these numbers, rather than that they were lost
+            missing = 0
         else:
             self.lost += ahead
-            oldest = self.expected + ahead - LATE
-            self._missing = {number for number in self._missing if number > oldest}
-            first = max(self.expected, oldest + 1)
-            self._missing.update(range(first, self.expected + ahead))
+            missing = missing << ahead | (1 << ahead) - 1
         self._late = 0
         self.expected += ahead + 1
+        self._missing = missing << 1 & _LATE_BITS
+        self._marked = self.expected
 
     def sample(self, now_s: float) -> None:
         """Note the counts; to be called about once a second."""
         samples = self._samples
         samples.append((now_s, self.sent, self.lost))
         while len(samples) > 2 and samples[1][0] <= now_s - WINDOW_S:
-            samples.popleft()
+            del samples[0]
 
     def quality(self, now_s: float) -> LinkQuality:
         """How well it is heard lately."""

@@ -109,6 +109,10 @@ def _socket(text: str, way: Way, rest: str) -> SocketUrl:
             every = f"{way}://0.0.0.0:{place['port'] or 14550}"
             raise UrlError(f"{text}: no host; {one} listens to this machine, {every} to all others")
         raise UrlError(f"{text}: no host; did you mean {one}?")
+    try:
+        place["host"].encode("idna")
+    except UnicodeError:
+        raise UrlError(f"{text}: '{place['host']}' is no name of a machine") from None
     if place["port"] is None or not re.fullmatch(r"[0-9]{1,5}", place["port"]):
         raise UrlError(f"{text}: its port must be a number, as in {way}://{place['host']}:14550")
     port = int(place["port"])
