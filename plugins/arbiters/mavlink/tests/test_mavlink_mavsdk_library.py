@@ -51,14 +51,14 @@ async def test_its_log_is_handed_to_the_loop_at_the_right_level(caplog):
     caplog.set_level(logging.DEBUG, library.__name__)
     library.read_log()
     try:
-        assert await asyncio.to_thread(library._take, 2, "a warning", None, 0)
-        assert await asyncio.to_thread(library._take, 1, "an info", None, 0)
+        assert await asyncio.to_thread(library._take, 2, b"a warning", None, 0, None)
+        assert await asyncio.to_thread(library._take, 1, b"an \xff info", None, 0, None)
     finally:
         library.leave_log()
-    library._take(3, "nobody reads this", None, 0)
+    library._take(3, b"nobody reads this", None, 0, None)
     await asyncio.sleep(0)
     assert [(each.levelname, each.message) for each in caplog.records] == [
         ("WARNING", "MAVSDK: a warning"),
-        ("DEBUG", "MAVSDK: an info"),
+        ("DEBUG", "MAVSDK: an \ufffd info"),
     ]
     assert {each.threadName for each in caplog.records} == {"MainThread"}

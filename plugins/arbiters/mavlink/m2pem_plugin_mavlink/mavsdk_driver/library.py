@@ -7,6 +7,7 @@ import logging
 from collections import Counter
 from importlib.metadata import PackageNotFoundError, version
 from types import ModuleType
+from typing import Any
 
 from m2pem.errors import PluginError
 
@@ -16,6 +17,9 @@ _LEVELS = (logging.DEBUG, logging.DEBUG, logging.WARNING, logging.ERROR)
 """Of its levels debug, info, warning and error; its info is of interest to its makers."""
 
 _readers: Counter[asyncio.AbstractEventLoop] = Counter()
+_callbacks: list[Any] = []
+"""Which MAVSDK calls as long as the process runs; it holds no reference itself."""
+
 _logger = logging.getLogger(__name__)
 
 
@@ -63,8 +67,11 @@ def reason(error: Exception) -> str:
 def read_log() -> None:
     """From now on its log goes to the logger of this module, in this event loop, and no more to the
     terminal; to be undone by `leave_log`."""
-    if not _readers:
-        require("mavsdk.logging").log_subscribe(_take)
+    # Not by its `log_subscribe`: that prints whatever is no UTF-8, as texts of vehicles may be.
+    log = require("mavsdk.logging")
+    if not _callbacks:
+        _callbacks.append(log.LogCallback(_take))
+    log._cmavsdk_lib.mavsdk_log_subscribe(_callbacks[0], None)
     _readers[asyncio.get_running_loop()] += 1
 
 
@@ -76,10 +83,11 @@ def leave_log() -> None:
         del _readers[loop]
 
 
-def _take(level: int, message: str, file: str | None, line: int) -> bool:
+def _take(level: int, message: bytes | None, _file: Any, _line: int, _data: Any) -> bool:
     # Called in MAVSDK's threads: logging there would make threads of Python of them.
+    text = (message or b"").decode("utf-8", "replace")
     for loop in tuple(_readers):
         with contextlib.suppress(RuntimeError):  # the loop is closed
-            loop.call_soon_threadsafe(_logger.log, _LEVELS[level], "MAVSDK: %s", message)
+            loop.call_soon_threadsafe(_logger.log, _LEVELS[level], "MAVSDK: %s", text)
             break
     return True

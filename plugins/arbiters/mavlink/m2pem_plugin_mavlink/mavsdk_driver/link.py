@@ -5,7 +5,7 @@ import contextlib
 import logging
 from collections import deque
 from collections.abc import Awaitable, Callable, Coroutine, Iterable
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeVar
 
 from m2pem.api import Clock
 from m2pem_plugin_mavlink.link.exchange import Exchange
@@ -13,14 +13,12 @@ from m2pem_plugin_mavlink.link.turns import Turns
 from m2pem_plugin_mavlink.link.vehicle_link import Listener
 from m2pem_plugin_mavlink.mavsdk_driver import json_fields, library
 from m2pem_plugin_mavlink.mavsdk_driver.calls import Calls
-from m2pem_plugin_mavlink.mavsdk_driver.missions import carried
-from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type, types_by_id
+from m2pem_plugin_mavlink.mavsdk_driver.missions import cancel_upload, carried
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, types_by_id
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, Transaction
 
 T = TypeVar("T")
-
-_Call: TypeAlias = Callable[[Any], Coroutine[Any, Any, Any]]
 
 US_PER_S = 1_000_000
 _logger = logging.getLogger(__name__)
@@ -28,16 +26,14 @@ _logger = logging.getLogger(__name__)
 UNSENT = 50
 """So many messages wait to be sent; of more, the oldest are dropped."""
 
-_COMMAND_LONG = message_type("COMMAND_LONG")
-_COMMANDS = frozenset({_COMMAND_LONG, message_type("COMMAND_INT")})
-
 
 class MavsdkLink:
     """The link of a vehicle, from when MAVSDK has found its system id (`attach`) to `close`, which
     calls `leave` at last.
 
-    What is sent before that is dropped. Commands and missions are carried by MAVSDK, with its own
-    ways of asking again. Messages are handed to listeners in the event loop.
+    What is sent before is dropped. Messages are handed to listeners in the event loop. Missions are
+    uploaded by MAVSDK. What else is exchanged goes message by message, as over other links:
+    MAVSDK would repeat commands that must not be given twice, and hold a thread for each question.
     """
 
     def __init__(
@@ -54,7 +50,6 @@ class MavsdkLink:
         self._readers: dict[int, asyncio.Task[None]] = {}
         self._unsent: deque[Message] = deque(maxlen=UNSENT)
         self._sender: asyncio.Task[None] | None = None
-        self._carrying: dict[str, asyncio.Task[None]] = {}
         self._exchanges: set[Exchange] = set()
         self._turns = Turns()
 
@@ -79,7 +74,7 @@ class MavsdkLink:
         self._closed = True
         for exchange in list(self._exchanges):
             exchange.abort(ExchangeError("the link was closed"))
-        tasks = [*self._readers.values(), *self._carrying.values()]
+        tasks = list(self._readers.values())
         if self._sender is not None:
             tasks.append(self._sender)
         for task in tasks:
@@ -93,12 +88,7 @@ class MavsdkLink:
 
     async def _let_go(self) -> None:
         if self.calls.pending:
-            for cancel in (
-                self.missions.cancel_mission_upload,
-                self.missions.cancel_mission_download,
-            ):
-                with contextlib.suppress(library.failure()):  # there is none to cancel
-                    await self.calls.make(cancel())
+            await cancel_upload(self)
         await self.calls.finish()
         self._direct.destroy()
         self.missions.destroy()
@@ -110,11 +100,8 @@ class MavsdkLink:
         return self._clock.now_us() / US_PER_S
 
     def send(self, message: Message) -> None:
-        """See `VehicleLink.send`. A command that MAVSDK is still sending is not sent twice."""
+        """See `VehicleLink.send`."""
         if self._closed or not self.attached:
-            return
-        if message.TYPE in _COMMANDS:
-            self._carry(message)
             return
         self._unsent.append(message)
         if self._sender is None or self._sender.done():
@@ -180,30 +167,16 @@ class MavsdkLink:
     # --- sending --------------------------------------------------------------------------------
 
     async def _send_all(self) -> None:
+        make = library.plugin("mavlink_direct").MavlinkMessage
         while self._unsent:
-            await self._call(self._direct.send_message, self._unsent.popleft())
-
-    def _carry(self, command: Message) -> None:
-        fields: Any = command
-        if command.TYPE is _COMMAND_LONG:  # of what is the same, it counts the attempts
-            fields = fields._replace(confirmation=0)
-        same = f"{command.TYPE.name} {json_fields.written(fields)}"
-        if same not in self._carrying:
-            self._carrying[same] = task = _begin(self._carry_one(command))
-            task.add_done_callback(lambda _: self._carrying.pop(same, None))
-
-    async def _carry_one(self, command: Message) -> None:
-        # Of two with the same number, MAVSDK would refuse the second one.
-        async with self._turns.turn(("carried", command.command)):
-            await self._call(self._direct.send_command, command)
-
-    async def _call(self, call: _Call, message: Message) -> None:
-        name, fields = message.TYPE.name, json_fields.written(message)
-        wrapped = library.plugin("mavlink_direct").MavlinkMessage(name, fields_json=fields)
-        try:
-            await self.calls.make(call(wrapped))
-        except library.failure() as error:
-            _logger.debug("MAVSDK: %s: %s", name, library.reason(error))
+            message = self._unsent.popleft()
+            fields = json_fields.written(message)
+            wrapped = make(message.TYPE.name, fields_json=fields)
+            try:
+                await self.calls.make(self._direct.send_message(wrapped))
+            except library.failure() as error:
+                name, reason = message.TYPE.name, library.reason(error)
+                _logger.warning("MAVSDK does not send %s %s: %s", name, fields, reason)
 
 
 def _begin(work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
