@@ -57,6 +57,10 @@ class Station(Protocol):
         """What notices that somebody else steers; not open yet."""
         ...
 
+    async def findings(self, vehicle: "Vehicle") -> Sequence[str]:
+        """Where the vehicle's own failsafes are not what the fleet says they are."""
+        ...
+
     async def close(self) -> None:
         """Let go of them, and of all sockets."""
         ...
@@ -148,14 +152,13 @@ class MavlinkArbiter:
             watch.open()
             self._watches.append(watch)
             limits = self.limits(resource)
-            self._helms[resource] = Helm(
-                vehicle, watch, self._ledger, limits, self._context.logger
-            )
+            self._helms[resource] = Helm(vehicle, watch, self._ledger, limits, self._context.logger)
             area = self._connections[resource].fence
             if area is not None:
                 self._fences[resource] = fences.setdefault(id(area), Fence(area))
             self._tasks.append(create(self._attend(resource)))
         heard = await asyncio.gather(*(helm.knows(HEARD_WITHIN_S) for helm in self._helms.values()))
+        self._tasks += [create(self._check(vehicle)) for vehicle in vehicles.values()]
         for resource, is_heard in zip(vehicles, heard, strict=True):
             if not is_heard:
                 self._context.logger.warning("%s: where it is was not heard yet", resource)
@@ -303,6 +306,13 @@ class MavlinkArbiter:
             return replace(unknown, number=3, state=state)
         mode = vehicle.state().mode or "an unknown mode"
         return replace(unknown, reason=f"{kept.resource} is in {mode}, and does not do it")
+
+    async def _check(self, vehicle: "Vehicle") -> None:
+        """Tell where the fleet and the vehicle disagree about failsafes, once it is heard."""
+        await vehicle.until(lambda: vehicle.identity is not None)
+        if self._station is not None and self._connections[vehicle.resource].failsafe:
+            for finding in await self._station.findings(vehicle):
+                self._context.logger.warning("%s", finding)
 
     async def _attend(self, resource: ResourceId) -> None:
         """Tell how a vehicle is, and notice when it falls silent."""

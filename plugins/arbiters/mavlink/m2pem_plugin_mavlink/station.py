@@ -1,10 +1,11 @@
 """The vehicles of a fleet behind their links."""
 
 import asyncio
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 
 from m2pem.api import ArbiterContext, Connection, ResourceId
 from m2pem.errors import PluginError
+from m2pem_plugin_mavlink.failsafe import check
 from m2pem_plugin_mavlink.foreign import TakeoverWatch
 from m2pem_plugin_mavlink.link.routed_link import GROUND_STATION, RoutedLink, open_link
 from m2pem_plugin_mavlink.mavsdk_driver.link import MavsdkLink
@@ -73,6 +74,12 @@ class LinkedStation:
     def watch(self, vehicle: Vehicle) -> TakeoverWatch:
         """What notices that somebody else steers; not open yet."""
         return TakeoverWatch(vehicle, self._settings[vehicle.resource].gcs_system_id)
+
+    async def findings(self, vehicle: Vehicle) -> Sequence[str]:
+        """Where the vehicle's own failsafes are not what the fleet says they are."""
+        word = self._connections[vehicle.resource].failsafe
+        own = self._settings[vehicle.resource].gcs_system_id
+        return [str(finding) for finding in await check(vehicle, word, own)]
 
     async def close(self) -> None:
         """Close all that was opened."""

@@ -2,11 +2,12 @@
 
 from collections.abc import Awaitable, Callable
 
+from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
+from mavlink_double import Body, DoubleStation, connections
+
 from m2pem.api import BehaviorReport, ResourceId
 from m2pem.executive.clock import run_virtual
 from m2pem.testing.contracts.bench import ArbiterBench, context
-from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
-from mavlink_double import Body, DoubleStation, connections
 
 START_US = 1_767_225_600_000_000
 V = ResourceId("v")
@@ -65,9 +66,7 @@ def after_a_restart(
     async def run(clock) -> None:
         def arbiter():
             lent = context(clock)
-            made = MavlinkArbiter(
-                connections(bodies), lent, lambda *_: DoubleStation(bodies, lent)
-            )
+            made = MavlinkArbiter(connections(bodies), lent, lambda *_: DoubleStation(bodies, lent))
             bench = Bench(made, clock)
             bench.bodies, bench.bus = bodies, lent.bus
             return bench

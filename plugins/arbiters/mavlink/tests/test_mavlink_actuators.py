@@ -3,11 +3,11 @@
 import math
 
 import pytest
-
-from m2pem.api import BehaviorState, Point
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from mavlink_double import Body, at
 from mavlink_play import after_a_restart, play
+
+from m2pem.api import BehaviorState, Point
 
 REVERSE, SERVO, RELAY, GRIPPER, ACTUATOR = 194, 183, 181, 211, 187
 

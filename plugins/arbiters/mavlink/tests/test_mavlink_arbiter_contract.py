@@ -1,11 +1,11 @@
 """The contract of arbiters, on vehicles without a network, in virtual time."""
 
 import pytest
+from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
+from mavlink_double import Body, DoubleStation, at, connections
 
 from m2pem.api import Point, ResourceId
 from m2pem.testing import ArbiterCase, ArbiterContract
-from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
-from mavlink_double import Body, DoubleStation, at, connections
 
 A, B = ResourceId("a"), ResourceId("b")
 

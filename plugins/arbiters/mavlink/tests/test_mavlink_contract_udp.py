@@ -2,63 +2,51 @@
 
 import asyncio
 import threading
+from typing import ClassVar
 
 import pytest
-
-from m2pem.api import Connection, Point, ResourceId
-from m2pem.executive.clock import SystemClock
-from m2pem.testing import ArbiterCase, ArbiterContract
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
 from m2pem_plugin_mavlink.link.routed_link import open_link
-from m2pem_plugin_mavlink.plane import offset
 from m2pem_plugin_mavlink.protocol.messages import Address
-from m2pem_plugin_mavlink.sim.geometry import Location
 from m2pem_plugin_mavlink.sim.simulator import Simulator
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.sim.specification import Kind
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+from mavlink_simulated import at, connections, specs
 
-A, B = ResourceId("a"), ResourceId("b")
-HOME = (47.397742, 8.545594)
+from m2pem.api import Point, ResourceId
+from m2pem.executive.clock import SystemClock
+from m2pem.testing import ArbiterCase, ArbiterContract
+
+A, B = ResourceId("v1"), ResourceId("v2")
+NUMBERS = {A: 1, B: 2}
 SPEED = 20.0
 
 
-def at(east: float, north: float) -> tuple[float, float]:
-    return offset(HOME, east, north)
-
-
 class _Simulated(ArbiterContract):
-    unsupported = {"virtual clock": "vehicles are told over real sockets"}
+    """The vehicles are simulated in a loop and thread of their own: they outlive the arbiters."""
+
+    unsupported: ClassVar = {"virtual clock": "vehicles are told over real sockets"}
     speed = SPEED
     kind = Kind.ROVER
-    domain = "ground"
     firmware = "ardupilot"
 
     @pytest.fixture
     def simulator(self):
-        """In a loop and thread of its own: it outlives the loop of the arbiter."""
-        specs = [
-            VehicleSpec(
-                self.kind,
-                system=number,
-                home=Location(*at(0.0, 20.0 * number), 488.0),
-                firmware=self.firmware,
-                estimator_s=1.0,
-            )
-            for number in (1, 2)
-        ]
-        started, stop = threading.Event(), None
-        simulator = Simulator(specs, speed=SPEED, to=None)
+        simulator = Simulator(
+            specs(self.kind, self.kind, firmware=self.firmware), speed=SPEED, to=None
+        )
+        started, stop = threading.Event(), asyncio.Event()
         loop = asyncio.new_event_loop()
 
         async def main() -> None:
-            nonlocal stop
-            stop = asyncio.Event()
             async with simulator:
                 await self.prepare(simulator)
                 started.set()
                 await stop.wait()
 
-        thread = threading.Thread(target=loop.run_until_complete, args=(main(),), name="asyncio_sim")
+        thread = threading.Thread(
+            target=loop.run_until_complete, args=(main(),), name="asyncio_simulator"
+        )
         thread.start()
         assert started.wait(20)
         yield simulator
@@ -71,20 +59,12 @@ class _Simulated(ArbiterContract):
 
     @pytest.fixture
     def make_arbiter(self, simulator):
-        def make(context):
-            connections = {}
-            for resource, number in ((A, 1), (B, 2)):
-                host, port = simulator[number].address
-                settings = {"url": f"udpout://{host}:{port}", "system_id": number}
-                connections[resource] = Connection(resource, self.domain, settings)
-            return MavlinkArbiter(connections, context)
-
-        return make
+        return lambda context: MavlinkArbiter(connections(simulator), context)
 
     @pytest.fixture
     def cut_link(self, simulator):
         def cut(_arbiter, vehicle) -> None:
-            port = simulator[1 if vehicle == A else 2].port
+            port = simulator[NUMBERS[vehicle]].port
             port.outward.carry = port.inward.carry = lambda *_: None
 
         return cut
@@ -92,7 +72,7 @@ class _Simulated(ArbiterContract):
     @pytest.fixture
     def effects(self, simulator):
         def count(_arbiter, vehicle) -> int:
-            truth = simulator[1 if vehicle == A else 2]
+            truth = simulator[NUMBERS[vehicle]]
             return truth.motions + truth.missions_begun + truth.takeoffs
 
         return count
@@ -115,7 +95,6 @@ class TestSimulatedRovers(_Simulated):
 
 class TestSimulatedCoptersTakingOff(_Simulated):
     kind = Kind.COPTER
-    domain = "air"
 
     @pytest.fixture
     def case(self):
@@ -131,7 +110,6 @@ class TestSimulatedCoptersTakingOff(_Simulated):
 
 class TestSimulatedCopters(_Simulated):
     kind = Kind.COPTER
-    domain = "air"
 
     async def prepare(self, simulator) -> None:
         await asyncio.gather(*(take_off(simulator[number], number) for number in (1, 2)))

@@ -3,11 +3,11 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from m2pem.api import Area, BehaviorState, Point, Route
 from m2pem_plugin_mavlink.fence import MARGIN_M, Fence
 from mavlink_double import Body, at
 from mavlink_play import V, play
+
+from m2pem.api import Area, BehaviorState, Point, Route
 
 
 def ring(*corners: tuple[float, float]) -> tuple:
@@ -16,7 +16,9 @@ def ring(*corners: tuple[float, float]) -> tuple:
 
 HOLE = ring((40, 40), (60, 40), (60, 60), (40, 60))
 FIELD = Area((ring((0, 0), (100, 0), (100, 100), (0, 100)), HOLE))
-U_SHAPE = Area((ring((0, 0), (100, 0), (100, 100), (70, 100), (70, 20), (30, 20), (30, 100), (0, 100)),))
+U_SHAPE = Area(
+    (ring((0, 0), (100, 0), (100, 100), (70, 100), (70, 20), (30, 20), (30, 100), (0, 100)),)
+)
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,9 @@
 import pytest
-
-from m2pem.api import BehaviorState
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from mavlink_double import Body
 from mavlink_play import after_a_restart, play
+
+from m2pem.api import BehaviorState
 
 SUCCEEDED, RUNNING, UNKNOWN = (
     BehaviorState.SUCCEEDED,
@@ -127,8 +127,9 @@ def test_a_speed_that_was_set_is_that_of_what_follows() -> None:
 
 
 def _point():
-    from m2pem.api import Point
     from mavlink_double import at
+
+    from m2pem.api import Point
 
     return Point((*at(0.0, 0.0), None))
 

@@ -1,6 +1,8 @@
 import math
 
 import pytest
+from mavlink_double import HOME_ALTITUDE_M, Body, at
+from mavlink_play import after_a_restart, play
 
 from m2pem.api import (
     BehaviorState,
@@ -10,8 +12,6 @@ from m2pem.api import (
     VehiclePosition,
     VehicleState,
 )
-from mavlink_double import HOME_ALTITUDE_M, Body, at
-from mavlink_play import after_a_restart, play
 
 W = ResourceId("w")
 
@@ -19,9 +19,7 @@ W = ResourceId("w")
 def says(bench, east: float, north: float, *, yaw=0.0, velocity=(0.0, 0.0, 0.0), **more) -> None:
     position = GeoPosition(*at(east, north), HOME_ALTITUDE_M)
     bench.bus.publish(
-        VehicleState(
-            W, bench.clock.now_us(), position, None, velocity, yaw_rad=yaw, **more
-        )
+        VehicleState(W, bench.clock.now_us(), position, None, velocity, yaw_rad=yaw, **more)
     )
 
 

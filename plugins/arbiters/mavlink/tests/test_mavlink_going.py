@@ -1,12 +1,12 @@
 import math
 
 import pytest
-
-from m2pem.api import BehaviorState, GeoPosition, Point, ResourceId, VehiclePosition, VehicleState
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
 from mavlink_double import HOME_ALTITUDE_M, Body, at
 from mavlink_play import after_a_restart, play
+
+from m2pem.api import BehaviorState, GeoPosition, Point, ResourceId, VehiclePosition, VehicleState
 
 SUCCEEDED = BehaviorState.SUCCEEDED
 

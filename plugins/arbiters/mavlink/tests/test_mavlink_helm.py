@@ -1,11 +1,11 @@
 """Taking over, being taken over, falling silent: who steers a vehicle."""
 
 import pytest
-
-from m2pem.api import BehaviorState, LinkState, Point, Route
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from mavlink_double import Body, at
 from mavlink_play import V, after_a_restart, play
+
+from m2pem.api import BehaviorState, LinkState, Point, Route
 
 FAILED, CANCELLED, RUNNING = BehaviorState.FAILED, BehaviorState.CANCELLED, BehaviorState.RUNNING
 FAR = Point((*at(800, 0), 20.0))
@@ -86,9 +86,7 @@ def test_what_preempts_a_cancel_in_flight_takes_over() -> None:
         (FlightMode.GUIDED, True),
     ],
 )
-def test_a_mode_that_nobody_here_asked_for_fails_the_behavior_and_is_not_fought(
-    mode, held
-) -> None:
+def test_a_mode_that_nobody_here_asked_for_fails_the_behavior_and_is_not_fought(mode, held) -> None:
     async def main(bench) -> None:
         await flying(bench)
         if held:
@@ -236,3 +234,14 @@ def test_what_is_held_on_the_ground_and_disarms_itself_takes_off_after_the_hold(
         assert (await bench.ended("r1.b1", 60)).state is BehaviorState.SUCCEEDED
 
     play(Body(), main)
+
+
+@pytest.mark.parametrize("failsafe", ["return_to_launch", ""])
+def test_a_failsafe_that_is_not_the_fleets_is_told_at_connect(failsafe, caplog) -> None:
+    async def main(bench) -> None:
+        await bench.clock.sleep(2)
+
+    caplog.set_level("WARNING")
+    body = Body(findings=["v: FS_GCS_ENABLE is 0"])
+    play(body, main, failsafe=failsafe)
+    assert ("FS_GCS_ENABLE is 0" in caplog.text) is bool(failsafe)

@@ -1,16 +1,17 @@
 """Routes, surveys and circles, flown as missions."""
 
 import math
+from itertools import pairwise
 
 import pytest
-
-from m2pem.api import Area, BehaviorState, Point, Route
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.plane import Plane
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
 from mavlink_double import HOME, Body, at
 from mavlink_play import after_a_restart, play
+
+from m2pem.api import Area, BehaviorState, Point, Route
 
 SUCCEEDED, RUNNING = BehaviorState.SUCCEEDED, BehaviorState.RUNNING
 WAYPOINT, CHANGE_SPEED = 16, 178
@@ -187,7 +188,7 @@ def test_an_orbit_is_one_turn_of_waypoints_round_the_circle() -> None:
         assert around[0] == pytest.approx((30, 0), abs=0.1), "begun at the near side"
         assert around[0] == pytest.approx(around[-1], abs=0.1)
         turn = [math.atan2(n, e - 50) for e, n in around[:3]]
-        assert all(math.remainder(b - a, math.tau) < 0 for a, b in zip(turn, turn[1:]))
+        assert all(math.remainder(b - a, math.tau) < 0 for a, b in pairwise(turn))
 
     play(Body().fly(), main)
 
@@ -298,9 +299,7 @@ def test_a_mission_that_is_not_flown_any_more_is_not_known(meanwhile) -> None:
         assert bench.told == ["downloaded"]
 
     way = route((30, 0, 20.0), (300, 0, 20.0))
-    after_a_restart(
-        Body().fly(), "single_vehicle_routing", main, meanwhile=meanwhile, route=way
-    )
+    after_a_restart(Body().fly(), "single_vehicle_routing", main, meanwhile=meanwhile, route=way)
 
 
 def test_a_mission_that_has_ended_meanwhile_has_succeeded() -> None:
@@ -312,9 +311,7 @@ def test_a_mission_that_has_ended_meanwhile_has_succeeded() -> None:
             body.step(0.1)
         body.reached = None
 
-    after_a_restart(
-        Body().fly(), "single_vehicle_routing", main, meanwhile=ended, route=L_SHAPE
-    )
+    after_a_restart(Body().fly(), "single_vehicle_routing", main, meanwhile=ended, route=L_SHAPE)
 
 
 def test_an_onboard_mission_is_found_again_after_a_restart() -> None:

@@ -2,11 +2,11 @@ import subprocess
 import sys
 
 import pytest
+from m2pem_plugin_mavlink.catalogue import offered
+from m2pem_plugin_mavlink.settings import Settings, read_settings
 
 from m2pem.api import Connection, ResourceId
 from m2pem.errors import PluginError
-from m2pem_plugin_mavlink.catalogue import offered
-from m2pem_plugin_mavlink.settings import Settings, read_settings
 
 V, W = ResourceId("uav1"), ResourceId("uav2")
 URL = "udpin://127.0.0.1:14550"
@@ -93,7 +93,11 @@ def test_a_driver_is_not_offered_what_it_cannot_do() -> None:
 def test_every_behavior_that_is_offered_is_there() -> None:
     from m2pem_plugin_mavlink.behaviors import BEHAVIORS
 
-    names = {spec.name for domain in ("air", "ground", "subsurface") for spec in offered(domain, "pymavlink")}
+    names = {
+        spec.name
+        for domain in ("air", "ground", "subsurface")
+        for spec in offered(domain, "pymavlink")
+    }
     assert names == set(BEHAVIORS)
 
 

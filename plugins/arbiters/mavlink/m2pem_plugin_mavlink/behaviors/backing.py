@@ -20,7 +20,7 @@ LOOK_EVERY_S = 0.1
 
 
 class Reverse(Behavior):
-    """Drive backwards over a distance, then stand: ArduPilot's DO_SET_REVERSE, and a place behind."""
+    """Drive backwards over a distance, then stand: by DO_SET_REVERSE, and a place behind."""
 
     name = "reverse"
     modes = frozenset({FlightMode.GUIDED, FlightMode.HOLD})
@@ -36,6 +36,7 @@ class Reverse(Behavior):
         self._done = False
 
     def refusal(self) -> str:
+        """It must know where it is and points, and not back out of the fence."""
         if self._from is None or self._yaw_rad is None:
             return "where it is, and where its bow points, is not known yet"
         if self.job.fence is None:
@@ -44,6 +45,7 @@ class Reverse(Behavior):
         return self.job.fence.breach(way, self._from, lambda _: "the place behind it")
 
     async def begin(self) -> None:
+        """Set it to drive backwards, to a place somewhat beyond the distance."""
         if self._from is None or self._yaw_rad is None:
             raise BehaviorFailedError("where it is, and where its bow points, is not known")
         if self._distance_m == 0:
@@ -57,6 +59,7 @@ class Reverse(Behavior):
         await driver.go_to(Place(*beyond), self._speed_m_s)
 
     async def go_on(self) -> None:
+        """To the same place as before."""
         if not self._done:
             await self.begin()
 
@@ -70,9 +73,11 @@ class Reverse(Behavior):
         self._done = True
 
     def finished(self) -> bool:
+        """It was stopped after the distance, and stands."""
         return self._done and stands(self.vehicle)
 
     async def leave(self) -> None:
+        """Set it to drive forwards again."""
         await self.vehicle.driver.command(dialect.MAV_CMD_DO_SET_REVERSE, 0.0)
 
     def _covered(self) -> bool:
@@ -88,6 +93,7 @@ class Reverse(Behavior):
         return offset(place, -distance_m * math.cos(yaw_rad), -distance_m * math.sin(yaw_rad))
 
     async def recognised(self) -> BehaviorState:
+        """By how far it is from where it began."""
         mode = self.vehicle.heard.mode
         if self._from is None or mode not in self.modes:
             return BehaviorState.UNKNOWN
@@ -99,9 +105,11 @@ class Reverse(Behavior):
         return BehaviorState.RUNNING if moves else BehaviorState.UNKNOWN
 
     def memory(self) -> Memory:
+        """Where it began, and where its bow pointed."""
         return {"from": list(self._from or ()), "yaw": self._yaw_rad}
 
     def recall(self, memory: Memory) -> None:
+        """The same."""
         began, yaw = memory.get("from"), memory.get("yaw")
         if isinstance(began, list) and len(began) == 2 and isinstance(yaw, int | float):
             self._from, self._yaw_rad = (began[0], began[1]), float(yaw)

@@ -31,8 +31,9 @@ class Job:
     """What is to be done, by whom, and where: the fleet's bus (positions of other vehicles) and the
     origin of its ENU frame (latitude and longitude in degrees, altitude in metres).
 
-    `now_s`: seconds of the arbiter's clock, which goes on over a restart. `fence`: what the vehicle may not leave. `cruise_m_s`: the speed that `set_speed` has set.
-    `actuators`: names that the fleet gives to actuators ("servo 9").
+    `now_s`: seconds of the arbiter's clock, which goes on over a restart. `fence`: what the vehicle
+    may not leave. `cruise_m_s`: the speed that `set_speed` has set. `actuators`: names that the
+    fleet gives to actuators ("servo 9").
     """
 
     vehicle: Vehicle

@@ -31,6 +31,7 @@ class Deploy(Behavior):
         self._value = wishes.number("value")
 
     def refusal(self) -> str:
+        """There must be such an actuator, and it must take the value."""
         if not self._kind:
             names = ", ".join(self.job.actuators)
             known = f"{names}; or " if names else ""
@@ -48,6 +49,7 @@ class Deploy(Behavior):
         return ""
 
     async def begin(self) -> None:
+        """Command it."""
         driver, number = self.vehicle.driver, float(self._number)
         if self._kind == "servo":
             await driver.command(dialect.MAV_CMD_DO_SET_SERVO, number, self._value or 0.0)
@@ -62,12 +64,15 @@ class Deploy(Behavior):
             await driver.command(dialect.MAV_CMD_DO_SET_ACTUATOR, *values, 0.0)
 
     async def go_on(self) -> None:
+        """Command it again."""
         await self.begin()
 
     def finished(self) -> bool:
+        """As soon as the autopilot has accepted."""
         return True
 
     async def recognised(self) -> BehaviorState:
+        """No autopilot tells how its actuators are set."""
         return BehaviorState.UNKNOWN
 
 

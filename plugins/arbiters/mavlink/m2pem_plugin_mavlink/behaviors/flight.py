@@ -1,6 +1,5 @@
 """Up, down and home."""
 
-
 from m2pem.api import BehaviorState
 from m2pem_plugin_mavlink.behaviors.behavior import ANY_MODE, Behavior, BehaviorFailedError, Job
 from m2pem_plugin_mavlink.behaviors.going import TOLERANCES_M
@@ -42,20 +41,24 @@ class ChangeAltitude(Behavior):
         self._altitude_m = altitude or 0.0
 
     def refusal(self) -> str:
+        """It must fly, and know where."""
         if reason := unless_airborne(self.vehicle):
             return reason
         return "" if where(self.vehicle) else "its position is not known yet"
 
     async def begin(self) -> None:
+        """Send it to the height, over where it is."""
         here = where(self.vehicle)
         if here is None:
             raise BehaviorFailedError("its position is not known")
         await self.vehicle.driver.go_to(Place(*here, self._altitude_m, self._frame))
 
     async def go_on(self) -> None:
+        """The same, over where it is by now."""
         await self.begin()
 
     def finished(self) -> bool:
+        """At the height, and neither climbing nor sinking."""
         height = height_m(self.vehicle.heard, self._frame)
         if height is None:
             raise BehaviorFailedError(f"its height above {self._frame} is not known")
@@ -67,6 +70,7 @@ class ChangeAltitude(Behavior):
         return velocity is None or abs(velocity[2]) < LEVEL_M_S
 
     async def recognised(self) -> BehaviorState:
+        """By its height, and whether it climbs or sinks towards the one asked for."""
         if not accepts(self, self.vehicle.heard.mode):
             return BehaviorState.UNKNOWN
         here = where(self.vehicle)
@@ -84,6 +88,7 @@ class Takeoff(ChangeAltitude):
     modes = frozenset({FlightMode.GUIDED, FlightMode.TAKEOFF})
 
     def refusal(self) -> str:
+        """The height must be above its home."""
         altitude_m = self._above_home_m()
         if altitude_m is None:
             return "the height of its home is not known yet: say a relative altitude"
@@ -95,6 +100,7 @@ class Takeoff(ChangeAltitude):
         return ""
 
     async def begin(self) -> None:
+        """Arm it and have it take off; one that flies only climbs."""
         altitude_m = self._above_home_m()
         if self.vehicle.heard.landed is False and self.vehicle.heard.armed:
             await super().begin()
@@ -102,6 +108,7 @@ class Takeoff(ChangeAltitude):
             await self.vehicle.driver.take_off(altitude_m)
 
     def finished(self) -> bool:
+        """Up there, and no longer climbing."""
         if self.vehicle.heard.landed is True:
             return False
         height = self.vehicle.heard.altitude_above_home_m
@@ -121,6 +128,7 @@ class Takeoff(ChangeAltitude):
         return self._altitude_m - heard.position.altitude_m + heard.altitude_above_home_m
 
     async def recognised(self) -> BehaviorState:
+        """As for a change of altitude; or it is in a mode for takeoffs."""
         state = await super().recognised()
         mode = self.vehicle.heard.mode
         climbs = self.vehicle.heard.armed and mode is FlightMode.TAKEOFF
@@ -134,10 +142,12 @@ class Land(Behavior):
     modes = frozenset({FlightMode.LAND})
 
     async def begin(self) -> None:
+        """Unless it has landed already."""
         if not self._down():
             await self.vehicle.driver.land()
 
     async def go_on(self) -> None:
+        """Land where it is by now."""
         await self.begin()
 
     async def steps(self) -> None:
@@ -145,12 +155,14 @@ class Land(Behavior):
         await disarm_when_down(self)
 
     def finished(self) -> bool:
+        """On the ground and disarmed."""
         return self._down()
 
     def _down(self) -> bool:
         return self.vehicle.heard.landed is True and self.vehicle.heard.armed is False
 
     async def recognised(self) -> BehaviorState:
+        """By its mode, or because it is down."""
         if self._down():
             return BehaviorState.SUCCEEDED
         lands = accepts(self, self.vehicle.heard.mode)
@@ -177,11 +189,13 @@ class ReturnToLaunch(Behavior):
         self._standing = Standing(job)
 
     def refusal(self) -> str:
+        """What stands on the ground away from home must take off first."""
         if on_the_ground(self.vehicle) and self._home_m() > self._near_m:
             return unless_airborne(self.vehicle)
         return ""
 
     async def begin(self) -> None:
+        """Unless it is at home already."""
         self._standing.forget()
         if self._is_there_already():
             self.modes = ANY_MODE
@@ -189,6 +203,7 @@ class ReturnToLaunch(Behavior):
         await self.vehicle.driver.return_home()
 
     async def go_on(self) -> None:
+        """The same."""
         await self.begin()
 
     async def steps(self) -> None:
@@ -209,6 +224,7 @@ class ReturnToLaunch(Behavior):
         return heard.home is not None and self._home_m() <= self._near_m and stands(self.vehicle)
 
     def finished(self) -> bool:
+        """At home: an aircraft down and disarmed (or hovering for long), others standing."""
         if self._is_there_already():
             return True
         standing_s = self._standing.seconds()
@@ -218,6 +234,7 @@ class ReturnToLaunch(Behavior):
         return self.vehicle.heard.home is None and standing_s >= DISARMS_WITHIN_S
 
     async def recognised(self) -> BehaviorState:
+        """By its mode, or because it is at home."""
         if self._is_there_already() and self._home_m() <= self._near_m:
             return BehaviorState.SUCCEEDED
         returns = accepts(self, self.vehicle.heard.mode)
@@ -236,13 +253,17 @@ class SetSpeed(Behavior):
         self.speed_m_s = Wishes(job).number("speed") or 0.0
 
     async def begin(self) -> None:
+        """Tell it the speed."""
         await self.vehicle.driver.set_speed(self.speed_m_s)
 
     async def go_on(self) -> None:
+        """Tell it again."""
         await self.begin()
 
     def finished(self) -> bool:
+        """As soon as the autopilot has accepted."""
         return True
 
     async def recognised(self) -> BehaviorState:
+        """No autopilot tells the speed that it was set to."""
         return BehaviorState.UNKNOWN

@@ -14,8 +14,9 @@ BEHIND_RAD = math.pi
 REPEAT_S = 0.5
 STALE_S = 3.0
 MOVED_M = 0.5
-LEAD_S = 1.0
-"""It is sent where its station will be by then; a place is reached later than it is told."""
+LEAD_S = 2.0
+"""It is sent where its station will be by then: told twice a second, and slowing down before each
+place that it is told, it lags so much behind."""
 
 COURSE_ABOVE_M_S = 1.0
 """Who moves faster points where it moves; its bow counts only if that is not known."""
@@ -38,6 +39,7 @@ class Follow(Behavior):
         self._course_rad: float | None = None
 
     def refusal(self) -> str:
+        """Another vehicle is needed that is heard, with its station within the fence."""
         if reason := unless_airborne(self.vehicle):
             return reason
         if self._target in ("", self.vehicle.resource):
@@ -47,10 +49,12 @@ class Follow(Behavior):
         return self._breach(self._station())
 
     async def begin(self) -> None:
+        """Send it to its station."""
         self._told = None
         await self._tell()
 
     async def go_on(self) -> None:
+        """To where the station is by now."""
         await self.begin()
 
     async def steps(self) -> None:
@@ -60,6 +64,7 @@ class Follow(Behavior):
             await self._tell()
 
     def finished(self) -> bool:
+        """Never: it goes on until it is interrupted."""
         return False
 
     async def _tell(self) -> None:
@@ -107,6 +112,7 @@ class Follow(Behavior):
         )
 
     async def recognised(self) -> BehaviorState:
+        """It flies in the mode in which it takes places; what it was told last does not matter."""
         heard = self.vehicle.heard
         follows = heard.armed and accepts(self, heard.mode) and not unless_airborne(self.vehicle)
         return BehaviorState.RUNNING if follows else BehaviorState.UNKNOWN

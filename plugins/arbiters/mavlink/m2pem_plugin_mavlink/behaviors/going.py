@@ -62,6 +62,7 @@ class Goto(Behavior):
         return replace(self.wishes.target(), heading_rad=self.wishes.number("heading"))
 
     def refusal(self) -> str:
+        """What flies must be in the air, and the way within the fence."""
         if reason := unless_airborne(self.vehicle):
             return reason
         place = self.target()
@@ -71,11 +72,13 @@ class Goto(Behavior):
         return self.job.fence.breach(way, where(self.vehicle), lambda _: "the target")
 
     async def begin(self) -> None:
+        """Send it there."""
         self._standing.forget()
         self._place = self.target()
         await self.vehicle.driver.go_to(self._place, self.wishes.speed_m_s)
 
     async def go_on(self) -> None:
+        """Send it there again."""
         await self.begin()
 
     async def steps(self) -> None:
@@ -94,6 +97,11 @@ class Goto(Behavior):
                 await self.vehicle.driver.go_to(new, self.wishes.speed_m_s)
 
     def finished(self) -> bool:
+        """Within the tolerance and turned; or it stands, as near as its autopilot goes.
+
+        Raises:
+            BehaviorFailedError: it stands outside of a tolerance that was asked for.
+        """
         place = self._place or self.target()
         away = away_m(self.vehicle, (place.latitude_deg, place.longitude_deg))
         high = off_height_m(self.vehicle, place) <= max(self._tolerance_m, HEIGHT_TOLERANCE_M)
@@ -116,6 +124,7 @@ class Goto(Behavior):
         return abs(off) <= TURNED_RAD or self._standing.seconds() >= TURN_S
 
     async def recognised(self) -> BehaviorState:
+        """By its place, and whether it moves towards the target."""
         self._place = place = self.target()
         if not accepts(self, self.vehicle.heard.mode):
             return BehaviorState.UNKNOWN
@@ -142,6 +151,7 @@ class Hold(Behavior):
         self._since_s: float | None = None
 
     async def begin(self) -> None:
+        """Stop it; what is not armed stands."""
         if on_the_ground(self.vehicle) or self.vehicle.heard.armed is False:
             self.modes = frozenset(FlightMode)  # it stands already, in whatever mode
         else:
@@ -149,19 +159,23 @@ class Hold(Behavior):
         self._since_s = self.job.now_s()
 
     def paused(self) -> None:
+        """A pause does not count in the duration."""
         if self._since_s is not None:
             self._left_s -= self.job.now_s() - self._since_s
             self._since_s = None
 
     async def go_on(self) -> None:
+        """For as long as is left."""
         await self.begin()
 
     def finished(self) -> bool:
+        """Standing, and the time is over."""
         now_s = self.job.now_s()
         over = self._since_s is not None and now_s - self._since_s >= self._left_s
         return over and stands(self.vehicle)
 
     async def recognised(self) -> BehaviorState:
+        """By its mode."""
         if self.vehicle.heard.armed and not accepts(self, self.vehicle.heard.mode):
             return BehaviorState.UNKNOWN
         self._since_s = self.job.now_s()
@@ -170,9 +184,11 @@ class Hold(Behavior):
         return BehaviorState.SUCCEEDED if self.finished() else BehaviorState.RUNNING
 
     def memory(self) -> Memory:
+        """When it ends."""
         return {"until_s": self.job.now_s() + self._left_s}
 
     def recall(self, memory: Memory) -> None:
+        """How long is left."""
         until_s = memory.get("until_s")
         if isinstance(until_s, int | float):
             self._left_s = max(0.0, until_s - self.job.now_s())

@@ -81,6 +81,7 @@ class MissionFlight(Behavior):
         return self._items
 
     def refusal(self) -> str:
+        """What flies must be in the air, and the way within the fence; a loop's way back, too."""
         if reason := unless_airborne(self.vehicle):
             return reason
         speeds = 0 if self.wishes.speed_m_s is None else 1
@@ -98,11 +99,13 @@ class MissionFlight(Behavior):
         )
 
     async def begin(self) -> None:
+        """Upload the items and start the mission."""
         self._standing.forget()
         await self.vehicle.driver.upload(self.items)
         await self.vehicle.driver.start_mission(0)
 
     async def go_on(self) -> None:
+        """From the item that it was moving to."""
         self._standing.forget()
         last = self._end[0] if self._end else 0
         current = self.vehicle.driver.current_item or 0
@@ -135,9 +138,11 @@ class MissionFlight(Behavior):
         return over or self._standing.seconds() >= STANDS_AT_END_S
 
     def finished(self) -> bool:
+        """At the last waypoint; a loop never is."""
         return not self.loop and self.at_the_end()
 
     async def recognised(self) -> BehaviorState:
+        """By the mission that it has stored, its mode, its item and its place."""
         if self._kept is None or self._end is None:
             return BehaviorState.UNKNOWN
         stored = await self.vehicle.driver.downloaded()
@@ -154,6 +159,7 @@ class MissionFlight(Behavior):
         return await self.vehicle.until(self.at_the_end, STANDS_AT_END_S + 0.5)
 
     def memory(self) -> Memory:
+        """The mission's fingerprint, its last item and where that is."""
         if not self.items or self._kept is None or self._end is None:
             raise BehaviorFailedError("there is no way to move")
         last, place = self._end
@@ -164,6 +170,7 @@ class MissionFlight(Behavior):
         }
 
     def recall(self, memory: Memory) -> None:
+        """The same."""
         mission, end = memory.get("mission"), memory.get("end")
         if isinstance(mission, list) and isinstance(end, list):
             self._kept = Fingerprint(int(mission[0]), int(mission[1]), mission[2])

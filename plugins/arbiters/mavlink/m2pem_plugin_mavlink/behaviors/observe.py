@@ -1,6 +1,7 @@
 """Watching an area or a place."""
 
 import math
+from itertools import pairwise
 
 from m2pem.api import Area, BehaviorState
 from m2pem_plugin_mavlink.behaviors.behavior import BehaviorFailedError, Job, Memory
@@ -23,6 +24,7 @@ class ObserveFromAbove(Orbit):
     ends = False
 
     def circle(self) -> tuple[Place, float]:
+        """Over the middle of the area, or the target."""
         area = self.wishes.area
         if area is None:
             return super().circle()
@@ -43,6 +45,7 @@ class ObserveFromTheEdge(Goto):
         self._since_s: float | None = None
 
     def target(self) -> Place:
+        """Where it stands and looks; chosen once."""
         if self._stand is None:
             self._stand = Place(*self._edge(), *self.wishes.altitude())
         return self._stand
@@ -65,6 +68,7 @@ class ObserveFromTheEdge(Goto):
         return plane.place((east * STANDOFF_M / away, north * STANDOFF_M / away))
 
     async def begin(self) -> None:
+        """Go there, or stay there."""
         if self._since_s is None:
             await super().begin()
         else:
@@ -74,6 +78,7 @@ class ObserveFromTheEdge(Goto):
         """It stands."""
 
     def finished(self) -> bool:
+        """After the duration, counted from the arrival; without one never."""
         if self._since_s is None:
             if not super().finished():
                 return False
@@ -81,16 +86,19 @@ class ObserveFromTheEdge(Goto):
         return self._seconds is not None and self.job.now_s() - self._since_s >= self._seconds
 
     def paused(self) -> None:
+        """A pause does not count in the duration."""
         if self._since_s is not None and self._seconds is not None:
             self._seconds -= self.job.now_s() - self._since_s
             self._since_s = self.job.now_s()
 
     async def go_on(self) -> None:
+        """Go on there, for as long as is left."""
         if self._since_s is not None:
             self._since_s = self.job.now_s()
         await self.begin()
 
     async def recognised(self) -> BehaviorState:
+        """By whether it goes there, or stands there."""
         if not accepts(self, self.vehicle.heard.mode) or not self.vehicle.heard.armed:
             return BehaviorState.UNKNOWN
         state = await super().recognised()
@@ -98,10 +106,12 @@ class ObserveFromTheEdge(Goto):
         return BehaviorState.RUNNING if watches and stands(self.vehicle) else state
 
     def memory(self) -> Memory:
+        """Where it stands."""
         place = self.target()
         return {"stand": [place.latitude_deg, place.longitude_deg]}
 
     def recall(self, memory: Memory) -> None:
+        """The same."""
         stand = memory.get("stand")
         if isinstance(stand, list):
             self._stand = Place(stand[0], stand[1], *self.wishes.altitude())
@@ -120,7 +130,7 @@ def middle(area: Area) -> tuple[LatLon, float]:
 
 def _nearest(ring: list[Level], here: Level) -> Level:
     candidates = []
-    for (ae, an), (be, bn) in zip(ring, ring[1:], strict=False):
+    for (ae, an), (be, bn) in pairwise(ring):
         de, dn = be - ae, bn - an
         length2 = de * de + dn * dn
         part = ((here[0] - ae) * de + (here[1] - an) * dn) / length2 if length2 else 0.0

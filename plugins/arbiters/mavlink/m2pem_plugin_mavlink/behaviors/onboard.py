@@ -21,6 +21,7 @@ class RunOnboardMission(Behavior):
         self._flew = False
 
     async def begin(self) -> None:
+        """Look at what is stored, and start it."""
         items = await self.vehicle.driver.downloaded()
         if not items:
             raise BehaviorFailedError("it has no mission stored")
@@ -32,9 +33,11 @@ class RunOnboardMission(Behavior):
         await self.vehicle.driver.start_mission(self._first)
 
     async def go_on(self) -> None:
+        """From the item that it was moving to."""
         await self.vehicle.driver.start_mission(self.vehicle.driver.current_item or self._first)
 
     def finished(self) -> bool:
+        """At the last waypoint, or down and disarmed after having flown."""
         heard = self.vehicle.heard
         self._flew = self._flew or heard.landed is False
         reached = self.vehicle.driver.reached_item
@@ -54,6 +57,7 @@ class RunOnboardMission(Behavior):
                 raise BehaviorFailedError(reason)
 
     async def recognised(self) -> BehaviorState:
+        """By its mode."""
         if self.vehicle.heard.mode is not FlightMode.MISSION or not self.vehicle.heard.armed:
             return BehaviorState.UNKNOWN
         items = await self.vehicle.driver.downloaded()

@@ -61,6 +61,7 @@ class Orbit(MissionFlight):
         return self._center
 
     def way(self) -> Sequence[MissionItem]:
+        """A polygon on the circle: all turns, or one lap that is begun anew each time."""
         center = self.center
         plane = Plane((center.latitude_deg, center.longitude_deg))
         sides = self._sides()
@@ -88,16 +89,19 @@ class Orbit(MissionFlight):
         return math.atan2(north, east)
 
     def named(self, index: int) -> str:
+        """Its corners have no names."""
         return "a point of the circle"
 
     # --- how ------------------------------------------------------------------------------------
 
     def refusal(self) -> str:
+        """As for a route; no turn at all needs no room."""
         if self._turns == 0 or self._seconds == 0:
             return unless_airborne(self.vehicle)
         return super().refusal()
 
     async def begin(self) -> None:
+        """By the autopilot's command, else by a mission."""
         self._done = self._turns == 0 or self._seconds == 0
         if self._done:
             return
@@ -108,6 +112,7 @@ class Orbit(MissionFlight):
             await super().begin()
 
     async def go_on(self) -> None:
+        """What was turned already counts."""
         if self._by_command or self._done:
             await self.begin()
         else:
@@ -153,6 +158,7 @@ class Orbit(MissionFlight):
         return True
 
     def finished(self) -> bool:
+        """After the turns or the time."""
         if self._by_command or self.loop or self._done:
             return self._done
         return self.at_the_end()
@@ -160,6 +166,7 @@ class Orbit(MissionFlight):
     # --- after a restart ------------------------------------------------------------------------
 
     async def recognised(self) -> BehaviorState:
+        """By its mode and its distance from the centre, or by its mission."""
         if self.vehicle.heard.mode is FlightMode.ORBIT:
             self._by_command = True
             near = self._look() or self._bearing_rad is not None
@@ -167,6 +174,7 @@ class Orbit(MissionFlight):
         return await super().recognised()
 
     def memory(self) -> Memory:
+        """As for a route, and the circle."""
         center = self.center
         return {
             **super().memory(),
@@ -177,6 +185,7 @@ class Orbit(MissionFlight):
         }
 
     def recall(self, memory: Memory) -> None:
+        """The same."""
         super().recall(memory)
         center, radius = memory.get("center"), memory.get("radius")
         if not isinstance(center, list) or not isinstance(radius, int | float):

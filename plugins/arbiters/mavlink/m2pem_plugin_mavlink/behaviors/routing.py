@@ -17,6 +17,7 @@ class Routing(MissionFlight):
         self.loop = self.wishes.flag("loop")
 
     def way(self) -> Sequence[MissionItem]:
+        """The waypoints of the route."""
         route = self.wishes.route
         if route is None or not route.waypoints:
             raise BehaviorFailedError("parameter 'route': it has no waypoints")
@@ -26,4 +27,5 @@ class Routing(MissionFlight):
         ]
 
     def named(self, index: int) -> str:
+        """By its number, from 1."""
         return f"waypoint {index + 1} of the route"

@@ -19,6 +19,7 @@ class Survey(MissionFlight):
     name = "area_survey"
 
     def way(self) -> Sequence[MissionItem]:
+        """The ends of the passes."""
         area = self.wishes.area
         if area is None:
             raise BehaviorFailedError("parameter 'area': there is none")
@@ -42,4 +43,5 @@ class Survey(MissionFlight):
         return [waypoint(place, *height) for place in places]
 
     def named(self, index: int) -> str:
+        """By the number of its pass, from 1."""
         return f"{'end' if index % 2 else 'begin'} of pass {index // 2 + 1} of the survey"

@@ -1,0 +1,87 @@
+"""Arbiters on simulated autopilots, over real UDP."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
+from m2pem_plugin_mavlink.plane import Plane, offset
+from m2pem_plugin_mavlink.sim.geometry import Location
+from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
+from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+
+from m2pem.api import Connection, ResourceId
+from m2pem.executive.clock import SystemClock
+from m2pem.testing.contracts.bench import ArbiterBench, context
+
+HOME = (47.397742, 8.545594)
+HOME_ALTITUDE_M = 488.0
+DOMAINS = {Kind.COPTER: "air", Kind.ROVER: "ground", Kind.PLANE: "air", Kind.BOAT: "surface"}
+
+
+def at(east: float, north: float) -> tuple[float, float]:
+    """The place so far from the first vehicle's home."""
+    return offset(HOME, east, north)
+
+
+def specs(*kinds: Kind, **more: Any) -> list[VehicleSpec]:
+    """Vehicles side by side, 20 m apart, that know soon where they are."""
+    return [
+        VehicleSpec(
+            kind,
+            system=number,
+            home=Location(*at(0.0, 20.0 * (number - 1)), HOME_ALTITUDE_M),
+            estimator_s=1.0,
+            **more,
+        )
+        for number, kind in enumerate(kinds, 1)
+    ]
+
+
+def connections(simulator: Simulator, **more: Any) -> dict[ResourceId, Connection]:
+    """The vehicles of a simulator, as v1, v2 and so on."""
+    made = {}
+    for vehicle in simulator:
+        number, kind = vehicle.autopilot.spec.system, vehicle.autopilot.spec.kind
+        resource = ResourceId(f"v{number}")
+        host, port = vehicle.address
+        settings = {"url": f"udpout://{host}:{port}", "system_id": number}
+        made[resource] = Connection(resource, DOMAINS[kind], settings, **more)
+    return made
+
+
+class Bench(ArbiterBench):
+    """A bench that knows where its vehicles really are."""
+
+    simulator: Simulator
+
+    def truth(self, number: int = 1) -> SimulatedVehicle:
+        """A vehicle as it really is."""
+        return self.simulator[number]
+
+    def level(self, number: int = 1) -> tuple[float, float]:
+        """East and north of the first home."""
+        where = self.truth(number).location
+        return Plane(HOME).level((where.latitude_deg, where.longitude_deg))
+
+    async def do(self, id_: str, behavior: str, vehicle: str = "v1", **parameters: Any) -> None:
+        """Start it and see it succeed."""
+        await self.start(id_, behavior, vehicle, **parameters)
+        end = await self.ended(id_, 600.0)
+        assert end.state == "SUCCEEDED", end
+
+
+def fly(
+    main: Callable[[Bench], Awaitable[None]], *kinds: Kind, speed: float = 20.0, **more: Any
+) -> None:
+    """Run `main` with an arbiter on simulated vehicles."""
+
+    async def run() -> None:
+        async with Simulator(specs(*kinds), speed=speed, to=None) as simulator:
+            clock = SystemClock(speed)
+            arbiter = MavlinkArbiter(connections(simulator, **more), context(clock))
+            async with Bench(arbiter, clock) as bench:
+                bench.simulator = simulator
+                await main(bench)
+
+    asyncio.run(run())
