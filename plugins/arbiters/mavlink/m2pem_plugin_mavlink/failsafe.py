@@ -4,6 +4,8 @@ Sources: the parameter references of ArduPilot (FS_*, BATT_FS_*, RTL_ALT, MAV_GC
 (NAV_DLL_ACT, COM_LOW_BAT_ACT, RTL_RETURN_ALT). Nothing is changed: findings say what to set.
 """
 
+import asyncio
+import contextlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -232,9 +234,11 @@ async def check(vehicle: Vehicle, word: str, own_system: int | None) -> tuple[Fa
     if not word or identity is None:
         return ()
     values: dict[str, float] = {}
-    for name in parameters_of_interest(identity):
-        try:
-            values[name] = await exchanges.parameter(vehicle.link, name)
-        except ExchangeError:
-            continue  # a parameter that a vehicle does not have is answered by silence
+
+    async def read(name: str) -> None:
+        # A parameter that a vehicle does not have is answered by silence.
+        with contextlib.suppress(ExchangeError):
+            values[name] = await exchanges.parameter(vehicle.link, identity.firmware, name)
+
+    await asyncio.gather(*map(read, parameters_of_interest(identity)))
     return findings(vehicle.resource, word, identity, values, own_system)

@@ -257,14 +257,8 @@ class TakeoverWatch:
 
 
 def _same(found: MissionItem, ours: MissionItem) -> bool:
-    """Whether an item is the one that was uploaded, but for what storing it may change: the frame,
-    which has older names, and what an item without a place has instead."""
-    if found.command != ours.command:
-        return False
+    """Whether an item is the one that was uploaded. What an item without a place is given back
+    with depends on the autopilot."""
     if ours.latitude_deg == 0.0 and ours.longitude_deg == 0.0:
-        return True
-    return (
-        abs(found.latitude_deg - ours.latitude_deg) < 2.5e-7
-        and abs(found.longitude_deg - ours.longitude_deg) < 2.5e-7
-        and abs(found.altitude_m - ours.altitude_m) < 0.02
-    )
+        return found.command == ours.command
+    return found.same_as(ours)

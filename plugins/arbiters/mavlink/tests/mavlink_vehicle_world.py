@@ -79,6 +79,7 @@ class ScriptedLink:
             news = asyncio.Event()
             entry = (transaction, news)
             self._awaiting.append(entry)
+            transaction.source = OWN
             try:
                 transaction.begin(self.now_s())
                 while True:

@@ -6,7 +6,7 @@ async with Simulator([VehicleSpec(), VehicleSpec(Kind.ROVER, system=2)], speed=1
 
 import asyncio
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from types import TracebackType
 from typing import Self
 
@@ -102,6 +102,7 @@ class Simulator:
             autopilot = Autopilot(spec, step_s=step_s)
             self._vehicles[spec.system] = SimulatedVehicle(VehiclePort(autopilot))
         self.now_s = 0.0
+        self._moved = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
 
     def __getitem__(self, system: int) -> SimulatedVehicle:
@@ -130,6 +131,7 @@ class Simulator:
             self._close()
             raise
         self._task = asyncio.create_task(self._run())
+        self._task.add_done_callback(lambda _: self._moved.set())
         return self
 
     async def __aexit__(
@@ -152,6 +154,18 @@ class Simulator:
         if self._task is not None:
             await asyncio.shield(self._task)
 
+    async def until(self, condition: Callable[[], bool]) -> None:
+        """Wait until something is so, looking whenever the vehicles have been moved on.
+
+        Raises:
+            Exception: whatever ended the simulation.
+        """
+        while not condition():
+            if self._task is not None and self._task.done():
+                self._task.result()
+            self._moved.clear()
+            await self._moved.wait()
+
     def _close(self) -> None:
         for vehicle in self:
             vehicle.port.close()
@@ -166,3 +180,4 @@ class Simulator:
             last_s = wall_s
             for vehicle in self:
                 vehicle.port.step(self.now_s)
+            self._moved.set()

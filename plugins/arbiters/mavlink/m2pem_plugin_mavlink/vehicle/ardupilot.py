@@ -5,6 +5,7 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem_plugin_mavlink.microservices.commands import CommandPlace
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges
@@ -165,19 +166,16 @@ class ArdupilotDriver(Autopilot):
 
     async def _reposition(self, place: Place, speed_m_s: float | None, radius_m: float) -> None:
         frame, altitude_m = self._altitude(place)
-        await exchanges.command_int(
+        await exchanges.command_at(
             self.link,
             dialect.MAV_CMD_DO_REPOSITION,
-            frame,
             (
                 -1.0 if speed_m_s is None else speed_m_s,
                 float(dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE),
                 radius_m,
                 math.nan,
             ),
-            place.latitude_deg,
-            place.longitude_deg,
-            altitude_m,
+            CommandPlace(place.latitude_deg, place.longitude_deg, altitude_m, frame),
         )
 
     def _altitude(self, place: Place) -> tuple[int, float]:

@@ -311,3 +311,7 @@ class Autopilot(ABC):
     async def command(self, command: int, *params: float) -> None:
         """Any command that has no method of its own."""
         await exchanges.command(self.link, command, *params)
+
+    async def command(self, command: int, *params: float) -> None:
+        """Any command that has no method of its own."""
+        await exchanges.command(self.link, command, *params)

@@ -1,116 +1,79 @@
-"""The exchanges that a vehicle is driven by, each in one call."""
+"""The exchanges that a vehicle is driven by, each in one call.
+
+Raises of all of them: `ExchangeError`, see the exchange.
+"""
 
 from collections.abc import Sequence
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
+from m2pem_plugin_mavlink.microservices.commands import Command, CommandPlace
+from m2pem_plugin_mavlink.microservices.intervals import RequestMessage, SetMessageInterval
+from m2pem_plugin_mavlink.microservices.mission_download import DownloadMission
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
-from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError, RefusedError, Transaction
+from m2pem_plugin_mavlink.microservices.mission_upload import UploadMission
+from m2pem_plugin_mavlink.microservices.missions import (
+    ClearMission,
+    ReadMissionItem,
+    SetCurrentItem,
+)
+from m2pem_plugin_mavlink.microservices.parameter_values import ParameterEncoding
+from m2pem_plugin_mavlink.microservices.parameters import ReadParameter
+from m2pem_plugin_mavlink.vehicle.identity import Firmware
 
-US_PER_S = 1_000_000
-
-
-class _Command(Transaction[None]):
-    wants = frozenset({message_type("COMMAND_ACK").id})
-
-    def __init__(self, asked: Message, vehicle: Address) -> None:
-        super().__init__(("command", asked.command))
-        self.asked, self.vehicle, self.left = asked, vehicle, 3
-
-    def begin(self, now_s: float) -> None:
-        self.expire(now_s)
-
-    def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        if message.command != self.asked.command or sender != self.vehicle:
-            return
-        if message.result == dialect.MAV_RESULT_ACCEPTED:
-            self.succeed(None)
-        elif message.result != dialect.MAV_RESULT_IN_PROGRESS:
-            self.fail(RefusedError(f"refused: {message.result}", message.result))
-
-    def expire(self, now_s: float) -> None:
-        if not self.left:
-            self.fail(NoAnswerError("no answer"))
-            return
-        self.left -= 1
-        self.outbox.append(self.asked)
-        self.deadline_s = now_s + 1.5
+_ENCODINGS = {
+    Firmware.ARDUPILOT: ParameterEncoding.C_CAST,
+    Firmware.PX4: ParameterEncoding.BYTEWISE,
+}
 
 
 async def command(link: VehicleLink, command_id: int, *params: float) -> None:
-    """COMMAND_LONG with its first parameters; the others are 0."""
-    named = {f"param{number}": float(value) for number, value in enumerate(params, 1)}
-    system, component = link.address
-    asked = message_type("COMMAND_LONG").make(
-        target_system=system, target_component=component, command=command_id, **named
-    )
-    await link.perform(_Command(asked, link.address))
+    """A command with its first parameters; the others are 0."""
+    await link.perform(Command(link.address, command_id, params))
 
 
-async def command_int(
-    link: VehicleLink,
-    command_id: int,
-    frame: int,
-    params: tuple[float, float, float, float],
-    latitude_deg: float,
-    longitude_deg: float,
-    altitude_m: float,
+async def command_at(
+    link: VehicleLink, command_id: int, params: Sequence[float], place: CommandPlace
 ) -> None:
-    """COMMAND_INT with a place; `frame`: a MAV_FRAME."""
-    named = {f"param{number}": float(value) for number, value in enumerate(params, 1)}
-    system, component = link.address
-    asked = message_type("COMMAND_INT").make(
-        target_system=system,
-        target_component=component,
-        frame=frame,
-        command=command_id,
-        **named,
-        x=round(latitude_deg * 1e7),
-        y=round(longitude_deg * 1e7),
-        z=altitude_m,
-    )
-    await link.perform(_Command(asked, link.address))
+    """A command with a place."""
+    await link.perform(Command(link.address, command_id, params, place=place))
 
 
 async def message_interval(link: VehicleLink, message_id: int, interval_s: float) -> None:
-    """Have a message sent so often, by the vehicle's clock."""
-    await command(
-        link, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, float(message_id), interval_s * US_PER_S
-    )
+    """Have a message sent so often, by the vehicle's clock, or as often as it can be."""
+    await link.perform(SetMessageInterval(link.address, message_id, interval_s))
 
 
-async def request_message(link: VehicleLink, message_id: int) -> None:
-    """Have a message sent once."""
-    await command(link, dialect.MAV_CMD_REQUEST_MESSAGE, float(message_id))
+async def request_message(link: VehicleLink, name: str) -> None:
+    """Have a message sent once; who listens to it hears it."""
+    await link.perform(RequestMessage(link.address, name, lambda message: message))
 
 
 async def upload(link: VehicleLink, items: Sequence[MissionItem]) -> None:
     """Store a mission, as it is to be stored."""
-    raise NotImplementedError
+    await link.perform(UploadMission(link.address, items))
 
 
 async def download(link: VehicleLink) -> tuple[MissionItem, ...]:
     """The mission that is stored, as it is stored."""
-    raise NotImplementedError
+    return await link.perform(DownloadMission(link.address))
 
 
 async def clear(link: VehicleLink) -> None:
     """Store no mission."""
-    raise NotImplementedError
+    await link.perform(ClearMission(link.address))
 
 
 async def set_current(link: VehicleLink, sequence: int) -> None:
     """Have the stored mission go on at an item."""
-    await command(link, dialect.MAV_CMD_DO_SET_MISSION_CURRENT, float(sequence))
+    await link.perform(SetCurrentItem(link.address, sequence))
 
 
 async def mission_item(link: VehicleLink, sequence: int) -> MissionItem:
     """One item of the stored mission, outside of a download."""
-    raise NotImplementedError
+    return await link.perform(ReadMissionItem(link.address, sequence))
 
 
-async def parameter(link: VehicleLink, name: str) -> float:
+async def parameter(link: VehicleLink, firmware: Firmware, name: str) -> float:
     """The value of a parameter."""
-    raise NotImplementedError
+    found = await link.perform(ReadParameter(link.address, name, _ENCODINGS[firmware]))
+    return found.value

@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem_plugin_mavlink.microservices.commands import CommandPlace
 from m2pem_plugin_mavlink.protocol.transaction import RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot, cannot, not_now
@@ -17,6 +18,7 @@ SETPOINT_EVERY_S = 0.2
 """OFFBOARD is entered only while setpoints come in, for some time before."""
 
 _CUSTOM = float(dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
+_AMSL: int = dialect.MAV_FRAME_GLOBAL
 _UNSUPPORTED = dialect.MAV_RESULT_UNSUPPORTED
 
 
@@ -93,19 +95,16 @@ class Px4Driver(Autopilot):
         heading = math.nan if place.heading_rad is None else place.heading_rad
         await self._by_command(
             "AUTO.LOITER",
-            lambda: exchanges.command_int(
+            lambda: exchanges.command_at(
                 self.link,
                 dialect.MAV_CMD_DO_REPOSITION,
-                dialect.MAV_FRAME_GLOBAL,
                 (
                     -1.0 if speed_m_s is None else speed_m_s,
                     float(dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE),
                     0.0,
                     heading,
                 ),
-                place.latitude_deg,
-                place.longitude_deg,
-                altitude_m,
+                CommandPlace(place.latitude_deg, place.longitude_deg, altitude_m, _AMSL),
             ),
         )
 
@@ -118,19 +117,16 @@ class Px4Driver(Autopilot):
         try:
             await self._by_command(
                 "POSCTL.ORBIT",
-                lambda: exchanges.command_int(
+                lambda: exchanges.command_at(
                     self.link,
                     dialect.MAV_CMD_DO_ORBIT,
-                    dialect.MAV_FRAME_GLOBAL,
                     (
                         radius_m,
                         math.nan if speed_m_s is None else speed_m_s,
                         float(dialect.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER),
                         0.0,
                     ),
-                    center.latitude_deg,
-                    center.longitude_deg,
-                    altitude_m,
+                    CommandPlace(center.latitude_deg, center.longitude_deg, altitude_m, _AMSL),
                 ),
             )
         except RefusedError as refused:

@@ -18,9 +18,6 @@ LOW_BATTERY = 0.15
 TEXTS_WITHIN_S = 35.0
 """An autopilot that cannot be armed says why every 30 s."""
 
-PREARM = "prearm"
-"""How a reason begins that is a check of the autopilot's own; which checks fail depends on the mode."""
-
 _HAS_POSITION = dialect.EKF_POS_HORIZ_ABS
 _NO_POSITION = dialect.EKF_CONST_POS_MODE
 _FIX_3D = dialect.GPS_FIX_TYPE_3D_FIX
@@ -53,9 +50,9 @@ def unlocated(firmware: Firmware, heard: Heard, now_s: float) -> tuple[str, ...]
 def _reasons(firmware: Firmware, heard: Heard, texts: Iterable[str]) -> Iterator[str]:
     if heard.prearm_passed is False:
         said = list(dict.fromkeys(_refusals(firmware, texts)))
-        yield from (f"{PREARM}: {text}" for text in said)
+        yield from (f"prearm: {text}" for text in said)
         if not said:
-            yield f"{PREARM}: a check fails, the vehicle does not say which"
+            yield "prearm: a check fails, the vehicle does not say which"
     if heard.battery_fraction is not None and heard.battery_fraction < LOW_BATTERY:
         yield f"battery at {heard.battery_fraction:.0%}".replace("%", " %")
 

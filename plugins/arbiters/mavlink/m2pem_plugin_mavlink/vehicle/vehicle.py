@@ -8,6 +8,7 @@ from typing import Any
 
 from m2pem.api import Clock, LinkState, ResourceId, VehicleState
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
+from m2pem_plugin_mavlink.microservices.texts import StatusTexts
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges
@@ -20,7 +21,6 @@ from m2pem_plugin_mavlink.vehicle.modes import modes_of
 from m2pem_plugin_mavlink.vehicle.ours import Ours
 from m2pem_plugin_mavlink.vehicle.streams import Streams, telemetry_streams
 from m2pem_plugin_mavlink.vehicle.telemetry import DEGRADED_SHARE, link_state, vehicle_state
-from m2pem_plugin_mavlink.vehicle.texts import Texts
 from m2pem_plugin_mavlink.vehicle.waiters import Waiters
 
 _HEARTBEAT = message_type("HEARTBEAT").id
@@ -55,7 +55,7 @@ class Vehicle:
         self.link = link
         self.heard = Heard()
         self.ours = Ours()
-        self.texts = Texts()
+        self.texts = StatusTexts()
         self.identity: Identity | None = None
         self.lost_after_s = lost_after_s
         self._clock = clock
@@ -135,7 +135,7 @@ class Vehicle:
 
     def recent_texts(self, within_s: float = 5.0) -> tuple[str, ...]:
         """What it said lately (STATUSTEXT), newest last: the reasons of its refusals."""
-        return self.texts.since(self.link.now_s() - within_s)
+        return tuple(each.text for each in self.texts.recent(self.link.now_s(), within_s))
 
     # --- waiting --------------------------------------------------------------------------------
 
@@ -208,7 +208,7 @@ class Vehicle:
 
     def _read_text(self, message: Message, sender: Address) -> None:
         if sender == self.link.address:
-            self.texts.take(message, self.link.now_s())
+            self.texts.take(message, sender, self.link.now_s())
             self._tell()
 
     def _tell(self) -> None:
@@ -268,7 +268,7 @@ class Vehicle:
 
     async def _ask_for_home(self) -> None:
         try:
-            await exchanges.request_message(self.link, _HOME)
+            await exchanges.request_message(self.link, "HOME_POSITION")
         except ExchangeError as error:
             self._logger.debug("%s: does not tell its home: %s", self.resource, error)
         finally:

@@ -1,0 +1,161 @@
+"""The basics of cameras (mavlink.io, "Camera Protocol v2", services/camera.html). A `device` of 0
+is a camera with an address of its own; 1 to 6 are cameras behind an autopilot."""
+
+import math
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.microservices.commands import Command
+from m2pem_plugin_mavlink.microservices.intervals import RequestMessage
+from m2pem_plugin_mavlink.protocol.messages import Address, Message
+
+MS_PER_S = 1000.0
+_NAN = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """What CAMERA_INFORMATION says."""
+
+    address: Address
+    device: int
+    vendor: str
+    model: str
+    capabilities: int
+
+    def has(self, capability: int) -> bool:
+        """Whether it has a CAMERA_CAP_FLAGS."""
+        return bool(self.capabilities & capability)
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureStatus:
+    """What a camera does (CAMERA_CAPTURE_STATUS). `images`: taken since its storage was formatted;
+    `free_mib`: space that is left."""
+
+    takes_images: bool
+    records: bool
+    recorded_s: float
+    free_mib: float
+    images: int
+
+
+@dataclass(frozen=True, slots=True)
+class Storage:
+    """One storage of a camera (STORAGE_INFORMATION). `status`: a STORAGE_STATUS."""
+
+    storage: int
+    count: int
+    status: int
+    total_mib: float
+    free_mib: float
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether images can be stored, as far as the camera knows."""
+        ready = (dialect.STORAGE_STATUS_READY, dialect.STORAGE_STATUS_NOT_SUPPORTED)
+        return self.status in ready
+
+
+class FindCamera(RequestMessage[Camera]):
+    """The camera of a component, if that has one."""
+
+    def __init__(self, target: Address, device: int = 0) -> None:
+        def read(message: Message) -> Camera | None:
+            if device not in (0, message.camera_device_id):
+                return None
+            return Camera(
+                target,
+                message.camera_device_id,
+                _text(message.vendor_name),
+                _text(message.model_name),
+                message.flags,
+            )
+
+        super().__init__(target, "CAMERA_INFORMATION", read)
+
+
+class ReadCaptureStatus(RequestMessage[CaptureStatus]):
+    """What a camera does now."""
+
+    def __init__(self, target: Address, device: int = 0) -> None:
+        def read(message: Message) -> CaptureStatus | None:
+            if device not in (0, message.camera_device_id):
+                return None
+            return CaptureStatus(
+                takes_images=message.image_status != 0,
+                records=message.video_status != 0,
+                recorded_s=message.recording_time_ms / MS_PER_S,
+                free_mib=message.available_capacity,
+                images=message.image_count,
+            )
+
+        super().__init__(target, "CAMERA_CAPTURE_STATUS", read)
+
+
+class ReadStorage(RequestMessage[Storage]):
+    """One of a camera's storages, the first is 1."""
+
+    def __init__(self, target: Address, storage: int = 1) -> None:
+        def read(message: Message) -> Storage | None:
+            if message.storage_id != storage:
+                return None
+            return Storage(
+                storage,
+                message.storage_count,
+                message.status,
+                message.total_capacity,
+                message.available_capacity,
+            )
+
+        super().__init__(target, "STORAGE_INFORMATION", read, index=storage)
+
+
+def take_image(target: Address, sequence: int, device: int = 0) -> Command:
+    """Take one image. A camera takes one for each `sequence`, which begins with 1: so a command
+    that is sent again takes no second image."""
+    params = (device, 0, 1, sequence, 0, 0, _NAN)
+    return Command(target, dialect.MAV_CMD_IMAGE_START_CAPTURE, params)
+
+
+def take_images(target: Address, interval_s: float, count: int = 0, device: int = 0) -> Command:
+    """Take `count` images, or with 0 go on until `stop_images`. Nothing keeps a camera from
+    counting anew when that comes twice, so a certain number is asked for only once."""
+    params = (device, interval_s, count, 0, 0, 0, _NAN)
+    return Command(target, dialect.MAV_CMD_IMAGE_START_CAPTURE, params, once=count != 0)
+
+
+def stop_images(target: Address, device: int = 0) -> Command:
+    """Take no more images."""
+    params = (device, _NAN, _NAN, _NAN, 0, 0, _NAN)
+    return Command(target, dialect.MAV_CMD_IMAGE_STOP_CAPTURE, params)
+
+
+def start_video(target: Address, status_hz: float = 0.0, device: int = 0) -> Command:
+    """Record; `status_hz`: how often CAMERA_CAPTURE_STATUS is to be sent."""
+    params = (0, status_hz, device, _NAN, 0, 0, _NAN)
+    return Command(target, dialect.MAV_CMD_VIDEO_START_CAPTURE, params)
+
+
+def stop_video(target: Address, device: int = 0) -> Command:
+    """Record no more."""
+    params = (0, device, _NAN, _NAN, 0, 0, _NAN)
+    return Command(target, dialect.MAV_CMD_VIDEO_STOP_CAPTURE, params)
+
+
+def zoom(target: Address, fraction: float, device: int = 0) -> Command:
+    """Zoom to a fraction of the camera's range: 0 is wide, 1 is narrow."""
+    params = (dialect.ZOOM_TYPE_RANGE, 100.0 * fraction, device, _NAN, 0, 0, _NAN)
+    return Command(target, dialect.MAV_CMD_SET_CAMERA_ZOOM, params)
+
+
+def camera_mode(target: Address, mode: int, device: int = 0) -> Command:
+    """Change to a CAMERA_MODE, which some cameras must be in to take images or to record."""
+    params = (device, mode, _NAN, _NAN, 0, 0, _NAN)
+    return Command(target, dialect.MAV_CMD_SET_CAMERA_MODE, params)
+
+
+def _text(characters: tuple[int, ...]) -> str:
+    """A text that travels as an array of numbers."""
+    return bytes(characters).partition(b"\0")[0].decode("utf-8", "replace")

@@ -1,0 +1,136 @@
+"""Commanding gimbals through their manager (mavlink.io, "Gimbal Protocol v2",
+services/gimbal_v2.html), which is the autopilot unless a camera brings its own.
+
+Whoever points a gimbal takes control of it first and releases it at the end. A `device` of 0 is all
+gimbals of the manager. Pitch is positive upwards from the horizon, yaw positive to the right.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.microservices.commands import Command
+from m2pem_plugin_mavlink.microservices.intervals import RequestMessage
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+
+ALL = 0
+UNCHANGED = -1
+LET_GO = -3
+"""For the one in control: be it no more."""
+
+_SET_PITCHYAW = message_type("GIMBAL_MANAGER_SET_PITCHYAW")
+_LEVEL: int = dialect.GIMBAL_MANAGER_FLAGS_ROLL_LOCK | dialect.GIMBAL_MANAGER_FLAGS_PITCH_LOCK
+
+
+class YawFrame(Enum):
+    """What yaw is measured from."""
+
+    VEHICLE = "vehicle"  # its bow; the gimbal turns with it
+    NORTH = "north"  # true north; the gimbal stays when the vehicle turns
+
+
+@dataclass(frozen=True, slots=True)
+class Aim:
+    """Where to point, with the camera level. None: as it is.
+
+    Raises:
+        ValueError: an angle is not finite.
+    """
+
+    pitch_rad: float | None = None
+    yaw_rad: float | None = None
+    yaw_frame: YawFrame = YawFrame.VEHICLE
+
+    def __post_init__(self) -> None:
+        for angle_rad in (self.pitch_rad, self.yaw_rad):
+            if angle_rad is not None and not math.isfinite(angle_rad):
+                raise ValueError(f"a gimbal cannot point to {angle_rad}")
+
+    @property
+    def flags(self) -> int:
+        """GIMBAL_MANAGER_FLAGS."""
+        north = self.yaw_frame is YawFrame.NORTH
+        return _LEVEL | (dialect.GIMBAL_MANAGER_FLAGS_YAW_LOCK if north else 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Gimbal:
+    """What GIMBAL_MANAGER_INFORMATION says. `device`: its id towards the manager; ranges are from
+    lowest to highest, `yaw_rad` from the bow."""
+
+    manager: Address
+    device: int
+    capabilities: int
+    pitch_rad: tuple[float, float]
+    yaw_rad: tuple[float, float]
+
+    def has(self, capability: int) -> bool:
+        """Whether it has a GIMBAL_MANAGER_CAP_FLAGS."""
+        return bool(self.capabilities & capability)
+
+
+class FindGimbal(RequestMessage[Gimbal]):
+    """The gimbal of a component, if that manages one.
+
+    `device`: which, of several; 0: whichever it tells of first.
+    """
+
+    def __init__(self, target: Address, device: int = ALL) -> None:
+        def read(message: Message) -> Gimbal | None:
+            if device not in (ALL, message.gimbal_device_id):
+                return None
+            return Gimbal(
+                target,
+                message.gimbal_device_id,
+                message.cap_flags,
+                (message.pitch_min, message.pitch_max),
+                (message.yaw_min, message.yaw_max),
+            )
+
+        super().__init__(target, "GIMBAL_MANAGER_INFORMATION", read)
+
+
+def take_control(manager: Address, controller: Address, device: int = ALL) -> Command:
+    """Have the manager listen to `controller` (which may be us) before all others."""
+    system, component = controller
+    params = (system, component, UNCHANGED, UNCHANGED, 0, 0, device)
+    return Command(manager, dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, params)
+
+
+def release(manager: Address, device: int = ALL) -> Command:
+    """Leave the gimbal to others; refused if it is not ours."""
+    params = (LET_GO, LET_GO, UNCHANGED, UNCHANGED, 0, 0, device)
+    return Command(manager, dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, params)
+
+
+def point(manager: Address, aim: Aim, device: int = ALL) -> Command:
+    """Point it, and hear that it was accepted. Where it points then, its attitude tells."""
+    pitch_deg, yaw_deg = (math.degrees(each) for each in _angles(aim))
+    params = (pitch_deg, yaw_deg, math.nan, math.nan, aim.flags, 0, device)
+    return Command(manager, dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, params)
+
+
+def pointing(manager: Address, aim: Aim, device: int = ALL) -> Message:
+    """The same without an answer, to be sent over and over (GIMBAL_MANAGER_SET_PITCHYAW)."""
+    pitch_rad, yaw_rad = _angles(aim)
+    message: Message = _SET_PITCHYAW.make(
+        flags=aim.flags,
+        pitch=pitch_rad,
+        yaw=yaw_rad,
+        pitch_rate=math.nan,
+        yaw_rate=math.nan,
+        target_system=manager.system,
+        target_component=manager.component,
+        gimbal_device_id=device,
+    )
+    return message
+
+
+def _angles(aim: Aim) -> tuple[float, float]:
+    pitch_rad, yaw_rad = aim.pitch_rad, aim.yaw_rad
+    return (
+        math.nan if pitch_rad is None else pitch_rad,
+        math.nan if yaw_rad is None else math.remainder(yaw_rad, math.tau),
+    )
