@@ -34,7 +34,9 @@ class Auto(Maneuver):
     def _start(self) -> int:
         """The item to begin with."""
         pilot, progress = self.autopilot, self.autopilot.mission
-        again = progress.complete or progress.current < progress.first
+        # A new plan may be shorter than the one in which it was.
+        known = progress.first <= progress.current < len(progress.items)
+        again = progress.complete or not known
         if again or pilot.parameters["MIS_RESTART"] == 1:
             return progress.first
         return progress.current
