@@ -4,14 +4,17 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 import pytest
+from m2pem_plugin_mavlink import failsafe
 from m2pem_plugin_mavlink.foreign import Cause, TakeoverWatch
 from m2pem_plugin_mavlink.link.routed_link import open_link
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.protocol.transaction import RefusedError
 from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
 from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import LinkState, ResourceId
 from m2pem.executive.clock import SystemClock
@@ -129,6 +132,99 @@ async def test_another_ground_station_is_noticed() -> None:
         await other.close()
         await link.close()
         await watch.close()
+
+
+def waypoint(latitude_deg: float, altitude_m: float = 10.0) -> MissionItem:
+    frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
+    return MissionItem(16, frame, (0.0, 0.0, 0.0, 0.0), latitude_deg, 8.545594, altitude_m)
+
+
+TAKEOFF = MissionItem(22, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, altitude_m=10.0)
+ROUTE = (TAKEOFF, waypoint(47.3979), waypoint(47.3981), waypoint(47.3983))
+
+
+async def test_a_mission_is_stored_read_and_flown_from_the_ground() -> None:
+    async with flying() as (truth, vehicle):
+        driver = vehicle.driver
+        await driver.upload(ROUTE)
+        stored = await driver.downloaded()
+        assert len(stored) == len(ROUTE)
+        assert all(a.same_as(b) for a, b in zip(stored[1:], ROUTE[1:], strict=True))
+        await driver.start_mission()
+        assert (truth.mode, truth.armed) == ("AUTO", True)
+        assert await vehicle.until(lambda: driver.reached_item == 2, 120.0)
+        assert await vehicle.until(lambda: driver.current_item == 3, 5.0)
+        assert await vehicle.until(lambda: driver.reached_item == 3, 60.0)
+        await driver.start_mission(1)
+        assert driver.reached_item is None
+        assert await vehicle.until(lambda: driver.current_item == 1, 10.0)
+        await driver.stop()
+        await driver.upload(())
+        assert await driver.downloaded() == ()
+
+
+async def test_a_rover_drives_a_mission() -> None:
+    async with flying(Kind.ROVER) as (truth, vehicle):
+        await vehicle.driver.upload(ROUTE[1:])
+        await vehicle.driver.start_mission(1)
+        assert truth.mode == "AUTO"
+        assert await vehicle.until(lambda: vehicle.driver.reached_item == 1, 120.0)
+
+
+@pytest.mark.parametrize(
+    ("replaced", "words"),
+    [
+        (ROUTE[:2], "has replaced the mission: it has 2 items, ours 4"),
+        ((TAKEOFF, *(waypoint(47.396 - n / 1000) for n in range(3))), "is not ours"),
+    ],
+)
+async def test_another_mission_by_another_ground_station_is_noticed(
+    replaced: tuple[MissionItem, ...], words: str
+) -> None:
+    async with flying() as (truth, vehicle):
+        watch = TakeoverWatch(vehicle, OWN.system)
+        watch.open()
+        await vehicle.driver.upload(ROUTE)
+        await vehicle.driver.start_mission()
+        assert await vehicle.until(lambda: vehicle.driver.current_item == 1, 60.0)
+        mission_modes = {FlightMode.MISSION}
+        await vehicle.sleep(3.0)
+        assert watch.taken_over(mission_modes) is None
+        host, port = truth.address
+        url = f"udpout://{host}:{port}"
+        link = await open_link(Address(1, 1), [url], SystemClock(SPEED), Address(254, 190))
+        other = Vehicle(ResourceId("qgc"), "air", link, SystemClock(SPEED))
+        other.open()
+        assert await other.identified(20.0)
+        await other.driver.upload(replaced)
+        assert await vehicle.until(lambda: watch.taken_over(mission_modes) is not None, 120.0)
+        takeover = watch.taken_over(mission_modes)
+        assert takeover is not None
+        assert words in takeover.reason or "begun to replace the mission" in takeover.reason
+        await other.close()
+        await link.close()
+        await watch.close()
+
+
+async def test_failsafes_are_read_and_compared() -> None:
+    async with flying() as (truth, vehicle):
+        truth.autopilot.parameters["FS_GCS_ENABLE"] = 0.0
+        found = await failsafe.check(vehicle, "return_to_launch", OWN.system)
+        texts = [str(each) for each in found]
+        assert (
+            "uav1: fleet says return_to_launch on loss of link, FS_GCS_ENABLE is 0 (disabled): "
+            "set it to 1"
+        ) in texts
+        assert any("watches the ground station with system id 255" in text for text in texts)
+        truth.autopilot.parameters["FS_GCS_ENABLE"] = 1.0
+        found = await failsafe.check(vehicle, "return_to_launch", OWN.system)
+        assert "FS_GCS_ENABLE" not in [each.parameter for each in found]
+
+
+async def test_a_refusal_says_why() -> None:
+    async with flying() as (_, vehicle):
+        with pytest.raises(RefusedError, match=r"COMPONENT_ARM_DISARM: failed \(.*Arm: .+\)"):
+            await vehicle.driver.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
 
 async def test_a_cut_link_is_lost_and_found_again() -> None:
