@@ -311,7 +311,3 @@ class Autopilot(ABC):
     async def command(self, command: int, *params: float) -> None:
         """Any command that has no method of its own."""
         await exchanges.command(self.link, command, *params)
-
-    async def command(self, command: int, *params: float) -> None:
-        """Any command that has no method of its own."""
-        await exchanges.command(self.link, command, *params)
