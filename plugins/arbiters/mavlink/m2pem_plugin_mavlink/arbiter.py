@@ -122,7 +122,7 @@ class MavlinkArbiter:
         """What a vehicle can do, by its domain; payloads are carried, no more."""
         if resource not in self._settings:
             return ()
-        return offered(self._connections[resource].domain, self._settings[resource].driver)
+        return offered(self._connections[resource].domain)
 
     def _taken(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """A payload may be held by what its vehicle does."""

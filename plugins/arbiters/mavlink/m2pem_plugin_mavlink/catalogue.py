@@ -1,4 +1,4 @@
-"""What a MAVLink vehicle can be asked for, by its domain and driver; needs no MAVLink library."""
+"""What a MAVLink vehicle can be asked for, by its domain; needs no MAVLink library."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -27,10 +27,6 @@ _BY_DOMAIN: Mapping[str, frozenset[str]] = {
     "surface": _EVERYWHERE | {"reverse"},
     "subsurface": _EVERYWHERE | {"change_altitude"},
 }
-_NOT_BY_DRIVER: Mapping[str, frozenset[str]] = {
-    "pymavlink": frozenset(),
-    "mavsdk": frozenset({"reverse", "deploy"}),
-}
 
 _BOUNDS: Mapping[ParameterKind, tuple[float | None, float | None]] = {
     ParameterKind.SPEED: (0.1, 100.0),
@@ -56,14 +52,14 @@ RUN_ONBOARD_MISSION = BehaviorSpec(
 )
 
 
-def offered(domain: str, driver: str) -> tuple[BehaviorSpec, ...]:
-    """What a vehicle of a domain is offered to do by a driver."""
-    return _offered(domain if domain in _BY_DOMAIN else "ground", driver)
+def offered(domain: str) -> tuple[BehaviorSpec, ...]:
+    """What a vehicle of a domain is offered to do, over MAVSDK too."""
+    return _offered(domain if domain in _BY_DOMAIN else "ground")
 
 
 @cache
-def _offered(domain: str, driver: str) -> tuple[BehaviorSpec, ...]:
-    names = _BY_DOMAIN[domain] - _NOT_BY_DRIVER.get(driver, frozenset())
+def _offered(domain: str) -> tuple[BehaviorSpec, ...]:
+    names = _BY_DOMAIN[domain]
     shared = (
         _bounded(spec)
         for (name, type_), spec in SHARED.items()

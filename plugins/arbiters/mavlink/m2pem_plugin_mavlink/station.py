@@ -1,15 +1,23 @@
-"""The vehicles of a fleet behind links of our own."""
+"""The vehicles of a fleet behind their links."""
 
-from collections.abc import Mapping, Sequence
+import asyncio
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 
 from m2pem.api import ArbiterContext, Connection, ResourceId
 from m2pem.errors import PluginError
 from m2pem_plugin_mavlink.failsafe import check
 from m2pem_plugin_mavlink.foreign import TakeoverWatch
 from m2pem_plugin_mavlink.link.routed_link import GROUND_STATION, RoutedLink, open_link
+from m2pem_plugin_mavlink.mavsdk_driver.link import MavsdkLink
+from m2pem_plugin_mavlink.mavsdk_driver.opening import open_mavsdk_link
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.settings import Settings
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+_OPEN: Mapping[str, Callable[..., Awaitable[RoutedLink | MavsdkLink]]] = {
+    "pymavlink": open_link,
+    "mavsdk": open_mavsdk_link,
+}
 
 
 class LinkedStation:
@@ -26,7 +34,7 @@ class LinkedStation:
         self._settings = settings
         self._context = context
         self._lost_after_s = lost_after_s
-        self._links: list[RoutedLink] = []
+        self._links: list[RoutedLink | MavsdkLink] = []
         self._vehicles: dict[ResourceId, Vehicle] = {}
 
     async def open(self) -> Mapping[ResourceId, Vehicle]:
@@ -48,7 +56,7 @@ class LinkedStation:
         address = Address(settings.system_id, settings.component_id)
         source = Address(settings.gcs_system_id, GROUND_STATION.component)
         try:
-            link = await open_link(address, settings.urls, clock, source)
+            link = await _OPEN[settings.driver](address, settings.urls, clock, source)
         except PluginError as error:
             raise PluginError(f"{resource}: connection.url: {error}") from error
         self._links.append(link)
@@ -77,6 +85,5 @@ class LinkedStation:
         """Close all that was opened."""
         for vehicle in self._vehicles.values():
             await vehicle.close()
-        for link in self._links:
-            await link.close()
+        await asyncio.gather(*(link.close() for link in self._links))
         self._vehicles, self._links = {}, []

@@ -38,14 +38,17 @@ def specs(*kinds: Kind, **more: Any) -> list[VehicleSpec]:
     ]
 
 
-def connections(simulator: Simulator, **more: Any) -> dict[ResourceId, Connection]:
+def connections(
+    simulator: Simulator, driver: str = "pymavlink", **more: Any
+) -> dict[ResourceId, Connection]:
     """The vehicles of a simulator, as v1, v2 and so on."""
     made = {}
     for vehicle in simulator:
         number, kind = vehicle.autopilot.spec.system, vehicle.autopilot.spec.kind
         resource = ResourceId(f"v{number}")
         host, port = vehicle.address
-        settings = {"url": f"udpout://{host}:{port}", "system_id": number}
+        url = f"udpout://{host}:{port}"
+        settings = {"driver": driver, "url": url, "system_id": number}
         made[resource] = Connection(resource, DOMAINS[kind], settings, **more)
     return made
 

@@ -79,30 +79,20 @@ def test_payloads_need_no_settings_of_their_own() -> None:
     ],
 )
 def test_a_domain_is_offered_what_it_can_do(domain, has, has_not) -> None:
-    names = {spec.name for spec in offered(domain, "pymavlink")}
+    names = {spec.name for spec in offered(domain)}
     assert has <= names
     assert not has_not & names
-
-
-def test_a_driver_is_not_offered_what_it_cannot_do() -> None:
-    mavsdk = {spec.name for spec in offered("ground", "mavsdk")}
-    assert not {"deploy", "reverse"} & mavsdk
-    assert "goto" in mavsdk
 
 
 def test_every_behavior_that_is_offered_is_there() -> None:
     from m2pem_plugin_mavlink.behaviors import BEHAVIORS
 
-    names = {
-        spec.name
-        for domain in ("air", "ground", "subsurface")
-        for spec in offered(domain, "pymavlink")
-    }
+    names = {spec.name for domain in ("air", "ground", "subsurface") for spec in offered(domain)}
     assert names == set(BEHAVIORS)
 
 
 def test_every_altitude_and_position_takes_a_frame() -> None:
-    for spec in offered("air", "pymavlink"):
+    for spec in offered("air"):
         if {"altitude", "target"} & set(spec.by_name) and spec.name != "follow":
             assert "altitude_frame" in spec.by_name, spec.name
 

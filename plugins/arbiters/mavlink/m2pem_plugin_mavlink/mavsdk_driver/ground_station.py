@@ -1,0 +1,90 @@
+"""A ground station that MAVSDK runs: one for each URL, for all vehicles heard there."""
+
+import asyncio
+import contextlib
+import socket
+from typing import Any
+
+from m2pem.errors import PluginError
+from m2pem_plugin_mavlink.mavsdk_driver import library
+from m2pem_plugin_mavlink.mavsdk_driver.link import MavsdkLink
+from m2pem_plugin_mavlink.protocol.messages import Address
+from m2pem_plugin_mavlink.protocol.url import SocketUrl, Url, Way
+
+
+class GroundStation:
+    """Between `open` and `close`. `source`: whom it sends as."""
+
+    def __init__(self, url: Url, source: Address) -> None:
+        self.url = url
+        self.source = source
+        self.links: list[MavsdkLink] = []
+        self._mavsdk: Any = None
+        self._systems: dict[int, Any] = {}
+        self._search: asyncio.Task[None] | None = None
+
+    def join(self, link: MavsdkLink) -> None:
+        """Attach a link as soon as its vehicle is heard."""
+        self.links.append(link)
+        system = self._systems.get(link.address.system)
+        if system is not None:
+            link.attach(system)
+
+    async def open(self) -> None:
+        """Listen.
+
+        Raises:
+            PluginError: the URL cannot be opened, or there is no MAVSDK.
+        """
+        mavsdk = library.require()
+        if isinstance(self.url, SocketUrl) and self.url.way is Way.UDP_IN:
+            _refuse_if_taken(self.url)
+        library.read_log()
+        self._mavsdk = mavsdk.Mavsdk(mavsdk.Configuration.create_manual(*self.source, True))
+        found = self._mavsdk.on_new_system()
+        # Begun before the connection, so that no system is missed.
+        self._search = asyncio.get_running_loop().create_task(self._attach(found))
+        await asyncio.sleep(0)
+        try:
+            await self._mavsdk.add_any_connection(str(self.url))
+        except library.failure() as error:
+            await self.close()
+            reason = library.reason(error)
+            raise PluginError(f"{self.url}: MAVSDK cannot open it: {reason}") from error
+
+    async def close(self) -> None:
+        """Close everything, once all links are closed: no thread and no socket is left."""
+        if self._search is not None:
+            self._search.cancel()
+            await asyncio.gather(self._search, return_exceptions=True)
+        if self._mavsdk is not None:
+            # In a thread, as it waits for its own. What else is MAVSDK's is held until then: were
+            # it collected, and thereby destroyed, at the same time, the process would be aborted.
+            await asyncio.get_running_loop().run_in_executor(None, self._mavsdk.destroy)
+            self._mavsdk = None
+            library.leave_log()
+        self.links.clear()
+        self._systems.clear()
+
+    async def _attach(self, found: Any) -> None:
+        """Attach the links of the systems that are found."""
+        async with contextlib.aclosing(found):
+            async for _ in found:
+                for system in await self._mavsdk.get_systems():
+                    id_ = await system.get_system_id()
+                    if id_ in self._systems:
+                        continue
+                    self._systems[id_] = system
+                    for link in self.links:
+                        if link.address.system == id_:
+                            link.attach(system)
+
+
+def _refuse_if_taken(url: SocketUrl) -> None:
+    """MAVSDK shares a port with whoever else listens there, and then hears nothing, or half."""
+    family = socket.AF_INET6 if ":" in url.host else socket.AF_INET
+    try:
+        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+            probe.bind((url.host, url.port))
+    except OSError as error:
+        raise PluginError(f"{url}: cannot listen there: {error.strerror or error}") from error

@@ -1,0 +1,48 @@
+"""Messages as MAVSDK hands them over and takes them: their fields in JSON.
+
+A field that is no number is null there, whether NaN or infinite.
+"""
+
+import json
+import math
+from typing import Any
+
+from m2pem_plugin_mavlink.protocol.messages import Message, MessageType
+
+
+def read(type_: MessageType, fields_json: str) -> Message:
+    """The message with these fields; those that it does not have, or that say nothing of it, are 0.
+
+    Raises:
+        ValueError: this is no JSON of a message.
+    """
+    fields = json.loads(fields_json)
+    if not isinstance(fields, dict):
+        raise ValueError(f"{type_.name}: no fields")  # noqa: TRY004  # as JSON that is none
+    names: tuple[str, ...] = type_.make._fields
+    texts = {names[index] for index in type_.texts}
+    given = {name: _read(fields[name], name in texts) for name in names if name in fields}
+    made: Message = type_.make(**given)
+    return made
+
+
+def _read(value: Any, is_text: bool) -> Any:
+    if is_text:
+        return str(value).encode("utf-8", "surrogateescape")
+    if isinstance(value, list):
+        return tuple(math.nan if item is None else item for item in value)
+    return math.nan if value is None else value
+
+
+def written(message: Message) -> str:
+    """The fields of a message, in JSON."""
+    names: tuple[str, ...] = message.TYPE.make._fields
+    return json.dumps({name: _written(value) for name, value in zip(names, message, strict=True)})
+
+
+def _written(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    if isinstance(value, tuple):
+        return [_written(item) for item in value]
+    return value if not isinstance(value, float) or math.isfinite(value) else None

@@ -1,0 +1,183 @@
+"""A vehicle's link through MAVSDK: implements `VehicleLink`."""
+
+import asyncio
+import contextlib
+import logging
+from collections import deque
+from collections.abc import Awaitable, Callable, Coroutine, Iterable
+from typing import Any, TypeVar
+
+from m2pem.api import Clock
+from m2pem_plugin_mavlink.link.exchange import Exchange
+from m2pem_plugin_mavlink.link.turns import Turns
+from m2pem_plugin_mavlink.link.vehicle_link import Listener
+from m2pem_plugin_mavlink.mavsdk_driver import json_fields, library
+from m2pem_plugin_mavlink.mavsdk_driver.calls import Calls
+from m2pem_plugin_mavlink.mavsdk_driver.missions import cancel_upload, carried
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, types_by_id
+from m2pem_plugin_mavlink.protocol.quality import LinkQuality
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, Transaction
+
+T = TypeVar("T")
+
+US_PER_S = 1_000_000
+_logger = logging.getLogger(__name__)
+
+UNSENT = 50
+"""So many messages wait to be sent; of more, the oldest are dropped."""
+
+
+class MavsdkLink:
+    """The link of a vehicle, from when MAVSDK has found its system id (`attach`) to `close`, which
+    calls `leave` at last.
+
+    What is sent before is dropped. Messages are handed to listeners in the event loop. Missions are
+    uploaded by MAVSDK. What else is exchanged goes message by message, as over other links:
+    MAVSDK would repeat commands that must not be given twice, and hold a thread for each question.
+    """
+
+    def __init__(
+        self, address: Address, clock: Clock, leave: Callable[[], Awaitable[None]]
+    ) -> None:
+        self.address = address
+        self.calls = Calls()
+        self.missions: Any = None
+        self._direct: Any = None
+        self._clock = clock
+        self._leave = leave
+        self._closed = False
+        self._listeners: dict[int, list[Listener]] = {}
+        self._readers: dict[int, asyncio.Task[None]] = {}
+        self._unsent: deque[Message] = deque(maxlen=UNSENT)
+        self._sender: asyncio.Task[None] | None = None
+        self._exchanges: set[Exchange] = set()
+        self._turns = Turns()
+
+    # --- life -----------------------------------------------------------------------------------
+
+    @property
+    def attached(self) -> bool:
+        """Whether MAVSDK has found it."""
+        return self._direct is not None
+
+    def attach(self, system: Any) -> None:
+        """MAVSDK has found it: begin to listen."""
+        self._direct = library.plugin("mavlink_direct").MavlinkDirectAsync(system)
+        self.missions = library.plugin("mission_raw").MissionRawAsync(system)
+        for id_ in self._listeners:
+            self._read(id_)
+
+    async def close(self) -> None:
+        """Listen no more, and let what is on its way come back. Exchanges fail."""
+        if self._closed:
+            return
+        self._closed = True
+        for exchange in list(self._exchanges):
+            exchange.abort(ExchangeError("the link was closed"))
+        tasks = list(self._readers.values())
+        if self._sender is not None:
+            tasks.append(self._sender)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        self._readers.clear()
+        self._listeners.clear()
+        if self.attached:
+            await self._let_go()
+        await self._leave()
+
+    async def _let_go(self) -> None:
+        if self.calls.pending:
+            await cancel_upload(self)
+        await self.calls.finish()
+        self._direct.destroy()
+        self.missions.destroy()
+
+    # --- VehicleLink ----------------------------------------------------------------------------
+
+    def now_s(self) -> float:
+        """See `VehicleLink.now_s`."""
+        return self._clock.now_us() / US_PER_S
+
+    def send(self, message: Message) -> None:
+        """See `VehicleLink.send`."""
+        if self._closed or not self.attached:
+            return
+        self._unsent.append(message)
+        if self._sender is None or self._sender.done():
+            self._sender = _begin(self._send_all())
+
+    def listen(self, ids: Iterable[int], listener: Listener) -> Callable[[], None]:
+        """See `VehicleLink.listen`."""
+        ids = tuple(ids)
+        for id_ in ids:
+            self._listeners.setdefault(id_, []).append(listener)
+            if self.attached:
+                self._read(id_)
+
+        def end() -> None:
+            for id_ in ids:
+                with contextlib.suppress(KeyError, ValueError):
+                    self._listeners[id_].remove(listener)
+
+        return end
+
+    async def perform(self, transaction: Transaction[T]) -> T:
+        """See `VehicleLink.perform`."""
+        async with self._turns.turn(transaction.key):
+            if self._closed:
+                raise ExchangeError("the link was closed")
+            if not self.attached:
+                raise NoAnswerError(f"system {self.address.system} was not heard yet")
+            if not await carried(self, transaction):
+                exchange = Exchange(transaction, self, self._clock)
+                self._exchanges.add(exchange)
+                try:
+                    await exchange.run()
+                finally:
+                    self._exchanges.discard(exchange)
+        return transaction.outcome()
+
+    def quality(self) -> LinkQuality | None:
+        """None: MAVSDK does not say how many frames get lost."""
+        return None
+
+    # --- hearing --------------------------------------------------------------------------------
+
+    def _read(self, id_: int) -> None:
+        if id_ not in self._readers:
+            self._readers[id_] = _begin(self._hand_over(id_))
+
+    async def _hand_over(self, id_: int) -> None:
+        type_ = types_by_id()[id_]
+        async with contextlib.aclosing(self._direct.subscribe_message(type_.name)) as messages:
+            async for each in messages:
+                listeners = self._listeners.get(id_)
+                if not listeners:
+                    continue
+                try:
+                    message = json_fields.read(type_, each.fields_json)
+                except (TypeError, ValueError) as error:
+                    _logger.debug("MAVSDK handed over a %s: %s", type_.name, error)
+                    continue
+                sender = Address(each.system_id, each.component_id)
+                for listener in tuple(listeners):
+                    listener(message, sender)
+
+    # --- sending --------------------------------------------------------------------------------
+
+    async def _send_all(self) -> None:
+        make = library.plugin("mavlink_direct").MavlinkMessage
+        while self._unsent:
+            message = self._unsent.popleft()
+            fields = json_fields.written(message)
+            wrapped = make(message.TYPE.name, fields_json=fields)
+            try:
+                await self.calls.make(self._direct.send_message(wrapped))
+            except library.failure() as error:
+                name, reason = message.TYPE.name, library.reason(error)
+                _logger.warning("MAVSDK does not send %s %s: %s", name, fields, reason)
+
+
+def _begin(work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
+    return asyncio.get_running_loop().create_task(work)
