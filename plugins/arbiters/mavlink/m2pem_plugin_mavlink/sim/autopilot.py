@@ -11,7 +11,7 @@ that of the simulation: whoever runs it decides how fast that passes.
 """
 
 import logging
-from typing import Any
+from typing import Any, TypeVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -47,6 +47,8 @@ from m2pem_plugin_mavlink.sim.texts import Texts
 AUTOPILOT_COMPONENT = 1
 REBOOT_S = 2.0
 """For how long a rebooting autopilot is silent."""
+
+P = TypeVar("P", bound=Part)
 
 logger = logging.getLogger(__name__)
 
@@ -109,7 +111,9 @@ class Autopilot:
         self._handlers: dict[str, list[MessageHandler]] = {}
         for part in self.parts:
             self._commands.handlers.update(part.commands())
-            self.streams.makers.update(part.reports())
+            for id_, maker in part.reports().items():
+                if id_ not in self.firmware.unknown_reports:
+                    self.streams.makers[id_] = maker
             for name, handler in part.messages().items():
                 self._handlers.setdefault(name, []).append(handler)
         for peer in self.peers:
@@ -163,7 +167,7 @@ class Autopilot:
             self.peers.append(peer)
             self.streams.meet(peer)
 
-    def part(self, kind: type[Part]) -> Part:
+    def part(self, kind: type[P]) -> P:
         """The part of that type.
 
         Raises:

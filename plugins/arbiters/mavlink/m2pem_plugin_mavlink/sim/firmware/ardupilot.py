@@ -40,6 +40,7 @@ class ArduPilot(Firmware):
         | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
     )
     mission_has_home = True
+    capacity = "BATT_CAPACITY"
     asks_for_items_as_int = False
 
     def __init__(self, spec: VehicleSpec) -> None:

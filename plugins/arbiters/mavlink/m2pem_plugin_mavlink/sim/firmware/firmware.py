@@ -50,6 +50,10 @@ class Firmware(ABC):
     """Item 0 of a mission is the home position."""
     asks_for_items_as_int: ClassVar[bool]
     """It asks with MISSION_REQUEST_INT rather than with MISSION_REQUEST."""
+    unknown_reports: ClassVar[frozenset[int]] = frozenset()
+    """Ids of messages that other firmwares make and this one does not."""
+    capacity: ClassVar[str]
+    """The parameter that has the battery's capacity in mAh."""
     reason_position: str
     reason_sensors: str
     loop_hz: float
@@ -103,6 +107,18 @@ class Firmware(ABC):
     def arming_text(self, reason: str) -> str:
         """How it says that it does not arm."""
         return f"Arm: {reason}"
+
+    def mode_text(self, mode: Mode, reason: str) -> str:
+        """How it says that it does not enter a mode."""
+        return f"Mode change to {mode.name} failed: {reason}"
+
+    def parameter_to_wire(self, name: str, value: float) -> float:
+        """A parameter's value as the float in PARAM_VALUE."""
+        return value
+
+    def parameter_from_wire(self, name: str, value: float) -> float:
+        """The value that the float in PARAM_SET means."""
+        return value
 
     def mode_entered(self, autopilot: "Autopilot") -> None:  # noqa: B027  # most say nothing
         """A mode has been entered: what it says or sends then."""

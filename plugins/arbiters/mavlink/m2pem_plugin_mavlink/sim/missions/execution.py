@@ -36,7 +36,7 @@ class Auto(Maneuver):
         """The item to begin with."""
         pilot, progress = self.autopilot, self.autopilot.mission
         again = progress.complete or progress.current < progress.first
-        if again or pilot.parameters["MIS_RESTART"] == 1:
+        if again or pilot.parameters.get("MIS_RESTART") == 1:
             return progress.first
         return progress.current
 
