@@ -20,7 +20,7 @@ MOST_SYSTEMS = 250
 UNITS_S = {"s": 1.0, "ms": 0.001, "min": 60.0, "": 1.0}
 
 
-class UdpAddress(click.ParamType):
+class UdpAddress(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
     """A URL such as udp://127.0.0.1:14550."""
 
     name = "url"
@@ -32,13 +32,14 @@ class UdpAddress(click.ParamType):
         try:
             url = urlsplit(str(value))
             if url.scheme in ("udp", "udpin", "udpout") and url.hostname and url.port:
-                return url.hostname, url.port
+                host = "127.0.0.1" if url.hostname == "localhost" else url.hostname
+                return host, url.port
         except ValueError:
             pass
         self.fail(f"{value!r} is not a UDP address such as udp://127.0.0.1:14550", param, ctx)
 
 
-class Place(click.ParamType):
+class Place(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
     """LAT,LON or LAT,LON,ALT."""
 
     name = "lat,lon,alt"
@@ -58,7 +59,7 @@ class Place(click.ParamType):
         return Location(latitude, longitude, altitude)
 
 
-class Duration(click.ParamType):
+class Duration(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
     """Seconds, or with a unit: 6s, 500ms, 1min."""
 
     name = "duration"
@@ -74,7 +75,7 @@ class Duration(click.ParamType):
 
 
 @click.command()
-@click.option("--copters", type=click.IntRange(0), default=1, show_default=True)
+@click.option("--copters", type=click.IntRange(0), help="[default: 1 if nothing else is asked for]")
 @click.option("--rovers", type=click.IntRange(0), default=0, show_default=True)
 @click.option("--planes", type=click.IntRange(0), default=0, show_default=True)
 @click.option("--boats", type=click.IntRange(0), default=0, show_default=True)
@@ -113,7 +114,7 @@ class Duration(click.ParamType):
 )
 @click.option("--first-system", type=click.IntRange(1, MOST_SYSTEMS), default=1, show_default=True)
 def mavlink(
-    copters: int,
+    copters: int | None,
     rovers: int,
     planes: int,
     boats: int,
@@ -128,8 +129,10 @@ def mavlink(
 
     Example: m2pem sim mavlink --copters 2 --rovers 1 --speed 10
     """
-    kinds = [Kind.COPTER] * copters + [Kind.ROVER] * rovers
-    kinds += [Kind.PLANE] * planes + [Kind.BOAT] * boats
+    others = [Kind.ROVER] * rovers + [Kind.PLANE] * planes + [Kind.BOAT] * boats
+    if copters is None:
+        copters = 0 if others else 1
+    kinds = [Kind.COPTER] * copters + others
     if not kinds:
         raise click.UsageError("no vehicles: say how many, such as --copters 2")
     if first_system + len(kinds) - 1 > MOST_SYSTEMS:

@@ -117,7 +117,8 @@ class Simulator:
         loop = asyncio.get_running_loop()
         try:
             for number, vehicle in enumerate(self):
-                local = ("127.0.0.1", 0)
+                near = self._to is None or self._to[0].startswith("127.")
+                local = ("127.0.0.1" if near else "0.0.0.0", 0)  # asked for
                 if self._listen is not None:
                     host, first = self._listen
                     local = (host, first + number if first else 0)

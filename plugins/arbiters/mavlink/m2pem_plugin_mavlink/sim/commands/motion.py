@@ -108,7 +108,7 @@ class MotionCommands(Part):
         maneuver = self.autopilot.modes.maneuver
         if not isinstance(maneuver, Guided | Auto):
             return Result.FAILED
-        maneuver.paused = command.param1 == 0
+        maneuver.pause(on=command.param1 == 0)
         return Result.ACCEPTED
 
     def _reverse(self, command: Command) -> Result:

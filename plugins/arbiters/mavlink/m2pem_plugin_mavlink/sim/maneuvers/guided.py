@@ -58,6 +58,11 @@ class Guided(Maneuver):
         self._velocity = demand
         self._velocity_until_s = self.autopilot.now_s + self.autopilot.tuning.setpoint_timeout_s
 
+    def pause(self, *, on: bool) -> None:
+        """Stop on the way, or go on."""
+        self.paused = on
+        self._stay = Stay(self.autopilot)
+
     def stop(self) -> None:
         """Stay where it is."""
         self.destination = self._velocity = None

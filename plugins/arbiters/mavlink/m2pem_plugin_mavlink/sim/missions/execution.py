@@ -1,7 +1,6 @@
 """AUTO: flying the mission, item by item."""
 
 from m2pem_plugin_mavlink.sim.demands import Demand
-from m2pem_plugin_mavlink.sim.geometry import Point
 from m2pem_plugin_mavlink.sim.maneuvers.maneuver import Maneuver
 from m2pem_plugin_mavlink.sim.maneuvers.standing import Stay
 from m2pem_plugin_mavlink.sim.missions.actions import Actions
@@ -46,7 +45,11 @@ class Auto(Maneuver):
         self._index: int | None = None
         self._actions = Actions(self.autopilot)
         self._stay = Stay(self.autopilot)
-        self._hold: Point | None = None
+
+    def pause(self, *, on: bool) -> None:
+        """Stop on the way, or go on."""
+        self.paused = on
+        self._stay = Stay(self.autopilot)
 
     def end(self) -> None:
         """Another mode has been entered."""
