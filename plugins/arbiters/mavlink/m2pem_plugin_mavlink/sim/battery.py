@@ -10,8 +10,8 @@ from m2pem_plugin_mavlink.sim.part import Part, ReportMaker
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.sim.autopilot import Autopilot
 
-FULL_V, EMPTY_V = 12.6, 10.5
-"""Three lithium cells."""
+FULL_V, EMPTY_V = 12.6, 10.2
+"""Three lithium cells; ArduPilot takes less than 10.5 V for low."""
 IDLE = 0.02
 """What electronics alone take, as a part of what moving takes."""
 

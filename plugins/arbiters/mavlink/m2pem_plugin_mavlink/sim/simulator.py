@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import Self
 
 from m2pem_plugin_mavlink.sim.autopilot import Autopilot
+from m2pem_plugin_mavlink.sim.faults import Faults
 from m2pem_plugin_mavlink.sim.geometry import Location
 from m2pem_plugin_mavlink.sim.server import Address, VehiclePort
 from m2pem_plugin_mavlink.sim.specification import VehicleSpec
@@ -28,9 +29,10 @@ logger = logging.getLogger(__name__)
 class SimulatedVehicle:
     """One vehicle as it really is, whatever its telemetry says; and the way to its autopilot."""
 
-    def __init__(self, port: VehiclePort) -> None:
+    def __init__(self, port: VehiclePort, seed: int) -> None:
         self.port = port
         self.autopilot: Autopilot = port.autopilot
+        self.faults = Faults(port, seed)
 
     @property
     def address(self) -> Address:
@@ -91,6 +93,7 @@ class Simulator:
         speed: float = 1.0,
         to: Address | None = ("127.0.0.1", 14550),
         listen: Address | None = None,
+        seed: int = 0,
     ) -> None:
         self.speed = speed
         self._to, self._listen = to, listen
@@ -100,7 +103,7 @@ class Simulator:
             if spec.system in self._vehicles:
                 raise ValueError(f"two vehicles have the system id {spec.system}")
             autopilot = Autopilot(spec, step_s=step_s)
-            self._vehicles[spec.system] = SimulatedVehicle(VehiclePort(autopilot))
+            self._vehicles[spec.system] = SimulatedVehicle(VehiclePort(autopilot), seed)
         self.now_s = 0.0
         self._task: asyncio.Task[None] | None = None
 
@@ -166,3 +169,4 @@ class Simulator:
             last_s = wall_s
             for vehicle in self:
                 vehicle.port.step(self.now_s)
+                vehicle.faults.step()

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
+from m2pem_plugin_mavlink.sim.fence.rules import FenceRules
 from m2pem_plugin_mavlink.sim.modes import Mode
 from m2pem_plugin_mavlink.sim.parameters import Parameters
 from m2pem_plugin_mavlink.sim.part import Part
@@ -54,6 +55,8 @@ class Firmware(ABC):
     """Ids of messages that other firmwares make and this one does not."""
     capacity: ClassVar[str]
     """The parameter that has the battery's capacity in mAh."""
+    gimbal_needs_control: ClassVar[bool] = False
+    """Only a ground station that has taken control of the gimbal may move it."""
     reason_position: str
     reason_sensors: str
     loop_hz: float
@@ -95,6 +98,10 @@ class Firmware(ABC):
     @abstractmethod
     def mode_number(self, base_mode: int, main: int, sub: int) -> int | None:
         """The custom_mode that the parameters of DO_SET_MODE mean; None: no custom mode."""
+
+    @abstractmethod
+    def fence_rules(self, parameters: Parameters) -> FenceRules:
+        """How the parameters set the fence up."""
 
     def parts(self) -> Sequence[type[Part]]:
         """What only this firmware has; their commands replace those of other parts."""

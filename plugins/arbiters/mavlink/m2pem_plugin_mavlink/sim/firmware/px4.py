@@ -6,9 +6,18 @@ from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem_plugin_mavlink.sim.failsafes.px4 import Px4Failsafes
+from m2pem_plugin_mavlink.sim.fence.rules import FenceRules
 from m2pem_plugin_mavlink.sim.firmware.firmware import Firmware, Tuning
 from m2pem_plugin_mavlink.sim.firmware.px4_commands import Px4Commands
-from m2pem_plugin_mavlink.sim.firmware.px4_modes import HOLD, NAMES, ROLES, custom_mode, modes_of
+from m2pem_plugin_mavlink.sim.firmware.px4_modes import (
+    FENCE_ACTIONS,
+    HOLD,
+    NAMES,
+    ROLES,
+    custom_mode,
+    modes_of,
+)
 from m2pem_plugin_mavlink.sim.firmware.px4_offboard import OffboardWatch
 from m2pem_plugin_mavlink.sim.firmware.px4_parameters import parameters_of, whole
 from m2pem_plugin_mavlink.sim.firmware.px4_reports import Px4Reports
@@ -75,6 +84,7 @@ class Px4(Firmware):
     mission_has_home = False
     asks_for_items_as_int = True
     unknown_reports = frozenset({dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT})
+    gimbal_needs_control = True
     capacity = "BAT1_CAPACITY"
     reason_position = "No valid position estimate"
     reason_sensors = "Sensors are still calibrating"
@@ -139,6 +149,17 @@ class Px4(Firmware):
             disarm_delay_s=p["COM_DISARM_PRFLT"],
         )
 
+    def fence_rules(self, parameters: Parameters) -> FenceRules:
+        """A fence that was uploaded always holds, unless there is no action."""
+        action = int(parameters["GF_ACTION"])
+        return FenceRules(
+            enabled=action != 0,
+            highest_m=parameters["GF_MAX_VER_DIST"] or None,
+            radius_m=parameters["GF_MAX_HOR_DIST"] or None,
+            mode=FENCE_ACTIONS.get(action),
+            text="Geofence exceeded ({})",
+        )
+
     def default_streams(self) -> Mapping[int, float]:
         """Nearly everything."""
         return STREAMS
@@ -165,7 +186,7 @@ class Px4(Firmware):
 
     def parts(self) -> Sequence[type[Part]]:
         """What only PX4 has."""
-        return (OffboardWatch, MissionAvailability, Px4Commands, Px4Reports)
+        return (OffboardWatch, MissionAvailability, Px4Commands, Px4Failsafes, Px4Reports)
 
     def arming_text(self, reason: str) -> str:
         """The reason, which PX4 says by itself before."""

@@ -24,6 +24,9 @@ RETURN, LAND, OFFBOARD = custom_mode(4, 5), custom_mode(4, 6), custom_mode(6)
 
 ROLES = Roles(hold=HOLD, guided=HOLD, mission=MISSION, back=RETURN, land=LAND)
 
+FENCE_ACTIONS = {2: HOLD, 3: RETURN, 4: LAND, 5: LAND}
+"""GF_ACTION; terminating ends in landing here."""
+
 NAMES = {
     POSITION: "Position",
     ORBIT: "Orbit",

@@ -1,4 +1,4 @@
-"""AUTO.LOITER of PX4: stay, or go to the place that was asked for (DO_REPOSITION) and stay there."""
+"""AUTO.LOITER of PX4: stay, or go to the place that was asked for and stay there."""
 
 from m2pem_plugin_mavlink.sim.demands import Demand, Rest
 from m2pem_plugin_mavlink.sim.geometry import Point
