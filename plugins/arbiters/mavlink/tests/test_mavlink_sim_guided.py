@@ -68,6 +68,13 @@ def test_reposition_works_in_guided_or_when_it_may_change_the_mode() -> None:
     assert bench.autopilot.chronicle.counts["motion"] == 1
 
 
+def test_reposition_needs_a_place_on_earth() -> None:
+    bench = Bench().airborne()
+    assert bench.command_int(192, -1, 1, at=(*bench.offset(40, 0), 20), frame=1) == 2
+    assert bench.command_int(192, -1, 1, at=(95.0, 8.5, 20)) == 2
+    assert bench.command_int(192, -1, 1, at=(*bench.offset(40, 0), math.nan)) == 2
+
+
 def test_the_same_place_again_is_no_new_motion() -> None:
     bench = Bench().airborne()
     for _ in range(3):

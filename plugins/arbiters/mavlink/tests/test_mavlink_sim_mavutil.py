@@ -134,7 +134,7 @@ async def test_a_copter_and_a_rover_share_a_port(ground: Ground) -> None:
 
 
 async def test_a_second_ground_station_is_learned_and_its_upload_denied() -> None:
-    async with Simulator([VehicleSpec()], speed=2, to=None) as sim:
+    async with Simulator([VehicleSpec()], speed=5, to=None) as sim:
         url = f"udpout:127.0.0.1:{sim[1].address[1]}"
 
         def scene() -> None:

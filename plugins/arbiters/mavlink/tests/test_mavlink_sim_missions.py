@@ -80,6 +80,23 @@ def test_left_and_entered_again_it_goes_on_where_it_was() -> None:
     assert bench.autopilot.chronicle.counts["mission"] == 1
 
 
+def test_in_a_new_plan_it_goes_on_at_the_same_number_or_if_there_is_none_at_the_beginning() -> None:
+    bench = Bench().airborne()
+    places = [item(n, 16, bench.offset(20 * n, 0), 20.0) for n in range(1, 5)]
+    bench.upload([HOME, *places])
+    bench.command(START)
+    bench.run_until(lambda: reached(bench) == [1, 2])
+    bench.command(dialect.MAV_CMD_DO_SET_MODE, 1, 5)
+    bench.upload([HOME, *places])
+    bench.command(START)
+    bench.run_until(lambda: reached(bench) == [1, 2, 3])
+    bench.command(dialect.MAV_CMD_DO_SET_MODE, 1, 5)
+    bench.upload([HOME, places[0]])
+    bench.command(START)
+    bench.run_until(lambda: bench.autopilot.mission.complete)
+    assert reached(bench) == [1, 2, 3, 1]
+
+
 def test_set_up_so_it_begins_again() -> None:
     bench = Bench(parameters={"MIS_RESTART": 1}).airborne()
     bench.upload([HOME, *(item(n, 16, bench.offset(30 * n, 0), 20.0) for n in (1, 2)), item(3, 17)])

@@ -223,6 +223,7 @@ class Autopilot:
 
     def reboot(self) -> None:
         """Start anew; the vehicle stays where it is."""
+        self.note("reboot")
         self._silent_until_s = self.now_s + REBOOT_S
         self.demand = Rest()
         self._boot()

@@ -12,6 +12,8 @@ from m2pem_plugin_mavlink.sim.part import CommandHandler, Part, ReportMaker
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.sim.autopilot import Autopilot
 
+HIGHEST_M = 100_000.0
+
 
 class Home(Part):
     """The home position, and the origin of local coordinates."""
@@ -58,7 +60,7 @@ class Home(Part):
             if not pilot.estimator.ready:
                 return Result.FAILED
             self.set(pilot.position)
-        elif command.has_position:
+        elif command.has_position and abs(command.z) < HIGHEST_M:
             origin_m = pilot.frame.origin.altitude_amsl_m
             relative = command.frame in (3, 6, 10, 11) and not command.was_long
             z_m = command.z + self.point.up_m + origin_m if relative else command.z

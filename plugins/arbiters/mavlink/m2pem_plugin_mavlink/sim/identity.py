@@ -79,9 +79,7 @@ class Identity(Part):
 
     def _timesync(self, message: Any, sender: Heard) -> None:
         if message.tc1 == 0:
-            answer = dialect.MAVLink_timesync_message(
-                self._boot_ns, message.ts1, sender.system, sender.component
-            )
+            answer = dialect.MAVLink_timesync_message(self._boot_ns, message.ts1)
             self.autopilot.send(answer, sender.peer)
 
     def _ping(self, message: Any, sender: Heard) -> None:

@@ -1,6 +1,8 @@
 """A simulated vehicle's UDP socket: frames in and out, each peer with its own parser."""
 
 import asyncio
+import logging
+import struct
 from typing import Any, cast
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -10,6 +12,8 @@ from m2pem_plugin_mavlink.sim.peers import Outgoing
 from m2pem_plugin_mavlink.sim.wire import Wire
 
 Address = tuple[str, int]
+
+logger = logging.getLogger(__name__)
 
 
 class VehiclePort(asyncio.DatagramProtocol):
@@ -58,7 +62,12 @@ class VehiclePort(asyncio.DatagramProtocol):
             peers = self.autopilot.peers if outgoing.to is None else [outgoing.to]
             for peer in peers:
                 address = cast("Address", peer)
-                frame = self._encode(outgoing, address)
+                try:
+                    frame = self._encode(outgoing, address)
+                except struct.error:
+                    # One message that cannot be sent must not stop the other vehicles.
+                    logger.exception("cannot encode %s", outgoing.message)
+                    continue
                 self.outward.carry(frame, address, self.autopilot.now_s)
 
     def close(self) -> None:

@@ -6,12 +6,12 @@ async with Simulator([VehicleSpec(), VehicleSpec(Kind.ROVER, system=2)], speed=1
 
 import asyncio
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from types import TracebackType
 from typing import Self
 
 from m2pem_plugin_mavlink.sim.autopilot import Autopilot
-from m2pem_plugin_mavlink.sim.faults import Faults
+from m2pem_plugin_mavlink.sim.faults import FaultError, Faults, PlannedFault
 from m2pem_plugin_mavlink.sim.geometry import Location
 from m2pem_plugin_mavlink.sim.server import Address, VehiclePort
 from m2pem_plugin_mavlink.sim.specification import VehicleSpec
@@ -105,7 +105,23 @@ class Simulator:
             autopilot = Autopilot(spec, step_s=step_s)
             self._vehicles[spec.system] = SimulatedVehicle(VehiclePort(autopilot), seed)
         self.now_s = 0.0
+        self._moved = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
+
+    def plan(self, faults: Iterable[PlannedFault]) -> None:
+        """Let faults happen to vehicles when their time comes.
+
+        Raises:
+            FaultError: it is for a vehicle that is not there, or cannot happen to it.
+        """
+        for fault in faults:
+            for system in self._vehicles if fault.systems is None else fault.systems:
+                if system not in self._vehicles:
+                    known = ", ".join(map(str, self._vehicles))
+                    raise FaultError(
+                        f"fault {fault.text!r}: there is no vehicle {system}; there are: {known}"
+                    )
+                fault.plan(self._vehicles[system].faults)
 
     def __getitem__(self, system: int) -> SimulatedVehicle:
         return self._vehicles[system]
@@ -133,6 +149,7 @@ class Simulator:
             self._close()
             raise
         self._task = asyncio.create_task(self._run())
+        self._task.add_done_callback(lambda _: self._moved.set())
         return self
 
     async def __aexit__(
@@ -155,6 +172,18 @@ class Simulator:
         if self._task is not None:
             await asyncio.shield(self._task)
 
+    async def until(self, condition: Callable[[], bool]) -> None:
+        """Wait until something is so, looking whenever the vehicles have been moved on.
+
+        Raises:
+            Exception: whatever ended the simulation.
+        """
+        while not condition():
+            if self._task is not None and self._task.done():
+                self._task.result()
+            self._moved.clear()
+            await self._moved.wait()
+
     def _close(self) -> None:
         for vehicle in self:
             vehicle.port.close()
@@ -170,3 +199,4 @@ class Simulator:
             for vehicle in self:
                 vehicle.port.step(self.now_s)
                 vehicle.faults.step()
+            self._moved.set()

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.sim.command import Command, Result
+from m2pem_plugin_mavlink.sim.command import GLOBAL_FRAMES, Command, Result
 from m2pem_plugin_mavlink.sim.geometry import wrapped_rad
 from m2pem_plugin_mavlink.sim.maneuvers.guided import Guided
 from m2pem_plugin_mavlink.sim.missions.execution import Auto
@@ -64,7 +64,8 @@ class MotionCommands(Part):
 
     def _reposition(self, command: Command) -> Result:
         pilot = self.autopilot
-        if not command.has_position or not math.isfinite(command.z):
+        placed = command.frame in GLOBAL_FRAMES and command.has_position
+        if not placed or not math.isfinite(command.z):
             return Result.DENIED
         if self._guided() is None:
             if not int(command.param2) & CHANGE_MODE:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from m2pem_plugin_mavlink.sim.autopilot import Autopilot
 
 SERVOS, RELAYS = 16, 6
+LONGEST_PULSE_US = 20_000
 RESERVED_SERVOS = 4
 """The first outputs drive motors; they cannot be set."""
 
@@ -29,6 +30,8 @@ class Payload(Part):
         """Set an output, if it is free."""
         if not RESERVED_SERVOS < output <= SERVOS:
             self.autopilot.warn(f"ServoRelayEvent: Channel {output} is already in use")
+            return False
+        if not 0 <= pulse_us <= LONGEST_PULSE_US:
             return False
         self.servos_us[output] = pulse_us
         self.autopilot.note("servo", f"{output}={pulse_us}")

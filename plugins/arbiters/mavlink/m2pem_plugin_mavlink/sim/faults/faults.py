@@ -6,7 +6,7 @@ sim[1].faults.after_arming(40, lambda faults: faults.lose_gps(10))
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from random import Random
@@ -118,19 +118,20 @@ class Faults:
 
     # --- another ground station -------------------------------------------------------------------
 
+    @property
+    def modes(self) -> Mapping[str, int]:
+        """The vehicle's modes by their names."""
+        return {each.name: each.number for each in self.autopilot.modes.by_number.values()}
+
     def take_over(self, mode: str) -> None:
         """Somebody else changes the mode.
 
         Raises:
             ValueError: the vehicle has no such mode.
         """
-        modes = self.autopilot.modes
-        for each in modes.by_number.values():
-            if each.name == mode:
-                modes.switch(each.number)
-                return
-        names = ", ".join(each.name for each in modes.by_number.values())
-        raise ValueError(f"there is no mode {mode!r}; there are: {names}")
+        if mode not in self.modes:
+            raise ValueError(f"there is no mode {mode!r}; there are: {', '.join(self.modes)}")
+        self.autopilot.modes.switch(self.modes[mode])
 
     def replace_mission(self, items: Sequence[Item]) -> None:
         """Somebody else has uploaded another mission."""

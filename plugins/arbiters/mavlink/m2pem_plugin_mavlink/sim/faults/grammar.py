@@ -26,7 +26,7 @@ class PlannedFault:
     """A fault in words.
 
     `systems`: the vehicles (None: all); `at_s`: how long after they were armed for the first time
-    (None: from the beginning); `for_s`: how long (None: for good).
+    (None: from the beginning); `for_s`: how long (None: for good); `mode`: the one that it needs.
     """
 
     text: str
@@ -35,9 +35,19 @@ class PlannedFault:
     end: Action | None
     at_s: float | None
     for_s: float | None
+    mode: str | None = None
 
     def plan(self, faults: Faults) -> None:
-        """Let it happen to a vehicle when its time comes."""
+        """Let it happen to a vehicle when its time comes.
+
+        Raises:
+            FaultError: the vehicle has no such mode.
+        """
+        if self.mode is not None and self.mode not in faults.modes:
+            raise FaultError(
+                f"fault {self.text!r}: vehicle {faults.autopilot.spec.system} has no mode "
+                f"{self.mode!r}; it has: {', '.join(faults.modes)}"
+            )
         if self.at_s is None:
             self._begin(faults)
         else:
@@ -56,7 +66,10 @@ Made = tuple[Action, Action | None]
 def _rate(match: re.Match[str]) -> Rate:
     if match[2] is not None:
         return every(int(match[2]), int(match[2]) - 1)
-    return share(float(match[1]) / 100)
+    percent = float(match[1])
+    if percent > 100:
+        raise ValueError(f"there are no more than 100 % of the frames, so not {percent:g} %")
+    return share(percent / 100)
 
 
 def _link(name: str) -> Callable[[re.Match[str]], Made]:
@@ -150,7 +163,8 @@ def parse(text: str) -> PlannedFault:
             raise FaultError(f"fault {text!r}: {error}") from error
         if for_s is not None and end is None:
             raise FaultError(f"fault {text!r}: {what!r} has no end; leave 'for ... s' out")
-        return PlannedFault(text, systems, begin, end, at_s, for_s)
+        mode = match[1].upper() if make is _mode else None
+        return PlannedFault(text, systems, begin, end, at_s, for_s, mode)
     known = "; ".join(ACTIONS)
     raise FaultError(
         f"fault {text!r}: {what!r} is no action. Actions: {known}. Then 'at 40 s' (after the first "

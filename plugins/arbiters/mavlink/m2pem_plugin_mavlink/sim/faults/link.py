@@ -36,6 +36,8 @@ def every(frames: int, first: int = 0) -> Rate:
     Raises:
         ValueError: there is no such frame.
     """
+    if frames < 1:
+        raise ValueError(f"one of every how many frames? Of 1 or more, not of {frames}")
     if not 0 <= first < frames:
         raise ValueError(f"of {frames} frames there is none with number {first}")
     return Rate(every=frames, first=first)

@@ -125,11 +125,7 @@ class Fence(Part):
 
     def reports(self) -> Mapping[int, ReportMaker]:
         """FENCE_STATUS."""
-        return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: self._report}
-
-    def _report(self) -> Any:
-        """Nothing while it is disabled."""
-        return self._status() if self.rules.enabled else None
+        return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: self._status}
 
     def _status(self) -> Any:
         kind = dialect.FENCE_BREACH_NONE if self.breach is None else TYPES[self.breach]

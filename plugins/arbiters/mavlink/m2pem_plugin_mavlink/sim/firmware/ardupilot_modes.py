@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from m2pem_plugin_mavlink.sim.firmware.firmware import Roles
 from m2pem_plugin_mavlink.sim.maneuvers.guided import Guided
 from m2pem_plugin_mavlink.sim.maneuvers.landing import Land
+from m2pem_plugin_mavlink.sim.maneuvers.plane_takeoff import PlaneTakeoff
 from m2pem_plugin_mavlink.sim.maneuvers.returning import ReturnToLaunch
 from m2pem_plugin_mavlink.sim.maneuvers.standing import CircleHere, Halt, Stay
 from m2pem_plugin_mavlink.sim.missions.execution import Auto
@@ -49,7 +50,7 @@ PLANE = (
     Mode(10, "AUTO", Auto, armable=True),
     Mode(11, "RTL", ReturnToLaunch),
     Mode(12, "LOITER", Stay, armable=True),
-    Mode(13, "TAKEOFF", Guided, armable=True),
+    Mode(13, "TAKEOFF", PlaneTakeoff, armable=True),
     Mode(15, "GUIDED", Guided, armable=True),
 )
 

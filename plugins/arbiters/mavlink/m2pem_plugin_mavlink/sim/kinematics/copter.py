@@ -29,10 +29,16 @@ class CopterKinematics:
     acceleration_mps2: float = 3.0
     climb_mps2: float = 2.0
     turn_rps: float = math.radians(90)
+    fastest_mps: float = 25.0
+    fastest_climb_mps: float = 10.0
 
     def step(self, body: Body, demand: Demand, dt_s: float) -> None:
         """Let `dt_s` pass."""
         north, east, up, yaw_rps = self._wanted(body, demand, dt_s)
+        speed = math.hypot(north, east)
+        if speed > self.fastest_mps:
+            north, east = north / speed * self.fastest_mps, east / speed * self.fastest_mps
+        up = max(-self.fastest_climb_mps, min(self.fastest_climb_mps, up))
         if body.on_ground and up <= 0:
             body.stop()
             return

@@ -18,6 +18,7 @@ class PlaneKinematics:
 
     cruise_mps: float = 22.0
     lift_off_mps: float = 12.0
+    fastest_mps: float = 40.0
     acceleration_mps2: float = 4.0
     braking_mps2: float = 3.0
     climb_mps: float = 5.0
@@ -34,7 +35,7 @@ class PlaneKinematics:
         if not body.on_ground:
             # It must not become so slow that it falls.
             speed_mps = max(speed_mps, self.lift_off_mps)
-        forward = towards(forward, speed_mps, change)
+        forward = towards(forward, min(speed_mps, self.fastest_mps), change)
         if body.on_ground and (forward < self.lift_off_mps or up_mps <= 0):
             course, up_mps = body.yaw_rad, 0.0
         self._turn(body, course, forward, dt_s)

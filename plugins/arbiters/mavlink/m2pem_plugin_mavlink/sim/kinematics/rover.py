@@ -19,11 +19,13 @@ class RoverKinematics:
     acceleration_mps2: float = 1.5
     turn_rps: float = math.radians(90)
     turn_radius_m: float = 0.9
+    fastest_mps: float = 10.0
 
     def step(self, body: Body, demand: Demand, dt_s: float) -> None:
         """Let `dt_s` pass."""
         forward = body.north_mps * math.cos(body.yaw_rad) + body.east_mps * math.sin(body.yaw_rad)
         speed, rate = self._wanted(body, demand, forward, dt_s)
+        speed = max(-self.fastest_mps, min(self.fastest_mps, speed))
         forward = towards(forward, speed, self.acceleration_mps2 * dt_s)
         most_rps = min(self.turn_rps, abs(forward) / self.turn_radius_m)
         if isinstance(demand, Drive):

@@ -34,7 +34,9 @@ class Auto(Maneuver):
     def _start(self) -> int:
         """The item to begin with."""
         pilot, progress = self.autopilot, self.autopilot.mission
-        again = progress.complete or progress.current < progress.first
+        # A new plan may be shorter than the one in which it was.
+        known = progress.first <= progress.current < len(progress.items)
+        again = progress.complete or not known
         if again or pilot.parameters.get("MIS_RESTART") == 1:
             return progress.first
         return progress.current
@@ -108,5 +110,5 @@ class Auto(Maneuver):
         progress.current = following
         pilot.say(f"Mission: {following} {NAVIGATION[item.command]}")
         self._leg = leg_of(pilot, item)
-        if item.command == NAV_TAKEOFF:
+        if item.command == NAV_TAKEOFF and pilot.body.on_ground:
             pilot.note("takeoff", f"item {following}")

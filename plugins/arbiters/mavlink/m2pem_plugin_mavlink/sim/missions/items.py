@@ -67,6 +67,8 @@ def item_of(message: Any) -> Item:
     x, y = message.x, message.y
     if message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM:
         x, y = round(x * 1e7), round(y * 1e7)
+        if max(abs(x), abs(y)) >= 1 << 31:
+            raise OverflowError(f"{message.x}, {message.y} is no place")
     return Item(
         message.frame,
         message.command,
