@@ -1,6 +1,7 @@
 """AUTO.TAKEOFF of PX4: climb straight up, then hold."""
 
 from m2pem_plugin_mavlink.sim.demands import Demand
+from m2pem_plugin_mavlink.sim.maneuvers.holding import Hold
 from m2pem_plugin_mavlink.sim.maneuvers.maneuver import Maneuver
 
 THERE_M = 0.5
@@ -42,5 +43,8 @@ class TakeOff(Maneuver):
         up_m = default_m if self.up_m is None else self.up_m
         if up_m - pilot.body.up_m <= THERE_M and not pilot.body.on_ground:
             self.taking_off = False
-            return self.hand_over(pilot.firmware.roles.hold, dt_s)
+            demand = self.hand_over(pilot.firmware.roles.hold, dt_s)
+            if isinstance(pilot.modes.maneuver, Hold):
+                pilot.modes.maneuver.keep(self._start.at_height(up_m))
+            return demand
         return self.reach(self._start.at_height(up_m), yaw_rad=pilot.body.yaw_rad)

@@ -27,6 +27,10 @@ class Hold(Maneuver):
             self._arrived = False
         self.destination, self.yaw_rad = point, yaw_rad
 
+    def keep(self, point: Point) -> None:
+        """Stay there, which is where it is, or nearly."""
+        self.destination, self.yaw_rad = point, self.autopilot.body.yaw_rad
+
     def step(self, dt_s: float) -> Demand:
         """Go there, or stay."""
         pilot, destination = self.autopilot, self.destination
