@@ -109,7 +109,7 @@ class Bench:
                 if answer.get_type() == "MISSION_ACK":
                     result: int = answer.type
                     return result
-            (request,) = [a for a in answers if a.get_type() == "MISSION_REQUEST"]
+            (request,) = [a for a in answers if a.get_type().startswith("MISSION_REQUEST")]
             answers = self.tell(items[request.seq])
 
     def _result(self, command: int, answers: list[Any]) -> int:

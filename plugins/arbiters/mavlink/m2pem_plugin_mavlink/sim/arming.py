@@ -33,8 +33,10 @@ class Arming(Part):
             yield from part.refusals()
 
     def refusals(self) -> Iterator[str]:
-        """What the estimator lacks."""
+        """What somebody has broken, and what the estimator lacks."""
         estimator, mode = self.autopilot.estimator, self.autopilot.modes.mode
+        if self.autopilot.troubles.arming is not None:
+            yield self.autopilot.troubles.arming
         if not estimator.sensors_well and self.autopilot.firmware.checks_sensors(self.autopilot):
             yield self.autopilot.firmware.reason_sensors
         if mode.needs_position and not estimator.ready:

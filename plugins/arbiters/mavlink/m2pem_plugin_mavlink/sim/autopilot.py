@@ -11,7 +11,7 @@ that of the simulation: whoever runs it decides how fast that passes.
 """
 
 import logging
-from typing import Any
+from typing import Any, TypeVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -25,6 +25,7 @@ from m2pem_plugin_mavlink.sim.commands.motion import MotionCommands
 from m2pem_plugin_mavlink.sim.commands.payload import Payload
 from m2pem_plugin_mavlink.sim.commands.system import SystemCommands
 from m2pem_plugin_mavlink.sim.demands import Circle, Demand, Reach, Rest
+from m2pem_plugin_mavlink.sim.equipment import equipment_of
 from m2pem_plugin_mavlink.sim.estimator import Estimator
 from m2pem_plugin_mavlink.sim.firmware import Tuning, firmware_of
 from m2pem_plugin_mavlink.sim.geometry import LocalFrame, Point
@@ -43,10 +44,13 @@ from m2pem_plugin_mavlink.sim.reports import Reports
 from m2pem_plugin_mavlink.sim.specification import VehicleSpec
 from m2pem_plugin_mavlink.sim.streams import Streams
 from m2pem_plugin_mavlink.sim.texts import Texts
+from m2pem_plugin_mavlink.sim.troubles import Troubles
 
 AUTOPILOT_COMPONENT = 1
 REBOOT_S = 2.0
 """For how long a rebooting autopilot is silent."""
+
+P = TypeVar("P", bound=Part)
 
 logger = logging.getLogger(__name__)
 
@@ -65,7 +69,7 @@ class Autopilot:
         self.parameters = Parameters({**self.firmware.parameters(), **spec.parameters})
         self.plans = PlanStore()
         self.chronicle = Chronicle()
-        self.components = {0, AUTOPILOT_COMPONENT}
+        self.troubles = Troubles()
         self.outbox: list[Outgoing] = []
         self.peers: list[Peer] = []
         self.demand: Demand = Rest()
@@ -103,15 +107,18 @@ class Autopilot:
             MotionCommands(self),
             Reports(self),
         ]
-        self.parts.extend(part(self) for part in self.firmware.parts())
+        own = (*equipment_of(self.spec), *self.firmware.parts())
+        self.parts.extend(part(self) for part in own)
         self._commands = CommandServer(self)
         self.parts += [self._commands, self.streams]
-        self._handlers: dict[str, list[MessageHandler]] = {}
+        self._handlers: dict[tuple[int, str], list[MessageHandler]] = {}
         for part in self.parts:
             self._commands.handlers.update(part.commands())
-            self.streams.makers.update(part.reports())
+            for id_, maker in part.reports().items():
+                if id_ not in self.firmware.unknown_reports:
+                    self.streams.makers[id_] = maker
             for name, handler in part.messages().items():
-                self._handlers.setdefault(name, []).append(handler)
+                self._handlers.setdefault((part.component, name), []).append(handler)
         for peer in self.peers:
             self.streams.meet(peer)
         self.modes.start()
@@ -163,7 +170,7 @@ class Autopilot:
             self.peers.append(peer)
             self.streams.meet(peer)
 
-    def part(self, kind: type[Part]) -> Part:
+    def part(self, kind: type[P]) -> P:
         """The part of that type.
 
         Raises:
@@ -196,16 +203,12 @@ class Autopilot:
         self.meet(sender)
         if now_s > self.now_s:
             self.step(now_s)
-        if self.silent or not self._is_for_us(message):
+        if self.silent or getattr(message, "target_system", 0) not in (0, self.spec.system):
             return
+        component = getattr(message, "target_component", 0) or AUTOPILOT_COMPONENT
         heard = Heard(sender, message.get_srcSystem(), message.get_srcComponent())
-        for handler in self._handlers.get(message.get_type(), ()):
+        for handler in self._handlers.get((component, message.get_type()), ()):
             handler(message, heard)
-
-    def _is_for_us(self, message: Any) -> bool:
-        system = getattr(message, "target_system", 0)
-        component = getattr(message, "target_component", 0)
-        return system in (0, self.spec.system) and component in self.components
 
     def step(self, now_s: float) -> None:
         """Let simulated time pass up to then, in steps that are small enough."""

@@ -10,8 +10,8 @@ from m2pem_plugin_mavlink.sim.part import Part, ReportMaker
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.sim.autopilot import Autopilot
 
-FULL_V, EMPTY_V = 12.6, 10.5
-"""Three lithium cells."""
+FULL_V, EMPTY_V = 12.6, 10.2
+"""Three lithium cells; ArduPilot takes less than 10.5 V for low."""
 IDLE = 0.02
 """What electronics alone take, as a part of what moving takes."""
 
@@ -32,7 +32,7 @@ class Battery(Part):
     @property
     def current_a(self) -> float:
         """What is drawn now."""
-        capacity_mah: float = self.autopilot.parameters["BATT_CAPACITY"]
+        capacity_mah: float = self.autopilot.parameters[self.autopilot.firmware.capacity]
         return capacity_mah * 3.6 / self.autopilot.spec.battery_s * self._load
 
     @property
@@ -51,7 +51,7 @@ class Battery(Part):
         return {dialect.MAVLINK_MSG_ID_BATTERY_STATUS: self._status}
 
     def _status(self) -> object:
-        used_mah = (1 - self.left) * self.autopilot.parameters["BATT_CAPACITY"]
+        used_mah = (1 - self.left) * self.autopilot.parameters[self.autopilot.firmware.capacity]
         return dialect.MAVLink_battery_status_message(
             0,
             dialect.MAV_BATTERY_FUNCTION_UNKNOWN,

@@ -49,6 +49,16 @@ class Command:
     sender: Heard
 
     @property
+    def flags(self) -> int:
+        """Parameter 5, of commands in which it is a whole number.
+
+        Raises:
+            ValueError: it is not a number.
+        """
+        scaled = not self.was_long and self.frame in GLOBAL_FRAMES
+        return round(self.latitude_deg * 1e7) if scaled else int(self.latitude_deg)
+
+    @property
     def has_position(self) -> bool:
         """Latitude and longitude are given, and are on Earth."""
         return (

@@ -4,10 +4,13 @@ import asyncio
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from urllib.parse import urlsplit
 
 import click
 
+from m2pem_plugin_mavlink.sim.faults import FaultError, PlannedFault, parse
+from m2pem_plugin_mavlink.sim.firmware import FIRMWARES
 from m2pem_plugin_mavlink.sim.geometry import LocalFrame, Location, Point
 from m2pem_plugin_mavlink.sim.server import Address
 from m2pem_plugin_mavlink.sim.simulator import Simulator
@@ -74,6 +77,23 @@ class Duration(click.ParamType):  # type: ignore[type-arg]  # older clicks have 
         return float(match[1]) * UNITS_S[match[2]]
 
 
+class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """A fault in words, such as 1: cut link at 40 s for 600 s."""
+
+    name = "fault"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> PlannedFault:
+        """When and where it happens."""
+        if isinstance(value, PlannedFault):
+            return value
+        try:
+            return parse(str(value))
+        except FaultError as error:
+            self.fail(str(error), param, ctx)
+
+
 @click.command()
 @click.option("--copters", type=click.IntRange(0), help="[default: 1 if nothing else is asked for]")
 @click.option("--rovers", type=click.IntRange(0), default=0, show_default=True)
@@ -113,6 +133,22 @@ class Duration(click.ParamType):  # type: ignore[type-arg]  # older clicks have 
     help="Until vehicles know where they are, in simulated time (ArduPilot: 41s).",
 )
 @click.option("--first-system", type=click.IntRange(1, MOST_SYSTEMS), default=1, show_default=True)
+@click.option(
+    "--firmware",
+    type=click.Choice(FIRMWARES),
+    default=FIRMWARES[0],
+    show_default=True,
+    help="As which autopilot all vehicles speak.",
+)
+@click.option("--camera", is_flag=True, help="All vehicles have a camera (component 100).")
+@click.option(
+    "--fault",
+    "faults",
+    type=Fault(),
+    multiple=True,
+    help='What goes wrong, such as "1: cut link at 40 s for 600 s": [VEHICLES:] ACTION '
+    "[at SECONDS s after it was first armed] [for SECONDS s]. May be given more than once.",
+)
 def mavlink(
     copters: int | None,
     rovers: int,
@@ -124,8 +160,11 @@ def mavlink(
     home: Location,
     estimator_s: float,
     first_system: int,
+    firmware: str,
+    camera: bool,
+    faults: tuple[PlannedFault, ...],
 ) -> None:
-    """Simulate MAVLink vehicles over UDP, as ArduPilot speaks, until Ctrl-C.
+    """Simulate MAVLink vehicles over UDP, as ArduPilot or PX4 speaks, until Ctrl-C.
 
     Example: m2pem sim mavlink --copters 2 --rovers 1 --speed 10
     """
@@ -137,21 +176,24 @@ def mavlink(
         raise click.UsageError("no vehicles: say how many, such as --copters 2")
     if first_system + len(kinds) - 1 > MOST_SYSTEMS:
         raise click.UsageError(f"system ids go to {MOST_SYSTEMS}: these are too many vehicles")
-    specs = list(_specs(kinds, home, estimator_s, first_system))
-    simulator = Simulator(specs, speed=speed, to=None if listen else to, listen=listen)
+    like = VehicleSpec(home=home, estimator_s=estimator_s, firmware=firmware, camera=camera)
+    try:
+        specs = list(_specs(kinds, like, first_system))
+        simulator = Simulator(specs, speed=speed, to=None if listen else to, listen=listen)
+        simulator.plan(faults)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
     try:
         asyncio.run(_run(simulator))
     except OSError as error:
         raise click.ClickException(f"cannot open a vehicle's UDP socket: {error}") from error
 
 
-def _specs(
-    kinds: list[Kind], home: Location, estimator_s: float, first_system: int
-) -> Iterator[VehicleSpec]:
-    frame = LocalFrame(home)
+def _specs(kinds: list[Kind], like: VehicleSpec, first_system: int) -> Iterator[VehicleSpec]:
+    frame = LocalFrame(like.home)
     for number, kind in enumerate(kinds):
         place = frame.to_location(Point(0.0, number * APART_M, 0.0))
-        yield VehicleSpec(kind, first_system + number, place, estimator_s=estimator_s)
+        yield replace(like, kind=kind, system=first_system + number, home=place)
 
 
 async def _run(simulator: Simulator) -> None:

@@ -18,9 +18,18 @@ SENSORS_WELL = 0.55
 
 
 class Estimator(Part):
-    """Knows where the vehicle is, or not yet, or (`lost`) no longer. `gps_lost`: no satellites."""
+    """Knows where the vehicle is, or not yet, or no longer. `found`: it has known it before."""
 
-    gps_lost = False
+    found = False
+
+    @property
+    def gps_lost(self) -> bool:
+        """There are no satellites."""
+        return self.autopilot.troubles.gps_lost
+
+    def step(self, dt_s: float) -> None:
+        """Remember that it knew."""
+        self.found = self.found or self.ready
 
     @property
     def ready(self) -> bool:

@@ -70,7 +70,7 @@ class ModeSwitch(Part):
         maneuver = mode.maneuver(self.autopilot)
         reason = self._refusal(mode) or maneuver.refusal()
         if reason is not None:
-            self.autopilot.warn(f"Mode change to {mode.name} failed: {reason}")
+            self.autopilot.warn(self.autopilot.firmware.mode_text(mode, reason))
             return False
         self._enter(mode, maneuver)
         return True

@@ -39,6 +39,10 @@ class Parameters:
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
 
+    def get(self, name: str) -> float | None:
+        """The value; None: this firmware has no such parameter."""
+        return self._values.get(name)
+
     def index(self, name: str) -> int:
         """Its number in the list."""
         return self._index[name]
@@ -89,7 +93,7 @@ class ParameterServer(Part):
         name, parameters = message.param_id, self.autopilot.parameters
         if name not in parameters:
             return
-        value = message.param_value
+        value = self.autopilot.firmware.parameter_from_wire(name, message.param_value)
         if math.isfinite(value):
             parameters[name] = value
         self._send(name, None, 0xFFFF)
@@ -99,7 +103,7 @@ class ParameterServer(Part):
         self.autopilot.send(
             dialect.MAVLink_param_value_message(
                 name.encode(),
-                parameters[name],
+                self.autopilot.firmware.parameter_to_wire(name, parameters[name]),
                 self.autopilot.firmware.parameter_type(name),
                 len(parameters),
                 index,

@@ -23,7 +23,9 @@ ReportMaker = Callable[[], Any]
 
 
 class Part:
-    """By itself it does nothing."""
+    """By itself it does nothing. `component`: to whom its messages and commands are sent."""
+
+    component = 1
 
     def __init__(self, autopilot: "Autopilot") -> None:
         self.autopilot = autopilot

@@ -69,7 +69,7 @@ class Reports(Part):
         """Before the estimator is ready, ArduPilot says zeros."""
         pilot, body = self.autopilot, self.autopilot.body
         place = pilot.frame.to_location(pilot.position)
-        known = pilot.estimator.ready
+        known = pilot.estimator.ready or pilot.estimator.found
         return dialect.MAVLink_global_position_int_message(
             pilot.boot_ms,
             round(place.latitude_deg * 1e7) if known else 0,

@@ -6,11 +6,12 @@ async with Simulator([VehicleSpec(), VehicleSpec(Kind.ROVER, system=2)], speed=1
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from types import TracebackType
 from typing import Self
 
 from m2pem_plugin_mavlink.sim.autopilot import Autopilot
+from m2pem_plugin_mavlink.sim.faults import FaultError, Faults, PlannedFault
 from m2pem_plugin_mavlink.sim.geometry import Location
 from m2pem_plugin_mavlink.sim.server import Address, VehiclePort
 from m2pem_plugin_mavlink.sim.specification import VehicleSpec
@@ -28,9 +29,10 @@ logger = logging.getLogger(__name__)
 class SimulatedVehicle:
     """One vehicle as it really is, whatever its telemetry says; and the way to its autopilot."""
 
-    def __init__(self, port: VehiclePort) -> None:
+    def __init__(self, port: VehiclePort, seed: int) -> None:
         self.port = port
         self.autopilot: Autopilot = port.autopilot
+        self.faults = Faults(port, seed)
 
     @property
     def address(self) -> Address:
@@ -91,6 +93,7 @@ class Simulator:
         speed: float = 1.0,
         to: Address | None = ("127.0.0.1", 14550),
         listen: Address | None = None,
+        seed: int = 0,
     ) -> None:
         self.speed = speed
         self._to, self._listen = to, listen
@@ -100,10 +103,25 @@ class Simulator:
             if spec.system in self._vehicles:
                 raise ValueError(f"two vehicles have the system id {spec.system}")
             autopilot = Autopilot(spec, step_s=step_s)
-            self._vehicles[spec.system] = SimulatedVehicle(VehiclePort(autopilot))
+            self._vehicles[spec.system] = SimulatedVehicle(VehiclePort(autopilot), seed)
         self.now_s = 0.0
         self._moved = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
+
+    def plan(self, faults: Iterable[PlannedFault]) -> None:
+        """Let faults happen to vehicles when their time comes.
+
+        Raises:
+            FaultError: it is for a vehicle that is not there, or cannot happen to it.
+        """
+        for fault in faults:
+            for system in self._vehicles if fault.systems is None else fault.systems:
+                if system not in self._vehicles:
+                    known = ", ".join(map(str, self._vehicles))
+                    raise FaultError(
+                        f"fault {fault.text!r}: there is no vehicle {system}; there are: {known}"
+                    )
+                fault.plan(self._vehicles[system].faults)
 
     def __getitem__(self, system: int) -> SimulatedVehicle:
         return self._vehicles[system]
@@ -180,4 +198,5 @@ class Simulator:
             last_s = wall_s
             for vehicle in self:
                 vehicle.port.step(self.now_s)
+                vehicle.faults.step()
             self._moved.set()

@@ -27,7 +27,8 @@ class VehicleSpec:
     `firmware`: a name in `sim.firmware.FIRMWARES`; `estimator_s`: for how long after its start
     the vehicle does not know where it is, in seconds of simulated time (ArduPilot takes 41);
     `parameters`: what differs from the firmware's defaults; `battery_s`: how long a full battery
-    lasts in motion.
+    lasts in motion; `gimbal`: it has one (None: if it is a copter); `camera`: it has one, as a
+    component of its own.
     """
 
     kind: Kind = Kind.COPTER
@@ -38,6 +39,8 @@ class VehicleSpec:
     estimator_s: float = 6.0
     parameters: Mapping[str, float] = field(default_factory=dict)
     battery_s: float = 1800.0
+    gimbal: bool | None = None
+    camera: bool = False
 
     @property
     def heading_rad(self) -> float:

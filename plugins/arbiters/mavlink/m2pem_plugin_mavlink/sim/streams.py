@@ -42,7 +42,8 @@ class Streams(Part):
         """Somebody new gets the firmware's default streams."""
         self._due[peer] = {}
         for id_, interval_s in self.autopilot.firmware.default_streams().items():
-            self._set(peer, id_, interval_s)
+            if id_ in self.makers:
+                self._set(peer, id_, interval_s)
 
     def interval_s(self, peer: Peer, id_: int) -> float | None:
         """How often a peer gets a message; None: not at all."""

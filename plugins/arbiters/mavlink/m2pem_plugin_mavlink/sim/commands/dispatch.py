@@ -21,8 +21,9 @@ Told = tuple[Heard, int]
 class CommandServer(Part):
     """Answers commands. `handlers`: by MAV_CMD; whoever is not there is UNSUPPORTED."""
 
-    def __init__(self, autopilot: "Autopilot") -> None:
+    def __init__(self, autopilot: "Autopilot", component: int = 1) -> None:
         super().__init__(autopilot)
+        self.component = component
         self.handlers: dict[int, CommandHandler] = {}
         self._answers: dict[Told, tuple[float, tuple[Any, ...], Result]] = {}
 
@@ -32,8 +33,15 @@ class CommandServer(Part):
 
     def _receive(self, message: Any, sender: Heard) -> None:
         command = command_of(message, sender)
+        refusal = self.autopilot.troubles.refusal_of(command.id)
         result = self._repeated(command)
-        if result is None:
+        if refusal is not None:
+            if refusal.text:
+                self.autopilot.warn(refusal.text)
+            if refusal.result is None:
+                return
+            result = refusal.result
+        elif result is None:
             result = self.perform(command)
             if len(self._answers) > 200:
                 self._answers.clear()
@@ -44,6 +52,7 @@ class CommandServer(Part):
                 command.id, result, 0, 0, sender.system, sender.component
             ),
             sender.peer,
+            self.component,
         )
 
     def perform(self, command: Command) -> Result:

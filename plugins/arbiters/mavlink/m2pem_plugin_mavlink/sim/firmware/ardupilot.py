@@ -5,11 +5,14 @@ from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.sim.firmware.ardupilot_modes import MODES, ROLES
+from m2pem_plugin_mavlink.sim.failsafes.ardupilot import ArduPilotFailsafes
+from m2pem_plugin_mavlink.sim.fence.rules import FenceRules
+from m2pem_plugin_mavlink.sim.firmware.ardupilot_modes import FENCE_ACTIONS, MODES, ROLES
 from m2pem_plugin_mavlink.sim.firmware.ardupilot_parameters import PARAMETERS, WHOLE_NUMBERS
 from m2pem_plugin_mavlink.sim.firmware.firmware import Firmware, Tuning
 from m2pem_plugin_mavlink.sim.modes import Mode
 from m2pem_plugin_mavlink.sim.parameters import Parameters
+from m2pem_plugin_mavlink.sim.part import Part
 from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
 
 if TYPE_CHECKING:
@@ -40,6 +43,7 @@ class ArduPilot(Firmware):
         | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
     )
     mission_has_home = True
+    capacity = "BATT_CAPACITY"
     asks_for_items_as_int = False
 
     def __init__(self, spec: VehicleSpec) -> None:
@@ -111,6 +115,22 @@ class ArduPilot(Firmware):
             setpoint_timeout_s=3.0,
             disarm_delay_s=0.0,
         )
+
+    def fence_rules(self, parameters: Parameters) -> FenceRules:
+        """FENCE_TYPE is a set of bits: height, circle around home, shapes, lowest height."""
+        p, types = parameters, int(parameters["FENCE_TYPE"])
+        return FenceRules(
+            enabled=p["FENCE_ENABLE"] != 0,
+            zones=bool(types & 4),
+            highest_m=p["FENCE_ALT_MAX"] if types & 1 else None,
+            lowest_m=p["FENCE_ALT_MIN"] if types & 8 else None,
+            radius_m=p["FENCE_RADIUS"] if types & 2 else None,
+            mode=FENCE_ACTIONS[self.spec.kind].get(int(p["FENCE_ACTION"])),
+        )
+
+    def parts(self) -> Sequence[type[Part]]:
+        """What only ArduPilot has."""
+        return (ArduPilotFailsafes,)
 
     def default_streams(self) -> Mapping[int, float]:
         """Next to nothing until somebody asks."""

@@ -67,3 +67,11 @@ ROLES: Mapping[Kind, Roles] = {
     Kind.BOAT: Roles(hold=5, guided=15, mission=10, back=11, land=None),
     Kind.PLANE: Roles(hold=12, guided=15, mission=10, back=11, land=None),
 }
+
+FENCE_ACTIONS: Mapping[Kind, Mapping[int, int]] = {
+    Kind.COPTER: {1: 6, 2: 9, 3: 21, 4: 17, 5: 21},
+    Kind.ROVER: {1: 11, 2: 4, 3: 12, 4: 12},
+    Kind.BOAT: {1: 11, 2: 4, 3: 12, 4: 12},
+    Kind.PLANE: {1: 11, 6: 11, 7: 11},
+}
+"""FENCE_ACTION to the mode that is entered at a breach; 0 only reports it."""

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
+from m2pem_plugin_mavlink.sim.fence.rules import FenceRules
 from m2pem_plugin_mavlink.sim.modes import Mode
 from m2pem_plugin_mavlink.sim.parameters import Parameters
 from m2pem_plugin_mavlink.sim.part import Part
@@ -50,6 +51,12 @@ class Firmware(ABC):
     """Item 0 of a mission is the home position."""
     asks_for_items_as_int: ClassVar[bool]
     """It asks with MISSION_REQUEST_INT rather than with MISSION_REQUEST."""
+    unknown_reports: ClassVar[frozenset[int]] = frozenset()
+    """Ids of messages that other firmwares make and this one does not."""
+    capacity: ClassVar[str]
+    """The parameter that has the battery's capacity in mAh."""
+    gimbal_needs_control: ClassVar[bool] = False
+    """Only a ground station that has taken control of the gimbal may move it."""
     reason_position: str
     reason_sensors: str
     loop_hz: float
@@ -92,6 +99,10 @@ class Firmware(ABC):
     def mode_number(self, base_mode: int, main: int, sub: int) -> int | None:
         """The custom_mode that the parameters of DO_SET_MODE mean; None: no custom mode."""
 
+    @abstractmethod
+    def fence_rules(self, parameters: Parameters) -> FenceRules:
+        """How the parameters set the fence up."""
+
     def parts(self) -> Sequence[type[Part]]:
         """What only this firmware has; their commands replace those of other parts."""
         return ()
@@ -103,6 +114,18 @@ class Firmware(ABC):
     def arming_text(self, reason: str) -> str:
         """How it says that it does not arm."""
         return f"Arm: {reason}"
+
+    def mode_text(self, mode: Mode, reason: str) -> str:
+        """How it says that it does not enter a mode."""
+        return f"Mode change to {mode.name} failed: {reason}"
+
+    def parameter_to_wire(self, name: str, value: float) -> float:
+        """A parameter's value as the float in PARAM_VALUE."""
+        return value
+
+    def parameter_from_wire(self, name: str, value: float) -> float:
+        """The value that the float in PARAM_SET means."""
+        return value
 
     def mode_entered(self, autopilot: "Autopilot") -> None:  # noqa: B027  # most say nothing
         """A mode has been entered: what it says or sends then."""

@@ -30,6 +30,13 @@ class Maneuver:
         """What the body is to do now. Asked only while armed."""
         raise NotImplementedError
 
+    def hand_over(self, mode: int, dt_s: float) -> Demand:
+        """Enter another mode and do what is done there; if that cannot be, stay."""
+        pilot = self.autopilot
+        pilot.modes.switch(mode)
+        successor = pilot.modes.maneuver
+        return self.stay(pilot.position) if successor is self else successor.step(dt_s)
+
     def stay(self, point: Point) -> Demand:
         """Remain at a point: a copter hovers, a rover stands, a boat keeps station, a plane
         circles."""

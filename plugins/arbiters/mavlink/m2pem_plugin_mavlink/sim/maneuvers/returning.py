@@ -18,7 +18,7 @@ class ReturnToLaunch(Maneuver):
         """At which height, is decided once."""
         pilot = self.autopilot
         home = pilot.home.point
-        up_m = home.up_m + pilot.tuning.return_up_m
+        up_m = self.least_up_m()
         if pilot.spec.kind is Kind.COPTER:
             up_m = max(up_m, pilot.body.up_m)
         elif pilot.spec.kind is not Kind.PLANE:
@@ -29,6 +29,10 @@ class ReturnToLaunch(Maneuver):
         self.arrived = False
         if pilot.body.on_ground and pilot.spec.kind is Kind.COPTER and pilot.arming.armed:
             pilot.arming.disarm_after_landing()
+
+    def least_up_m(self) -> float:
+        """The height at which it comes home, unless it is higher already."""
+        return self.autopilot.home.point.up_m + self.autopilot.tuning.return_up_m
 
     def step(self, dt_s: float) -> Demand:
         """Climb, fly, wait, land."""

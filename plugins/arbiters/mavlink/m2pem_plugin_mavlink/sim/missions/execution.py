@@ -37,7 +37,7 @@ class Auto(Maneuver):
         # A new plan may be shorter than the one in which it was.
         known = progress.first <= progress.current < len(progress.items)
         again = progress.complete or not known
-        if again or pilot.parameters["MIS_RESTART"] == 1:
+        if again or pilot.parameters.get("MIS_RESTART") == 1:
             return progress.first
         return progress.current
 

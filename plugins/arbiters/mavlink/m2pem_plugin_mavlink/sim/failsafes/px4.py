@@ -1,0 +1,108 @@
+"""Failsafes of PX4: ground station, battery, position (PX4: Commander, failsafe.cpp)."""
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.sim.failsafes.watch import Change, Heartbeats, Lasting, Watch
+from m2pem_plugin_mavlink.sim.firmware.px4_modes import (
+    HOLD,
+    LAND,
+    MISSION,
+    OFFBOARD,
+    RETURN,
+    custom_mode,
+)
+from m2pem_plugin_mavlink.sim.part import MessageHandler, Part
+from m2pem_plugin_mavlink.sim.peers import Heard
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink.sim.autopilot import Autopilot
+
+POSITION_S = 1.0
+"""For how long the position must be unknown."""
+LINK_ACTIONS = {1: HOLD, 2: RETURN, 3: LAND, 5: LAND, 6: LAND}
+"""NAV_DLL_ACT; terminating and disarming end in landing here."""
+EXCEPTIONS = {MISSION: 1, HOLD: 2, OFFBOARD: 4}
+"""COM_DLL_EXCEPT: modes that go on without a ground station."""
+RETURN_THEN_LAND = 3
+"""COM_LOW_BAT_ACT: return when it is critical, land in an emergency."""
+
+
+class Px4Failsafes(Part):
+    """Watches the ground station, the battery and the position."""
+
+    def __init__(self, autopilot: "Autopilot") -> None:
+        super().__init__(autopilot)
+        self._heartbeats = Heartbeats()
+        self._link = Watch()
+        self._position = Lasting()
+        self._low, self._critical, self._emergency = Watch(), Watch(), Watch()
+
+    def messages(self) -> Mapping[str, MessageHandler]:
+        """Heartbeats of any ground station."""
+        return {"HEARTBEAT": self._heard}
+
+    def _heard(self, message: Any, sender: Heard) -> None:
+        if message.type == dialect.MAV_TYPE_GCS:
+            self._heartbeats.heard(self.autopilot.now_s)
+
+    def step(self, dt_s: float) -> None:
+        """Look after all three."""
+        self._look_at_link()
+        self._look_at_battery()
+        self._look_at_position()
+
+    def _act(self, what: str, mode: int) -> None:
+        """In the air only, and never back to something milder."""
+        pilot = self.autopilot
+        pilot.note("failsafe", what)
+        if not pilot.arming.armed or pilot.modes.mode.number == LAND:
+            return
+        last_resort = LAND if LAND in pilot.modes.by_number else custom_mode(1)
+        for number in (mode, last_resort):
+            if number in pilot.modes.by_number and pilot.modes.switch(number):
+                pilot.warn(f"Failsafe activated: {what}, now {pilot.modes.mode.name}")
+                return
+
+    def _look_at_link(self) -> None:
+        pilot, p = self.autopilot, self.autopilot.parameters
+        change = self._link.look(self._heartbeats.missed(p["COM_DL_LOSS_T"], pilot.now_s))
+        if change is Change.WELL:
+            pilot.say("Connection to ground station regained")
+        if change is not Change.WRONG:
+            return
+        pilot.warn("Connection to ground station lost")
+        mode = LINK_ACTIONS.get(int(p["NAV_DLL_ACT"]))
+        excepted = EXCEPTIONS.get(pilot.modes.mode.number, 0) & int(p["COM_DLL_EXCEPT"])
+        if mode is not None and not excepted:
+            self._act("no ground station", mode)
+
+    def _look_at_battery(self) -> None:
+        pilot, p = self.autopilot, self.autopilot.parameters
+        left, action = pilot.battery.left, int(p["COM_LOW_BAT_ACT"])
+        if self._low.look(left < p["BAT_LOW_THR"]) is Change.WRONG:
+            pilot.warn("Low battery level! Return advised")
+        if self._critical.look(left < p["BAT_CRIT_THR"]) is Change.WRONG:
+            pilot.warn("Critical battery level! Return now")
+            if action:
+                self._act("critical battery", RETURN if action == RETURN_THEN_LAND else LAND)
+        emergency = self._emergency.look(left < p["BAT_EMERGEN_THR"]) is Change.WRONG
+        if emergency:
+            pilot.warn("Dangerous battery level! Land now")
+            if action:
+                self._act("empty battery", LAND)
+
+    def refusals(self) -> Iterator[str]:
+        """It is not armed with an empty battery."""
+        pilot = self.autopilot
+        if pilot.battery.left < pilot.parameters["BAT_CRIT_THR"]:
+            yield "Low battery"
+
+    def _look_at_position(self) -> None:
+        pilot = self.autopilot
+        needs = pilot.arming.armed and pilot.modes.mode.needs_position
+        lost = needs and not pilot.estimator.ready
+        if self._position.look_for(lost, POSITION_S, pilot.now_s) is Change.WRONG:
+            self._act("no valid position estimate", LAND)

@@ -1,0 +1,1 @@
+"""The fence: its shapes (`zones`), and what happens at it (`fence`)."""

@@ -1,0 +1,197 @@
+"""PX4 1.16: copter, rover and boat."""
+
+import struct
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.sim.failsafes.px4 import Px4Failsafes
+from m2pem_plugin_mavlink.sim.fence.rules import FenceRules
+from m2pem_plugin_mavlink.sim.firmware.firmware import Firmware, Tuning
+from m2pem_plugin_mavlink.sim.firmware.px4_commands import Px4Commands
+from m2pem_plugin_mavlink.sim.firmware.px4_modes import (
+    FENCE_ACTIONS,
+    HOLD,
+    NAMES,
+    ROLES,
+    custom_mode,
+    modes_of,
+)
+from m2pem_plugin_mavlink.sim.firmware.px4_offboard import OffboardWatch
+from m2pem_plugin_mavlink.sim.firmware.px4_parameters import parameters_of, whole
+from m2pem_plugin_mavlink.sim.firmware.px4_reports import Px4Reports
+from m2pem_plugin_mavlink.sim.missions.availability import MissionAvailability
+from m2pem_plugin_mavlink.sim.modes import Mode
+from m2pem_plugin_mavlink.sim.parameters import Parameters
+from m2pem_plugin_mavlink.sim.part import Part
+from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink.sim.autopilot import Autopilot
+
+TYPES = {
+    Kind.COPTER: dialect.MAV_TYPE_QUADROTOR,
+    Kind.ROVER: dialect.MAV_TYPE_GROUND_ROVER,
+    Kind.BOAT: dialect.MAV_TYPE_SURFACE_BOAT,
+}
+
+STREAMS: Mapping[int, float] = {
+    dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
+    dialect.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
+    dialect.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+    dialect.MAVLINK_MSG_ID_GPS_RAW_INT: 1.0,
+    dialect.MAVLINK_MSG_ID_ATTITUDE: 0.1,
+    dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 0.1,
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 0.2,
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 0.2,
+    dialect.MAVLINK_MSG_ID_MISSION_CURRENT: 1.0,
+    dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: 1.0,
+    dialect.MAVLINK_MSG_ID_VFR_HUD: 0.25,
+    dialect.MAVLINK_MSG_ID_TIMESYNC: 10.0,
+    dialect.MAVLINK_MSG_ID_ALTITUDE: 1.0,
+    dialect.MAVLINK_MSG_ID_BATTERY_STATUS: 2.0,
+    dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,
+    dialect.MAVLINK_MSG_ID_HOME_POSITION: 2.0,
+    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1.0,
+    dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: 0.5,
+    dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: 2.0,
+    dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: 0.5,
+}
+"""What is sent unasked, in seconds; those that this vehicle has."""
+
+
+class Px4(Firmware):
+    """PX4 on one kind of vehicle.
+
+    Raises:
+        ValueError: it is a plane.
+    """
+
+    autopilot_id = dialect.MAV_AUTOPILOT_PX4
+    version = 1 << 24 | 16 << 16 | 0 << 8 | dialect.FIRMWARE_VERSION_TYPE_DEV
+    capabilities = (
+        dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+        | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+        | dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+        | dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+        | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+        | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+        | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+        | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+        | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+    )
+    mission_has_home = False
+    asks_for_items_as_int = True
+    unknown_reports = frozenset({dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT})
+    gimbal_needs_control = True
+    capacity = "BAT1_CAPACITY"
+    reason_position = "No valid position estimate"
+    reason_sensors = "Sensors are still calibrating"
+    loop_hz = 1000.0
+    first_mode = HOLD
+    roles = ROLES
+
+    def __init__(self, spec: VehicleSpec) -> None:
+        if spec.kind not in TYPES:
+            raise ValueError(
+                f"a {spec.kind} with PX4 is not simulated; there are: {', '.join(TYPES)}, "
+                "or a plane with ArduPilot"
+            )
+        super().__init__(spec)
+
+    @property
+    def vehicle_type(self) -> int:
+        """MAV_TYPE."""
+        type_: int = TYPES[self.spec.kind]
+        return type_
+
+    def modes(self) -> Sequence[Mode]:
+        """The modes of the vehicle."""
+        return modes_of(self.spec.kind)
+
+    def parameters(self) -> Mapping[str, float]:
+        """The defaults, and its own number."""
+        own = {"MAV_SYS_ID": self.spec.system, "MAV_TYPE": self.vehicle_type}
+        return {**parameters_of(self.spec.kind), **own}
+
+    def parameter_type(self, name: str) -> int:
+        """Whole numbers are sent as such."""
+        int32, real32 = dialect.MAV_PARAM_TYPE_INT32, dialect.MAV_PARAM_TYPE_REAL32
+        type_: int = int32 if whole(name) else real32
+        return type_
+
+    def parameter_to_wire(self, name: str, value: float) -> float:
+        """The float whose bytes are those of the whole number."""
+        if not whole(name):
+            return value
+        number: float = struct.unpack("<f", struct.pack("<i", int(value)))[0]
+        return number
+
+    def parameter_from_wire(self, name: str, value: float) -> float:
+        """The whole number whose bytes the float has."""
+        if not whole(name):
+            return value
+        return float(struct.unpack("<i", struct.pack("<f", value))[0])
+
+    def tuning(self, parameters: Parameters) -> Tuning:
+        """Metres and seconds."""
+        p, copter = parameters, self.spec.kind is Kind.COPTER
+        return Tuning(
+            cruise_mps=p["MPC_XY_CRUISE"] if copter else p["RO_SPEED_LIM"],
+            climb_mps=p["MPC_Z_V_AUTO_UP"] if copter else 0.0,
+            descent_mps=p["MPC_Z_V_AUTO_DN"] if copter else 0.0,
+            land_mps=p["MPC_LAND_SPEED"] if copter else 0.0,
+            return_up_m=p["RTL_RETURN_ALT"] if copter else 0.0,
+            loiter_radius_m=p["NAV_LOITER_RAD"] if copter else p["NAV_ACC_RAD"],
+            acceptance_m=p["NAV_ACC_RAD"],
+            setpoint_timeout_s=p["COM_OF_LOSS_T"] + 1.0,
+            disarm_delay_s=p["COM_DISARM_PRFLT"],
+        )
+
+    def fence_rules(self, parameters: Parameters) -> FenceRules:
+        """A fence that was uploaded always holds, unless there is no action."""
+        action = int(parameters["GF_ACTION"])
+        return FenceRules(
+            enabled=action != 0,
+            highest_m=parameters["GF_MAX_VER_DIST"] or None,
+            radius_m=parameters["GF_MAX_HOR_DIST"] or None,
+            mode=FENCE_ACTIONS.get(action),
+            text="Geofence exceeded ({})",
+        )
+
+    def default_streams(self) -> Mapping[int, float]:
+        """Nearly everything."""
+        return STREAMS
+
+    def base_mode(self, autopilot: "Autopilot") -> int:
+        """Flags of the mode."""
+        flags: int = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        if autopilot.modes.mode.automatic:
+            flags |= dialect.MAV_MODE_FLAG_AUTO_ENABLED
+            flags |= dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
+            flags |= dialect.MAV_MODE_FLAG_GUIDED_ENABLED
+        else:
+            flags |= dialect.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+            flags |= dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
+        if autopilot.arming.armed:
+            flags |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        return flags
+
+    def mode_number(self, base_mode: int, main: int, sub: int) -> int | None:
+        """Parameters 2 and 3 are the main and the sub mode."""
+        if not base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+            return None
+        return custom_mode(main, sub)
+
+    def parts(self) -> Sequence[type[Part]]:
+        """What only PX4 has."""
+        return (OffboardWatch, MissionAvailability, Px4Commands, Px4Failsafes, Px4Reports)
+
+    def arming_text(self, reason: str) -> str:
+        """The reason, which PX4 says by itself before."""
+        return f"Preflight Fail: {reason}"
+
+    def mode_text(self, mode: Mode, reason: str) -> str:
+        """Without a reason."""
+        return f"Switching to {NAMES.get(mode.number, mode.name)} is currently not available"

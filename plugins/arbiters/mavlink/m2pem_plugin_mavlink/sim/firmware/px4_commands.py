@@ -1,0 +1,156 @@
+"""Commands that PX4 takes in another way than ArduPilot (PX4: Commander, navigator)."""
+
+import math
+from collections.abc import Mapping
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.sim.command import Command, Result
+from m2pem_plugin_mavlink.sim.firmware.px4_modes import (
+    HOLD,
+    LAND,
+    MISSION,
+    NAMES,
+    OFFBOARD,
+    ORBIT,
+    RETURN,
+    TAKEOFF,
+)
+from m2pem_plugin_mavlink.sim.firmware.px4_offboard import OffboardWatch
+from m2pem_plugin_mavlink.sim.geometry import Location, Point, wrapped_rad
+from m2pem_plugin_mavlink.sim.maneuvers.climbing import TakeOff
+from m2pem_plugin_mavlink.sim.maneuvers.holding import Hold
+from m2pem_plugin_mavlink.sim.maneuvers.orbiting import Orbit
+from m2pem_plugin_mavlink.sim.missions.availability import MissionAvailability
+from m2pem_plugin_mavlink.sim.part import CommandHandler, Part
+from m2pem_plugin_mavlink.sim.specification import Kind
+
+CHANGE_MODE = 1
+"""Parameter 2 of DO_REPOSITION; PX4 does without no reposition."""
+FORCE = 21196
+ORBIT_MPS = 3.0
+WIDEST_ORBIT_M = 1000.0
+"""MC_ORBIT_RAD_MAX."""
+
+
+class Px4Commands(Part):
+    """Refusals are TEMPORARILY_REJECTED, with a text that gives no reason."""
+
+    def commands(self) -> Mapping[int, CommandHandler]:
+        """By MAV_CMD."""
+        handlers: dict[int, CommandHandler] = {
+            dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._arm,
+            dialect.MAV_CMD_DO_SET_MODE: self._set_mode,
+            dialect.MAV_CMD_DO_REPOSITION: self._reposition,
+            dialect.MAV_CMD_MISSION_START: self._start_mission,
+            dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _: self._enter(RETURN),
+            dialect.MAV_CMD_NAV_LOITER_UNLIM: lambda _: self._enter(HOLD),
+            dialect.MAV_CMD_CONDITION_YAW: lambda _: Result.UNSUPPORTED,
+            dialect.MAV_CMD_DO_PAUSE_CONTINUE: lambda _: Result.UNSUPPORTED,
+        }
+        if self.autopilot.spec.kind is Kind.COPTER:
+            handlers[dialect.MAV_CMD_NAV_TAKEOFF] = self._take_off
+            handlers[dialect.MAV_CMD_NAV_LAND] = lambda _: self._enter(LAND)
+            handlers[dialect.MAV_CMD_DO_ORBIT] = self._orbit
+        return handlers
+
+    def _arm(self, command: Command) -> Result:
+        arming, force = self.autopilot.arming, command.param2 == FORCE
+        if command.param1 not in (0, 1):
+            return Result.UNSUPPORTED
+        if command.param1 == 1:
+            done = arming.arm(force=force)
+            if not done:
+                self.autopilot.warn("Arming denied: Resolve system health failures first")
+        else:
+            done = arming.disarm(force=force)
+            if not done:
+                self.autopilot.warn("Disarming denied: not landed")
+        return Result.ACCEPTED if done else Result.TEMPORARILY_REJECTED
+
+    def _set_mode(self, command: Command) -> Result:
+        firmware = self.autopilot.firmware
+        number = firmware.mode_number(int(command.param1), int(command.param2), int(command.param3))
+        if number is None or number not in self.autopilot.modes.by_number:
+            return Result.TEMPORARILY_REJECTED
+        return self._enter(number)
+
+    def _enter(self, mode: int) -> Result:
+        """While nothing is armed, every mode may be chosen."""
+        pilot = self.autopilot
+        if mode == OFFBOARD and pilot.arming.armed and not pilot.part(OffboardWatch).streaming:
+            pilot.warn(f"Switching to {NAMES[mode]} is currently not available")
+            return Result.TEMPORARILY_REJECTED
+        return Result.ACCEPTED if pilot.modes.switch(mode) else Result.TEMPORARILY_REJECTED
+
+    def _take_off(self, command: Command) -> Result:
+        """The height is above the sea; it climbs as soon as it is armed."""
+        result = self._enter(TAKEOFF)
+        maneuver = self.autopilot.modes.maneuver
+        if result is Result.ACCEPTED and isinstance(maneuver, TakeOff):
+            maneuver.climb_to(self._up_m(command.z))
+        return result
+
+    def _reposition(self, command: Command) -> Result:
+        """The mode changes first; that a place is refused after that, only a text says."""
+        pilot = self.autopilot
+        if int(command.param2) != CHANGE_MODE:
+            return Result.UNSUPPORTED
+        result = self._enter(HOLD)
+        maneuver = pilot.modes.maneuver
+        if result is not Result.ACCEPTED or not isinstance(maneuver, Hold):
+            return result
+        point = self._place(command)
+        if pilot.guided.refusal(point) is not None:
+            pilot.warn("Reposition is outside geofence")
+            return result
+        if command.param1 > 0:
+            pilot.modes.set_speed(command.param1)
+        yaw_rad = wrapped_rad(command.param4) if math.isfinite(command.param4) else None
+        maneuver.go_to(point, yaw_rad)
+        return result
+
+    def _orbit(self, command: Command) -> Result:
+        pilot = self.autopilot
+        radius_m = command.param1 if math.isfinite(command.param1) else 20.0
+        if not 1.0 <= abs(radius_m) <= WIDEST_ORBIT_M:
+            return Result.DENIED
+        result = self._enter(ORBIT)
+        maneuver = pilot.modes.maneuver
+        if result is Result.ACCEPTED and isinstance(maneuver, Orbit):
+            speed_mps = command.param2 if command.param2 > 0 else ORBIT_MPS
+            maneuver.around(self._place(command), radius_m, speed_mps)
+        return result
+
+    def _start_mission(self, command: Command) -> Result:
+        """It enters the mode and arms."""
+        pilot = self.autopilot
+        missions = self.autopilot.part(MissionAvailability)
+        first = int(command.param1)
+        if not -1 <= first < len(pilot.plans[0]):
+            return Result.DENIED
+        if not missions.available:
+            pilot.warn(f"Switching to {NAMES[MISSION]} is currently not available")
+            return Result.DENIED
+        if first > 0:
+            pilot.mission.set_current(first)
+        started = pilot.modes.switch(MISSION) and pilot.arming.arm()
+        return Result.ACCEPTED if started else Result.DENIED
+
+    def _up_m(self, amsl_m: float) -> float | None:
+        """Above the frame's origin."""
+        if not math.isfinite(amsl_m):
+            return None
+        return amsl_m - self.autopilot.frame.origin.altitude_amsl_m
+
+    def _place(self, command: Command) -> Point:
+        """Where it says; NaN or nothing means here, and at the height that it has."""
+        pilot = self.autopilot
+        point = pilot.position
+        if command.has_position:
+            location = Location(command.latitude_deg, command.longitude_deg, 0.0)
+            point = pilot.frame.to_point(location).at_height(point.up_m)
+        up_m = self._up_m(command.z)
+        if up_m is not None and pilot.spec.kind is Kind.COPTER:
+            point = point.at_height(up_m)
+        return point

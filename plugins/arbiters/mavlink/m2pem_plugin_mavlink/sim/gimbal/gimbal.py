@@ -1,0 +1,214 @@
+"""The gimbal, and the gimbal manager in the autopilot (mavlink.io, "Gimbal Protocol v2").
+
+As with ArduPilot, the device is not on the network: the autopilot speaks for it, and tells its
+attitude (GIMBAL_DEVICE_ATTITUDE_STATUS) only when it is asked to.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.sim.command import Command, Result
+from m2pem_plugin_mavlink.sim.geometry import Location, Point
+from m2pem_plugin_mavlink.sim.gimbal.pointing import (
+    NEUTRAL,
+    PITCH_RAD,
+    RETRACTED,
+    YAW_RAD,
+    Pointing,
+    pitch_and_yaw,
+)
+from m2pem_plugin_mavlink.sim.part import CommandHandler, MessageHandler, Part, ReportMaker
+from m2pem_plugin_mavlink.sim.peers import Heard
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink.sim.autopilot import Autopilot
+
+DEVICE = 1
+"""GIMBAL_DEVICE ids up to 6 are those that the autopilot speaks for."""
+RETRACT, NEUTRAL_FLAG, YAW_LOCK = 1, 2, 16
+YAW_FROM_VEHICLE, YAW_FROM_NORTH = 32, 64
+ALWAYS = 4 | 8
+"""GIMBAL_MANAGER_FLAGS; it is always stabilised in roll and pitch."""
+CAPABILITIES = 1 | 2 | 4 | 16 | 32 | 128 | 256 | 512 | 1024 | 131072
+
+
+class Controller(NamedTuple):
+    """Who may move it."""
+
+    system: int = 0
+    component: int = 0
+
+
+class Gimbal(Part):
+    """`pointing`: where it points; `primary`, `secondary`: who controls it."""
+
+    def __init__(self, autopilot: "Autopilot") -> None:
+        super().__init__(autopilot)
+        self.pointing = Pointing()
+        self.primary, self.secondary = Controller(), Controller()
+        self._target: Point | None = None
+
+    # --- motion -----------------------------------------------------------------------------------
+
+    def step(self, dt_s: float) -> None:
+        """Move; a place that is watched is followed."""
+        body = self.autopilot.body
+        if self._target is not None:
+            here = body.point
+            away_m = here.distance_m(self._target)
+            pitch_rad = math.atan2(self._target.up_m - here.up_m, max(away_m, 1e-3))
+            self.pointing.point(pitch_rad, here.bearing_rad(self._target), locked=True)
+        self.pointing.step(dt_s, body.yaw_rad)
+
+    def _point(
+        self, flags: int, pitch_rad: float, yaw_rad: float, pitch_rps: float, yaw_rps: float
+    ) -> bool:
+        """As both the command and the message have it: angles, or (without them) rates."""
+        self._target = None
+        locked = bool(flags & (YAW_LOCK | YAW_FROM_NORTH)) and not flags & YAW_FROM_VEHICLE
+        if flags & RETRACT:
+            self.pointing.point(*RETRACTED, locked=False)
+        elif flags & NEUTRAL_FLAG:
+            self.pointing.point(*NEUTRAL, locked=False)
+        elif math.isfinite(pitch_rad) and math.isfinite(yaw_rad):
+            self.pointing.point(pitch_rad, yaw_rad, locked)
+        elif math.isfinite(pitch_rps) and math.isfinite(yaw_rps):
+            self.pointing.turn(pitch_rps, yaw_rps, locked, self.autopilot.body.yaw_rad)
+        else:
+            return False
+        self.autopilot.note("gimbal", f"{math.degrees(pitch_rad):.0f} {math.degrees(yaw_rad):.0f}")
+        return True
+
+    # --- commands ---------------------------------------------------------------------------------
+
+    def commands(self) -> Mapping[int, CommandHandler]:
+        """Of the manager, and regions of interest."""
+        return {
+            dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: self._configure,
+            dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self._pitch_yaw,
+            dialect.MAV_CMD_DO_SET_ROI_LOCATION: self._watch,
+            dialect.MAV_CMD_DO_SET_ROI: self._watch,
+            dialect.MAV_CMD_DO_SET_ROI_NONE: self._watch_nothing,
+            dialect.MAV_CMD_DO_MOUNT_CONTROL: self._mount_control,
+        }
+
+    def messages(self) -> Mapping[str, MessageHandler]:
+        """Those that have no acknowledgement."""
+        return {
+            "GIMBAL_MANAGER_SET_PITCHYAW": self._set_pitch_yaw,
+            "GIMBAL_MANAGER_SET_ATTITUDE": self._set_attitude,
+        }
+
+    def _configure(self, command: Command) -> Result:
+        """Who is in control: -1 leaves it as it is, -2 is the sender, -3 nobody if it was he."""
+        if int(command.z) not in (0, DEVICE):
+            return Result.DENIED
+        sender = Controller(command.sender.system, command.sender.component)
+        self.primary = _controller(self.primary, command.param1, command.param2, sender)
+        self.secondary = _controller(self.secondary, command.param3, command.param4, sender)
+        self.autopilot.send(self._status())
+        return Result.ACCEPTED
+
+    def _may(self, sender: Heard) -> bool:
+        """PX4 obeys only who is in control, ArduPilot anybody."""
+        who = Controller(sender.system, sender.component)
+        free = not self.autopilot.firmware.gimbal_needs_control
+        return free or who in (self.primary, self.secondary)
+
+    def _pitch_yaw(self, command: Command) -> Result:
+        if int(command.z) not in (0, DEVICE) or not self._may(command.sender):
+            return Result.DENIED
+        angles = (command.param1, command.param2, command.param3, command.param4)
+        done = self._point(command.flags, *map(math.radians, angles))
+        return Result.ACCEPTED if done else Result.FAILED
+
+    def _watch(self, command: Command) -> Result:
+        if not command.has_position or not math.isfinite(command.z):
+            return Result.DENIED
+        pilot = self.autopilot
+        place = pilot.frame.to_point(Location(command.latitude_deg, command.longitude_deg, 0.0))
+        self._target = place.at_height(pilot.guided.up_m(command.z, command.frame))
+        return Result.ACCEPTED
+
+    def _watch_nothing(self, command: Command) -> Result:
+        self._target = None
+        self.pointing.point(*NEUTRAL, locked=False)
+        return Result.ACCEPTED
+
+    def _mount_control(self, command: Command) -> Result:
+        """The old way; only with angles."""
+        if command.z != dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING:
+            return Result.FAILED
+        angles = (math.radians(command.param1), math.radians(command.param3))
+        done = self._point(YAW_FROM_VEHICLE, *angles, math.nan, math.nan)
+        return Result.ACCEPTED if done else Result.FAILED
+
+    def _set_pitch_yaw(self, message: Any, sender: Heard) -> None:
+        if message.gimbal_device_id in (0, DEVICE) and self._may(sender):
+            rates = (message.pitch_rate, message.yaw_rate)
+            self._point(message.flags, message.pitch, message.yaw, *rates)
+
+    def _set_attitude(self, message: Any, sender: Heard) -> None:
+        if message.gimbal_device_id not in (0, DEVICE) or not self._may(sender):
+            return
+        angles = (math.nan, math.nan)
+        if all(map(math.isfinite, message.q)):
+            angles = pitch_and_yaw(message.q)
+        rates = (message.angular_velocity_y, message.angular_velocity_z)
+        self._point(message.flags, *angles, *rates)
+
+    # --- telemetry --------------------------------------------------------------------------------
+
+    def reports(self) -> Mapping[int, ReportMaker]:
+        """Of the manager and the device."""
+        return {
+            dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION: self._information,
+            dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: self._status,
+            dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: self._attitude,
+        }
+
+    @property
+    def _flags(self) -> int:
+        return ALWAYS | (YAW_LOCK if self.pointing.locked else 0)
+
+    def _information(self) -> Any:
+        return dialect.MAVLink_gimbal_manager_information_message(
+            self.autopilot.boot_ms, CAPABILITIES, DEVICE, 0.0, 0.0, *PITCH_RAD, *YAW_RAD
+        )
+
+    def _status(self) -> Any:
+        return dialect.MAVLink_gimbal_manager_status_message(
+            self.autopilot.boot_ms, self._flags, DEVICE, *self.primary, *self.secondary
+        )
+
+    def _attitude(self) -> Any:
+        heading_rad = self.autopilot.body.yaw_rad
+        frame = YAW_FROM_NORTH if self.pointing.locked else YAW_FROM_VEHICLE
+        return dialect.MAVLink_gimbal_device_attitude_status_message(
+            0,
+            0,
+            self.autopilot.boot_ms,
+            self._flags | frame,
+            self.pointing.quaternion(heading_rad),
+            0.0,
+            0.0,
+            0.0,
+            0,
+            heading_rad,
+            0.0,
+            DEVICE,
+        )
+
+
+def _controller(now: Controller, system: float, component: float, sender: Controller) -> Controller:
+    match int(system):
+        case -1:
+            return now
+        case -2:
+            return sender
+        case -3:
+            return Controller() if now == sender else now
+    return Controller(int(system), max(0, int(component)))
