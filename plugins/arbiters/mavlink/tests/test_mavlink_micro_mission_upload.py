@@ -242,7 +242,8 @@ def test_a_vehicle_that_asks_slowly_and_for_ever_is_left_in_time() -> None:
     upload = UploadMission(VEHICLE, ITEMS)
     played = run(upload, Drips())
     assert isinstance(played.error, NoAnswerError)
-    assert played.ended_s <= upload.bound_s
+    assert played.error.reason == "upload of the mission: not done within 75 s"
+    assert played.ended_s == upload.bound_s == 75.0
 
 
 @pytest.mark.parametrize(
