@@ -8,7 +8,8 @@ import difflib
 import logging
 import os
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -126,7 +127,10 @@ class PluginManager:
         return self._one("service", self.services(), name)
 
     def commands(self, cli: "click.Group") -> None:
-        """Add the plugins' commands; a plugin that would replace a command adds none."""
+        """Add the plugins' commands; a plugin that would replace a command adds none.
+
+        Groups of the same name become one: `m2pem sim` has a command of each simulator.
+        """
         import click  # noqa: PLC0415  # not everything that uses plugins has a command line
 
         hook = _HOOKS["command"]
@@ -136,14 +140,20 @@ class PluginManager:
             own = click.Group(cli.name)
             if self._run(plugin, hook, own.commands, cli=own) is not None:
                 continue
-            if taken := sorted(known & set(own.commands)):
+            if taken := sorted(_taken(known, cli, own)):
                 error = PluginError(f"there is a command {', '.join(taken)} already")
                 self._failed(plugin.origin, error, hook, own.commands)
                 continue
             known |= set(own.commands)
             for name, command in own.commands.items():
-                cli.add_command(command, name)
-                offers[name] = _Offer(command, plugin.origin)
+                shared = cli.commands.get(name)
+                if isinstance(shared, click.Group) and isinstance(command, click.Group):
+                    both = copy(shared)
+                    both.commands = {**shared.commands, **command.commands}
+                    cli.add_command(both, name)
+                else:
+                    cli.add_command(command, name)
+                offers.setdefault(name, _Offer(command, plugin.origin))
 
     def check_mission(self, mission: "Mission", fleet: "Fleet | None") -> list[Finding]:
         """The plugins' findings; for a check that breaks, a warning: it may have had some."""
@@ -306,6 +316,18 @@ def _is_namesake(broken: PluginFailure, name: str) -> bool:
     """Whether a name can only belong to that plugin."""
     distribution = canonical(broken.distribution).removeprefix("m2pem-plugin-")
     return name in broken.names or canonical(name) in (canonical(broken.name), distribution)
+
+
+def _taken(known: set[str], cli: "click.Group", own: "click.Group") -> Iterator[str]:
+    """The commands of `own` that somebody else has already; in a group of both, "group command"."""
+    import click  # noqa: PLC0415  # see `PluginManager.commands`
+
+    for name in known & set(own.commands):
+        theirs, ours = cli.commands.get(name), own.commands[name]
+        if isinstance(theirs, click.Group) and isinstance(ours, click.Group):
+            yield from (f"{name} {each}" for each in set(theirs.commands) & set(ours.commands))
+        else:
+            yield name
 
 
 def _findings(result: object) -> list[Finding]:

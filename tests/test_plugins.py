@@ -355,6 +355,40 @@ def test_a_command_that_would_replace_another_is_refused_with_its_plugin(install
     assert only_failure(plugins).error == "there is a command run already"
 
 
+SIMULATOR = """
+        import click
+        @hookimpl
+        def m2pem_register_commands(cli):
+            group = click.Group("sim")
+            group.command("{0}")(lambda: None)
+            cli.add_command(group)
+        """
+
+
+def test_plugins_share_a_group_of_commands(install: Install) -> None:
+    install("boat", SIMULATOR.format("sea"))
+    install("truck", SIMULATOR.format("road"))
+    cli = click.Group()
+    plugins = manager()
+    plugins.commands(cli)
+    group = cli.commands["sim"]
+    assert isinstance(group, click.Group)
+    assert sorted(group.commands) == ["road", "sea"]
+    assert not plugins.failures
+
+
+def test_a_command_that_would_replace_another_of_a_shared_group_is_refused(
+    install: Install,
+) -> None:
+    install("a-boat", SIMULATOR.format("sea"))
+    install("b-boat", SIMULATOR.format("sea"))
+    cli = click.Group()
+    plugins = manager()
+    plugins.commands(cli)
+    assert only_failure(plugins).error == "there is a command sim sea already"
+    assert only_failure(plugins).distribution == "m2pem-plugin-b-boat"
+
+
 def test_a_plugin_whose_commands_break_adds_none(install: Install) -> None:
     install(
         "boat",

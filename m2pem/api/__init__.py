@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from m2pem.model.values import Value
     from m2pem.resources.behaviors import SHARED
     from m2pem.resources.fleet import Fleet
+    from m2pem.resources.lawn_mower import lawn_mower, longest_edge_yaw
 
 # Loaded when asked for: an arbiter's module need not pay for what an OCU imports.
 _MODULES = {
@@ -90,6 +91,7 @@ _MODULES = {
     "m2pem.model.values": "Value",
     "m2pem.resources.behaviors": "SHARED",
     "m2pem.resources.fleet": "Fleet",
+    "m2pem.resources.lawn_mower": "lawn_mower longest_edge_yaw",
 }
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 
@@ -144,6 +146,8 @@ __all__ = [
     "Value",
     "VehiclePosition",
     "VehicleState",
+    "lawn_mower",
+    "longest_edge_yaw",
     "parse_mission",
 ]
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.model.geometry import Area
 from m2pem.resources import parameters
 
 if TYPE_CHECKING:
@@ -30,7 +31,8 @@ class Connection:
     """How a resource is reached: the fleet file's `connection`, and what it is.
 
     `behaviors`: the names that the fleet allows; None means all that the arbiter offers.
-    `home`: where a simulated vehicle stands at first, in WGS-84 degrees and metres.
+    `failsafe`: the fleet's word for what the vehicle does by itself when its link is lost, or "".
+    `fence`: the area that the vehicle may not leave; None: the fleet has none.
     """
 
     resource: ResourceId
@@ -39,6 +41,8 @@ class Connection:
     behaviors: tuple[str, ...] | None = None
     detector: bool = False
     lost_after_s: float | None = None
+    failsafe: str = ""
+    fence: Area | None = None
 
 
 @dataclass(frozen=True, slots=True)

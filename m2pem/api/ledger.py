@@ -53,7 +53,7 @@ class Ledger:
     def admit(
         self,
         request: BehaviorRequest,
-        native_ref: str | None = None,
+        native_ref: str | Callable[[], str] | None = None,
         refusal: Callable[[BehaviorRequest], str] = lambda _: "",
     ) -> bool:
         """Whether to do what `Arbiter.start` was asked. If so, it is reported ACCEPTED.
@@ -61,7 +61,8 @@ class Ledger:
         False: it is known already, or of a past epoch; or it was reported REJECTED, because the
         behavior or a parameter does not fit the catalogue, or a resource is busy. Behaviors that it
         preempts are reported CANCELLED: the new command must end them on the vehicle. `refusal`
-        tells why a request that fits the catalogue cannot be done; "" if it can.
+        tells why a request that fits the catalogue cannot be done; "" if it can. A `native_ref`
+        that must be made is made once nothing speaks against the request.
         """
         if not self._is_new(request):
             return False
@@ -76,7 +77,8 @@ class Ledger:
         for holder in holders.values():
             self.end(holder, BehaviorState.CANCELLED, reason=f"{request.id} took over")
         self._holders.update(dict.fromkeys(request.resources, request.id))
-        self._enter(request, BehaviorState.ACCEPTED, native_ref=native_ref)
+        reference = native_ref() if callable(native_ref) else native_ref
+        self._enter(request, BehaviorState.ACCEPTED, native_ref=reference)
         return True
 
     def may_cancel(self, behavior: BehaviorId, epoch: int) -> bool:

@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 from m2pem.api.arbiter import Arbiter, ArbiterContext, Connection
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.model.geometry import Area
 from m2pem.resources.fleet import Fleet
 from m2pem.resources.graph import ResourceGraph
 
@@ -41,6 +42,8 @@ class FleetArbiters:
     ) -> None:
         self.fleet = fleet
         extra = dict(settings or {})
+        area = fleet.geometries.get(fleet.fence)
+        fence = area if isinstance(area, Area) else None
         connections: dict[str, dict[ResourceId, Connection]] = {}
         for vehicle in fleet.vehicles.values():
             name = SIMULATED if simulated else vehicle.arbiter
@@ -50,6 +53,8 @@ class FleetArbiters:
                 {**vehicle.settings, **extra},
                 vehicle.behaviors,
                 lost_after_s=vehicle.lost_after_s,
+                failsafe=vehicle.failsafe,
+                fence=fence,
             )
         for payload in fleet.payloads.values():
             name = SIMULATED if simulated else payload.arbiter
@@ -61,6 +66,8 @@ class FleetArbiters:
                 payload.behaviors,
                 detector=payload.detector,
                 lost_after_s=owner.lost_after_s,
+                failsafe=owner.failsafe,
+                fence=fence,
             )
         self.by_name: dict[str, Arbiter] = {
             name: plugins.arbiter(name)(group, context) for name, group in connections.items()

@@ -9,7 +9,7 @@ from m2pem.model.geometry import Area
 from m2pem.sim.course import Course, Craft
 from m2pem.sim.phases import Pose, Vector
 from m2pem.sim.pursuit import Pursuit
-from m2pem.sim.survey import lawn_mower, longest_edge_yaw
+from m2pem.resources.lawn_mower import lawn_mower, longest_edge_yaw
 from m2pem.sim.track import Plan
 from m2pem.sim.wishes import RefusedError, Wishes
 

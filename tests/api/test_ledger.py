@@ -79,3 +79,17 @@ def test_old_behaviors_are_forgotten_and_running_ones_are_not(monkeypatch) -> No
     assert book.last("r1.b1").state is BehaviorState.ACCEPTED
     assert book.last("r1.b2").state is BehaviorState.UNKNOWN
     assert book.last("r1.b4").state is BehaviorState.REJECTED
+
+
+def test_a_reference_is_not_made_for_what_is_refused(virtual) -> None:
+    book = ledger()
+    made: list[str] = []
+
+    def make() -> str:
+        made.append("native")
+        return "native"
+
+    assert not book.admit(request("r1.b1"), make, lambda _: "it rains")
+    assert made == []
+    assert book.admit(request("r1.b2"), make)
+    assert [report.native_ref for report in reported(book, virtual)] == [None, "native"]

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 from m2pem import hookimpl
 
 if TYPE_CHECKING:
+    import click
+
     from m2pem.api import Arbiter
 
 
@@ -15,3 +17,17 @@ def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], N
     from m2pem_plugin_mavlink.arbiter import MavlinkArbiter  # noqa: PLC0415  # starting up must be fast
 
     register("mavlink", MavlinkArbiter)
+
+
+@hookimpl
+def m2pem_register_commands(cli: "click.Group") -> None:
+    """Add `sim mavlink`; the group `sim` may be there already, of another plugin."""
+    import click  # noqa: PLC0415  # starting up must be fast
+
+    from m2pem_plugin_mavlink.sim.command_line import mavlink  # noqa: PLC0415
+
+    group = cli.commands.get("sim")
+    if not isinstance(group, click.Group):
+        group = click.Group("sim", help="Simulate vehicles that speak as real ones do.")
+        cli.add_command(group)
+    group.add_command(mavlink)

@@ -1,13 +1,20 @@
 """What a vehicle does for one request."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, TypeAlias
 
 from m2pem.api import BehaviorState, FleetBus, ResolvedValue
+from m2pem_plugin_mavlink.fence import Fence
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+Memory: TypeAlias = Mapping[str, float | str | list[float] | None]
+"""What a behavior must know to be recognised after a restart, beside its parameters; goes into a
+text of JSON."""
+
+ANY_MODE: frozenset[FlightMode] = frozenset(FlightMode)
 
 
 class BehaviorFailedError(Exception):
@@ -22,29 +29,43 @@ class BehaviorFailedError(Exception):
 @dataclass(frozen=True, slots=True)
 class Job:
     """What is to be done, by whom, and where: the fleet's bus (positions of other vehicles) and the
-    origin of its ENU frame (latitude and longitude in degrees, altitude in metres)."""
+    origin of its ENU frame (latitude and longitude in degrees, altitude in metres).
+
+    `now_s`: seconds of the arbiter's clock, which goes on over a restart. `fence`: what the vehicle may not leave. `cruise_m_s`: the speed that `set_speed` has set.
+    `actuators`: names that the fleet gives to actuators ("servo 9").
+    """
 
     vehicle: Vehicle
     parameters: Mapping[str, ResolvedValue]
     bus: FleetBus
     origin: tuple[float, float, float]
+    now_s: Callable[[], float]
+    fence: Fence | None = None
+    cruise_m_s: float | None = None
+    actuators: Mapping[str, str] = field(default_factory=dict)
 
 
 class Behavior(ABC):
-    """One behavior. The arbiter calls `begin` once; then `finished` whenever something is heard of
-    the vehicle; `go_on` after a hold. `steps`, if it has any, run beside that and are cancelled
-    with it (a setpoint that must be repeated).
+    """One behavior. The arbiter asks for a `refusal`, calls `begin` once (again, if it was held
+    before that had ended), then `finished` several times a second; `paused` and `go_on` at a hold
+    and after it. `steps`, if it has any, run beside that and are cancelled with it (a setpoint that
+    must be repeated).
 
     `modes`: those in which it goes on; another one, that nobody here asked for, says that somebody
-    else has taken the vehicle over.
+    else has taken the vehicle over. `steers`: beginning it ends what the vehicle did before.
     """
 
     name: ClassVar[str]
-    modes: ClassVar[frozenset[FlightMode]]
+    modes: frozenset[FlightMode]
+    steers: ClassVar[bool] = True
 
     def __init__(self, job: Job) -> None:
         self.job = job
         self.vehicle = job.vehicle
+
+    def refusal(self) -> str:
+        """Why it cannot be done; "" if it can. Nothing has been sent yet."""
+        return ""
 
     @abstractmethod
     async def begin(self) -> None:
@@ -62,6 +83,9 @@ class Behavior(ABC):
             BehaviorFailedError: it has failed.
         """
 
+    def paused(self) -> None:  # noqa: B027  # most have no clock of their own
+        """The vehicle is being held."""
+
     @abstractmethod
     async def go_on(self) -> None:
         """Have the vehicle go on after it was held."""
@@ -69,7 +93,17 @@ class Behavior(ABC):
     async def steps(self) -> None:  # noqa: B027  # most have none
         """What must be done over and over while it goes on and is not held."""
 
+    async def leave(self) -> None:  # noqa: B027  # most leave nothing behind
+        """Undo what must not outlive it; another behavior takes over without a stop."""
+
     @abstractmethod
     async def recognised(self) -> BehaviorState:
         """After a restart, by looking at the vehicle and asking it nothing but what it has: RUNNING
         (it does just this), SUCCEEDED (it has done it) or UNKNOWN."""
+
+    def memory(self) -> Memory:
+        """What `recall` needs after a restart, beside parameters that are no routes or areas."""
+        return {}
+
+    def recall(self, memory: Memory) -> None:  # noqa: B027  # most need nothing
+        """Before `recognised`: what `memory` said when it began."""

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from typing import Protocol, TypeAlias, TypeVar
 
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
+from m2pem_plugin_mavlink.protocol.quality import LinkQuality
 from m2pem_plugin_mavlink.protocol.transaction import Transaction
 
 T = TypeVar("T")
@@ -39,4 +40,8 @@ class VehicleLink(Protocol):
     def listen(self, ids: Iterable[int], listener: Listener) -> Callable[[], None]:
         """Hand over all messages with these ids of this system, any component; the function that is
         returned ends it. Only messages that somebody listens to are decoded."""
+        ...
+
+    def quality(self) -> LinkQuality | None:
+        """How well the autopilot is heard over the endpoint in use; None: never yet."""
         ...

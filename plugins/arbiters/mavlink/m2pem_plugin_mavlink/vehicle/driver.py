@@ -51,6 +51,8 @@ class Driver(Protocol):
     """
 
     name: str
+    home_items: int
+    """How many items of a stored mission stand before the first real one."""
 
     def mode_name(self, custom_mode: int) -> str:
         """The autopilot's own name of a mode: "GUIDED", "AUTO.MISSION"."""
@@ -90,6 +92,10 @@ class Driver(Protocol):
 
     async def set_speed(self, speed_m_s: float) -> None:
         """The speed over ground of what follows."""
+        ...
+
+    async def command(self, command: int, *params: float) -> None:
+        """Any command (a MAV_CMD with up to seven parameters) that has no method of its own."""
         ...
 
     async def move(self, velocity_ned_m_s: tuple[float, float, float]) -> None:

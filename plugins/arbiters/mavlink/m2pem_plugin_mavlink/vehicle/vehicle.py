@@ -1,69 +1,280 @@
 """One vehicle as behaviors see it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+import asyncio
+import logging
+import math
+from collections.abc import Callable, Coroutine
+from typing import Any
 
-from m2pem.api import GeoPosition, ResourceId, VehicleState
+from m2pem.api import Clock, LinkState, ResourceId, VehicleState
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
-from m2pem_plugin_mavlink.vehicle.driver import Driver, FlightMode
+from m2pem_plugin_mavlink.microservices.texts import StatusTexts
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
+from m2pem_plugin_mavlink.vehicle import exchanges
+from m2pem_plugin_mavlink.vehicle.driver import Driver
+from m2pem_plugin_mavlink.vehicle.drivers import driver_of
+from m2pem_plugin_mavlink.vehicle.heard import Heard
+from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Identity, identity
+from m2pem_plugin_mavlink.vehicle.intake import Intake
+from m2pem_plugin_mavlink.vehicle.modes import modes_of
+from m2pem_plugin_mavlink.vehicle.ours import Ours
+from m2pem_plugin_mavlink.vehicle.streams import Streams, telemetry_streams
+from m2pem_plugin_mavlink.vehicle.telemetry import DEGRADED_SHARE, link_state, vehicle_state
+from m2pem_plugin_mavlink.vehicle.waiters import Waiters
+
+_HEARTBEAT = message_type("HEARTBEAT").id
+_STATUSTEXT = message_type("STATUSTEXT").id
+_HOME = message_type("HOME_POSITION").id
+
+HOME_EVERY_S = 5.0
+"""A home position that is not sent by itself is asked for so often, until it is there."""
+
+__all__ = ["Heard", "Vehicle"]
 
 
-@dataclass(slots=True)
-class Heard:
-    """What was heard of a vehicle last; None: not heard yet. Frames and units as in VehicleState.
+class Vehicle:
+    """A vehicle of the fleet behind its link, between `open` and `close`.
 
-    `landed`: stands on the ground (EXTENDED_SYS_STATE, or where that is not sent, what the heights
-    and speeds say). `changes` counts messages that changed something.
+    Nothing is sent before its heartbeat has told what it is; then it is asked for the messages that
+    `heard` is made of, and again when they stop coming. All times are of the arbiter's clock.
     """
 
-    position: GeoPosition | None = None
-    altitude_above_home_m: float | None = None
-    altitude_above_terrain_m: float | None = None
-    velocity_enu_m_s: tuple[float, float, float] | None = None
-    yaw_rad: float | None = None
-    custom_mode: int | None = None
-    mode: FlightMode = FlightMode.OTHER
-    armed: bool | None = None
-    landed: bool | None = None
-    home: GeoPosition | None = None
-    changes: int = 0
+    def __init__(
+        self,
+        resource: ResourceId,
+        domain: str,
+        link: VehicleLink,
+        clock: Clock,
+        *,
+        lost_after_s: float = 3.0,
+        logger: logging.Logger | None = None,
+    ) -> None:
+        self.resource = resource
+        self.domain = domain
+        self.link = link
+        self.heard = Heard()
+        self.ours = Ours()
+        self.texts = StatusTexts()
+        self.identity: Identity | None = None
+        self.lost_after_s = lost_after_s
+        self._clock = clock
+        self._logger = logger or logging.getLogger(__name__)
+        self._driver: Driver | None = None
+        self._intake: Intake | None = None
+        self._streams: Streams | None = None
+        self._waiters = Waiters(clock)
+        self._watchers: list[Callable[[], None]] = []
+        self._deafen: list[Callable[[], None]] = []
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._asking = False
+        self._boots = 0
+        self._stranger = False
+        self._home_asked_s = -math.inf
+
+    # --- life -----------------------------------------------------------------------------------
+
+    def open(self) -> None:
+        """Listen."""
+        self._deafen.append(self.link.listen((_HEARTBEAT,), self._identify))
+        self._deafen.append(self.link.listen((_STATUSTEXT,), self._read_text))
+        self._go(self._watch_silence())
+
+    async def close(self) -> None:
+        """Listen no more; the vehicle goes on with what it does."""
+        for deafen in self._deafen:
+            deafen()
+        self._deafen.clear()
+        tasks = list(self._tasks)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def watch(self, watcher: Callable[[], None]) -> Callable[[], None]:
+        """Call `watcher` whenever the vehicle was heard or has fallen silent, until the function
+        that is returned is called."""
+        self._watchers.append(watcher)
+        return lambda: self._watchers.remove(watcher) if watcher in self._watchers else None
+
+    # --- what is known --------------------------------------------------------------------------
 
     @property
-    def speed_m_s(self) -> float:
-        """Over ground and in height; infinite while it is not known."""
-        if self.velocity_enu_m_s is None:
-            return float("inf")
-        east, north, up = self.velocity_enu_m_s
-        return float((east * east + north * north + up * up) ** 0.5)
+    def driver(self) -> Driver:
+        """How its autopilot is driven.
 
+        Raises:
+            NoAnswerError: it was not heard yet, so that nobody knows.
+        """
+        if self._driver is None:
+            raise NoAnswerError(f"{self.resource} was not heard yet")
+        return self._driver
 
-class Vehicle(Protocol):
-    """A vehicle of the fleet behind its link."""
+    @property
+    def silent_s(self) -> float | None:
+        """Since when nothing was heard of it; None: nothing ever was."""
+        return None if self.heard.at_s is None else self.link.now_s() - self.heard.at_s
 
-    resource: ResourceId
-    domain: str
-    link: VehicleLink
-    driver: Driver
-    heard: Heard
+    @property
+    def link_state(self) -> LinkState:
+        """Whether it is heard."""
+        quality = self.link.quality()
+        return link_state(self.silent_s, self.lost_after_s, quality.loss if quality else 0.0)
 
     def state(self) -> VehicleState:
         """Its telemetry now."""
-        ...
+        heard, driver = self.heard, self._driver
+        known = driver is not None and heard.custom_mode is not None
+        return vehicle_state(
+            self.resource,
+            self._clock.now_us(),
+            heard,
+            driver.mode_name(heard.custom_mode or 0) if driver is not None and known else "",
+            driver.readiness() if driver is not None else None,
+            self.link_state,
+        )
+
+    def recent_texts(self, within_s: float = 5.0) -> tuple[str, ...]:
+        """What it said lately (STATUSTEXT), newest last: the reasons of its refusals."""
+        return tuple(each.text for each in self.texts.recent(self.link.now_s(), within_s))
+
+    # --- waiting --------------------------------------------------------------------------------
 
     async def identified(self, within_s: float) -> bool:
         """Wait until its heartbeat has told which autopilot and kind of vehicle it is."""
-        ...
+        return await self.until(lambda: self._driver is not None, within_s)
 
     async def until(self, true: Callable[[], bool], within_s: float | None = None) -> bool:
         """Wait until something is true; it is looked at whenever the vehicle is heard. False: it
         was not within so many seconds of the arbiter's clock."""
-        ...
+        return await self._waiters.wait(true, within_s)
 
     async def sleep(self, seconds: float) -> None:
         """Wait, by the arbiter's clock."""
-        ...
+        await self._clock.sleep(seconds)
 
-    def recent_texts(self, within_s: float = 5.0) -> tuple[str, ...]:
-        """What it said lately (STATUSTEXT), newest last: the reasons of its refusals."""
-        ...
+    def want(self, message: str, interval_s: float) -> None:
+        """Have it send a message that telemetry is not made of (a gimbal's attitude, say)."""
+        if self._streams is None:
+            raise NoAnswerError(f"{self.resource} was not heard yet")
+        self._streams.wanted[message_type(message).id] = interval_s
+
+    # --- hearing --------------------------------------------------------------------------------
+
+    def _identify(self, message: Message, sender: Address) -> None:
+        if sender != self.link.address:
+            return
+        found = identity(message.autopilot, message.type)
+        if self.identity is not None:
+            if found != self.identity:
+                self._logger.warning(
+                    "%s: was %s and now says that it is %s; do two vehicles have system id %d?",
+                    self.resource, self.identity, found or "none that is known", sender.system,
+                )  # fmt: skip
+            return
+        if found is None:
+            self._tell_of_stranger(message.autopilot, message.type)
+            return
+        self._logger.info("%s: %s, system id %d", self.resource, found, sender.system)
+        self.identity = found
+        flies = found.kind not in ON_THE_GROUND
+        if flies != (self.domain == "air"):
+            self._logger.warning(
+                "%s: the fleet says %s, its heartbeat %s", self.resource, self.domain, found.kind
+            )
+        self._driver = driver_of(self, found)
+        self._streams = Streams(telemetry_streams(found.firmware))
+        self._intake = Intake(self.heard, modes_of(found), flies=flies)
+        self._hear(message, sender)
+        self._deafen.append(self.link.listen(self._intake.wants, self._hear))
+
+    def _tell_of_stranger(self, autopilot: int, type_: int) -> None:
+        if not self._stranger:
+            self._stranger = True
+            self._logger.warning(
+                "%s: system id %d is no vehicle with ArduPilot or PX4: autopilot %d, type %d",
+                self.resource, self.link.address.system, autopilot, type_,
+            )  # fmt: skip
+
+    def _hear(self, message: Message, sender: Address) -> None:
+        if sender != self.link.address or self._intake is None or self._streams is None:
+            return
+        self._intake.take(message, self.link.now_s())
+        if self.heard.boots != self._boots:
+            self._boots = self.heard.boots
+            self._streams.forget()
+        if message.TYPE.id == _HEARTBEAT:
+            self._ask_for_streams()
+        self._tell()
+
+    def _read_text(self, message: Message, sender: Address) -> None:
+        if sender == self.link.address:
+            self.texts.take(message, sender, self.link.now_s())
+            self._tell()
+
+    def _tell(self) -> None:
+        self._waiters.look()
+        for watcher in tuple(self._watchers):
+            watcher()
+
+    async def _watch_silence(self) -> None:
+        """What is true because nothing was heard is noticed, too."""
+        while True:
+            silent_s = self.silent_s
+            if silent_s is None or silent_s >= self.lost_after_s:
+                before_s = self.heard.at_s
+                await self.until(lambda before_s=before_s: self.heard.at_s != before_s)  # type: ignore[misc]
+                continue
+            bounds_s = (DEGRADED_SHARE * self.lost_after_s, self.lost_after_s)
+            ahead_s = min(bound - silent_s for bound in bounds_s if bound > silent_s)
+            await self._clock.sleep(max(ahead_s, 0.001))
+            if self.link_state is not LinkState.CONNECTED:
+                self._tell()
+
+    # --- asking for streams ---------------------------------------------------------------------
+
+    def _ask_for_streams(self) -> None:
+        assert self._streams is not None
+        if self._asking:
+            return
+        due = self._streams.due(self.heard.messages_s, self.link.now_s())
+        now_s = self.link.now_s()
+        if due:
+            self._asking = True
+            self._go(self._ask(self._streams, due))
+        elif (
+            _HOME in self._streams.refused
+            and self.heard.home is None
+            and now_s - self._home_asked_s >= HOME_EVERY_S
+        ):
+            self._home_asked_s, self._asking = now_s, True
+            self._go(self._ask_for_home())
+
+    async def _ask(self, streams: Streams, due: list[int]) -> None:
+        try:
+            for id_ in due:
+                try:
+                    await exchanges.message_interval(self.link, id_, streams.wanted[id_])
+                except RefusedError as error:
+                    if not error.temporary:
+                        streams.refused.add(id_)
+                    self._logger.debug("%s: sends no message %d: %s", self.resource, id_, error)
+                except ExchangeError as error:
+                    streams.unanswered(id_)
+                    self._logger.debug("%s: message %d: %s", self.resource, id_, error)
+                else:
+                    streams.asked(id_, self.link.now_s())
+        finally:
+            self._asking = False
+
+    async def _ask_for_home(self) -> None:
+        try:
+            await exchanges.request_message(self.link, "HOME_POSITION")
+        except ExchangeError as error:
+            self._logger.debug("%s: does not tell its home: %s", self.resource, error)
+        finally:
+            self._asking = False
+
+    def _go(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from m2pem.sim.survey import MAX_STRIPS, Ring, lawn_mower, longest_edge_yaw
+from m2pem.resources.lawn_mower import MAX_STRIPS, Ring, lawn_mower, longest_edge_yaw
 
 SQUARE: Ring = [(0, 0), (100, 0), (100, 60), (0, 60), (0, 0)]
 
@@ -81,3 +81,22 @@ def test_every_point_of_any_area_is_within_half_a_spacing(
     for place in tries:
         if inside([ring], place):
             assert distance(points, place) <= spacing / 2 + 1e-6
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.lists(st.floats(10, 100), min_size=3, max_size=9),
+    st.floats(5, 60),
+    st.floats(-math.pi, math.pi),
+)
+def test_passes_are_parallel_and_at_most_a_spacing_apart(
+    radii: list[float], spacing: float, yaw: float
+) -> None:
+    corners = [
+        (radius * math.cos(math.tau * i / len(radii)), radius * math.sin(math.tau * i / len(radii)))
+        for i, radius in enumerate(radii)
+    ]
+    points = lawn_mower([[*corners, corners[0]]], spacing, yaw)
+    across = [north * math.cos(yaw) - east * math.sin(yaw) for east, north in points]
+    assert across[::2] == pytest.approx(across[1::2])
+    assert all(0.0 <= b - a + 1e-9 <= spacing + 1e-6 for a, b in pairwise(across[::2]))

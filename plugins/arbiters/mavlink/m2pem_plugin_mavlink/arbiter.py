@@ -1,0 +1,330 @@
+"""The arbiter of MAVLink vehicles. Its catalogue needs no MAVLink library, and no connection."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Protocol
+
+from m2pem.api import (
+    ArbiterContext,
+    BehaviorId,
+    BehaviorReport,
+    BehaviorRequest,
+    BehaviorSpec,
+    BehaviorState,
+    Connection,
+    Ledger,
+    Limits,
+    Mailbox,
+    PayloadState,
+    ResourceId,
+    VehicleState,
+)
+from m2pem_plugin_mavlink.catalogue import offered
+from m2pem_plugin_mavlink.native_ref import Kept, native_ref, read_native_ref
+from m2pem_plugin_mavlink.settings import Settings, read_settings
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink.behaviors.behavior import Behavior
+    from m2pem_plugin_mavlink.fence import Fence
+    from m2pem_plugin_mavlink.foreign import TakeoverWatch
+    from m2pem_plugin_mavlink.helm import Helm
+    from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+LOST_AFTER_S = 3.0
+HOLD_WITHIN_S = 6.0
+"""BRAKE stops a copter from 10 m/s within 4 s; a command that is lost is sent again after 1.5 s."""
+
+CANCEL_TIMEOUT_S = 10.0
+SILENT_SHARE = 0.8
+"""Of `lost_after_s`: after so much of it a vehicle is lost, as it takes a while to notice."""
+
+HEARD_WITHIN_S = 5.0
+"""Vehicles that are there say so every second; `connect` waits for them no longer."""
+
+TELEMETRY_EVERY_S = 0.2
+STATES_WAITING = 1000
+
+
+class Station(Protocol):
+    """The vehicles of a fleet, over whatever carries their messages."""
+
+    async def open(self) -> Mapping[ResourceId, "Vehicle"]:
+        """Listen; the vehicles need not be heard yet."""
+        ...
+
+    def watch(self, vehicle: "Vehicle") -> "TakeoverWatch":
+        """What notices that somebody else steers; not open yet."""
+        ...
+
+    async def close(self) -> None:
+        """Let go of them, and of all sockets."""
+        ...
+
+
+MakeStation = Callable[
+    [
+        Mapping[ResourceId, Connection],
+        Mapping[ResourceId, Settings],
+        ArbiterContext,
+        Mapping[ResourceId, float],
+    ],
+    Station,
+]
+"""Of connections, their settings, the context, and after how many seconds each vehicle is lost."""
+
+
+def _station(
+    connections: Mapping[ResourceId, Connection],
+    settings: Mapping[ResourceId, Settings],
+    context: ArbiterContext,
+    lost_after_s: Mapping[ResourceId, float],
+) -> Station:
+    from m2pem_plugin_mavlink.station import LinkedStation  # noqa: PLC0415  # it needs pymavlink
+
+    return LinkedStation(connections, settings, context, lost_after_s)
+
+
+class MavlinkArbiter:
+    """Implements `m2pem.api.Arbiter`. What a fleet may say of it: docs/mavlink.md.
+
+    Raises:
+        PluginError: a connection cannot be used; the text names the resource and the key.
+    """
+
+    def __init__(
+        self,
+        connections: Mapping[ResourceId, Connection],
+        context: ArbiterContext,
+        make_station: MakeStation = _station,
+    ) -> None:
+        self._connections = connections
+        self._context = context
+        self._settings = read_settings(connections)
+        self._make_station = make_station
+        self._station: Station | None = None
+        self._ledger = Ledger(self._taken, context.logger)
+        self._states: Mailbox[VehicleState | PayloadState] = Mailbox(STATES_WAITING)
+        self._helms: dict[ResourceId, Helm] = {}
+        self._watches: list[TakeoverWatch] = []
+        self._fences: dict[ResourceId, Fence] = {}
+        self._pending: dict[BehaviorId, Behavior] = {}
+        self._asked: set[BehaviorId] = set()
+        self._tasks: list[asyncio.Task[None]] = []
+
+    # --- what is offered ------------------------------------------------------------------------
+
+    def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+        """What a vehicle can do, by its domain; payloads are carried, no more."""
+        if resource not in self._settings:
+            return ()
+        return offered(self._connections[resource].domain, self._settings[resource].driver)
+
+    def _taken(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+        """A payload may be held by what its vehicle does."""
+        return self.catalogue(ResourceId(resource.partition("/")[0]))
+
+    def limits(self, resource: ResourceId) -> Limits:
+        """The bounds that hold for a vehicle."""
+        own = self._connections[resource].lost_after_s if resource in self._connections else None
+        return Limits(LOST_AFTER_S if own is None else own, HOLD_WITHIN_S, CANCEL_TIMEOUT_S)
+
+    # --- life -----------------------------------------------------------------------------------
+
+    async def connect(self) -> None:
+        """Listen to all vehicles; returns when all were heard, or soon."""
+        from m2pem_plugin_mavlink.fence import Fence  # noqa: PLC0415  # it needs pymap3d
+        from m2pem_plugin_mavlink.helm import Helm  # noqa: PLC0415  # it needs pymavlink
+
+        lost_after_s = {resource: self.limits(resource).lost_after_s for resource in self._settings}
+        self._station = self._make_station(
+            self._connections, self._settings, self._context, lost_after_s
+        )
+        vehicles = await self._station.open()
+        create = asyncio.get_running_loop().create_task
+        fences: dict[int, Fence] = {}
+        for resource, vehicle in vehicles.items():
+            watch = self._station.watch(vehicle)
+            watch.open()
+            self._watches.append(watch)
+            limits = self.limits(resource)
+            self._helms[resource] = Helm(
+                vehicle, watch, self._ledger, limits, self._context.logger
+            )
+            area = self._connections[resource].fence
+            if area is not None:
+                self._fences[resource] = fences.setdefault(id(area), Fence(area))
+            self._tasks.append(create(self._attend(resource)))
+        heard = await asyncio.gather(*(helm.knows(HEARD_WITHIN_S) for helm in self._helms.values()))
+        for resource, is_heard in zip(vehicles, heard, strict=True):
+            if not is_heard:
+                self._context.logger.warning("%s: where it is was not heard yet", resource)
+
+    async def close(self) -> None:
+        """Listen no more. Vehicles keep doing what they do."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._tasks = []
+        for helm in self._helms.values():
+            await helm.close()
+        for watch in self._watches:
+            await watch.close()
+        self._watches = []
+        station, self._station = self._station, None
+        if station is not None:
+            await station.close()
+        self._states.close()
+        self._ledger.close()
+
+    # --- behaviors ------------------------------------------------------------------------------
+
+    async def start(self, request: BehaviorRequest) -> None:
+        """Start a behavior; see `BehaviorRequest`."""
+        asked = request.id in self._asked
+        self._asked.discard(request.id)
+        try:
+            if self._ledger.admit(request, lambda: self._native_ref(request), self._refusal):
+                resource, behavior = _vehicles(request)[0], self._pending[request.id]
+                self._helms[resource].take(request.id, behavior, look_first=asked)
+        finally:
+            self._pending.pop(request.id, None)
+
+    async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
+        """Stop the vehicle that does it."""
+        if self._ledger.may_cancel(behavior, epoch):
+            for resource, helm in self._helms.items():
+                if self._ledger.holder(resource) == behavior:
+                    helm.cancel(behavior)
+
+    async def hold(self, resource: ResourceId) -> None:
+        """Have a vehicle stand still at once."""
+        if resource in self._helms:
+            self._helms[resource].hold()
+
+    async def resume(self, resource: ResourceId) -> None:
+        """Have a vehicle go on."""
+        if resource in self._helms:
+            self._helms[resource].resume()
+
+    async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
+        """What is known; after a restart, what the vehicle itself shows. Nothing is sent to it but
+        questions."""
+        known = self._ledger.last(behavior)
+        if known.state is not BehaviorState.UNKNOWN:
+            return known
+        kept = read_native_ref(native_ref) if native_ref else None
+        if kept is None or kept.resource not in self._helms:
+            self._asked.add(behavior)
+            return known
+        return await self._look(behavior, kept, native_ref or "")
+
+    # --- streams --------------------------------------------------------------------------------
+
+    def reports(self) -> AsyncIterator[BehaviorReport]:
+        """Reports as they come, for one reader, until `close`."""
+        return self._ledger.reports()
+
+    def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
+        """States as they come, for one reader, until `close`; a slow one misses old states."""
+        return self._states.read()
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _refusal(self, request: BehaviorRequest) -> str:
+        from m2pem_plugin_mavlink.behaviors.behavior import (  # noqa: PLC0415
+            BehaviorFailedError,
+        )
+
+        vehicles = _vehicles(request)
+        if len(vehicles) != 1:
+            return f"{request.behavior} takes one vehicle, and has {len(vehicles)}"
+        resource = vehicles[0]
+        allowed = self._connections[resource].behaviors
+        if allowed is not None and request.behavior not in allowed:
+            return f"the fleet does not allow {resource} the behavior '{request.behavior}'"
+        if resource not in self._helms:
+            return "the arbiter is not connected"
+        kept = Kept(resource, request.behavior, request.parameters, {})
+        try:
+            behavior = self._make(kept)
+            self._pending[request.id] = behavior
+            return behavior.refusal()
+        except BehaviorFailedError as error:
+            return error.reason
+
+    def _make(self, kept: Kept) -> "Behavior":
+        from m2pem_plugin_mavlink.behaviors import BEHAVIORS  # noqa: PLC0415
+        from m2pem_plugin_mavlink.behaviors.behavior import Job  # noqa: PLC0415
+
+        helm, clock = self._helms[kept.resource], self._context.clock
+        job = Job(
+            helm.vehicle,
+            kept.parameters,
+            self._context.bus,
+            self._context.origin,
+            lambda: clock.now_us() / 1e6,
+            self._fences.get(kept.resource),
+            helm.cruise_m_s,
+            self._settings[kept.resource].actuators,
+        )
+        return BEHAVIORS[kept.behavior](job)
+
+    def _native_ref(self, request: BehaviorRequest) -> str:
+        memory = self._pending[request.id].memory()
+        resource = _vehicles(request)[0]
+        return native_ref(Kept(resource, request.behavior, request.parameters, memory))
+
+    async def _look(self, id_: BehaviorId, kept: Kept, reference: str) -> BehaviorReport:
+        from m2pem_plugin_mavlink.behaviors import BEHAVIORS  # noqa: PLC0415
+        from m2pem_plugin_mavlink.behaviors.behavior import (  # noqa: PLC0415
+            BehaviorFailedError,
+        )
+        from m2pem_plugin_mavlink.protocol.transaction import ExchangeError  # noqa: PLC0415
+
+        helm = self._helms[kept.resource]
+        vehicle = helm.vehicle
+        unknown = BehaviorReport(id_, 0, BehaviorState.UNKNOWN, native_ref=reference)
+        if kept.behavior not in BEHAVIORS:
+            return replace(unknown, reason=f"there is no behavior '{kept.behavior}' any more")
+        if not await helm.knows(HEARD_WITHIN_S):
+            return replace(unknown, reason=f"where {kept.resource} is was not heard")
+        try:
+            behavior = self._make(kept)
+            behavior.recall(kept.memory)
+            state = await behavior.recognised()
+        except (BehaviorFailedError, ExchangeError) as error:
+            return replace(unknown, reason=str(error))
+        if state is BehaviorState.RUNNING:
+            self._ledger.adopt(id_, [kept.resource], reference)
+            helm.adopt(id_, behavior)
+            return self._ledger.last(id_)
+        if state is BehaviorState.SUCCEEDED:
+            return replace(unknown, number=3, state=state)
+        mode = vehicle.state().mode or "an unknown mode"
+        return replace(unknown, reason=f"{kept.resource} is in {mode}, and does not do it")
+
+    async def _attend(self, resource: ResourceId) -> None:
+        """Tell how a vehicle is, and notice when it falls silent."""
+        helm, clock = self._helms[resource], self._context.clock
+        bound_s = self.limits(resource).lost_after_s * SILENT_SHARE
+        began_us, told = clock.now_us(), -1
+        state: VehicleState | None = None
+        while True:
+            vehicle = helm.vehicle
+            silent_s = vehicle.silent_s
+            if silent_s is None:
+                silent_s = (clock.now_us() - began_us) / 1e6
+            if silent_s >= bound_s and self._ledger.holder(resource) is not None:
+                helm.drop()
+                self._ledger.lose(resource, f"not heard for {silent_s:.1f} s")
+            changes = vehicle.heard.changes
+            if changes != told or (state is not None and vehicle.link_state != state.link):
+                told = changes
+                state = replace(vehicle.state(), behavior=helm.behavior)
+                self._states.put(state)
+            await clock.sleep(TELEMETRY_EVERY_S)
+
+
+def _vehicles(request: BehaviorRequest) -> list[ResourceId]:
+    return [resource for resource in request.resources if "/" not in resource]

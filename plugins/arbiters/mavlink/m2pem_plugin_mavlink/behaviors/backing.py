@@ -1,0 +1,107 @@
+"""Backwards."""
+
+import math
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import BehaviorState
+from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError, Job, Memory
+from m2pem_plugin_mavlink.behaviors.looking import away_m, stands, where
+from m2pem_plugin_mavlink.behaviors.wishes import Wishes
+from m2pem_plugin_mavlink.plane import LatLon, offset
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+
+SPEED_M_S = 1.0
+BEYOND_M = 5.0
+"""Autopilots stop some way before the place that they were told: it lies so far beyond."""
+
+STOPPING_S = 0.25
+LOOK_EVERY_S = 0.1
+
+
+class Reverse(Behavior):
+    """Drive backwards over a distance, then stand: ArduPilot's DO_SET_REVERSE, and a place behind."""
+
+    name = "reverse"
+    modes = frozenset({FlightMode.GUIDED, FlightMode.HOLD})
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        wishes = Wishes(job)
+        distance = wishes.number("distance")
+        self._distance_m = 5.0 if distance is None else distance
+        self._speed_m_s = wishes.speed_m_s or SPEED_M_S
+        self._from = where(self.vehicle)
+        self._yaw_rad = self.vehicle.heard.yaw_rad
+        self._done = False
+
+    def refusal(self) -> str:
+        if self._from is None or self._yaw_rad is None:
+            return "where it is, and where its bow points, is not known yet"
+        if self.job.fence is None:
+            return ""
+        way = [self._behind(self._from, self._yaw_rad, self._distance_m)]
+        return self.job.fence.breach(way, self._from, lambda _: "the place behind it")
+
+    async def begin(self) -> None:
+        if self._from is None or self._yaw_rad is None:
+            raise BehaviorFailedError("where it is, and where its bow points, is not known")
+        if self._distance_m == 0:
+            self._done = True
+            return
+        driver = self.vehicle.driver
+        await driver.set_mode(FlightMode.GUIDED)  # a change of mode makes it drive forwards again
+        await driver.arm()
+        await driver.command(dialect.MAV_CMD_DO_SET_REVERSE, 1.0)
+        beyond = self._behind(self._from, self._yaw_rad, self._distance_m + BEYOND_M)
+        await driver.go_to(Place(*beyond), self._speed_m_s)
+
+    async def go_on(self) -> None:
+        if not self._done:
+            await self.begin()
+
+    async def steps(self) -> None:
+        """Stop it after the distance."""
+        if self._done:
+            return
+        while not self._covered():
+            await self.vehicle.sleep(LOOK_EVERY_S)
+        await self.vehicle.driver.stop()
+        self._done = True
+
+    def finished(self) -> bool:
+        return self._done and stands(self.vehicle)
+
+    async def leave(self) -> None:
+        await self.vehicle.driver.command(dialect.MAV_CMD_DO_SET_REVERSE, 0.0)
+
+    def _covered(self) -> bool:
+        if self._from is None:
+            return False
+        speed = self.vehicle.heard.speed_m_s
+        rolls_on = STOPPING_S * speed if math.isfinite(speed) else 0.0
+        driven = away_m(self.vehicle, self._from)
+        return math.isfinite(driven) and driven + rolls_on >= self._distance_m
+
+    @staticmethod
+    def _behind(place: LatLon, yaw_rad: float, distance_m: float) -> LatLon:
+        return offset(place, -distance_m * math.cos(yaw_rad), -distance_m * math.sin(yaw_rad))
+
+    async def recognised(self) -> BehaviorState:
+        mode = self.vehicle.heard.mode
+        if self._from is None or mode not in self.modes:
+            return BehaviorState.UNKNOWN
+        if self._covered():
+            self._done = mode is FlightMode.HOLD
+            over = self._done and stands(self.vehicle)
+            return BehaviorState.SUCCEEDED if over else BehaviorState.RUNNING
+        moves = mode is FlightMode.GUIDED and not stands(self.vehicle)
+        return BehaviorState.RUNNING if moves else BehaviorState.UNKNOWN
+
+    def memory(self) -> Memory:
+        return {"from": list(self._from or ()), "yaw": self._yaw_rad}
+
+    def recall(self, memory: Memory) -> None:
+        began, yaw = memory.get("from"), memory.get("yaw")
+        if isinstance(began, list) and len(began) == 2 and isinstance(yaw, int | float):
+            self._from, self._yaw_rad = (began[0], began[1]), float(yaw)

@@ -1,0 +1,85 @@
+"""Working an actuator."""
+
+import math
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import BehaviorState
+from m2pem_plugin_mavlink.behaviors.behavior import ANY_MODE, Behavior, Job
+from m2pem_plugin_mavlink.behaviors.wishes import Wishes
+
+KINDS = "'servo N', 'relay N', 'actuator N', 'gripper' or 'gripper N'"
+
+_PULSE_US = (500.0, 2500.0)
+
+
+class Deploy(Behavior):
+    """Set a servo (its output, in microseconds), a relay (0 or 1), an actuator of PX4 (-1 to 1), or
+    have a gripper release (0, the default) or grab (1). A number alone is that of a servo."""
+
+    name = "deploy"
+    modes = ANY_MODE
+    steers = False
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        wishes = Wishes(job)
+        self._called = wishes.text("actuator")
+        meant = job.actuators.get(self._called, self._called)
+        words = meant.replace(":", " ").lower().split()
+        self._kind, self._number = _read(words)
+        self._value = wishes.number("value")
+
+    def refusal(self) -> str:
+        if not self._kind:
+            names = ", ".join(self.job.actuators)
+            known = f"{names}; or " if names else ""
+            return f"parameter 'actuator': there is no '{self._called}': write {known}{KINDS}"
+        if self._kind == "servo" and self._value is None:
+            return "a servo needs the parameter 'value': its pulse in microseconds"
+        low, high = {
+            "servo": _PULSE_US,
+            "relay": (0.0, 1.0),
+            "gripper": (0.0, 1.0),
+            "actuator": (-1.0, 1.0),
+        }[self._kind]
+        if self._value is not None and not low <= self._value <= high:
+            return f"parameter 'value': a {self._kind} takes {low:g} to {high:g}"
+        return ""
+
+    async def begin(self) -> None:
+        driver, number = self.vehicle.driver, float(self._number)
+        if self._kind == "servo":
+            await driver.command(dialect.MAV_CMD_DO_SET_SERVO, number, self._value or 0.0)
+        elif self._kind == "relay":
+            on = 1.0 if self._value is None else round(self._value)
+            await driver.command(dialect.MAV_CMD_DO_SET_RELAY, number, on)
+        elif self._kind == "gripper":
+            await driver.command(dialect.MAV_CMD_DO_GRIPPER, number, round(self._value or 0.0))
+        else:
+            values = [math.nan] * 6
+            values[self._number - 1] = 1.0 if self._value is None else self._value
+            await driver.command(dialect.MAV_CMD_DO_SET_ACTUATOR, *values, 0.0)
+
+    async def go_on(self) -> None:
+        await self.begin()
+
+    def finished(self) -> bool:
+        return True
+
+    async def recognised(self) -> BehaviorState:
+        return BehaviorState.UNKNOWN
+
+
+def _read(words: list[str]) -> tuple[str, int]:
+    """The kind and number of an actuator; ("", 0) if it is none."""
+    match words:
+        case [number] if number.isdecimal():
+            return "servo", int(number)
+        case ["gripper"]:
+            return "gripper", 1
+        case ["actuator", number] if number.isdecimal() and 1 <= int(number) <= 6:
+            return "actuator", int(number)
+        case [("servo" | "relay" | "gripper") as kind, number] if number.isdecimal():
+            return kind, int(number)
+    return "", 0

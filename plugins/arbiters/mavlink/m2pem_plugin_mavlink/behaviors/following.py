@@ -1,0 +1,112 @@
+"""Staying with another vehicle of the fleet, whatever its domain and its arbiter."""
+
+import math
+
+from m2pem.api import BehaviorState, LinkState, VehicleState
+from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError, Job
+from m2pem_plugin_mavlink.behaviors.looking import accepts, unless_airborne, where
+from m2pem_plugin_mavlink.behaviors.wishes import Wishes, state_of
+from m2pem_plugin_mavlink.plane import LatLon, distance_m, offset
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+
+OFFSET_M = 15.0
+BEHIND_RAD = math.pi
+REPEAT_S = 0.5
+STALE_S = 3.0
+MOVED_M = 0.5
+LEAD_S = 1.0
+"""It is sent where its station will be by then; a place is reached later than it is told."""
+
+COURSE_ABOVE_M_S = 1.0
+"""Who moves faster points where it moves; its bow counts only if that is not known."""
+
+
+class Follow(Behavior):
+    """Keep a station at another vehicle: `offset` from it, at `bearing` from its bow."""
+
+    name = "follow"
+    modes = frozenset({FlightMode.GUIDED})
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        self._wishes = Wishes(job)
+        self._target = self._wishes.target_vehicle or ""
+        distance, bearing = self._wishes.number("offset"), self._wishes.number("bearing")
+        self._offset_m = OFFSET_M if distance is None else distance
+        self._bearing_rad = BEHIND_RAD if bearing is None else bearing
+        self._told: LatLon | None = None
+        self._course_rad: float | None = None
+
+    def refusal(self) -> str:
+        if reason := unless_airborne(self.vehicle):
+            return reason
+        if self._target in ("", self.vehicle.resource):
+            return "parameter 'target': another vehicle is expected"
+        if self._state() is None:
+            return f"parameter 'target': {self._target} has not been heard"
+        return self._breach(self._station())
+
+    async def begin(self) -> None:
+        self._told = None
+        await self._tell()
+
+    async def go_on(self) -> None:
+        await self.begin()
+
+    async def steps(self) -> None:
+        """Tell it twice a second where its station is."""
+        while True:
+            await self.vehicle.sleep(REPEAT_S)
+            await self._tell()
+
+    def finished(self) -> bool:
+        return False
+
+    async def _tell(self) -> None:
+        if self._state() is None:
+            await self._stop(f"{self._target} has not been heard for {STALE_S:g} s")
+        station = self._station()
+        if reason := self._breach(station):
+            await self._stop(reason)
+        if self._told is None or distance_m(self._told, station) > MOVED_M:
+            self._told = station
+            place = Place(*station, *self._wishes.altitude())
+            await self.vehicle.driver.go_to(place, self._wishes.speed_m_s)
+
+    async def _stop(self, reason: str) -> None:
+        await self.vehicle.driver.stop()
+        raise BehaviorFailedError(reason)
+
+    def _breach(self, station: LatLon) -> str:
+        if self.job.fence is None:
+            return ""
+        name = f"its station at {self._target}"
+        return self.job.fence.breach([station], where(self.vehicle), lambda _: name)
+
+    def _state(self) -> VehicleState | None:
+        """What the target said; None: nothing that is new enough."""
+        state = state_of(self.job, self._target)
+        if state is None or state.position is None or state.link is LinkState.LOST:
+            return None
+        return state if self.job.now_s() - state.time_us / 1e6 <= STALE_S else None
+
+    def _station(self) -> LatLon:
+        state = self._state()
+        if state is None or state.position is None:
+            raise BehaviorFailedError(f"{self._target} has not been heard")
+        east, north, _ = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
+        if state.yaw_rad is not None:
+            self._course_rad = state.yaw_rad
+        elif math.hypot(east, north) > COURSE_ABOVE_M_S:
+            self._course_rad = math.atan2(north, east)
+        yaw = (self._course_rad or 0.0) - self._bearing_rad
+        return offset(
+            (state.position.latitude_deg, state.position.longitude_deg),
+            east * LEAD_S + self._offset_m * math.cos(yaw),
+            north * LEAD_S + self._offset_m * math.sin(yaw),
+        )
+
+    async def recognised(self) -> BehaviorState:
+        heard = self.vehicle.heard
+        follows = heard.armed and accepts(self, heard.mode) and not unless_airborne(self.vehicle)
+        return BehaviorState.RUNNING if follows else BehaviorState.UNKNOWN

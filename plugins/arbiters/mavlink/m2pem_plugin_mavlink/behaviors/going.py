@@ -1,0 +1,184 @@
+"""Going to a place, and standing."""
+
+import math
+from dataclasses import replace
+
+from m2pem.api import BehaviorState
+from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError, Job, Memory
+from m2pem_plugin_mavlink.behaviors.looking import (
+    HEIGHT_TOLERANCE_M,
+    Standing,
+    accepts,
+    away_m,
+    heads_for,
+    off_height_m,
+    on_the_ground,
+    stands,
+    unless_airborne,
+    where,
+)
+from m2pem_plugin_mavlink.behaviors.wishes import Wishes
+from m2pem_plugin_mavlink.plane import distance_m
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+
+TOLERANCES_M = {"air": 2.0, "ground": 2.5, "surface": 5.0, "subsurface": 3.0}
+"""How near is there, if nobody says; what autopilots take for a waypoint's radius."""
+
+NEAREST_M = 0.5
+"""Nearer than this a satellite receiver cannot tell."""
+
+SETTLED_S = 10.0
+"""Who stands for so long near its target considers itself arrived."""
+
+SETTLED_WITHIN_M = 10.0
+TURNED_RAD = math.radians(10.0)
+TURN_S = 10.0
+"""A vehicle at its target has turned by then."""
+
+MOVED_M = 1.0
+"""A target that has moved by so much is told to the vehicle again."""
+
+REPEAT_S = 0.5
+
+
+class Goto(Behavior):
+    """Go to a place, or to where another vehicle is, as long as it takes."""
+
+    name = "goto"
+    modes = frozenset({FlightMode.GUIDED})
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        self.wishes = Wishes(job)
+        self._place: Place | None = None
+        self._standing = Standing(job)
+        tolerance = self.wishes.number("tolerance")
+        self._said = tolerance is not None
+        usual_m = TOLERANCES_M.get(self.vehicle.domain, 2.5)
+        self._tolerance_m = usual_m if tolerance is None else max(tolerance, NEAREST_M)
+
+    def target(self) -> Place:
+        """Where to go now."""
+        return replace(self.wishes.target(), heading_rad=self.wishes.number("heading"))
+
+    def refusal(self) -> str:
+        if reason := unless_airborne(self.vehicle):
+            return reason
+        place = self.target()
+        if self.job.fence is None:
+            return ""
+        way = [(place.latitude_deg, place.longitude_deg)]
+        return self.job.fence.breach(way, where(self.vehicle), lambda _: "the target")
+
+    async def begin(self) -> None:
+        self._standing.forget()
+        self._place = self.target()
+        await self.vehicle.driver.go_to(self._place, self.wishes.speed_m_s)
+
+    async def go_on(self) -> None:
+        await self.begin()
+
+    async def steps(self) -> None:
+        """Go after a target that moves."""
+        while self.wishes.target_vehicle is not None:
+            await self.vehicle.sleep(REPEAT_S)
+            new, old = self.target(), self._place
+            at = (new.latitude_deg, new.longitude_deg)
+            if old is None or _apart_m(new, old) > MOVED_M:
+                if self.job.fence is not None and self.job.fence.outside_m(at) > 0:
+                    await self.vehicle.driver.stop()
+                    raise BehaviorFailedError(
+                        f"{self.wishes.target_vehicle} has left the fleet's fence"
+                    )
+                self._place = new
+                await self.vehicle.driver.go_to(new, self.wishes.speed_m_s)
+
+    def finished(self) -> bool:
+        place = self._place or self.target()
+        away = away_m(self.vehicle, (place.latitude_deg, place.longitude_deg))
+        high = off_height_m(self.vehicle, place) <= max(self._tolerance_m, HEIGHT_TOLERANCE_M)
+        if away <= self._tolerance_m and high:
+            return self._turned(place)
+        if self._standing.seconds() < SETTLED_S or away > SETTLED_WITHIN_M or not high:
+            return False
+        if self._said:
+            raise BehaviorFailedError(
+                f"it stands {away:.1f} m from its target, and tolerance is {self._tolerance_m:g} m:"
+                " its autopilot takes that for there"
+            )
+        return True
+
+    def _turned(self, place: Place) -> bool:
+        yaw = self.vehicle.heard.yaw_rad
+        if place.heading_rad is None or self.vehicle.domain != "air" or yaw is None:
+            return True
+        off = math.remainder(math.pi / 2 - place.heading_rad - yaw, math.tau)
+        return abs(off) <= TURNED_RAD or self._standing.seconds() >= TURN_S
+
+    async def recognised(self) -> BehaviorState:
+        self._place = place = self.target()
+        if not accepts(self, self.vehicle.heard.mode):
+            return BehaviorState.UNKNOWN
+        if self.finished():
+            return BehaviorState.SUCCEEDED
+        if await heads_for(self.vehicle, place):
+            return BehaviorState.RUNNING
+        return BehaviorState.SUCCEEDED if self.finished() else BehaviorState.UNKNOWN
+
+
+def _apart_m(a: Place, b: Place) -> float:
+    return distance_m((a.latitude_deg, a.longitude_deg), (b.latitude_deg, b.longitude_deg))
+
+
+class Hold(Behavior):
+    """Stand for a time, or until it stands."""
+
+    name = "hold"
+    modes = frozenset({FlightMode.HOLD})
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        self._left_s = Wishes(job).number("duration") or 0.0
+        self._since_s: float | None = None
+
+    async def begin(self) -> None:
+        if on_the_ground(self.vehicle) or self.vehicle.heard.armed is False:
+            self.modes = frozenset(FlightMode)  # it stands already, in whatever mode
+        else:
+            await self.vehicle.driver.stop()
+        self._since_s = self.job.now_s()
+
+    def paused(self) -> None:
+        if self._since_s is not None:
+            self._left_s -= self.job.now_s() - self._since_s
+            self._since_s = None
+
+    async def go_on(self) -> None:
+        await self.begin()
+
+    def finished(self) -> bool:
+        now_s = self.job.now_s()
+        over = self._since_s is not None and now_s - self._since_s >= self._left_s
+        return over and stands(self.vehicle)
+
+    async def recognised(self) -> BehaviorState:
+        if self.vehicle.heard.armed and not accepts(self, self.vehicle.heard.mode):
+            return BehaviorState.UNKNOWN
+        self._since_s = self.job.now_s()
+        if self.vehicle.heard.armed is False:
+            self.modes = frozenset(FlightMode)
+        return BehaviorState.SUCCEEDED if self.finished() else BehaviorState.RUNNING
+
+    def memory(self) -> Memory:
+        return {"until_s": self.job.now_s() + self._left_s}
+
+    def recall(self, memory: Memory) -> None:
+        until_s = memory.get("until_s")
+        if isinstance(until_s, int | float):
+            self._left_s = max(0.0, until_s - self.job.now_s())
+
+
+class DriveStop(Hold):
+    """Stop."""
+
+    name = "drive_stop"

@@ -1,0 +1,120 @@
+"""Whether a vehicle is there, stands, or is on its way: by what it says of itself."""
+
+import math
+
+from m2pem_plugin_mavlink.behaviors.behavior import Behavior, Job
+from m2pem_plugin_mavlink.behaviors.wishes import AMSL, RELATIVE
+from m2pem_plugin_mavlink.plane import LatLon, Plane, distance_m
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.vehicle import Heard, Vehicle
+
+STANDS_BELOW_M_S = 0.3
+"""Positions of a vehicle that stands drift; a gust moves one that hovers."""
+
+HEIGHT_TOLERANCE_M = 1.0
+
+LOOKS_FOR_S = 4.0
+"""After a restart: a vehicle that is on its way has turned and moves by then."""
+
+_TOWARDS = math.cos(math.radians(60.0))
+
+
+class Standing:
+    """For how long a vehicle has stood, as far as anybody has looked."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self._since_s: float | None = None
+
+    def seconds(self) -> float:
+        """Up to now; 0 while it moves."""
+        now_s = self._job.now_s()
+        if self._job.vehicle.heard.speed_m_s >= STANDS_BELOW_M_S:
+            self._since_s = None
+            return 0.0
+        if self._since_s is None:
+            self._since_s = now_s
+        return now_s - self._since_s
+
+    def forget(self) -> None:
+        """Count anew."""
+        self._since_s = None
+
+
+def stands(vehicle: Vehicle) -> bool:
+    """Whether it hardly moves."""
+    return vehicle.heard.speed_m_s < STANDS_BELOW_M_S
+
+
+def where(vehicle: Vehicle) -> LatLon | None:
+    """Its latitude and longitude."""
+    position = vehicle.heard.position
+    return (position.latitude_deg, position.longitude_deg) if position is not None else None
+
+
+def away_m(vehicle: Vehicle, place: LatLon) -> float:
+    """How far it is from a place, over ground; infinite while that is not known."""
+    here = where(vehicle)
+    return distance_m(place, here) if here is not None else math.inf
+
+
+def height_m(heard: Heard, frame: str) -> float | None:
+    """Its height in a frame of altitudes."""
+    if frame == RELATIVE:
+        return heard.altitude_above_home_m
+    if frame == AMSL:
+        return heard.position.altitude_m if heard.position is not None else None
+    return heard.altitude_above_terrain_m
+
+
+def off_height_m(vehicle: Vehicle, place: Place) -> float:
+    """How far it is from a place in height; 0 where no height was asked for, or none is known."""
+    if place.altitude_m is None:
+        return 0.0
+    height = height_m(vehicle.heard, place.altitude_frame)
+    return abs(height - place.altitude_m) if height is not None else 0.0
+
+
+def on_the_ground(vehicle: Vehicle) -> bool:
+    """Whether it is an aircraft that has not taken off."""
+    return vehicle.domain == "air" and vehicle.heard.landed is True
+
+
+def unless_airborne(vehicle: Vehicle) -> str:
+    """Why a motion cannot begin yet; "" if it can."""
+    if on_the_ground(vehicle):
+        return f"{vehicle.resource} stands on the ground: let it take off first (takeoff)"
+    return ""
+
+
+def modes_of(behavior: Behavior) -> frozenset[FlightMode]:
+    """The modes in which a behavior goes on. PX4 goes to a place in the mode in which it holds."""
+    modes = behavior.modes
+    if FlightMode.GUIDED in modes and "px4" in behavior.vehicle.driver.name.lower():
+        return modes | {FlightMode.HOLD}
+    return modes
+
+
+def accepts(behavior: Behavior, mode: FlightMode) -> bool:
+    """Whether a vehicle in a mode may be doing what the behavior has told it."""
+    return mode in modes_of(behavior)
+
+
+async def heads_for(vehicle: Vehicle, place: Place) -> bool:
+    """Whether it moves towards a place; waits a little for that to be seen."""
+    target = (place.latitude_deg, place.longitude_deg)
+
+    def towards() -> bool:
+        here, velocity = where(vehicle), vehicle.heard.velocity_enu_m_s
+        if here is None or velocity is None or vehicle.heard.speed_m_s < STANDS_BELOW_M_S:
+            return False
+        east, north = Plane(here).level(target)
+        height = height_m(vehicle.heard, place.altitude_frame)
+        up = 0.0
+        if place.altitude_m is not None and height is not None:
+            up = place.altitude_m - height
+        ahead = math.hypot(east, north, up)
+        along = (east * velocity[0] + north * velocity[1] + up * velocity[2]) if ahead else 0.0
+        return along > _TOWARDS * ahead * vehicle.heard.speed_m_s
+
+    return await vehicle.until(towards, LOOKS_FOR_S)

@@ -1,0 +1,129 @@
+"""Watching an area or a place."""
+
+import math
+
+from m2pem.api import Area, BehaviorState
+from m2pem_plugin_mavlink.behaviors.behavior import BehaviorFailedError, Job, Memory
+from m2pem_plugin_mavlink.behaviors.going import Goto
+from m2pem_plugin_mavlink.behaviors.looking import accepts, stands, where
+from m2pem_plugin_mavlink.behaviors.orbit import Orbit
+from m2pem_plugin_mavlink.plane import LatLon, Level, Plane
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+
+RADII_M = (15.0, 300.0)
+"""A circle is no smaller and no larger than these."""
+
+STANDOFF_M = 20.0
+
+
+class ObserveFromAbove(Orbit):
+    """Circle over the middle of an area, at the distance of its farthest corner; or a place."""
+
+    name = "area_observe"
+    ends = False
+
+    def circle(self) -> tuple[Place, float]:
+        area = self.wishes.area
+        if area is None:
+            return super().circle()
+        center, radius = middle(area)
+        return Place(*center), max(RADII_M[0], min(RADII_M[1], radius))
+
+
+class ObserveFromTheEdge(Goto):
+    """Stand at the nearest point of an area's edge, or off a place, and look."""
+
+    name = "area_observe"
+    modes = frozenset({FlightMode.GUIDED, FlightMode.HOLD})
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        self._seconds = self.wishes.number("duration")
+        self._stand: Place | None = None
+        self._since_s: float | None = None
+
+    def target(self) -> Place:
+        if self._stand is None:
+            self._stand = Place(*self._edge(), *self.wishes.altitude())
+        return self._stand
+
+    def _edge(self) -> LatLon:
+        here = where(self.vehicle)
+        if here is None:
+            raise BehaviorFailedError("its position is not known yet")
+        area = self.wishes.area
+        if area is not None:
+            plane = Plane(area.rings[0][0][:2])
+            ring = [plane.level(corner[:2]) for corner in area.rings[0]]
+            return plane.place(_nearest(ring, plane.level(here)))
+        target = self.wishes.target()
+        plane = Plane((target.latitude_deg, target.longitude_deg))
+        east, north = plane.level(here)
+        away = math.hypot(east, north)
+        if away <= STANDOFF_M:
+            return here
+        return plane.place((east * STANDOFF_M / away, north * STANDOFF_M / away))
+
+    async def begin(self) -> None:
+        if self._since_s is None:
+            await super().begin()
+        else:
+            await self.vehicle.driver.stop()
+
+    async def steps(self) -> None:
+        """It stands."""
+
+    def finished(self) -> bool:
+        if self._since_s is None:
+            if not super().finished():
+                return False
+            self._since_s = self.job.now_s()
+        return self._seconds is not None and self.job.now_s() - self._since_s >= self._seconds
+
+    def paused(self) -> None:
+        if self._since_s is not None and self._seconds is not None:
+            self._seconds -= self.job.now_s() - self._since_s
+            self._since_s = self.job.now_s()
+
+    async def go_on(self) -> None:
+        if self._since_s is not None:
+            self._since_s = self.job.now_s()
+        await self.begin()
+
+    async def recognised(self) -> BehaviorState:
+        if not accepts(self, self.vehicle.heard.mode) or not self.vehicle.heard.armed:
+            return BehaviorState.UNKNOWN
+        state = await super().recognised()
+        watches = state is BehaviorState.SUCCEEDED or self._since_s is not None
+        return BehaviorState.RUNNING if watches and stands(self.vehicle) else state
+
+    def memory(self) -> Memory:
+        place = self.target()
+        return {"stand": [place.latitude_deg, place.longitude_deg]}
+
+    def recall(self, memory: Memory) -> None:
+        stand = memory.get("stand")
+        if isinstance(stand, list):
+            self._stand = Place(stand[0], stand[1], *self.wishes.altitude())
+
+
+def middle(area: Area) -> tuple[LatLon, float]:
+    """The middle of an area, and how far its farthest corner is from it."""
+    plane = Plane(area.rings[0][0][:2])
+    corners = [plane.level(corner[:2]) for corner in area.rings[0][:-1]]
+    center = (
+        sum(east for east, _ in corners) / len(corners),
+        sum(north for _, north in corners) / len(corners),
+    )
+    return plane.place(center), max(math.dist(center, corner) for corner in corners)
+
+
+def _nearest(ring: list[Level], here: Level) -> Level:
+    candidates = []
+    for (ae, an), (be, bn) in zip(ring, ring[1:], strict=False):
+        de, dn = be - ae, bn - an
+        length2 = de * de + dn * dn
+        part = ((here[0] - ae) * de + (here[1] - an) * dn) / length2 if length2 else 0.0
+        part = max(0.0, min(1.0, part))
+        candidates.append((ae + de * part, an + dn * part))
+    return min(candidates, key=lambda point: math.dist(point, here))

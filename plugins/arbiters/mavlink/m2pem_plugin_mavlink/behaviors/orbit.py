@@ -1,0 +1,186 @@
+"""Circling."""
+
+import math
+from collections.abc import Sequence
+
+from m2pem.api import BehaviorState
+from m2pem_plugin_mavlink.behaviors.behavior import BehaviorFailedError, Job, Memory
+from m2pem_plugin_mavlink.behaviors.looking import away_m, unless_airborne, where
+from m2pem_plugin_mavlink.behaviors.mission_flight import MissionFlight, waypoint
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.plane import Plane
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+
+RADIUS_M = 30.0
+MOST_ITEMS = 400
+"""More laps than fit are begun anew each."""
+
+NEAR_THE_CIRCLE = 0.25
+"""Of its radius; and so many metres at least:"""
+
+NEAR_THE_CIRCLE_M = 5.0
+LOOK_EVERY_S = 0.2
+
+
+class Orbit(MissionFlight):
+    """Circle a place clockwise, for turns or a time: by the autopilot's own command, where it has
+    one, else by waypoints round the circle. A vehicle is circled where it is when this begins."""
+
+    name = "orbit"
+    modes = frozenset({FlightMode.MISSION, FlightMode.ORBIT})
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        self._center: Place | None = None
+        self._radius_m = self.wishes.number("radius") or RADIUS_M
+        self._seconds = self.wishes.number("duration")
+        self._turns = self.wishes.number("turns")
+        if self._turns is None and self._seconds is None and self.ends:
+            self._turns = 1.0
+        self._by_command = False
+        self._turned_rad = 0.0
+        self._bearing_rad: float | None = None
+        self._done = False
+
+    ends = True
+    """Whether it ends after one turn when nobody says otherwise."""
+
+    # --- where ----------------------------------------------------------------------------------
+
+    def circle(self) -> tuple[Place, float]:
+        """The centre, and the radius in metres."""
+        return self.wishes.target(), self._radius_m
+
+    @property
+    def center(self) -> Place:
+        """Its height is known."""
+        if self._center is None:
+            place, self._radius_m = self.circle()
+            height = self.wishes.altitude_to_fly(place.altitude_m, place.altitude_frame)
+            self._center = Place(place.latitude_deg, place.longitude_deg, *height)
+        return self._center
+
+    def way(self) -> Sequence[MissionItem]:
+        center = self.center
+        plane = Plane((center.latitude_deg, center.longitude_deg))
+        sides = self._sides()
+        laps = 1.0 if self._turns is None else self._turns
+        self.loop = self._turns is None or laps * sides > MOST_ITEMS
+        sweep = math.tau if self.loop else math.tau * laps
+        count = max(1, math.ceil(sides * sweep / math.tau - 1e-9))
+        began = self._begins_at(plane)
+        angles = [began - sweep * index / count for index in range(count + 1)]
+        if self.loop:
+            angles.pop()  # the lap's end is its beginning
+        height = (center.altitude_m or 0.0, center.altitude_frame)
+        around = [(self._radius_m * math.cos(a), self._radius_m * math.sin(a)) for a in angles]
+        return [waypoint(plane.place(level), *height) for level in around]
+
+    def _sides(self) -> int:
+        """Of the polygon: corners that stand no more than a metre or so off the circle."""
+        return max(8, min(36, math.ceil(math.tau * self._radius_m / 12.0)))
+
+    def _begins_at(self, plane: Plane) -> float:
+        here = where(self.vehicle)
+        if here is None:
+            return math.pi / 2
+        east, north = plane.level(here)
+        return math.atan2(north, east)
+
+    def named(self, index: int) -> str:
+        return "a point of the circle"
+
+    # --- how ------------------------------------------------------------------------------------
+
+    def refusal(self) -> str:
+        if self._turns == 0 or self._seconds == 0:
+            return unless_airborne(self.vehicle)
+        return super().refusal()
+
+    async def begin(self) -> None:
+        self._done = self._turns == 0 or self._seconds == 0
+        if self._done:
+            return
+        self._bearing_rad = None
+        speed = self.wishes.speed_m_s
+        self._by_command = await self.vehicle.driver.orbit(self.center, self._radius_m, speed)
+        if not self._by_command:
+            await super().begin()
+
+    async def go_on(self) -> None:
+        if self._by_command or self._done:
+            await self.begin()
+        else:
+            await super().go_on()
+
+    async def steps(self) -> None:
+        """Stop at the end; begin each lap anew until then."""
+        if self._done:
+            return
+        if self._by_command or self.loop:
+            await self._circle()
+            await self.vehicle.driver.stop()
+            self._done = True
+
+    async def _circle(self) -> None:
+        left_s: float | None = None
+        while True:
+            await self.vehicle.sleep(LOOK_EVERY_S)
+            on_it = self._look()
+            if on_it and left_s is None and self._seconds is not None:
+                left_s = self.job.now_s() + self._seconds
+            if left_s is not None and self.job.now_s() >= left_s:
+                return
+            if self._turns is not None and self._turned_rad >= math.tau * self._turns:
+                return
+            if not self._by_command and self.at_the_end():
+                self._standing.forget()
+                await self.vehicle.driver.start_mission(0)
+
+    def _look(self) -> bool:
+        """Add to what was turned; whether it is on the circle."""
+        center = (self.center.latitude_deg, self.center.longitude_deg)
+        here = where(self.vehicle)
+        near_m = max(NEAR_THE_CIRCLE_M, NEAR_THE_CIRCLE * self._radius_m)
+        if here is None or abs(away_m(self.vehicle, center) - self._radius_m) > near_m:
+            self._bearing_rad = None
+            return False
+        east, north = Plane(center).level(here)
+        bearing = math.atan2(north, east)
+        if self._bearing_rad is not None:
+            self._turned_rad += abs(math.remainder(bearing - self._bearing_rad, math.tau))
+        self._bearing_rad = bearing
+        return True
+
+    def finished(self) -> bool:
+        if self._by_command or self.loop or self._done:
+            return self._done
+        return self.at_the_end()
+
+    # --- after a restart ------------------------------------------------------------------------
+
+    async def recognised(self) -> BehaviorState:
+        if self.vehicle.heard.mode is FlightMode.ORBIT:
+            self._by_command = True
+            near = self._look() or self._bearing_rad is not None
+            return BehaviorState.RUNNING if near else BehaviorState.UNKNOWN
+        return await super().recognised()
+
+    def memory(self) -> Memory:
+        center = self.center
+        return {
+            **super().memory(),
+            "center": [center.latitude_deg, center.longitude_deg, center.altitude_m or 0.0],
+            "frame": center.altitude_frame,
+            "radius": self._radius_m,
+            "loop": float(self.loop),
+        }
+
+    def recall(self, memory: Memory) -> None:
+        super().recall(memory)
+        center, radius = memory.get("center"), memory.get("radius")
+        if not isinstance(center, list) or not isinstance(radius, int | float):
+            raise BehaviorFailedError("where it circles is not known any more")
+        self._center = Place(center[0], center[1], center[2], str(memory.get("frame")))
+        self._radius_m = float(radius)
+        self.loop = bool(memory.get("loop"))

@@ -1,0 +1,85 @@
+"""What a MAVLink vehicle can be asked for, by its domain and driver; needs no MAVLink library."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+from m2pem.api import SHARED, BehaviorSpec, BehaviorType, ParameterKind, ParameterSpec
+
+_EVERYWHERE = frozenset(
+    {
+        "single_vehicle_routing",
+        "goto",
+        "hold",
+        "drive_stop",
+        "return_to_launch",
+        "area_survey",
+        "orbit",
+        "area_observe",
+        "follow",
+        "set_speed",
+        "deploy",
+    }
+)
+_BY_DOMAIN: Mapping[str, frozenset[str]] = {
+    "ground": _EVERYWHERE | {"reverse"},
+    "air": _EVERYWHERE | {"takeoff", "land", "change_altitude"},
+    "surface": _EVERYWHERE | {"reverse"},
+    "subsurface": _EVERYWHERE | {"change_altitude"},
+}
+_NOT_BY_DRIVER: Mapping[str, frozenset[str]] = {
+    "pymavlink": frozenset(),
+    "mavsdk": frozenset({"reverse", "deploy"}),
+}
+
+_BOUNDS: Mapping[ParameterKind, tuple[float | None, float | None]] = {
+    ParameterKind.SPEED: (0.1, 100.0),
+    ParameterKind.ALTITUDE: (-11_000.0, 20_000.0),
+}
+"""Within these every autopilot understands a value; what a vehicle can do is its own to say."""
+
+ORBIT_TURNS = 1000.0
+
+RUN_ONBOARD_MISSION = BehaviorSpec(
+    "run_onboard_mission",
+    BehaviorType.VEHICLE,
+    (
+        ParameterSpec(
+            "first",
+            ParameterKind.COUNT,
+            minimum=0,
+            maximum=65_000,
+            doc="The item to begin with; 0, the default, is the first one after home.",
+        ),
+    ),
+    doc="Carry out the mission that the vehicle has stored.",
+)
+
+
+def offered(domain: str, driver: str) -> tuple[BehaviorSpec, ...]:
+    """What a vehicle of a domain is offered to do by a driver."""
+    return _offered(domain if domain in _BY_DOMAIN else "ground", driver)
+
+
+@cache
+def _offered(domain: str, driver: str) -> tuple[BehaviorSpec, ...]:
+    names = _BY_DOMAIN[domain] - _NOT_BY_DRIVER.get(driver, frozenset())
+    shared = (
+        _bounded(spec)
+        for (name, type_), spec in SHARED.items()
+        if type_ is BehaviorType.VEHICLE and name in names
+    )
+    return (*shared, RUN_ONBOARD_MISSION)
+
+
+def _bounded(spec: BehaviorSpec) -> BehaviorSpec:
+    return replace(spec, parameters=tuple(_bound(parameter) for parameter in spec.parameters))
+
+
+def _bound(spec: ParameterSpec) -> ParameterSpec:
+    if spec.name == "turns":
+        return replace(spec, maximum=ORBIT_TURNS)
+    if spec.kind not in _BOUNDS:
+        return spec
+    low, high = _BOUNDS[spec.kind]
+    return replace(spec, minimum=low, maximum=high)

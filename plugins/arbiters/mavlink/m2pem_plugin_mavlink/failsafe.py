@@ -1,0 +1,244 @@
+"""What the fleet says that a vehicle does when its link is lost, against what it is set to.
+
+Sources: the parameter references of ArduPilot (FS_*, BATT_FS_*, RTL_ALT, MAV_GCS_SYSID) and PX4
+(NAV_DLL_ACT, COM_LOW_BAT_ACT, RTL_RETURN_ALT). Nothing is changed: findings say what to set.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from m2pem.api import ResourceId
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
+from m2pem_plugin_mavlink.vehicle import exchanges
+from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Firmware, Identity, Kind
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+RETURN, LAND, HOLD, CONTINUE = "return_to_launch", "land", "hold", "continue"
+WORDS = (RETURN, LAND, HOLD, CONTINUE)
+"""What a fleet's `failsafe` may be for a MAVLink vehicle."""
+
+Values = Mapping[str, float]
+"""Parameters of a vehicle, by name; one that it does not have is left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class FailsafeFinding:
+    """The fleet and the vehicle disagree. `parameter`: the one to look at, "" if it is the fleet's
+    word; `text` is for people, and says what would be right."""
+
+    resource: ResourceId
+    parameter: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.resource}: {self.text}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Setting:
+    """A parameter of which each value is an action: those that are as good as a word of the fleet's
+    (the one to set first), and what the values mean."""
+
+    names: tuple[str, ...]
+    fits: Mapping[str, tuple[int, ...]]
+    meanings: Mapping[int, str]
+
+    def value(self, values: Values) -> tuple[str, int] | None:
+        """Its name on this vehicle (it was renamed over the years) and its value."""
+        for name in self.names:
+            if name in values:
+                return name, round(values[name])
+        return None
+
+    def meaning(self, value: int) -> str:
+        return self.meanings.get(value, "unknown to m2pem")
+
+
+_COPTER_ACTIONS = {
+    1: "return to launch",
+    2: "return to launch, or go on with the mission",
+    3: "SmartRTL, else return to launch",
+    4: "SmartRTL, else land",
+    5: "land",
+    6: "landing sequence of the mission, else return to launch",
+    7: "brake, else land",
+}
+_COPTER_GCS = _Setting(
+    ("FS_GCS_ENABLE",),
+    {RETURN: (1, 3, 6), LAND: (5,), HOLD: (7,), CONTINUE: (0,)},
+    {0: "disabled", **_COPTER_ACTIONS},
+)
+_PLANE_ENABLE = _Setting(
+    ("FS_GCS_ENABL",),
+    {RETURN: (1, 2), LAND: (1, 2), CONTINUE: (0,)},
+    {0: "disabled", 1: "heartbeat", 2: "heartbeat and radio", 3: "heartbeat, in AUTO only"},
+)
+_PLANE_ACTION = _Setting(
+    ("FS_LONG_ACTN",),
+    {RETURN: (1,), LAND: (5,), CONTINUE: (0,)},
+    {0: "go on", 1: "return to launch", 2: "glide", 3: "parachute", 4: "AUTO", 5: "AUTOLAND"},
+)
+_ROVER_ENABLE = _Setting(
+    ("FS_GCS_ENABLE",),
+    {RETURN: (1,), HOLD: (1,), CONTINUE: (0,)},
+    {0: "disabled", 1: "enabled", 2: "enabled, but not in AUTO"},
+)
+_ROVER_ACTION = _Setting(
+    ("FS_ACTION",),
+    {RETURN: (1, 3, 4), HOLD: (2, 6), CONTINUE: (0,)},
+    {
+        0: "nothing",
+        1: "return to launch",
+        2: "hold",
+        3: "SmartRTL, else return to launch",
+        4: "SmartRTL, else hold",
+        5: "terminate",
+        6: "loiter, else hold",
+    },
+)
+_SUB_GCS = _Setting(
+    ("FS_GCS_ENABLE",),
+    {HOLD: (3,), CONTINUE: (0, 1), LAND: (4,)},
+    {0: "disabled", 1: "warn", 2: "disarm", 3: "hold the depth", 4: "surface"},
+)
+_PX4_LINK = _Setting(
+    ("NAV_DLL_ACT",),
+    {RETURN: (2,), LAND: (3,), HOLD: (1,), CONTINUE: (0,)},
+    {0: "disabled", 1: "hold", 2: "return", 3: "land", 5: "terminate", 6: "disarm"},
+)
+_LINK: Mapping[tuple[Firmware, Kind], tuple[_Setting, ...]] = {
+    (Firmware.ARDUPILOT, Kind.COPTER): (_COPTER_GCS,),
+    (Firmware.ARDUPILOT, Kind.PLANE): (_PLANE_ENABLE, _PLANE_ACTION),
+    (Firmware.ARDUPILOT, Kind.VTOL): (_PLANE_ENABLE, _PLANE_ACTION),
+    (Firmware.ARDUPILOT, Kind.ROVER): (_ROVER_ENABLE, _ROVER_ACTION),
+    (Firmware.ARDUPILOT, Kind.BOAT): (_ROVER_ENABLE, _ROVER_ACTION),
+    (Firmware.ARDUPILOT, Kind.SUB): (_SUB_GCS,),
+    **{(Firmware.PX4, kind): (_PX4_LINK,) for kind in Kind},
+}
+_BATTERY = {Firmware.ARDUPILOT: "BATT_FS_LOW_ACT", Firmware.PX4: "COM_LOW_BAT_ACT"}
+_OUR_STATION = ("MAV_GCS_SYSID", "SYSID_MYGCS")
+_RETURN_HEIGHT = ("RTL_ALT_M", "RTL_ALT")
+_PILOT = "FS_THR_ENABLE"
+_GOES_ON_IN_AUTO = 1 << 1
+
+
+def parameters_of_interest(identity: Identity) -> tuple[str, ...]:
+    """The names of the parameters that `findings` looks at; a vehicle does not have all of them."""
+    link = [name for each in _LINK[identity.firmware, identity.kind] for name in each.names]
+    battery = _BATTERY[identity.firmware]
+    if identity.firmware is Firmware.PX4:
+        return (*link, battery)
+    rest: list[str] = [*_OUR_STATION]
+    if identity.kind is Kind.COPTER:
+        rest += [_PILOT, "FS_OPTIONS", *_RETURN_HEIGHT]
+    return (*link, battery, *rest)
+
+
+def findings(
+    resource: ResourceId,
+    word: str,
+    identity: Identity,
+    values: Values,
+    own_system: int | None = None,
+) -> tuple[FailsafeFinding, ...]:
+    """Where a vehicle is set to something else than its fleet's `failsafe` says; "" says nothing,
+    and then nothing is found. `own_system`: the system id that this arbiter sends with."""
+    if not word:
+        return ()
+    if word not in WORDS:
+        text = f"failsafe '{word}' is not known for MAVLink vehicles; known: {', '.join(WORDS)}"
+        return (FailsafeFinding(resource, "", text),)
+    found = [*_link_findings(word, identity, values)]
+    if word != CONTINUE:
+        found += _station_findings(identity, values, own_system)
+    found += _battery_findings(identity, values)
+    if identity == Identity(Firmware.ARDUPILOT, Kind.COPTER):
+        found += _copter_findings(word, values)
+    return tuple(FailsafeFinding(resource, parameter, text) for parameter, text in found)
+
+
+_Found = Iterator[tuple[str, str]]
+
+
+def _link_findings(word: str, identity: Identity, values: Values) -> _Found:
+    for setting in _LINK[identity.firmware, identity.kind]:
+        fits = setting.fits.get(word)
+        if fits is None:
+            yield "", f"fleet says {word} on loss of link, which no {identity} can be set to"
+            return
+        has = setting.value(values)
+        if has is None:
+            name = setting.names[0]
+            yield name, f"fleet says {word} on loss of link; {name} could not be read"
+        elif has[1] not in fits:
+            name, value = has
+            yield (
+                name,
+                f"fleet says {word} on loss of link, {name} is {value} ({setting.meaning(value)}): "
+                f"set it to {fits[0]}",
+            )
+        elif word == CONTINUE and setting is not _PLANE_ACTION and setting is not _ROVER_ACTION:
+            return  # it is off: what it would do does not matter
+
+
+def _station_findings(identity: Identity, values: Values, own_system: int | None) -> _Found:
+    """ArduPilot misses the heartbeats of one ground station alone."""
+    if identity.firmware is not Firmware.ARDUPILOT or own_system is None:
+        return
+    for name in _OUR_STATION:
+        if name in values and round(values[name]) != own_system:
+            yield (
+                name,
+                f"its failsafe watches the ground station with system id {values[name]:.0f} "
+                f"({name}), m2pem has {own_system}: set one of them to the other",
+            )
+
+
+def _battery_findings(identity: Identity, values: Values) -> _Found:
+    name = _BATTERY[identity.firmware]
+    if name in values and round(values[name]) == 0 and identity.kind not in ON_THE_GROUND:
+        only = "it only warns" if identity.firmware is Firmware.PX4 else "nothing happens"
+        yield name, f"{only} when its battery is low, {name} is 0: set it to 2 or 3"
+
+
+def _copter_findings(word: str, values: Values) -> _Found:
+    options = round(values.get("FS_OPTIONS", 0.0))
+    if word != CONTINUE and options & _GOES_ON_IN_AUTO:
+        yield (
+            "FS_OPTIONS",
+            f"fleet says {word} on loss of link, FS_OPTIONS is {options}: in AUTO it goes on; "
+            f"set it to {options & ~_GOES_ON_IN_AUTO}",
+        )
+    pilot = values.get(_PILOT)
+    if word != CONTINUE and pilot is not None and round(pilot) in _COPTER_ACTIONS:
+        value = round(pilot)
+        if value not in _COPTER_GCS.fits[word]:
+            yield (
+                _PILOT,
+                f"fleet says {word} on loss of link, on loss of its remote control {_PILOT} is "
+                f"{value} ({_COPTER_ACTIONS[value]})",
+            )
+    if word != RETURN:
+        return
+    for name in _RETURN_HEIGHT:
+        if name in values and values[name] == 0.0:
+            yield name, f"{name} is 0: it returns at the height that it has; set a height"
+
+
+async def check(vehicle: Vehicle, word: str, own_system: int | None) -> tuple[FailsafeFinding, ...]:
+    """Ask a vehicle that is identified for its parameters, and compare; what it does not answer is
+    among the findings."""
+    identity = vehicle.identity
+    if not word or identity is None:
+        return ()
+    values: dict[str, float] = {}
+
+    async def read(name: str) -> None:
+        # A parameter that a vehicle does not have is answered by silence.
+        with contextlib.suppress(ExchangeError):
+            values[name] = await exchanges.parameter(vehicle.link, identity.firmware, name)
+
+    await asyncio.gather(*map(read, parameters_of_interest(identity)))
+    return findings(vehicle.resource, word, identity, values, own_system)

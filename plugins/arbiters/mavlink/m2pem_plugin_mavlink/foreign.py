@@ -1,0 +1,264 @@
+"""Somebody else at the vehicle: another ground station, a person at its sticks, its own failsafes.
+
+MAVLink lets anybody command (no arbitration between ground stations). So what the vehicle does is
+compared with what it was asked for here; why it does something else is read from its texts, and is
+else a guess, which the words leave open.
+"""
+
+import asyncio
+import re
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from enum import StrEnum
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
+from m2pem_plugin_mavlink.vehicle import exchanges
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode
+from m2pem_plugin_mavlink.vehicle.identity import Firmware
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+SETTLES_S = 1.5
+"""A change is judged so long after it was seen: the text that explains it may come after it."""
+
+TEXTS_BEFORE_S = 3.0
+"""A text that came so long before a change may explain it."""
+
+_FAILSAFE = re.compile(
+    r"failsafe|fail-safe|fence|battery.*(low|critical|emergency)|low battery|EKF variance|"
+    r"glitch|crash|terrain data|dead reckon|vibration|"
+    r"(link|connection|control|signal|position).*lost",
+    re.IGNORECASE,
+)
+_PILOT = re.compile(r"pilot took over|manual control|sticks|RC override|taking over", re.IGNORECASE)
+_STANDS_AFTER = frozenset({FlightMode.LAND, FlightMode.RETURN, FlightMode.MISSION})
+_FOLLOWS = {
+    FlightMode.TAKEOFF: frozenset({FlightMode.HOLD}),
+    FlightMode.RETURN: frozenset({FlightMode.LAND, FlightMode.HOLD}),
+    FlightMode.MISSION: frozenset({FlightMode.HOLD, FlightMode.RETURN, FlightMode.LAND}),
+}
+"""What autopilots go over to by themselves when a mode has done its work."""
+
+_COUNT = message_type("MISSION_COUNT").id
+_ACK = message_type("MISSION_ACK").id
+_REQUESTS = (message_type("MISSION_REQUEST").id, message_type("MISSION_REQUEST_INT").id)
+
+
+class Cause(StrEnum):
+    """Who or what has taken a vehicle over, as far as can be told."""
+
+    FAILSAFE = "failsafe"
+    PILOT = "pilot"
+    STATION = "station"
+
+
+@dataclass(frozen=True, slots=True)
+class Takeover:
+    """A vehicle does what it was not asked for here. `reason`: for people."""
+
+    cause: Cause
+    reason: str
+
+
+class TakeoverWatch:
+    """Watches a vehicle between `open` and `close`.
+
+    `own`: the system id that this arbiter sends with; None: not known, and then what a vehicle says
+    to another ground station counts only while no exchange of ours goes on.
+    """
+
+    def __init__(self, vehicle: Vehicle, own: int | None = None) -> None:
+        self.vehicle = vehicle
+        self.own = own
+        self._ends: list[Callable[[], None]] = []
+        self._mode: int | None = None
+        self._mode_s = 0.0
+        self._before: int | None = None
+        self._armed: bool | None = None
+        self._disarmed: tuple[float, FlightMode] | None = None
+        self._settled: tuple[int | None, int | None] = (None, None)
+        self._mission: tuple[MissionItem, ...] | None = None
+        self._mission_s = 0.0
+        self._replaced = ""
+        self._checked: int | None = None
+        self._check: asyncio.Task[None] | None = None
+
+    def open(self) -> None:
+        """Watch."""
+        self._ends.append(self.vehicle.watch(self._look))
+        ids = (_COUNT, _ACK, *_REQUESTS)
+        self._ends.append(self.vehicle.link.listen(ids, self._overhear))
+
+    async def close(self) -> None:
+        """Watch no more."""
+        for end in self._ends:
+            end()
+        self._ends.clear()
+        if self._check is not None:
+            self._check.cancel()
+            await asyncio.wait([self._check])
+
+    # --- the answer -----------------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Something new is about to be asked of it: how it is by now is not a takeover."""
+        self._disarmed = None
+        self._settled = (self.vehicle.heard.custom_mode, self.vehicle.ours.custom_mode)
+
+    def taken_over(self, modes: Collection[FlightMode]) -> Takeover | None:
+        """Whether somebody else has taken over a vehicle that is to be in one of these modes.
+
+        A change that was just seen is judged `SETTLES_S` later, or once a text explains it. The
+        mode of a vehicle that is not armed is nobody's concern.
+        """
+        return self._disarmed_by(modes) or self._mode_by(modes) or self._mission_by(modes)
+
+    def _mode_by(self, modes: Collection[FlightMode]) -> Takeover | None:
+        heard, ours = self.vehicle.heard, self.vehicle.ours
+        number = heard.custom_mode
+        if number is None or not heard.armed or ours.changing:
+            return None
+        if number == ours.custom_mode or (number, ours.custom_mode) == self._settled:
+            return None
+        if ours.custom_mode is None:
+            natural = heard.mode in modes
+        else:
+            asked = self.vehicle.driver.flight_mode(ours.custom_mode)
+            natural = heard.mode in modes and heard.mode in _FOLLOWS.get(asked, ())
+            if asked is FlightMode.MISSION:
+                natural = natural and self._mission_is_over()
+        if natural:
+            return None
+        name = self.vehicle.driver.mode_name(number)
+        before = "" if self._before is None else self.vehicle.driver.mode_name(self._before)
+        changed = f"the mode changed from {before} to {name}" if before else f"the mode is {name}"
+        return self._explained(
+            self._mode_s,
+            changed,
+            Takeover(Cause.PILOT, f"a person has taken over: {changed}, not asked for here")
+            if heard.mode is FlightMode.MANUAL
+            else Takeover(
+                Cause.STATION,
+                f"another ground station or a switch has taken over: {changed}, not asked for here",
+            ),
+        )
+
+    def _disarmed_by(self, modes: Collection[FlightMode]) -> Takeover | None:
+        if self._disarmed is None or not modes:
+            return None
+        at_s, mode = self._disarmed
+        if self.vehicle.heard.landed and mode in _STANDS_AFTER:
+            return None
+        changed = f"it was disarmed in {mode}"
+        return self._explained(
+            at_s,
+            changed,
+            Takeover(Cause.STATION, f"{changed}, not from here: by somebody else or by itself"),
+        )
+
+    def _mission_by(self, modes: Collection[FlightMode]) -> Takeover | None:
+        if FlightMode.MISSION not in modes or not self._replaced:
+            return None
+        return Takeover(Cause.STATION, f"another ground station has {self._replaced}")
+
+    def _explained(self, since_s: float, changed: str, otherwise: Takeover) -> Takeover | None:
+        """What its texts say of a change; without any: `otherwise`, when there was time for one."""
+        now_s = self.vehicle.link.now_s()
+        texts = self.vehicle.recent_texts(now_s - since_s + TEXTS_BEFORE_S)
+        for cause, pattern in ((Cause.FAILSAFE, _FAILSAFE), (Cause.PILOT, _PILOT)):
+            said = [text for text in texts if pattern.search(text)]
+            if said:
+                who = "a failsafe of its own" if cause is Cause.FAILSAFE else "a person"
+                return Takeover(cause, f"{who} has taken over: {changed}: {'; '.join(said)}")
+        return otherwise if now_s - since_s >= SETTLES_S else None
+
+    def _mission_is_over(self) -> bool:
+        mission, driver = self.vehicle.ours.mission, self.vehicle.driver
+        if not mission:
+            return True
+        last = len(mission) - 1
+        return (driver.reached_item or 0) >= last or (driver.current_item or 0) >= last
+
+    # --- what is seen ---------------------------------------------------------------------------
+
+    def _look(self) -> None:
+        heard, ours, now_s = self.vehicle.heard, self.vehicle.ours, self.vehicle.link.now_s()
+        if heard.custom_mode != self._mode:
+            self._before, self._mode, self._mode_s = self._mode, heard.custom_mode, now_s
+        if heard.armed != self._armed:
+            if self._armed and heard.armed is False and not ours.disarming:
+                self._disarmed = (now_s, heard.mode)
+            elif heard.armed:
+                self._disarmed = None
+            self._armed = heard.armed
+        if ours.mission is not self._mission:
+            self._mission, self._replaced, self._checked = ours.mission, "", None
+            self._mission_s = now_s
+        # What it said before it was stored may still come in.
+        settled = now_s - self._mission_s > SETTLES_S
+        if ours.mission is not None and settled and not ours.exchanging:
+            self._look_at_mission(ours.mission)
+
+    def _look_at_mission(self, mission: tuple[MissionItem, ...]) -> None:
+        heard = self.vehicle.heard
+        current_s = heard.messages_s.get(dialect.MAVLINK_MSG_ID_MISSION_CURRENT)
+        if current_s is None or current_s != heard.at_s:
+            return
+        if heard.mission_total is not None and heard.mission_total != len(mission):
+            self._replaced = (
+                f"replaced the mission: it has {heard.mission_total} items, ours {len(mission)}"
+                if heard.mission_total
+                else "cleared the mission"
+            )
+        item = self.vehicle.driver.current_item
+        checking = self._check is not None and not self._check.done()
+        if item is not None and item != self._checked and item < len(mission) and not checking:
+            self._checked = item
+            if self._answers_single_requests:
+                work = self._spot_check(item, mission)
+                self._check = asyncio.get_running_loop().create_task(work)
+
+    @property
+    def _answers_single_requests(self) -> bool:
+        """PX4 gives an item only as part of a download."""
+        identity = self.vehicle.identity
+        return identity is not None and identity.firmware is Firmware.ARDUPILOT
+
+    async def _spot_check(self, item: int, mission: tuple[MissionItem, ...]) -> None:
+        """The item that it now moves to must be the one that was uploaded."""
+        try:
+            found = await exchanges.mission_item(self.vehicle.link, item + 1)
+        except ExchangeError:
+            return  # what is not answered proves nothing
+        if self.vehicle.ours.mission is mission and not _same(found, mission[item]):
+            self._replaced = f"replaced the mission: its item {item + 1} is not ours"
+
+    def _overhear(self, message: Message, sender: Address) -> None:
+        """What it says about missions to somebody else. Links need not carry that."""
+        if sender != self.vehicle.link.address or message.mission_type:
+            return
+        to: int = message.target_system
+        ours = self.vehicle.ours
+        if to in (0, self.own) or (self.own is None and ours.exchanging) or ours.mission is None:
+            return
+        id_ = message.TYPE.id
+        if id_ in _REQUESTS:
+            self._replaced = f"begun to replace the mission (system {to})"
+        elif id_ == _ACK and message.type == dialect.MAV_MISSION_ACCEPTED:
+            # Also the end of a download; then its count was the same.
+            self._checked = None
+        elif id_ == _COUNT:
+            home = self.vehicle.driver.home_items
+            if message.count != len(ours.mission) + home:
+                self._replaced = f"replaced the mission: it has {message.count - home} items"
+
+
+def _same(found: MissionItem, ours: MissionItem) -> bool:
+    """Whether an item is the one that was uploaded. What an item without a place is given back
+    with depends on the autopilot."""
+    if ours.latitude_deg == 0.0 and ours.longitude_deg == 0.0:
+        return found.command == ours.command
+    return found.same_as(ours)

@@ -1,0 +1,281 @@
+"""Who steers one vehicle: one behavior at a time, from its beginning to its end.
+
+Whatever is asked of it (a new behavior, a hold, a cancel) takes effect at once: what was being done
+for it before, an exchange in flight too, is given up, and only then something else is sent.
+"""
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+from m2pem.api import BehaviorId, BehaviorState, Ledger, Limits
+from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError
+from m2pem_plugin_mavlink.behaviors.flight import SetSpeed
+from m2pem_plugin_mavlink.behaviors.looking import modes_of, on_the_ground
+from m2pem_plugin_mavlink.foreign import Cause, TakeoverWatch
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+LOOK_EVERY_S = 0.2
+"""So often is a behavior asked whether it is finished."""
+
+KNOWN_WITHIN_S = 5.0
+STOP_SHARE = 0.8
+"""Of the time in which a cancelled vehicle must be free: a stop that takes longer has failed."""
+
+_HELD = frozenset({FlightMode.HOLD})
+
+
+@dataclass(slots=True)
+class _Flight:
+    """A behavior that goes on. `begun`: the vehicle does it; `looked`: it was recognised on a
+    vehicle that had it already, and nothing need be sent."""
+
+    id: BehaviorId
+    behavior: Behavior
+    begun: bool = False
+    looked: bool = False
+    cancelled: bool = False
+
+
+class Helm:
+    """Steers a vehicle; what becomes of it goes to the ledger."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        watch: TakeoverWatch,
+        ledger: Ledger,
+        limits: Limits,
+        logger: logging.Logger,
+    ) -> None:
+        self.vehicle = vehicle
+        self.cruise_m_s: float | None = None
+        self._watch = watch
+        self._ledger = ledger
+        self._limits = limits
+        self._logger = logger
+        self._flight: _Flight | None = None
+        self._held = False
+        self._work: set[asyncio.Task[None]] = set()
+
+    @property
+    def behavior(self) -> str:
+        """The name of what it does now, or ""."""
+        return self._flight.behavior.name if self._flight is not None else ""
+
+    async def knows(self, within_s: float) -> bool:
+        """Wait until it is known what the vehicle is, where it is and whether it flies; False: it
+        was not within so many seconds."""
+        heard = self.vehicle.heard
+        return await self.vehicle.identified(within_s) and await self.vehicle.until(
+            lambda: heard.position is not None and heard.landed is not None, within_s
+        )
+
+    # --- what may be asked ----------------------------------------------------------------------
+
+    def take(self, id_: BehaviorId, behavior: Behavior, *, look_first: bool = False) -> None:
+        """Do this from now on, in place of what it does.
+
+        `look_first`: it may have been begun before a restart; then it is not begun again.
+        """
+        before = self._flight
+        self._flight = flight = _Flight(id_, behavior)
+        self._held = False
+        self._watch.begin()
+        self._replace(lambda: self._fly(flight, before.behavior if before else None, look_first))
+
+    def adopt(self, id_: BehaviorId, behavior: Behavior) -> None:
+        """The vehicle was found doing it, and is to go on."""
+        self._flight = flight = _Flight(id_, behavior, begun=True, looked=True)
+        self._held = False
+        self._replace(lambda: self._fly(flight))
+
+    def cancel(self, id_: BehaviorId) -> None:
+        """Stop, and be free."""
+        flight = self._flight
+        if flight is not None and flight.id == id_ and not flight.cancelled:
+            flight.cancelled = True
+            self._replace(lambda: self._cancel(flight))
+
+    def hold(self) -> None:
+        """Stand still, and keep the behavior."""
+        flight = self._flight
+        if flight is not None and flight.cancelled:
+            return  # it is being stopped already
+        if flight is not None and not self._held:
+            flight.behavior.paused()
+        self._held = True
+        self._replace(lambda: self._stand(flight))
+
+    def resume(self) -> None:
+        """Go on with the behavior."""
+        flight, held = self._flight, self._held
+        self._held = False
+        if flight is not None and held:
+            self._replace(lambda: self._fly(flight))
+
+    def drop(self) -> None:
+        """It cannot be reached: its behavior is nobody's any more."""
+        self._flight = None
+        self._held = False
+        for task in self._work:
+            task.cancel()
+
+    async def close(self) -> None:
+        """Leave the vehicle as it is."""
+        tasks = list(self._work)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    # --- one thing at a time --------------------------------------------------------------------
+
+    def _replace(self, work: Callable[[], Awaitable[None]]) -> None:
+        before = set(self._work)
+        for task in before:
+            task.cancel()
+        task = asyncio.get_running_loop().create_task(self._after(before, work))
+        self._work.add(task)
+        task.add_done_callback(self._work.discard)
+
+    async def _after(
+        self, before: set[asyncio.Task[None]], work: Callable[[], Awaitable[None]]
+    ) -> None:
+        if before:
+            await asyncio.wait(before)
+        await work()
+
+    # --- what is done ---------------------------------------------------------------------------
+
+    async def _fly(
+        self, flight: _Flight, before: Behavior | None = None, look_first: bool = False
+    ) -> None:
+        try:
+            await self._heard()
+            if before is not None:
+                await self._make_way(before, flight.behavior)
+            if look_first and await flight.behavior.recognised() is BehaviorState.RUNNING:
+                flight.begun = flight.looked = True
+            await self._set_out(flight)
+            await self._until_finished(flight)
+        except BehaviorFailedError as error:
+            await self._fail(flight, error.reason, error.code)
+        except _TakenOverError as error:
+            self._over(flight, BehaviorState.FAILED, error.code, error.reason)
+        except ExchangeError as error:
+            await self._fail(flight, error.reason)
+        except asyncio.CancelledError:
+            raise
+        except Exception as error:  # one vehicle's bug must not hang its mission
+            self._logger.exception("%s: %s", self.vehicle.resource, flight.behavior.name)
+            await self._fail(flight, f"m2pem is wrong: {type(error).__name__}: {error}")
+        else:
+            if isinstance(flight.behavior, SetSpeed):
+                self.cruise_m_s = flight.behavior.speed_m_s
+            self._over(flight, BehaviorState.SUCCEEDED)
+
+    async def _heard(self) -> None:
+        """Wait for a vehicle that was not heard yet; one that is never heard is LOST. One that
+        knows no position yet is asked all the same: its driver says why it is not ready."""
+        if not await self.knows(KNOWN_WITHIN_S):
+            await self.vehicle.until(lambda: self.vehicle.identity is not None)
+
+    async def _make_way(self, before: Behavior, after: Behavior) -> None:
+        """What takes over without steering must not let the old motion go on."""
+        if after.steers:
+            await before.leave()
+        elif before.steers:
+            await self._stop()
+
+    async def _set_out(self, flight: _Flight) -> None:
+        if flight.looked:
+            flight.looked = False
+        elif flight.begun:
+            await flight.behavior.go_on()
+        else:
+            await flight.behavior.begin()
+            flight.begun = True
+        self._ledger.progress(flight.id)
+
+    async def _until_finished(self, flight: _Flight) -> None:
+        steps = asyncio.get_running_loop().create_task(flight.behavior.steps())
+        try:
+            while not flight.behavior.finished():
+                if steps.done():
+                    steps.result()
+                self._look(modes_of(flight.behavior))
+                await self.vehicle.sleep(LOOK_EVERY_S)
+        finally:
+            steps.cancel()
+            await asyncio.gather(steps, return_exceptions=True)
+
+    def _look(self, modes: frozenset[FlightMode]) -> None:
+        if takeover := self._watch.taken_over(modes):
+            code = "TAKEN_OVER"
+            if takeover.cause is Cause.FAILSAFE:
+                code = "BATTERY_LOW" if "batt" in takeover.reason.lower() else "FAILED"
+            raise _TakenOverError(takeover.reason, code)
+
+    async def _stand(self, flight: _Flight | None) -> None:
+        try:
+            await self._stop()
+            while flight is not None:
+                # One that is held before it has left the ground disarms itself after a while.
+                if not on_the_ground(self.vehicle):
+                    self._look(_HELD)
+                await self.vehicle.sleep(LOOK_EVERY_S)
+        except _TakenOverError as error:
+            if flight is not None:
+                self._over(flight, BehaviorState.FAILED, error.code, error.reason)
+        except ExchangeError as error:
+            self._logger.error("%s: cannot be held: %s", self.vehicle.resource, error)
+
+    async def _cancel(self, flight: _Flight) -> None:
+        stop = asyncio.get_running_loop().create_task(self._stop())
+        limit_s = STOP_SHARE * self._limits.cancel_timeout_s
+        late = asyncio.get_running_loop().create_task(self.vehicle.sleep(limit_s))
+        try:
+            await asyncio.wait([stop, late], return_when=asyncio.FIRST_COMPLETED)
+            if not stop.done():
+                reason = f"it did not stop within {limit_s:g} s of the cancel"
+                self._over(flight, BehaviorState.FAILED, "TIMEOUT", reason)
+            elif (error := stop.exception()) is not None:
+                self._over(flight, BehaviorState.FAILED, "", f"it would not stop: {error}")
+            else:
+                self._over(flight, BehaviorState.CANCELLED)
+        finally:
+            for task in (stop, late):
+                task.cancel()
+            await asyncio.gather(stop, late, return_exceptions=True)
+
+    async def _stop(self) -> None:
+        if await self.vehicle.identified(0.0):
+            await self.vehicle.driver.stop()
+
+    async def _fail(self, flight: _Flight, reason: str, code: str = "") -> None:
+        """What has failed half-way must not go on; a vehicle that stands is left as it is."""
+        try:
+            if flight.behavior.steers and self.vehicle.heard.landed is not True:
+                await self._stop()
+        except ExchangeError as error:
+            self._logger.error("%s: does not stop: %s", self.vehicle.resource, error)
+        self._over(flight, BehaviorState.FAILED, code, reason)
+
+    def _over(
+        self, flight: _Flight, state: BehaviorState, code: str = "", reason: str = ""
+    ) -> None:
+        if self._flight is flight:
+            self._flight = None
+        self._ledger.end(flight.id, state, code, reason)
+
+
+class _TakenOverError(Exception):
+    """Somebody else steers: nothing more is sent."""
+
+    def __init__(self, reason: str, code: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.code = code

@@ -1,0 +1,182 @@
+"""All endpoints of an event loop, shared by whoever speaks MAVLink in it.
+
+Equal URLs are one socket, however many vehicles are reached over it, and whichever arbiters they
+belong to. To each peer we say once a second that we are there, as each of the sources in use; an
+autopilot takes ten seconds without that for a lost ground station, and some radios and routers send
+nothing to who has not spoken yet.
+"""
+
+import asyncio
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+from m2pem.api import Clock
+from m2pem.errors import PluginError
+from m2pem_plugin_mavlink.link.endpoint import Endpoint
+from m2pem_plugin_mavlink.link.peer import Peer
+from m2pem_plugin_mavlink.link.route import Route
+from m2pem_plugin_mavlink.link.streams import SerialEndpoint, TcpInEndpoint, TcpOutEndpoint
+from m2pem_plugin_mavlink.link.udp import UdpEndpoint
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+from m2pem_plugin_mavlink.protocol.url import SerialUrl, Url, Way
+
+US_PER_S = 1_000_000
+HEARTBEAT_US = US_PER_S
+PEERS_AT_ONCE = 64
+"""Peers that are spoken to before others get their turn."""
+
+MAV_TYPE_GCS = 6
+MAV_AUTOPILOT_INVALID = 8
+MAV_STATE_ACTIVE = 4
+MAVLINK_VERSION = 3
+
+_KINDS: dict[Way, type[Endpoint]] = {
+    Way.UDP_IN: UdpEndpoint,
+    Way.UDP_OUT: UdpEndpoint,
+    Way.TCP_IN: TcpInEndpoint,
+    Way.TCP_OUT: TcpOutEndpoint,
+}
+
+
+@dataclass(slots=True)
+class _Opened:
+    endpoint: Endpoint
+    users: int = 0
+
+
+class Hub:
+    """Heartbeats and silences are timed by the clock of whoever opened the first endpoint, so that
+    they fit simulated vehicles that run faster than real time."""
+
+    _clock: Clock
+
+    def __init__(self) -> None:
+        self._opened: dict[Url, _Opened] = {}
+        self._sources: Counter[Address] = Counter()
+        self._own_systems: set[int] = set()
+        self._changing = asyncio.Lock()
+        self._beating: asyncio.Task[None] | None = None
+
+    def now_s(self) -> float:
+        """Seconds of the hub's clock."""
+        return self._clock.now_us() / US_PER_S
+
+    def endpoint(self, url: Url) -> Endpoint:
+        """An endpoint that is open."""
+        return self._opened[url].endpoint
+
+    async def join(
+        self, system: int, urls: Sequence[Url], source: Address, clock: Clock
+    ) -> list[Route]:
+        """Open the endpoints over which a vehicle is reached, and speak as `source`.
+
+        Raises:
+            PluginError: one of them cannot be opened; nothing is left of the others.
+        """
+        async with self._changing:
+            if not self._opened:
+                self._clock = clock
+            ours = (source.system, *(each.system for each in self._sources))
+            taken = any(each.endpoint.leads_to(source.system) for each in self._opened.values())
+            if taken or system in ours:
+                clash = source.system if taken else system
+                raise PluginError(
+                    f"system id {clash} is a vehicle's and our own: one of them must change"
+                )
+            self._speak_as(source)
+            joined: list[Url] = []
+            try:
+                for url in dict.fromkeys(urls):
+                    await self._open(url)
+                    joined.append(url)
+            except BaseException:
+                await self._leave(joined, source)
+                raise
+            return [self._opened[url].endpoint.route(system) for url in joined]
+
+    async def leave(self, routes: Sequence[Route], source: Address) -> None:
+        """Undo one `join`."""
+        async with self._changing:
+            for route in routes:
+                self._opened[route.url].endpoint.release(route)
+            await self._leave([route.url for route in routes], source)
+
+    async def _open(self, url: Url) -> None:
+        opened = self._opened.get(url)
+        if opened is None:
+            kind = SerialEndpoint if isinstance(url, SerialUrl) else _KINDS[url.way]
+            endpoint = kind(url, self._own_systems, self.now_s, self._greet)
+            await endpoint.open()
+            opened = self._opened[url] = _Opened(endpoint)
+        opened.users += 1
+        if self._beating is None:
+            self._beating = asyncio.create_task(self._beat())
+
+    async def _leave(self, urls: Sequence[Url], source: Address) -> None:
+        self._speak_no_more_as(source)
+        for url in urls:
+            opened = self._opened[url]
+            opened.users -= 1
+            if not opened.users:
+                del self._opened[url]
+                await opened.endpoint.close()
+        if not self._opened and self._beating is not None:
+            self._beating.cancel()
+            await asyncio.wait([self._beating])
+            self._beating = None
+
+    def _speak_as(self, source: Address) -> None:
+        self._sources[source] += 1
+        if source.system not in self._own_systems:
+            self._own_systems.add(source.system)
+            for opened in self._opened.values():
+                opened.endpoint.forget(source.system)
+
+    def _speak_no_more_as(self, source: Address) -> None:
+        self._sources[source] -= 1
+        if not self._sources[source]:
+            del self._sources[source]
+        self._own_systems.clear()
+        self._own_systems.update(each.system for each in self._sources)
+
+    def _greet(self, peer: Peer) -> None:
+        for source in self._sources:
+            peer.send(_HEARTBEAT, source)
+
+    async def _beat(self) -> None:
+        at_us = self._clock.now_us()
+        while True:
+            at_us += HEARTBEAT_US
+            now_us = self._clock.now_us()
+            if (
+                at_us <= now_us
+            ):  # the machine was asleep: beats that were missed are not made up for
+                at_us = now_us + HEARTBEAT_US
+            await self._clock.sleep_until(at_us)
+            for opened in list(self._opened.values()):
+                opened.endpoint.look_after()
+                for number, peer in enumerate(list(opened.endpoint.peers.values())):
+                    self._greet(peer)
+                    if number % PEERS_AT_ONCE == PEERS_AT_ONCE - 1:
+                        await asyncio.sleep(0)
+
+
+def _heartbeat() -> Message:
+    made: Message = message_type("HEARTBEAT").make(
+        type=MAV_TYPE_GCS,
+        autopilot=MAV_AUTOPILOT_INVALID,
+        system_status=MAV_STATE_ACTIVE,
+        mavlink_version=MAVLINK_VERSION,
+    )
+    return made
+
+
+_HEARTBEAT = _heartbeat()
+_hubs: WeakKeyDictionary[asyncio.AbstractEventLoop, Hub] = WeakKeyDictionary()
+
+
+def shared_hub() -> Hub:
+    """The hub of the running event loop."""
+    return _hubs.setdefault(asyncio.get_running_loop(), Hub())

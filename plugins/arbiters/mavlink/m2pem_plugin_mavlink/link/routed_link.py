@@ -1,0 +1,169 @@
+"""The link to a vehicle through the hub: `await open_link(address, urls, clock)`."""
+
+import logging
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
+
+from m2pem.api import Clock
+from m2pem.errors import PluginError
+from m2pem_plugin_mavlink.link.exchange import Exchange
+from m2pem_plugin_mavlink.link.hub import Hub, shared_hub
+from m2pem_plugin_mavlink.link.route import Route
+from m2pem_plugin_mavlink.link.vehicle_link import Listener
+from m2pem_plugin_mavlink.protocol.messages import Address, Message
+from m2pem_plugin_mavlink.protocol.quality import LinkQuality
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, Transaction
+from m2pem_plugin_mavlink.protocol.url import parse_url
+
+T = TypeVar("T")
+
+_logger = logging.getLogger(__name__)
+
+GROUND_STATION = Address(255, 190)
+"""Who we are, if nobody says otherwise: what MAVLink gives to ground stations."""
+
+SILENT_S = 2.5
+"""Longer than this without anything, and another endpoint is tried."""
+
+WORSE_LOSS = 0.1
+"""By so much more must be lost on the endpoint in use than on another one before it is left."""
+
+US_PER_S = 1_000_000
+
+
+async def open_link(
+    address: Address, urls: Sequence[str], clock: Clock, source: Address = GROUND_STATION
+) -> "RoutedLink":
+    """Reach a vehicle over one or more endpoints, the preferred one first; `source`: who we are.
+
+    Returns when listening: a vehicle that is silent, or a connection that does not come about yet,
+    is no error.
+
+    Raises:
+        PluginError: a URL is wrong, or an endpoint cannot be opened.
+    """
+    if not urls:
+        raise PluginError("no URL says where the vehicle is reached: udpin://127.0.0.1:14550")
+    hub = shared_hub()
+    routes = await hub.join(address.system, [parse_url(url) for url in urls], source, clock)
+    return RoutedLink(hub, address, source, routes, clock)
+
+
+class RoutedLink:
+    """See `VehicleLink`. Sends over the endpoint that hears the vehicle best."""
+
+    def __init__(
+        self, hub: Hub, address: Address, source: Address, routes: Sequence[Route], clock: Clock
+    ) -> None:
+        self.address = address
+        self.source = source
+        self._hub = hub
+        self._routes = list(routes)
+        self._clock = clock
+        self._used = self._routes[0]
+        self._listening: list[tuple[frozenset[int], Listener]] = []
+        self._exchanges: set[Exchange] = set()
+        self._closed = False
+
+    def now_s(self) -> float:
+        """See `VehicleLink.now_s`."""
+        return self._clock.now_us() / US_PER_S
+
+    def send(self, message: Message) -> None:
+        """See `VehicleLink.send`. Nothing is sent to a vehicle that was never heard: nobody knows
+        where it is.
+
+        Raises:
+            struct.error: a field's value does not fit its type.
+        """
+        if self._closed:
+            return
+        component = getattr(message, "target_component", 0)
+        peer = self._best().peer_of(component, self.address.component)
+        if peer is not None:
+            peer.send(message, self.source)
+
+    def listen(self, ids: Iterable[int], listener: Listener) -> Callable[[], None]:
+        """See `VehicleLink.listen`.
+
+        Raises:
+            KeyError: the dialect has no message with such an id.
+        """
+        wanted = frozenset(ids)
+        entry = wanted, listener
+        for route in self._routes:
+            route.listen(wanted, listener)
+        self._listening.append(entry)
+
+        def end() -> None:
+            if entry in self._listening:
+                self._listening.remove(entry)
+                for route in self._routes:
+                    route.unlisten(wanted, listener)
+
+        return end
+
+    async def perform(self, transaction: Transaction[T]) -> T:
+        """See `VehicleLink.perform`. Cancelling it ends the exchange: nothing more is sent."""
+        async with self._routes[0].turns.turn((self.source, transaction.key)):
+            if self._closed:
+                raise ExchangeError("the link was closed")
+            exchange = Exchange(transaction, self, self._clock)
+            self._exchanges.add(exchange)
+            try:
+                await exchange.run()
+            finally:
+                self._exchanges.discard(exchange)
+        return transaction.outcome()
+
+    def quality(self) -> LinkQuality | None:
+        """How well the autopilot is heard over the endpoint in use; None: never yet."""
+        return self._quality(self._best())
+
+    def qualities(self) -> dict[str, LinkQuality | None]:
+        """The same for each endpoint, by its URL."""
+        return {str(route.url): self._quality(route) for route in self._routes}
+
+    def heard_systems(self) -> set[int]:
+        """Every system id that is heard on its endpoints: for when the vehicle's own is not."""
+        heard = (self._hub.endpoint(route.url).heard_systems() for route in self._routes)
+        return set().union(*heard)
+
+    async def close(self) -> None:
+        """Let go of the vehicle, and of endpoints that nobody else uses. Exchanges fail."""
+        if self._closed:
+            return
+        self._closed = True
+        for exchange in list(self._exchanges):
+            exchange.abort(ExchangeError("the link was closed"))
+        for wanted, listener in self._listening:
+            for route in self._routes:
+                route.unlisten(wanted, listener)
+        self._listening.clear()
+        await self._hub.leave(self._routes, self.source)
+
+    def _quality(self, route: Route) -> LinkQuality | None:
+        return route.quality(self.address.component, self._hub.now_s())
+
+    def _best(self) -> Route:
+        used = self._used
+        if len(self._routes) == 1:
+            return used
+        qualities = {route: self._quality(route) for route in self._routes}
+        live = {
+            route: each.loss for route, each in qualities.items() if each and each.age_s <= SILENT_S
+        }
+        if live:
+            best = min(live, key=lambda route: live[route])
+            if used in live and live[used] <= live[best] + WORSE_LOSS:
+                best = used
+        else:
+            ages = {route: each.age_s if each else math.inf for route, each in qualities.items()}
+            best = min(ages, key=lambda route: ages[route])
+            if ages[best] == ages[used]:
+                best = used
+        if best is not used:
+            _logger.info("system %d: now over %s, not %s", self.address.system, best.url, used.url)
+            self._used = best
+        return best

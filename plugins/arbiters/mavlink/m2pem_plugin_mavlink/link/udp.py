@@ -1,0 +1,142 @@
+"""MAVLink over UDP.
+
+asyncio's own datagram transport reads one datagram each time the loop goes round; here all that
+are there are read, so that bursts of many vehicles don't overflow the socket's buffer.
+"""
+
+import asyncio
+import errno
+import socket
+from typing import Any
+
+from m2pem.errors import PluginError
+from m2pem_plugin_mavlink.link.endpoint import Endpoint, logger
+from m2pem_plugin_mavlink.link.peer import Peer
+from m2pem_plugin_mavlink.protocol.url import SocketUrl, Way
+
+RECEIVE_BUFFER_BYTES = 8 * 2**20
+"""Asked for; the system gives no more than net.core.rmem_max."""
+
+LARGEST_DATAGRAM = 65_535
+AT_ONCE = 256
+"""Datagrams that are read before others get their turn: about a millisecond's work."""
+
+MOST_PEERS = 2_048
+FORGOTTEN_S = 60.0
+
+
+class UdpEndpoint(Endpoint):
+    """`udpin` and `udpout`: the latter has one peer from the first, and hears no other."""
+
+    url: SocketUrl
+    _socket: socket.socket
+
+    async def open(self) -> None:
+        """See `Endpoint.open`."""
+        self._socket = await _opened(self.url)
+        asyncio.get_running_loop().add_reader(self._socket, self._readable)
+        if self.url.way is Way.UDP_OUT:
+            address = self._socket.getpeername()
+            self.peers[address] = peer = self._peer(address, self.now_s())
+            self.greet(peer)
+
+    async def close(self) -> None:
+        """See `Endpoint.close`."""
+        asyncio.get_running_loop().remove_reader(self._socket)
+        self._socket.close()
+        for key in list(self.peers):
+            self.drop(key)
+
+    @property
+    def port(self) -> int:
+        """The local one."""
+        port: int = self._socket.getsockname()[1]
+        return port
+
+    def look_after(self) -> None:
+        """See `Endpoint.look_after`."""
+        super().look_after()
+        if self.url.way is Way.UDP_IN:
+            for key in list(self.idle_peers(self.now_s() - FORGOTTEN_S)):
+                self.drop(key)
+
+    def _readable(self) -> None:
+        now_s = self.now_s()
+        receive, peers = self._socket.recvfrom, self.peers
+        for _ in range(AT_ONCE):
+            try:
+                data, address = receive(LARGEST_DATAGRAM)
+            except (BlockingIOError, InterruptedError):
+                return
+            except OSError:
+                continue  # what was sent before did not arrive: nobody listens there, yet
+            peer = peers.get(address)
+            if peer is None:
+                self._stranger(data, address, now_s)
+            else:
+                peer.heard_s = now_s
+                peer.inbound.datagram(data, now_s)
+
+    def _stranger(self, data: bytes, address: Any, now_s: float) -> None:
+        """Whoever sends a right frame is a peer; of others nothing is kept."""
+        peer = self._peer(address, now_s)
+        peer.inbound.datagram(data, now_s)
+        if not peer.inbound.senders:
+            return
+        if len(self.peers) >= MOST_PEERS:
+            idle = next(iter(self.idle_peers(now_s)), None)
+            if idle is None:
+                peer.open = False
+                return
+            self.drop(idle)
+        self.peers[address] = peer
+
+    def _peer(self, address: Any, now_s: float) -> Peer:
+        host, port = address[:2]
+        name = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+        connected = self.url.way is Way.UDP_OUT
+
+        def write(data: bytes) -> None:
+            try:
+                if connected:
+                    self._socket.send(data)
+                else:
+                    self._socket.sendto(data, address)
+            except OSError as error:
+                # Lost, as any datagram may be; a refusal answers an earlier one.
+                if error.errno not in (errno.ECONNREFUSED, errno.EAGAIN, errno.ENOBUFS):
+                    logger.debug("%s: nothing sent to %s: %s", self.url, name, error)
+
+        return Peer(name, write, self.meet, now_s)
+
+
+async def _opened(url: SocketUrl) -> socket.socket:
+    loop = asyncio.get_running_loop()
+    try:
+        found = await loop.getaddrinfo(url.host, url.port, type=socket.SOCK_DGRAM)
+    except OSError as error:
+        raise PluginError(f"{url}: '{url.host}' is not found: {error.strerror}") from None
+    family, kind, protocol, _, address = found[0]
+    opened = socket.socket(family, kind, protocol)
+    opened.setblocking(False)
+    opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+    try:
+        if url.way is Way.UDP_IN:
+            opened.bind(address)
+        else:
+            opened.connect(address)
+    except OSError as error:
+        opened.close()
+        raise PluginError(f"{url}: {why_not(error)}") from None
+    return opened
+
+
+def why_not(error: OSError) -> str:
+    """Why a socket cannot be had, for people."""
+    if error.errno == errno.EADDRINUSE:
+        return "another program has this port; end it, or use another port"
+    if error.errno == errno.EADDRNOTAVAIL:
+        return "this machine does not have that address; to listen to all others, use 0.0.0.0"
+    if error.errno == errno.EACCES:
+        return "not allowed: a port below 1024, or a broadcast address"
+    return error.strerror or str(error)

@@ -1,0 +1,160 @@
+"""Frames of MAVLink 1 and 2: found, checked and made (mavlink.io, "Packet Serialization").
+
+A frame is only looked into as far as somebody needs: of a datagram that consists of frames and
+nothing else the headers are read, and UDP has protected the rest. What comes out of a stream, or of
+a datagram with anything else in it, has a right checksum.
+"""
+
+import re
+from struct import Struct
+from typing import NamedTuple
+
+from fastcrc.crc16 import mcrf4xx
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.protocol.messages import Address, Message
+
+V1 = 0xFE
+V2 = 0xFD
+SIGNED = 0x01
+"""The only incompatibility flag: 13 bytes of signature follow. Frames with others are not read."""
+
+HEADER_V1 = Struct("<xBBHB")  # length, sequence, sender, id
+HEADER_V2 = Struct("<xBBxBHHB")  # length, flags, sequence, sender, lower and upper part of the id
+AROUND_V1 = 8
+AROUND_V2 = 12
+SIGNATURE = 13
+LONGEST = 255 + AROUND_V2 + SIGNATURE
+CRC_START = 0xFFFF
+
+EXTRA: dict[int, bytes] = {
+    id_: bytes((each.crc_extra,)) for id_, each in dialect.mavlink_map.items()
+}
+"""By message id: what the checksum goes on with after the frame. Others cannot be checked."""
+
+_MAGIC = re.compile(b"[\xfd\xfe]")
+_MADE = Struct("<BBBBBBBHB")
+_CRC = Struct("<H")
+
+
+class Frame(NamedTuple):
+    """What is known of a frame. `sender`: system + 256 * component; `checked`: its checksum is
+    right (False: the message is unknown, or nobody looked)."""
+
+    sequence: int
+    sender: int
+    id: int
+    payload: bytes
+    checked: bool
+
+
+def right(frame: bytes, id_: int) -> bool:
+    """Whether a whole frame, without a signature, has the checksum of its message."""
+    sum_ = mcrf4xx(EXTRA[id_], mcrf4xx(frame[1:-2], CRC_START))
+    return frame[-2] == sum_ & 255 and frame[-1] == sum_ >> 8
+
+
+def encode(message: Message, sequence: int, source: Address) -> bytes:
+    """A message as a frame of MAVLink 2, without the zeros at its end. `sequence`: 0..255.
+
+    Raises:
+        struct.error: a field's value does not fit its type.
+    """
+    type_ = message.TYPE
+    payload = type_.pack(message).rstrip(b"\0") or b"\0"
+    id_ = type_.id
+    header = _MADE.pack(V2, len(payload), 0, 0, sequence, *source, id_ & 0xFFFF, id_ >> 16)
+    sum_ = mcrf4xx(EXTRA[id_], mcrf4xx(payload, mcrf4xx(header[1:], CRC_START)))
+    return header + payload + _CRC.pack(sum_)
+
+
+def clean(data: bytes) -> list[bytes] | None:
+    """The frames of a datagram that has nothing else in it, without signatures; else None."""
+    found = []
+    start, size = 0, len(data)
+    while start < size:
+        if size - start < AROUND_V1:
+            return None
+        magic, length, flags = data[start], data[start + 1], data[start + 2]
+        if magic == V2:
+            end = start + AROUND_V2 + length
+            after = end + SIGNATURE if flags & SIGNED else end
+        elif magic == V1:
+            end = after = start + AROUND_V1 + length
+        else:
+            return None
+        if after > size:
+            return None
+        found.append(data[start:end])
+        start = after
+    return found
+
+
+def read(frame: bytes) -> Frame | None:
+    """One of the frames that `clean` has found; None: it has a flag that is not known."""
+    if frame[0] == V1:
+        _, sequence, sender, id_ = HEADER_V1.unpack_from(frame)
+        return Frame(sequence, sender, id_, frame[6:-2], False)
+    _, flags, sequence, sender, low, high = HEADER_V2.unpack_from(frame)
+    if flags & ~SIGNED:
+        return None
+    return Frame(sequence, sender, low | high << 16, frame[10:-2], False)
+
+
+def scan(data: bytes, unfinished: bool = False) -> tuple[list[Frame], int, int]:
+    """All frames among other bytes: those with a right checksum; and those that cannot be checked,
+    if another frame or nothing follows them and no right frame is inside of them.
+
+    Then the number of bytes that belong to none; and where a frame begins whose end is not there
+    yet, if `unfinished` says that more may come (else: the size of `data`).
+    """
+    found: list[Frame] = []
+    junk = position = 0
+    size = len(data)
+    doubt: Frame | None = None  # cannot be checked, and ends at `doubt_end` if that is not 0
+    doubt_end = junk_before = 0
+    while True:
+        if doubt_end and position >= doubt_end:
+            if doubt is not None:
+                found.append(doubt)
+            junk, doubt_end = junk_before, 0
+        if position >= size:
+            break
+        magic = data[position]
+        # Of the payload; this stays if not even the header is whole.
+        begin, length, flags = size, 1, 0
+        if magic == V2:
+            if size - position >= AROUND_V2:
+                length, flags, sequence, sender, low, high = HEADER_V2.unpack_from(data, position)
+                id_ = low | high << 16 if high else low
+                begin = position + 10
+        elif magic == V1:
+            if size - position >= AROUND_V1:
+                length, sequence, sender, id_ = HEADER_V1.unpack_from(data, position)
+                begin = position + 6
+        else:
+            next_ = _MAGIC.search(data, position)
+            start = next_.start() if next_ else size
+            junk += start - position
+            position = start
+            continue
+        end = begin + length
+        after = end + 15 if flags & SIGNED else end + 2
+        if after <= size:
+            extra = None if flags & ~SIGNED else EXTRA.get(id_)
+            if extra is not None:
+                sum_ = mcrf4xx(extra, mcrf4xx(data[position + 1 : end], CRC_START))
+                if data[end] == sum_ & 255 and data[end + 1] == sum_ >> 8:
+                    found.append(Frame(sequence, sender, id_, data[begin:end], True))
+                    position = after
+                    doubt_end = 0
+                    continue
+            elif not doubt_end and (after == size or data[after] in (V1, V2)):
+                payload = data[begin:end]
+                doubt = None if flags & ~SIGNED else Frame(sequence, sender, id_, payload, False)
+                doubt_end, junk_before = after, junk
+        elif unfinished and not doubt_end:
+            break
+        junk += 1
+        position += 1
+    return found, junk, position

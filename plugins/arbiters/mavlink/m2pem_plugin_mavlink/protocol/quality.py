@@ -1,0 +1,113 @@
+"""How well a sender is heard over one path: loss, rate and age.
+
+Each sender numbers its frames 0..255, over and over, on each of its links (mavlink.io, "Packet
+Serialization").
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+WINDOW_S = 5.0
+"""Loss and rate are those of about so many seconds."""
+
+RESTART_S = 1.0
+"""After a silence as long as this, whatever comes is new: nothing is late by so much."""
+
+LATE = 128
+"""So far back a number is late; farther, it is ahead."""
+
+RESTART_FRAMES = 32
+"""A sender began anew if so many frames on end seem to be late."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkQuality:
+    """`loss`: lost frames of all sent, 0..1; `rate_hz`: frames received a second; `age_s`: since
+    the last one."""
+
+    loss: float
+    rate_hz: float
+    age_s: float
+
+
+class Reception:
+    """Counts what comes from one sender over one path, from the frame with number `sequence` on.
+
+    `expected`: the number of the next frame, counted on beyond 255; `lost`, `doubled`: so many
+    frames; `heard_s`: when the last one came.
+    """
+
+    __slots__ = (
+        "_late",
+        "_missing",
+        "_samples",
+        "_start",
+        "doubled",
+        "expected",
+        "heard_s",
+        "lost",
+    )
+
+    def __init__(self, sequence: int, now_s: float) -> None:
+        self.expected = sequence
+        self.heard_s = now_s
+        self.lost = 0
+        self.doubled = 0
+        self._start = sequence
+        self._late = 0
+        self._missing: set[int] = set()
+        self._samples = deque([(now_s, 0, 0)])
+
+    @property
+    def sent(self) -> int:
+        """Frames that were sent, as far as their numbers tell."""
+        return self.expected - self._start
+
+    def count(self, sequence: int, now_s: float) -> None:
+        """A frame has come."""
+        if sequence == self.expected & 255:
+            self.expected += 1
+        else:
+            self.astray(sequence, now_s)
+        self.heard_s = now_s
+
+    def astray(self, sequence: int, now_s: float) -> None:
+        """A frame that was not expected next: some are missing, or it is late or doubled."""
+        ahead = (sequence - self.expected) & 255
+        if ahead >= LATE and now_s - self.heard_s < RESTART_S:
+            number = self.expected + ahead - 256
+            if number in self._missing:
+                self._missing.remove(number)
+                self.lost -= 1
+                self._late = 0
+                return
+            self._late += 1
+            if self._late < RESTART_FRAMES:
+                self.doubled += 1
+                return
+            self._start += ahead  # it skipped these numbers, rather than that they were lost
+        else:
+            self.lost += ahead
+            oldest = self.expected + ahead - LATE
+            self._missing = {number for number in self._missing if number > oldest}
+            first = max(self.expected, oldest + 1)
+            self._missing.update(range(first, self.expected + ahead))
+        self._late = 0
+        self.expected += ahead + 1
+
+    def sample(self, now_s: float) -> None:
+        """Note the counts; to be called about once a second."""
+        samples = self._samples
+        samples.append((now_s, self.sent, self.lost))
+        while len(samples) > 2 and samples[1][0] <= now_s - WINDOW_S:
+            samples.popleft()
+
+    def quality(self, now_s: float) -> LinkQuality:
+        """How well it is heard lately."""
+        since_s, sent_before, lost_before = self._samples[0]
+        sent = self.sent - sent_before
+        lost = min(max(self.lost - lost_before, 0), sent)
+        age_s = max(now_s - self.heard_s, 0.0)
+        loss = lost / sent if sent else float(age_s > WINDOW_S)
+        rate_hz = (sent - lost) / (now_s - since_s) if now_s > since_s else 0.0
+        return LinkQuality(loss, rate_hz, age_s)

@@ -1,0 +1,117 @@
+"""Arming and disarming, and what must be well before."""
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.sim.command import Command, Result
+from m2pem_plugin_mavlink.sim.part import CommandHandler, Part
+from m2pem_plugin_mavlink.sim.specification import Kind
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink.sim.autopilot import Autopilot
+
+FORCE_ARM, FORCE = 2989, 21196
+"""Parameter 2 of MAV_CMD_COMPONENT_ARM_DISARM: do it in spite of everything."""
+
+
+class Arming(Part):
+    """Whether motors may turn."""
+
+    def __init__(self, autopilot: "Autopilot") -> None:
+        super().__init__(autopilot)
+        self.armed = False
+        self._idle_s = 0.0
+
+    def reasons(self) -> Iterator[str]:
+        """Why it would not arm in its present mode, best first."""
+        mode = self.autopilot.modes.mode
+        if not mode.armable:
+            yield f"{mode.name} mode not armable"
+        for part in self.autopilot.parts:
+            yield from part.refusals()
+
+    def refusals(self) -> Iterator[str]:
+        """What the estimator lacks."""
+        estimator, mode = self.autopilot.estimator, self.autopilot.modes.mode
+        if not estimator.sensors_well and self.autopilot.firmware.checks_sensors(self.autopilot):
+            yield self.autopilot.firmware.reason_sensors
+        if mode.needs_position and not estimator.ready:
+            yield self.autopilot.firmware.reason_position
+
+    @property
+    def healthy(self) -> bool:
+        """Nothing is against arming it (the bit PREARM_CHECK of SYS_STATUS)."""
+        return next(self.reasons(), None) is None
+
+    def arm(self, *, force: bool = False) -> bool:
+        """Arm; says why if it will not. To be armed already is well."""
+        if self.armed:
+            return True
+        reason = None if force else next(self.reasons(), None)
+        if reason is not None:
+            self.autopilot.warn(self.autopilot.firmware.arming_text(reason))
+            return False
+        self.armed, self._idle_s = True, 0.0
+        self.autopilot.note("armed")
+        self.autopilot.home.set_at_arming()
+        self.autopilot.modes.maneuver.begin()
+        self.autopilot.say("Arming motors")
+        return True
+
+    def disarm(self, *, force: bool = False) -> bool:
+        """Stop the motors; not in flight, unless forced."""
+        if not self.armed:
+            return True
+        if not (force or self._may_disarm()):
+            return False
+        self.armed = False
+        self.autopilot.note("disarmed")
+        self.autopilot.say("Disarming motors")
+        return True
+
+    def disarm_after_landing(self) -> None:
+        """It is on the ground, and was to land."""
+        if self.armed:
+            self.autopilot.note("landed")
+            self.disarm()
+
+    def _may_disarm(self) -> bool:
+        return self.autopilot.spec.kind in (Kind.ROVER, Kind.BOAT) or self.autopilot.body.on_ground
+
+    def step(self, dt_s: float) -> None:
+        """What stands on the ground armed is disarmed after a while (DISARM_DELAY)."""
+        pilot = self.autopilot
+        delay_s = pilot.tuning.disarm_delay_s
+        flies = pilot.spec.kind is Kind.COPTER
+        if not (self.armed and flies and pilot.body.on_ground and delay_s > 0):
+            self._idle_s = 0.0
+            return
+        self._idle_s += dt_s
+        if self._idle_s >= delay_s:
+            self.disarm()
+
+    def commands(self) -> Mapping[int, CommandHandler]:
+        """Arm and disarm; ask what is against it."""
+        return {
+            dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._command,
+            dialect.MAV_CMD_RUN_PREARM_CHECKS: self._check,
+        }
+
+    def _command(self, command: Command) -> Result:
+        force = command.param2 in (FORCE, FORCE_ARM)
+        if command.param1 == 1:
+            done = self.arm(force=force)
+        elif command.param1 == 0:
+            done = self.disarm(force=command.param2 == FORCE)
+        else:
+            return Result.UNSUPPORTED
+        return Result.ACCEPTED if done else Result.FAILED
+
+    def _check(self, command: Command) -> Result:
+        if self.armed:
+            return Result.TEMPORARILY_REJECTED
+        for reason in self.reasons():
+            self.autopilot.warn(f"PreArm: {reason}")
+        return Result.ACCEPTED

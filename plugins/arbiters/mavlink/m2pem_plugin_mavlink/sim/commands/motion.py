@@ -1,0 +1,125 @@
+"""Commands that move the vehicle: takeoff, landing, going somewhere, speed, heading, missions."""
+
+import math
+from collections.abc import Mapping
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.sim.command import Command, Result
+from m2pem_plugin_mavlink.sim.geometry import wrapped_rad
+from m2pem_plugin_mavlink.sim.maneuvers.guided import Guided
+from m2pem_plugin_mavlink.sim.missions.execution import Auto
+from m2pem_plugin_mavlink.sim.part import CommandHandler, Part
+from m2pem_plugin_mavlink.sim.specification import Kind
+
+CHANGE_MODE = 1
+"""Parameter 2 of DO_REPOSITION: enter GUIDED if it is in another mode."""
+
+
+class MotionCommands(Part):
+    """Does what ArduPilot does with them."""
+
+    def commands(self) -> Mapping[int, CommandHandler]:
+        """By MAV_CMD; what a kind of vehicle cannot do, it does not know."""
+        roles, kind = self.autopilot.firmware.roles, self.autopilot.spec.kind
+        handlers: dict[int, CommandHandler] = {
+            dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _: self._enter(roles.back),
+            dialect.MAV_CMD_NAV_LOITER_UNLIM: lambda _: self._enter(roles.hold),
+            dialect.MAV_CMD_DO_REPOSITION: self._reposition,
+            dialect.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
+            dialect.MAV_CMD_MISSION_START: self._start_mission,
+        }
+        land = roles.land
+        if land is not None:
+            handlers[dialect.MAV_CMD_NAV_LAND] = lambda _: self._enter(land)
+        if kind is Kind.COPTER:
+            handlers[dialect.MAV_CMD_NAV_TAKEOFF] = self._take_off
+            handlers[dialect.MAV_CMD_CONDITION_YAW] = self._yaw
+            handlers[dialect.MAV_CMD_DO_PAUSE_CONTINUE] = self._pause
+        elif kind is not Kind.PLANE:
+            handlers[dialect.MAV_CMD_DO_SET_REVERSE] = self._reverse
+        return handlers
+
+    def _enter(self, mode: int) -> Result:
+        return Result.ACCEPTED if self.autopilot.modes.switch(mode) else Result.FAILED
+
+    def _guided(self) -> Guided | None:
+        maneuver = self.autopilot.modes.maneuver
+        return maneuver if isinstance(maneuver, Guided) else None
+
+    def _take_off(self, command: Command) -> Result:
+        """In GUIDED only, and armed; while it climbs already, or has, nothing is begun anew."""
+        pilot, guided = self.autopilot, self._guided()
+        up_m = pilot.home.point.up_m + command.z
+        if guided is None or not pilot.arming.armed or not math.isfinite(command.z):
+            return Result.FAILED
+        if not pilot.body.on_ground:
+            again = guided.takeoff_up_m is not None and guided.destination is None
+            return Result.ACCEPTED if again else Result.FAILED
+        if up_m <= pilot.body.up_m + 0.1 or not pilot.estimator.ready:
+            return Result.FAILED
+        if not guided.taking_off:
+            guided.take_off(up_m)
+        return Result.ACCEPTED
+
+    def _reposition(self, command: Command) -> Result:
+        pilot = self.autopilot
+        if not command.has_position or not math.isfinite(command.z):
+            return Result.DENIED
+        if self._guided() is None:
+            if not int(command.param2) & CHANGE_MODE:
+                return Result.DENIED
+            if not pilot.modes.switch(pilot.firmware.roles.guided):
+                return Result.FAILED
+        guided = self._guided()
+        point = pilot.guided.point_of(command)
+        if guided is None or point is None:
+            return Result.DENIED
+        reason = pilot.guided.refusal(point)
+        if reason is not None:
+            pilot.warn(reason)
+            return Result.FAILED
+        if command.param1 > 0:
+            pilot.modes.set_speed(command.param1)
+        guided.go_to(point)
+        return Result.ACCEPTED
+
+    def _change_speed(self, command: Command) -> Result:
+        if not math.isfinite(command.param2) or command.param2 <= 0:
+            return Result.FAILED
+        if command.param1 in (0, 1):
+            self.autopilot.modes.set_speed(command.param2)
+        return Result.ACCEPTED
+
+    def _yaw(self, command: Command) -> Result:
+        guided = self._guided()
+        if guided is None or not 0 <= command.param1 <= 360 or command.param4 not in (0, 1):
+            return Result.FAILED
+        angle = math.radians(command.param1)
+        if command.param4 == 1:
+            sign = -1 if command.param3 < 0 else 1
+            angle = self.autopilot.body.yaw_rad + sign * angle
+        guided.yaw_rad = wrapped_rad(angle)
+        return Result.ACCEPTED
+
+    def _pause(self, command: Command) -> Result:
+        if command.param1 not in (0, 1):
+            return Result.DENIED
+        maneuver = self.autopilot.modes.maneuver
+        if not isinstance(maneuver, Guided | Auto):
+            return Result.FAILED
+        maneuver.pause(on=command.param1 == 0)
+        return Result.ACCEPTED
+
+    def _reverse(self, command: Command) -> Result:
+        self.autopilot.modes.reverse = command.param1 == 1
+        return Result.ACCEPTED
+
+    def _start_mission(self, command: Command) -> Result:
+        pilot = self.autopilot
+        if command.param1 or command.param2:
+            return Result.DENIED
+        result = self._enter(pilot.firmware.roles.mission)
+        if result is Result.ACCEPTED:
+            pilot.mission.released = True
+        return result

@@ -1,0 +1,137 @@
+"""ArduPilot 4.7: copter, rover (boats are rovers) and plane."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.sim.firmware.ardupilot_modes import MODES, ROLES
+from m2pem_plugin_mavlink.sim.firmware.ardupilot_parameters import PARAMETERS, WHOLE_NUMBERS
+from m2pem_plugin_mavlink.sim.firmware.firmware import Firmware, Tuning
+from m2pem_plugin_mavlink.sim.modes import Mode
+from m2pem_plugin_mavlink.sim.parameters import Parameters
+from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink.sim.autopilot import Autopilot
+
+TYPES = {
+    Kind.COPTER: dialect.MAV_TYPE_QUADROTOR,
+    Kind.ROVER: dialect.MAV_TYPE_GROUND_ROVER,
+    Kind.BOAT: dialect.MAV_TYPE_SURFACE_BOAT,
+    Kind.PLANE: dialect.MAV_TYPE_FIXED_WING,
+}
+
+
+class ArduPilot(Firmware):
+    """ArduPilot on one kind of vehicle."""
+
+    autopilot_id = dialect.MAV_AUTOPILOT_ARDUPILOTMEGA
+    version = 4 << 24 | 7 << 16 | 0 << 8 | dialect.FIRMWARE_VERSION_TYPE_DEV
+    capabilities = (
+        dialect.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+        | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+        | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+        | dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+        | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+        | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+        | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+        | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+        | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+    )
+    mission_has_home = True
+    asks_for_items_as_int = False
+
+    def __init__(self, spec: VehicleSpec) -> None:
+        super().__init__(spec)
+        plane, copter = spec.kind is Kind.PLANE, spec.kind is Kind.COPTER
+        self.reason_position = "AHRS: waiting for home" if plane else "Need Position Estimate"
+        self.reason_sensors = "Gyros not calibrated"
+        self.loop_hz = 400.0 if copter else 50.0
+        self.first_mode = 0
+        self.roles = ROLES[spec.kind]
+
+    @property
+    def vehicle_type(self) -> int:
+        """MAV_TYPE."""
+        type_: int = TYPES[self.spec.kind]
+        return type_
+
+    def modes(self) -> Sequence[Mode]:
+        """The modes of the vehicle."""
+        return MODES[self.spec.kind]
+
+    def parameters(self) -> Mapping[str, float]:
+        """The defaults, and its own number."""
+        return {**PARAMETERS[self.spec.kind], "MAV_SYSID": self.spec.system}
+
+    def parameter_type(self, name: str) -> int:
+        """Values travel as floats, whatever their type."""
+        whole, real = dialect.MAV_PARAM_TYPE_INT32, dialect.MAV_PARAM_TYPE_REAL32
+        type_: int = whole if name in WHOLE_NUMBERS else real
+        return type_
+
+    def tuning(self, parameters: Parameters) -> Tuning:
+        """ArduPilot has centimetres in a copter's, metres in the others' parameters."""
+        p = parameters
+        match self.spec.kind:
+            case Kind.COPTER:
+                land_high = p["LAND_SPEED_HIGH"] or p["WPNAV_SPEED_DN"]
+                return Tuning(
+                    cruise_mps=p["WPNAV_SPEED"] / 100,
+                    climb_mps=p["WPNAV_SPEED_UP"] / 100,
+                    descent_mps=land_high / 100,
+                    land_mps=p["LAND_SPEED"] / 100,
+                    return_up_m=p["RTL_ALT"] / 100,
+                    loiter_radius_m=10.0,
+                    acceptance_m=p["WPNAV_RADIUS"] / 100,
+                    setpoint_timeout_s=p["GUID_TIMEOUT"],
+                    disarm_delay_s=p["DISARM_DELAY"],
+                )
+            case Kind.PLANE:
+                return Tuning(
+                    cruise_mps=p["AIRSPEED_CRUISE"],
+                    climb_mps=5.0,
+                    descent_mps=5.0,
+                    land_mps=2.0,
+                    return_up_m=p["RTL_ALTITUDE"],
+                    loiter_radius_m=p["WP_LOITER_RAD"],
+                    acceptance_m=p["WP_RADIUS"],
+                    setpoint_timeout_s=3.0,
+                    disarm_delay_s=0.0,
+                )
+        return Tuning(
+            cruise_mps=p["WP_SPEED"] or p["CRUISE_SPEED"],
+            climb_mps=0.0,
+            descent_mps=0.0,
+            land_mps=0.0,
+            return_up_m=0.0,
+            loiter_radius_m=p["LOIT_RADIUS"],
+            acceptance_m=p["WP_RADIUS"],
+            setpoint_timeout_s=3.0,
+            disarm_delay_s=0.0,
+        )
+
+    def default_streams(self) -> Mapping[int, float]:
+        """Next to nothing until somebody asks."""
+        return {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, dialect.MAVLINK_MSG_ID_TIMESYNC: 10.0}
+
+    def base_mode(self, autopilot: "Autopilot") -> int:
+        """Flags of the mode."""
+        flags: int = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        if autopilot.modes.mode.automatic:
+            flags |= dialect.MAV_MODE_FLAG_GUIDED_ENABLED
+        flags |= dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
+        if self.spec.kind is Kind.COPTER:
+            flags |= dialect.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+        if autopilot.arming.armed:
+            flags |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        return flags
+
+    def mode_number(self, base_mode: int, main: int, sub: int) -> int | None:
+        """The second parameter is the mode."""
+        return main if base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED else None
+
+    def checks_sensors(self, autopilot: "Autopilot") -> bool:
+        """Unless the checks are switched off."""
+        return autopilot.parameters["ARMING_CHECK"] != 0

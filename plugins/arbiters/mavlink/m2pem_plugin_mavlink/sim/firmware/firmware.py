@@ -1,0 +1,108 @@
+"""What a firmware decides: numbers, names, modes, defaults, wording."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+from m2pem_plugin_mavlink.sim.modes import Mode
+from m2pem_plugin_mavlink.sim.parameters import Parameters
+from m2pem_plugin_mavlink.sim.part import Part
+from m2pem_plugin_mavlink.sim.specification import VehicleSpec
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink.sim.autopilot import Autopilot
+
+
+class Tuning(NamedTuple):
+    """How the vehicle behaves, read from its parameters, whatever the firmware calls them."""
+
+    cruise_mps: float
+    climb_mps: float
+    descent_mps: float
+    land_mps: float
+    return_up_m: float
+    loiter_radius_m: float
+    acceptance_m: float
+    setpoint_timeout_s: float
+    disarm_delay_s: float
+
+
+class Roles(NamedTuple):
+    """Which mode (custom_mode) does what; None: this kind of vehicle has none."""
+
+    hold: int
+    guided: int
+    mission: int
+    back: int
+    land: int | None
+
+
+class Firmware(ABC):
+    """ArduPilot or PX4, on one kind of vehicle."""
+
+    autopilot_id: ClassVar[int]
+    """MAV_AUTOPILOT."""
+    version: ClassVar[int]
+    """As in AUTOPILOT_VERSION.flight_sw_version."""
+    capabilities: ClassVar[int]
+    """MAV_PROTOCOL_CAPABILITY."""
+    mission_has_home: ClassVar[bool]
+    """Item 0 of a mission is the home position."""
+    asks_for_items_as_int: ClassVar[bool]
+    """It asks with MISSION_REQUEST_INT rather than with MISSION_REQUEST."""
+    reason_position: str
+    reason_sensors: str
+    loop_hz: float
+    first_mode: int
+    roles: Roles
+
+    def __init__(self, spec: VehicleSpec) -> None:
+        self.spec = spec
+
+    @property
+    @abstractmethod
+    def vehicle_type(self) -> int:
+        """MAV_TYPE."""
+
+    @abstractmethod
+    def modes(self) -> Sequence[Mode]:
+        """All its modes."""
+
+    @abstractmethod
+    def parameters(self) -> Mapping[str, float]:
+        """All its parameters, with their defaults."""
+
+    @abstractmethod
+    def parameter_type(self, name: str) -> int:
+        """MAV_PARAM_TYPE."""
+
+    @abstractmethod
+    def tuning(self, parameters: Parameters) -> Tuning:
+        """What the parameters say."""
+
+    @abstractmethod
+    def default_streams(self) -> Mapping[int, float]:
+        """What is sent unasked: message id to interval in seconds."""
+
+    @abstractmethod
+    def base_mode(self, autopilot: "Autopilot") -> int:
+        """MAV_MODE_FLAG, as HEARTBEAT has it."""
+
+    @abstractmethod
+    def mode_number(self, base_mode: int, main: int, sub: int) -> int | None:
+        """The custom_mode that the parameters of DO_SET_MODE mean; None: no custom mode."""
+
+    def parts(self) -> Sequence[type[Part]]:
+        """What only this firmware has; their commands replace those of other parts."""
+        return ()
+
+    def checks_sensors(self, autopilot: "Autopilot") -> bool:
+        """Arming waits until sensors are well, whatever the mode."""
+        return True
+
+    def arming_text(self, reason: str) -> str:
+        """How it says that it does not arm."""
+        return f"Arm: {reason}"
+
+    def mode_entered(self, autopilot: "Autopilot") -> None:  # noqa: B027  # most say nothing
+        """A mode has been entered: what it says or sends then."""

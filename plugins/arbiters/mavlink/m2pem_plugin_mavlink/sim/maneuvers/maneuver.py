@@ -1,0 +1,57 @@
+"""A maneuver: what a vehicle does while it is armed and in a mode."""
+
+from typing import TYPE_CHECKING
+
+from m2pem_plugin_mavlink.sim.demands import Circle, Demand, Drive, Reach
+from m2pem_plugin_mavlink.sim.geometry import Point
+from m2pem_plugin_mavlink.sim.specification import Kind
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink.sim.autopilot import Autopilot
+
+
+class Maneuver:
+    """Made when its mode is entered, gone when it is left."""
+
+    def __init__(self, autopilot: "Autopilot") -> None:
+        self.autopilot = autopilot
+
+    def refusal(self) -> str | None:
+        """Why it cannot be begun now, as ArduPilot words it; None: it can. Changes nothing."""
+        return None
+
+    def begin(self) -> None:
+        """Its mode has been entered; it may be armed or not."""
+
+    def end(self) -> None:
+        """Its mode has been left."""
+
+    def step(self, dt_s: float) -> Demand:
+        """What the body is to do now. Asked only while armed."""
+        raise NotImplementedError
+
+    def stay(self, point: Point) -> Demand:
+        """Remain at a point: a copter hovers, a rover stands, a boat keeps station, a plane
+        circles."""
+        tuning = self.autopilot.tuning
+        match self.autopilot.spec.kind:
+            case Kind.ROVER:
+                return Drive(0.0)
+            case Kind.PLANE:
+                return Circle(point, tuning.loiter_radius_m, tuning.cruise_mps)
+            case Kind.BOAT:
+                if self.autopilot.position.distance_m(point) <= tuning.loiter_radius_m:
+                    return Drive(0.0)
+        return self.reach(point, yaw_rad=self.autopilot.body.yaw_rad)
+
+    def reach(self, point: Point, *, yaw_rad: float | None = None) -> Reach:
+        """Go to a point at the speed that is set."""
+        tuning = self.autopilot.tuning
+        return Reach(
+            point,
+            self.autopilot.modes.speed_mps,
+            tuning.climb_mps,
+            tuning.descent_mps,
+            yaw_rad,
+            self.autopilot.modes.reverse,
+        )

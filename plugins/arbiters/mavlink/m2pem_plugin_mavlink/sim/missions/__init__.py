@@ -1,0 +1,1 @@
+"""Plans (mission, fence, rally points): storing them, their protocol, flying the mission."""

@@ -1,0 +1,210 @@
+"""The legs of a mission: one item of navigation each, from its beginning until it is done."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from m2pem_plugin_mavlink.sim.demands import Circle, Demand, Drive, Reach
+from m2pem_plugin_mavlink.sim.geometry import Location, Point, wrapped_rad
+from m2pem_plugin_mavlink.sim.maneuvers.landing import come_down
+from m2pem_plugin_mavlink.sim.maneuvers.maneuver import Maneuver
+from m2pem_plugin_mavlink.sim.maneuvers.returning import ReturnToLaunch
+from m2pem_plugin_mavlink.sim.missions.plan import Item
+from m2pem_plugin_mavlink.sim.specification import Kind
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink.sim.autopilot import Autopilot
+
+SURFACE = (Kind.ROVER, Kind.BOAT)
+
+
+class Leg(Maneuver):
+    """Goes to the item's place, and is done there. `done`: go on to the next item."""
+
+    done = False
+
+    def __init__(self, autopilot: "Autopilot", item: Item) -> None:
+        super().__init__(autopilot)
+        self.item = item
+        self.place = self._place()
+        self._there_s = -1.0
+
+    def _place(self) -> Point:
+        """Where it says, or where the vehicle is; at its height, or (0) at the present one."""
+        pilot, item = self.autopilot, self.item
+        point = pilot.position
+        if item.has_place:
+            point = pilot.frame.to_point(Location(item.latitude_deg, item.longitude_deg, 0.0))
+        if pilot.spec.kind in SURFACE:
+            return point.at_height(0.0)
+        if item.z == 0 and not item.has_place:
+            return point.at_height(pilot.body.up_m)
+        return point.at_height(pilot.guided.up_m(item.z, item.frame))
+
+    @property
+    def arrived(self) -> bool:
+        """It is within the radius of acceptance."""
+        pilot = self.autopilot
+        radius_m = max(pilot.tuning.acceptance_m, 0.5)
+        near = pilot.position.distance_m(self.place) <= radius_m
+        return near and abs(self.place.up_m - pilot.body.up_m) <= max(radius_m, 2.0)
+
+    def step(self, dt_s: float) -> Demand:
+        """Go there; once there, whatever is to be done there."""
+        if self._there_s < 0 and self.arrived:
+            self._there_s = 0.0
+        if self._there_s < 0:
+            return self.reach(self.place)
+        self._there_s += dt_s
+        return self.there(dt_s)
+
+    def there(self, dt_s: float) -> Demand:
+        """It has arrived: wait as long as the first parameter says (planes don't wait)."""
+        plane = self.autopilot.spec.kind is Kind.PLANE
+        self.done = plane or self._there_s > self.item.param1
+        return self.stay(self.place)
+
+
+class Takeoff(Leg):
+    """Climb to the height; a plane does so along its heading."""
+
+    def _place(self) -> Point:
+        pilot = self.autopilot
+        up_m = pilot.guided.up_m(self.item.z, self.item.frame)
+        if pilot.spec.kind is Kind.PLANE:
+            return pilot.position.moved(pilot.body.yaw_rad, 3000.0).at_height(up_m)
+        return pilot.position.at_height(up_m)
+
+    def step(self, dt_s: float) -> Demand:
+        """Up."""
+        near_m = 2.0 if self.autopilot.spec.kind is Kind.PLANE else 0.5
+        self.done = self.place.up_m - self.autopilot.body.up_m <= near_m
+        yaw_rad = None if self.autopilot.spec.kind is Kind.PLANE else self.autopilot.body.yaw_rad
+        return self.reach(self.place, yaw_rad=yaw_rad)
+
+
+class Loiter(Leg):
+    """Stay there for ever."""
+
+    def there(self, dt_s: float) -> Demand:
+        """Stay, or go around if there is a radius."""
+        return self.stay(self.place)
+
+
+class LoiterTime(Loiter):
+    """Stay there as many seconds as the first parameter says."""
+
+    def there(self, dt_s: float) -> Demand:
+        """Stay."""
+        self.done = self._there_s >= self.item.param1
+        return super().there(dt_s)
+
+
+class LoiterTurns(Leg):
+    """Go around as often as the first parameter says; the third is the radius."""
+
+    _turned_rad = 0.0
+    _bearing_rad: float | None = None
+
+    def step(self, dt_s: float) -> Demand:
+        """Go around, and count."""
+        pilot = self.autopilot
+        radius_m = self.item.param3 or pilot.tuning.loiter_radius_m
+        distance_m = pilot.position.distance_m(self.place)
+        bearing = self.place.bearing_rad(pilot.position)
+        if abs(distance_m - abs(radius_m)) < max(2.0, abs(radius_m) / 3):
+            if self._bearing_rad is not None:
+                self._turned_rad += abs(wrapped_rad(bearing - self._bearing_rad))
+            self._bearing_rad = bearing
+        self.done = self._turned_rad >= math.tau * self.item.param1
+        return Circle(self.place, radius_m, pilot.modes.speed_mps)
+
+
+class LoiterToAltitude(Leg):
+    """Go there, and be done at the height."""
+
+    def there(self, dt_s: float) -> Demand:
+        """It was there at that height."""
+        self.done = True
+        return self.stay(self.place)
+
+
+class Return(Leg):
+    """RTL, within the mission."""
+
+    def __init__(self, autopilot: "Autopilot", item: Item) -> None:
+        super().__init__(autopilot, item)
+        self._return = ReturnToLaunch(autopilot)
+        self._return.begin()
+
+    def step(self, dt_s: float) -> Demand:
+        """Home; a copter has then landed, a rover stands, a plane circles for ever."""
+        demand = self._return.step(dt_s)
+        pilot = self.autopilot
+        if pilot.spec.kind in SURFACE:
+            self.done = self._return.arrived
+        elif pilot.spec.kind is Kind.COPTER:
+            self.done = not pilot.arming.armed
+        return demand
+
+
+class Land(Leg):
+    """Go there at the present height, and come down; a plane glides there."""
+
+    def _place(self) -> Point:
+        up_m = self.autopilot.body.up_m
+        return super()._place().at_height(up_m)
+
+    def step(self, dt_s: float) -> Demand:
+        """Come down."""
+        if self.autopilot.spec.kind is not Kind.PLANE:
+            return super().step(dt_s)
+        pilot = self.autopilot
+        if pilot.body.on_ground:
+            if pilot.body.ground_speed_mps < 1.0:
+                self.done = True
+                pilot.arming.disarm_after_landing()
+            return Drive(0.0)
+        seconds = pilot.position.distance_m(self.place) / max(pilot.body.ground_speed_mps, 1.0)
+        sink_mps = min(pilot.tuning.descent_mps, pilot.body.up_m / max(seconds, 1.0))
+        speed_mps = pilot.modes.speed_mps
+        return Reach(self.place.at_height(-10.0), speed_mps, 0.0, max(sink_mps, 0.5))
+
+    def there(self, dt_s: float) -> Demand:
+        """Down; on the ground the motors stop."""
+        demand = come_down(self, self.place)
+        self.done = self.autopilot.body.on_ground
+        return demand
+
+
+class Delay(Leg):
+    """Wait as many seconds as the first parameter says."""
+
+    def step(self, dt_s: float) -> Demand:
+        """Wait here."""
+        self._there_s = max(self._there_s, 0.0) + dt_s
+        self.done = self._there_s >= self.item.param1
+        return self.stay(self.place)
+
+    def _place(self) -> Point:
+        return self.autopilot.position
+
+
+LEGS: Mapping[int, type[Leg]] = {
+    16: Leg,
+    17: Loiter,
+    18: LoiterTurns,
+    19: LoiterTime,
+    20: Return,
+    21: Land,
+    22: Takeoff,
+    31: LoiterToAltitude,
+    82: Leg,
+    93: Delay,
+}
+"""By MAV_CMD; one for each of `items.NAVIGATION`."""
+
+
+def leg_of(autopilot: "Autopilot", item: Item) -> Leg:
+    """What flies an item of navigation."""
+    return LEGS[item.command](autopilot, item)

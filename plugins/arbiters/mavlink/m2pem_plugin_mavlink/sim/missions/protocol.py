@@ -1,0 +1,212 @@
+"""The mission protocol as ArduPilot serves it (mavlink.io, "Mission Protocol"; ArduPilot's
+MissionItemProtocol): upload, partial upload, download, clearing."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.sim.missions.items import ACCEPTED, fault_of, item_of, message_of
+from m2pem_plugin_mavlink.sim.missions.plan import FENCE, MISSION, RALLY, Item
+from m2pem_plugin_mavlink.sim.missions.upload import Upload
+from m2pem_plugin_mavlink.sim.part import MessageHandler, Part
+from m2pem_plugin_mavlink.sim.peers import Heard
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink.sim.autopilot import Autopilot
+
+ERROR, UNSUPPORTED, NO_SPACE = 1, 3, 4
+INVALID, INVALID_SEQUENCE, DENIED, CANCELLED = 5, 13, 14, 15
+"""MAV_MISSION_RESULT."""
+ALL = 255
+"""MAV_MISSION_TYPE of a request to clear all plans."""
+MOST_ITEMS: Mapping[int, int] = {MISSION: 724, FENCE: 200, RALLY: 30}
+NAMES: Mapping[int, str] = {MISSION: "Mission", FENCE: "Fence", RALLY: "Rally"}
+RECEIVED: Mapping[int, str] = {MISSION: "Flight plan received", RALLY: "Rally points received"}
+TOTALS: Mapping[int, str] = {MISSION: "MIS_TOTAL", FENCE: "FENCE_TOTAL", RALLY: "RALLY_TOTAL"}
+"""Parameters that count the items."""
+
+
+class MissionServer(Part):
+    """Takes and gives plans. One upload at a time; a second uploader is denied."""
+
+    def __init__(self, autopilot: "Autopilot") -> None:
+        super().__init__(autopilot)
+        self.upload: Upload | None = None
+
+    def messages(self) -> Mapping[str, MessageHandler]:
+        """The protocol."""
+        return {
+            "MISSION_COUNT": self._begin,
+            "MISSION_WRITE_PARTIAL_LIST": self._begin_partial,
+            "MISSION_ITEM_INT": self._take,
+            "MISSION_ITEM": self._take,
+            "MISSION_REQUEST_LIST": self._count,
+            "MISSION_REQUEST_INT": self._give,
+            "MISSION_REQUEST": self._give,
+            "MISSION_CLEAR_ALL": self._clear,
+            "MISSION_ACK": self._acknowledged,
+        }
+
+    def step(self, dt_s: float) -> None:
+        """Ask again for what did not come; give up at last."""
+        upload, now_s = self.upload, self.autopilot.now_s
+        if upload is None:
+            return
+        if upload.abandoned(now_s):
+            self.upload = None
+            self.autopilot.warn(f"{NAMES[upload.kind]} upload timeout")
+            self._acknowledge(upload.uploader, upload.kind, CANCELLED)
+        elif upload.should_ask(now_s):
+            self._ask(upload)
+
+    def _begin(self, message: Any, sender: Heard) -> None:
+        kind, count = message.mission_type, message.count
+        if not self._may_upload(kind, sender):
+            return
+        if count > MOST_ITEMS[kind]:
+            self._acknowledge(sender, kind, NO_SPACE)
+            return
+        plans = self.autopilot.plans
+        plans[kind] = plans[kind][:count]
+        self._counted(kind)
+        if count == 0:
+            self._complete(sender, kind)
+        else:
+            self._start(sender, kind, 0, count)
+
+    def _begin_partial(self, message: Any, sender: Heard) -> None:
+        kind, first, last = message.mission_type, message.start_index, message.end_index
+        if not self._may_upload(kind, sender):
+            return
+        if not 0 <= first <= last < len(self.autopilot.plans[kind]):
+            self.autopilot.warn("Flight plan update rejected")
+            self._acknowledge(sender, kind, ERROR)
+            return
+        self._start(sender, kind, first, last + 1)
+
+    def _may_upload(self, kind: int, sender: Heard) -> bool:
+        if kind not in MOST_ITEMS:
+            self._acknowledge(sender, kind, UNSUPPORTED)
+            return False
+        other = self.upload is not None and self.upload.uploader != sender
+        if other:
+            self._acknowledge(sender, kind, DENIED)
+        return not other
+
+    def _start(self, sender: Heard, kind: int, first: int, end: int) -> None:
+        now_s = self.autopilot.now_s
+        self.upload = Upload(sender, kind, first, end, now_s, now_s)
+        self._ask(self.upload)
+
+    def _ask(self, upload: Upload) -> None:
+        upload.asked_s = self.autopilot.now_s
+        make = dialect.MAVLink_mission_request_message
+        if self.autopilot.firmware.asks_for_items_as_int:
+            make = dialect.MAVLink_mission_request_int_message
+        to = upload.uploader
+        message = make(to.system, to.component, upload.next, upload.kind)
+        self.autopilot.send(message, to.peer)
+
+    def _take(self, message: Any, sender: Heard) -> None:
+        upload, kind = self.upload, message.mission_type
+        if upload is None or kind != upload.kind:
+            self._acknowledge(sender, kind, ERROR)
+            return
+        if message.seq != upload.next:
+            self._acknowledge(sender, kind, INVALID_SEQUENCE)
+            return
+        if sender != upload.uploader:
+            self._acknowledge(sender, kind, DENIED)
+            return
+        try:
+            item = item_of(message)
+            fault = fault_of(kind, item)
+        except (ValueError, OverflowError):
+            fault = INVALID
+        if fault != ACCEPTED:
+            self.upload = None
+            self._acknowledge(sender, kind, fault)
+            return
+        self.autopilot.plans.put(kind, upload.next, item)
+        self._counted(kind)
+        upload.heard_s = self.autopilot.now_s
+        upload.next += 1
+        if upload.next < upload.end:
+            self._ask(upload)
+        else:
+            self.upload = None
+            self._complete(sender, kind)
+
+    def _complete(self, sender: Heard, kind: int) -> None:
+        self._acknowledge(sender, kind, ACCEPTED)
+        if kind in RECEIVED:
+            self.autopilot.say(RECEIVED[kind])
+        self.autopilot.note("upload", f"{NAMES[kind]} {len(self.autopilot.plans[kind])}")
+
+    def _counted(self, kind: int) -> None:
+        if TOTALS[kind] in self.autopilot.parameters:
+            self.autopilot.parameters[TOTALS[kind]] = len(self.autopilot.plans[kind])
+
+    def _count(self, message: Any, sender: Heard) -> None:
+        kind = message.mission_type
+        if kind not in MOST_ITEMS:
+            self._acknowledge(sender, kind, UNSUPPORTED)
+        elif self.upload is not None:
+            self._acknowledge(sender, kind, DENIED)
+        else:
+            count = len(self.autopilot.plans[kind])
+            answer = dialect.MAVLink_mission_count_message(
+                sender.system, sender.component, count, kind
+            )
+            self.autopilot.send(answer, sender.peer)
+
+    def _give(self, message: Any, sender: Heard) -> None:
+        kind, seq, pilot = message.mission_type, message.seq, self.autopilot
+        if kind not in MOST_ITEMS:
+            self._acknowledge(sender, kind, UNSUPPORTED)
+            return
+        if seq >= len(pilot.plans[kind]):
+            self._acknowledge(sender, kind, INVALID_SEQUENCE)
+            return
+        item = pilot.plans[kind][seq]
+        if kind == MISSION and seq == 0 and pilot.firmware.mission_has_home:
+            item = self._home()
+        current = kind == MISSION and seq == pilot.mission.current
+        whole = message.get_type() == "MISSION_REQUEST_INT"
+        to = (sender.system, sender.component)
+        message = message_of(item, seq, kind, current=current, to=to, whole=whole)
+        pilot.send(message, sender.peer)
+
+    def _home(self) -> Item:
+        """Item 0 is the home position, whatever was uploaded there."""
+        pilot = self.autopilot
+        place = pilot.frame.to_location(pilot.home.point)
+        x, y = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
+        return Item(0, 16, 0, 0, 0, 0, x, y, round(place.altitude_amsl_m, 2))
+
+    def _clear(self, message: Any, sender: Heard) -> None:
+        """A mission that is being flown is not cleared."""
+        kind, pilot = message.mission_type, self.autopilot
+        kinds = tuple(MOST_ITEMS) if kind == ALL else (kind,)
+        if kind != ALL and kind not in MOST_ITEMS:
+            self._acknowledge(sender, kind, UNSUPPORTED)
+        elif self.upload is not None:
+            self._acknowledge(sender, kind, DENIED)
+        elif MISSION in kinds and pilot.mission.running:
+            self._acknowledge(sender, kind, ERROR)
+        else:
+            for each in kinds:
+                pilot.plans[each] = ()
+                self._counted(each)
+            self._acknowledge(sender, kind, ACCEPTED)
+
+    def _acknowledged(self, message: Any, sender: Heard) -> None:
+        """The end of a download, or an uploader that gives up."""
+        upload = self.upload
+        if message.type == CANCELLED and upload is not None and upload.uploader == sender:
+            self.upload = None
+
+    def _acknowledge(self, to: Heard, kind: int, result: int) -> None:
+        message = dialect.MAVLink_mission_ack_message(to.system, to.component, result, kind)
+        self.autopilot.send(message, to.peer)

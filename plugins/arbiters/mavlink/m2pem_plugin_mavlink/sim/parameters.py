@@ -1,0 +1,108 @@
+"""Parameters: named numbers that set the vehicle up, and their protocol (mavlink.io, "Parameter
+Protocol"). As with ArduPilot, an unknown name gets no answer at all."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.sim.part import MessageHandler, Part
+from m2pem_plugin_mavlink.sim.peers import Heard, Peer
+
+LIST_BURST = 25
+"""How many of a list are sent in one step, that sockets' buffers do not overflow."""
+
+
+class Parameters:
+    """The values, by name, in the order in which a list has them."""
+
+    def __init__(self, values: Mapping[str, float]) -> None:
+        self._values = {name: float(values[name]) for name in sorted(values)}
+        self._names = list(self._values)
+        self._index = {name: index for index, name in enumerate(self._names)}
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[name]
+
+    def __setitem__(self, name: str, value: float) -> None:
+        if name not in self._values:
+            raise KeyError(name)
+        self._values[name] = float(value)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._values
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def index(self, name: str) -> int:
+        """Its number in the list."""
+        return self._index[name]
+
+    def name(self, index: int) -> str | None:
+        """The name at a number of the list."""
+        return self._names[index] if 0 <= index < len(self._names) else None
+
+
+class ParameterServer(Part):
+    """Answers PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET."""
+
+    def __init__(self, autopilot: Any) -> None:
+        super().__init__(autopilot)
+        self._listing: dict[Peer, Iterator[str]] = {}
+
+    def messages(self) -> Mapping[str, MessageHandler]:
+        """The protocol."""
+        return {
+            "PARAM_REQUEST_LIST": self._list,
+            "PARAM_REQUEST_READ": self._read,
+            "PARAM_SET": self._set,
+        }
+
+    def step(self, dt_s: float) -> None:
+        """Send more of the lists that were asked for."""
+        for peer, names in list(self._listing.items()):
+            for _ in range(LIST_BURST):
+                name = next(names, None)
+                if name is None:
+                    del self._listing[peer]
+                    break
+                self._send(name, peer, self.autopilot.parameters.index(name))
+
+    def _list(self, message: Any, sender: Heard) -> None:
+        self._listing[sender.peer] = iter(self.autopilot.parameters)
+
+    def _read(self, message: Any, sender: Heard) -> None:
+        parameters = self.autopilot.parameters
+        name: str | None = message.param_id
+        if message.param_index != -1:
+            name = parameters.name(message.param_index)
+        if name is not None and name in parameters:
+            self._send(name, sender.peer, parameters.index(name))
+
+    def _set(self, message: Any, sender: Heard) -> None:
+        """Everybody is told of the new value."""
+        name, parameters = message.param_id, self.autopilot.parameters
+        if name not in parameters:
+            return
+        value = message.param_value
+        if math.isfinite(value):
+            parameters[name] = value
+        self._send(name, None, 0xFFFF)
+
+    def _send(self, name: str, to: Peer | None, index: int) -> None:
+        parameters = self.autopilot.parameters
+        self.autopilot.send(
+            dialect.MAVLink_param_value_message(
+                name.encode(),
+                parameters[name],
+                self.autopilot.firmware.parameter_type(name),
+                len(parameters),
+                index,
+            ),
+            to,
+        )

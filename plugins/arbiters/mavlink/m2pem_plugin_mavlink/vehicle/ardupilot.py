@@ -1,0 +1,239 @@
+"""How ArduPilot is driven: ArduCopter, ArduPlane, ArduRover (boats too) and ArduSub."""
+
+import contextlib
+import math
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.microservices.commands import CommandPlace
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedError
+from m2pem_plugin_mavlink.vehicle import exchanges
+from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot, cannot, not_now
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.identity import Kind
+
+STOP_WITHIN_S = 3.0
+"""The mode in which it stops is commanded for so long before another one is tried."""
+
+TAKEOFF_ATTEMPTS = 3
+PLANE_PITCH_DEG = 15.0
+
+_FRAMES = {
+    "relative": dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    "amsl": dialect.MAV_FRAME_GLOBAL,
+    "terrain": dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+}
+_STOP_MODES = {
+    # BRAKE stops hardest, and whatever the sticks say: from 10 m/s within 4 s, from 5 m/s within 3.
+    Kind.COPTER: ("BRAKE", "LOITER"),
+    Kind.PLANE: ("LOITER",),  # it never stands: it circles where it was
+    Kind.VTOL: ("LOITER",),
+    Kind.ROVER: ("HOLD",),
+    Kind.BOAT: ("LOITER", "HOLD"),
+    Kind.SUB: ("POSHOLD", "ALT_HOLD"),
+}
+_WINGED = frozenset({Kind.PLANE, Kind.VTOL})
+
+
+class ArdupilotDriver(Autopilot):
+    """Drives a vehicle with ArduPilot; see `Driver`."""
+
+    home_items = 1
+
+    async def _command_mode(self, custom_mode: int) -> None:
+        await exchanges.command(
+            self.link,
+            dialect.MAV_CMD_DO_SET_MODE,
+            float(dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED),
+            float(custom_mode),
+        )
+
+    async def _enter_arming_mode(self) -> None:
+        """GUIDED, which is refused as long as there is no position: an arming in STABILIZE would
+        succeed without one, and the takeoff then fail. A plane that is armed in GUIDED would set
+        out at once; it is armed in the mode that it is in."""
+        if self.kind not in _WINGED:
+            await self.set_mode(FlightMode.GUIDED)
+
+    async def _have_it_checked(self) -> None:
+        with contextlib.suppress(ExchangeError):  # older ones do not know the command
+            await exchanges.command(self.link, dialect.MAV_CMD_RUN_PREARM_CHECKS)
+
+    # --- up and down ----------------------------------------------------------------------------
+
+    async def take_off(self, altitude_m: float) -> None:
+        """Arm where needed, and climb to so much above home. A plane does that by a mission, which
+        takes the place of the one that it has."""
+        match self.kind:
+            case Kind.COPTER:
+                await self._copter_takes_off(altitude_m)
+            case Kind.PLANE | Kind.VTOL:
+                await self._plane_takes_off(altitude_m)
+            case _:
+                raise cannot(f"a {self.kind} does not take off")
+
+    async def _copter_takes_off(self, altitude_m: float) -> None:
+        if self.in_the_air:
+            await self.go_to(self._here(altitude_m))
+            return
+        for attempt in range(1, TAKEOFF_ATTEMPTS + 1):
+            await self.arm()
+            await self.set_mode(FlightMode.GUIDED)
+            try:
+                await exchanges.command(
+                    self.link, dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, altitude_m
+                )
+            except RefusedError:
+                # A copter that was armed long ago disarms itself; or its position is just lost.
+                if attempt == TAKEOFF_ATTEMPTS:
+                    raise
+                await self.vehicle.sleep(1.0)
+            else:
+                return
+
+    async def _plane_takes_off(self, altitude_m: float) -> None:
+        if self.in_the_air:
+            await self.go_to(self._here(altitude_m))
+            return
+        here = self._here(altitude_m)
+        vtol = self.kind is Kind.VTOL
+        takeoff = dialect.MAV_CMD_NAV_VTOL_TAKEOFF if vtol else dialect.MAV_CMD_NAV_TAKEOFF
+        frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
+        place = (here.latitude_deg, here.longitude_deg, altitude_m)
+        await self.upload(
+            [
+                MissionItem(takeoff, frame, (PLANE_PITCH_DEG, 0.0, 0.0, 0.0), *place),
+                MissionItem(dialect.MAV_CMD_NAV_LOITER_UNLIM, frame, (0.0, 0.0, 0.0, 0.0), *place),
+            ]
+        )
+        await self.start_mission()
+
+    def _here(self, altitude_m: float) -> Place:
+        position = self.heard.position
+        if position is None:
+            raise not_now("its position is not known")
+        return Place(position.latitude_deg, position.longitude_deg, altitude_m)
+
+    async def land(self) -> None:
+        """Land where it is: a plane by the landing of its mission, if that has one."""
+        match self.kind:
+            case Kind.COPTER | Kind.VTOL:
+                await self.set_mode(FlightMode.LAND)
+            case Kind.PLANE:
+                await exchanges.command(self.link, dialect.MAV_CMD_DO_LAND_START)
+                self.ours.custom_mode = self.modes.number("AUTO")
+            case _:
+                raise cannot(f"a {self.kind} does not land")
+
+    async def return_home(self) -> None:
+        """Return to launch."""
+        if self.kind is Kind.SUB:
+            raise cannot("a sub does not return to launch")
+        if self.kind in (Kind.ROVER, Kind.BOAT):
+            await self._arm_to_drive()
+        await self.set_mode(FlightMode.RETURN)
+
+    async def stop(self) -> None:
+        """BRAKE, HOLD or LOITER, whatever stops this kind of vehicle best; one that is not armed
+        stands already."""
+        if self.heard.armed is False:
+            return
+        *better, last = _STOP_MODES[self.kind]
+        for name in better:
+            try:
+                await self._change_mode(self.modes.number(name), STOP_WITHIN_S)
+            except RefusedError:
+                continue
+            return
+        await self._change_mode(self.modes.number(last), STOP_WITHIN_S)
+
+    # --- to places ------------------------------------------------------------------------------
+
+    async def go_to(self, place: Place, speed_m_s: float | None = None) -> None:
+        """Go to a place in GUIDED. The speed is set before, since GUIDED begins with its own."""
+        await self._arm_to_drive()
+        await self.set_mode(FlightMode.GUIDED)
+        if speed_m_s is not None:
+            await self.set_speed(speed_m_s)
+        await self._reposition(place, speed_m_s, 0.0)
+        if place.heading_rad is not None and self.kind is Kind.COPTER:
+            await exchanges.command(
+                self.link,
+                dialect.MAV_CMD_CONDITION_YAW,
+                math.degrees(place.heading_rad) % 360.0,
+            )
+
+    async def _reposition(self, place: Place, speed_m_s: float | None, radius_m: float) -> None:
+        frame, altitude_m = self._altitude(place)
+        await exchanges.command_at(
+            self.link,
+            dialect.MAV_CMD_DO_REPOSITION,
+            (
+                -1.0 if speed_m_s is None else speed_m_s,
+                float(dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE),
+                radius_m,
+                math.nan,
+            ),
+            CommandPlace(place.latitude_deg, place.longitude_deg, altitude_m, frame),
+        )
+
+    def _altitude(self, place: Place) -> tuple[int, float]:
+        """A MAV_FRAME and a height in it; ArduPilot takes no NaN for "as it is"."""
+        if self.kind in (Kind.ROVER, Kind.BOAT):
+            return dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, 0.0
+        if place.altitude_m is not None:
+            return _FRAMES[place.altitude_frame], place.altitude_m
+        if self.heard.position is None:
+            raise not_now("its height is not known")
+        return dialect.MAV_FRAME_GLOBAL, self.heard.position.altitude_m
+
+    async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
+        """Only planes can be told to circle a place; the CIRCLE of copters and rovers has no
+        command for its center."""
+        if self.kind not in _WINGED:
+            return False
+        await self._arm_to_drive()
+        await self.set_mode(FlightMode.GUIDED)
+        if speed_m_s is not None:
+            await self.set_speed(speed_m_s)
+        await self._reposition(center, speed_m_s, radius_m)
+        return True
+
+    async def move(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
+        """One velocity setpoint, which holds for 3 s. It does not take the vehicle back from
+        somebody who has left GUIDED."""
+        if self.kind in _WINGED:
+            raise cannot(f"a {self.kind} takes no velocities")
+        guided = self.modes.number("GUIDED")
+        if self.heard.custom_mode != guided:
+            if self._left_by_somebody(guided) and not self.ours.changing:
+                raise not_now(f"it is in mode {self.modes.name(self.heard.custom_mode or 0)} now")
+            await self._arm_to_drive()
+            await self.set_mode(FlightMode.GUIDED)
+        self._send_velocity(velocity_ned_m_s)
+
+    # --- missions -------------------------------------------------------------------------------
+
+    def _as_stored(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
+        """Item 0 is home, which the vehicle replaces by its own."""
+        home = self.heard.home
+        place = (
+            (home.latitude_deg, home.longitude_deg, home.altitude_m) if home else (0.0, 0.0, 0.0)
+        )
+        frame = dialect.MAV_FRAME_GLOBAL
+        return (MissionItem(dialect.MAV_CMD_NAV_WAYPOINT, frame, (0.0,) * 4, *place), *items)
+
+    async def start_mission(self, first: int = 0) -> None:
+        """Fly the stored mission from an item on, arming where needed. From the ground a copter
+        wants a mission that begins with a takeoff, and MISSION_START; a plane sets out when it is
+        armed, and so is armed last."""
+        if self.kind not in _WINGED:
+            await self.arm()
+        self.heard.reached_sequence = None
+        await exchanges.set_current(self.link, first + self.home_items)
+        await self.set_mode(FlightMode.MISSION)
+        if self.kind in _WINGED:
+            await self.arm()
+        elif self.kind is Kind.COPTER and not self.in_the_air:
+            await exchanges.command(self.link, dialect.MAV_CMD_MISSION_START)

@@ -1,0 +1,313 @@
+"""What the drivers of all autopilots share: to command, and to believe what is then heard."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Awaitable, Callable, Sequence
+from typing import TYPE_CHECKING
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.protocol.messages import message_type
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
+from m2pem_plugin_mavlink.vehicle import exchanges
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Readiness
+from m2pem_plugin_mavlink.vehicle.identity import Identity, Kind
+from m2pem_plugin_mavlink.vehicle.modes import modes_of
+from m2pem_plugin_mavlink.vehicle.readiness import TEXTS_WITHIN_S, readiness, unlocated
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+LOCATED_WITHIN_S = 90.0
+"""An ArduPilot has a position some 41 s after it was switched on."""
+
+CHECKED_WITHIN_S = 20.0
+"""Pre-arm checks may fail for a while: gyros warm up, a change of mode is not yet looked at."""
+
+MODE_WITHIN_S = 10.0
+ARM_WITHIN_S = 20.0
+SHOWS_WITHIN_S = 2.5
+"""A heartbeat comes every second, and one of them may be lost."""
+
+RETRY_S = 1.0
+
+_SET_POSITION_TARGET = message_type("SET_POSITION_TARGET_LOCAL_NED")
+_VELOCITY_ONLY = (
+    dialect.POSITION_TARGET_TYPEMASK_X_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_Y_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_Z_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_AX_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_AY_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_AZ_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
+)
+_UNSUPPORTED: int = dialect.MAV_RESULT_UNSUPPORTED
+_LATER: int = dialect.MAV_RESULT_TEMPORARILY_REJECTED
+
+
+def cannot(reason: str) -> RefusedError:
+    """It is not even asked: it has no such thing."""
+    return RefusedError(reason, _UNSUPPORTED)
+
+
+def not_now(reason: str) -> RefusedError:
+    """It is not asked as it stands."""
+    return RefusedError(reason, _LATER, temporary=True)
+
+
+class Autopilot(ABC):
+    """Implements `Driver`, but for what each make of autopilot has its own way of."""
+
+    home_items: int
+    """How many items of a stored mission stand before the first real one."""
+
+    def __init__(self, vehicle: "Vehicle", identity: Identity) -> None:
+        self.vehicle = vehicle
+        self.identity = identity
+        self.kind: Kind = identity.kind
+        self.name: str = identity.firmware
+        self.modes = modes_of(identity)
+        self.link = vehicle.link
+        self.heard = vehicle.heard
+        self.ours = vehicle.ours
+
+    # --- what it says ---------------------------------------------------------------------------
+
+    def mode_name(self, custom_mode: int) -> str:
+        """The autopilot's own name of a mode."""
+        return self.modes.name(custom_mode)
+
+    def flight_mode(self, custom_mode: int) -> FlightMode:
+        """What a mode is for."""
+        return self.modes.purpose(custom_mode)
+
+    def readiness(self) -> Readiness:
+        """Whether it may be armed now."""
+        texts = self.vehicle.recent_texts(TEXTS_WITHIN_S)
+        return readiness(self.identity.firmware, self.heard, texts, self.link.now_s())
+
+    @property
+    def current_item(self) -> int | None:
+        """The item that the vehicle moves to, numbered as in `upload`."""
+        return self._item(self.heard.mission_sequence)
+
+    @property
+    def reached_item(self) -> int | None:
+        """The item reached last since the mission was started."""
+        return self._item(self.heard.reached_sequence)
+
+    def _item(self, sequence: int | None) -> int | None:
+        if sequence is None or sequence < self.home_items:
+            return None
+        return sequence - self.home_items
+
+    @property
+    def in_the_air(self) -> bool:
+        """Whether it flies."""
+        return bool(self.heard.armed) and self.heard.landed is False
+
+    # --- modes ----------------------------------------------------------------------------------
+
+    async def set_mode(self, mode: FlightMode) -> None:
+        """Change the mode, again and again until its heartbeat shows it, within `MODE_WITHIN_S`.
+
+        Raises:
+            ExchangeError: it does not; one in which a person steers is never commanded.
+        """
+        if mode in (FlightMode.MANUAL, FlightMode.OTHER):
+            raise cannot(f"mode {mode} is for people")
+        custom_mode = self.modes.for_purpose(mode)
+        if custom_mode is None:
+            raise cannot(f"a {self.kind} with {self.name} has no mode for {mode}")
+        await self._change_mode(custom_mode)
+
+    async def _change_mode(self, custom_mode: int, within_s: float = MODE_WITHIN_S) -> None:
+        await self._enter(
+            custom_mode,
+            lambda: self._command_mode(custom_mode),
+            lambda: self.heard.custom_mode == custom_mode,
+            within_s,
+        )
+
+    @abstractmethod
+    async def _command_mode(self, custom_mode: int) -> None: ...
+
+    async def _enter(
+        self,
+        custom_mode: int,
+        command: Callable[[], Awaitable[None]],
+        shows: Callable[[], bool],
+        within_s: float = MODE_WITHIN_S,
+        *,
+        must_accept: bool = False,
+    ) -> None:
+        """Give a command that changes the mode, and note that the change is ours."""
+        before = self.ours.custom_mode
+        self.ours.custom_mode = custom_mode
+        self.ours.changing += 1
+        name = f"mode {self.modes.name(custom_mode)}"
+        try:
+            await self._repeat(command, shows, within_s, name, must_accept=must_accept)
+        except RefusedError:
+            self.ours.custom_mode = before
+            raise
+        finally:
+            self.ours.changing -= 1
+
+    async def _repeat(
+        self,
+        command: Callable[[], Awaitable[None]],
+        shows: Callable[[], bool],
+        within_s: float,
+        what: str,
+        *,
+        must_accept: bool = False,
+    ) -> None:
+        """Command until what is heard shows that it is so: an acknowledgement may be lost, and a
+        refusal may be for now. `must_accept`: that it is so proves nothing, as it may have been
+        before."""
+        end_s = self.link.now_s() + within_s
+        while True:
+            error: ExchangeError = NoAnswerError(f"{what} was accepted, but does not come")
+            accepted, wait_s = False, RETRY_S
+            try:
+                await command()
+                accepted, wait_s = True, SHOWS_WITHIN_S
+            except RefusedError as refused:
+                error = refused
+                if refused.result == _UNSUPPORTED:
+                    raise
+            except NoAnswerError as silence:
+                error = silence
+            if must_accept and not accepted:
+                await self.vehicle.sleep(wait_s)
+            elif await self.vehicle.until(shows, wait_s):
+                return
+            if self.link.now_s() >= end_s:
+                raise error
+
+    # --- arming ---------------------------------------------------------------------------------
+
+    async def arm(self) -> None:
+        """Wait until it knows where it is and its checks pass, within `LOCATED_WITHIN_S` and
+        `CHECKED_WITHIN_S`, and arm it, until its heartbeat shows it. An armed vehicle is left as it
+        is.
+
+        Raises:
+            ExchangeError: it is not ready (and why), or refuses.
+        """
+        if self.heard.armed:
+            return
+        if not await self.vehicle.until(self._is_located, LOCATED_WITHIN_S):
+            raise self._not_ready()
+        # What its other checks say may be of the mode that it is in: some cannot be armed.
+        await self._enter_arming_mode()
+        if not self.readiness().ready:
+            await self._have_it_checked()
+        if not await self.vehicle.until(lambda: self.readiness().ready, CHECKED_WITHIN_S):
+            raise self._not_ready()
+        await self._arm()
+
+    def _is_located(self) -> bool:
+        return not unlocated(self.identity.firmware, self.heard, self.link.now_s())
+
+    def _not_ready(self) -> RefusedError:
+        return not_now("not ready: " + "; ".join(self.readiness().reasons))
+
+    async def _have_it_checked(self) -> None:  # noqa: B027  # only ArduPilot can be asked
+        """Have it say now why it cannot be armed; else it does that every 30 s."""
+
+    @abstractmethod
+    async def _enter_arming_mode(self) -> None: ...
+
+    async def _arm(self) -> None:
+        await self._repeat(
+            lambda: exchanges.command(self.link, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0),
+            lambda: self.heard.armed is True,
+            ARM_WITHIN_S,
+            "arming",
+        )
+        self.ours.disarming = False
+
+    async def disarm(self) -> None:
+        """Disarm; refused in flight."""
+        if self.heard.armed is False:
+            return
+        self.ours.disarming = True
+        try:
+            await exchanges.command(self.link, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+        except RefusedError:
+            self.ours.disarming = False
+            raise
+        if not await self.vehicle.until(lambda: self.heard.armed is False, 2 * SHOWS_WITHIN_S):
+            raise NoAnswerError("disarming was accepted, but does not come")
+
+    async def _arm_to_drive(self) -> None:
+        """What drives is armed when it is to move; what flies takes off first."""
+        if self.heard.armed:
+            return
+        if self.kind in (Kind.COPTER, Kind.PLANE, Kind.VTOL):
+            raise not_now("it stands on the ground, not armed: it must take off first")
+        await self.arm()
+
+    # --- velocity -------------------------------------------------------------------------------
+
+    def _send_velocity(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
+        north, east, down = velocity_ned_m_s
+        self.link.send(
+            _SET_POSITION_TARGET.make(
+                target_system=self.link.address.system,
+                target_component=self.link.address.component,
+                coordinate_frame=dialect.MAV_FRAME_LOCAL_NED,
+                type_mask=_VELOCITY_ONLY,
+                vx=north,
+                vy=east,
+                vz=down,
+            )
+        )
+
+    def _left_by_somebody(self, custom_mode: int) -> bool:
+        """Whether it was brought into a mode from here and is in another one now."""
+        return self.ours.custom_mode == custom_mode and self.heard.custom_mode != custom_mode
+
+    # --- missions -------------------------------------------------------------------------------
+
+    async def upload(self, items: Sequence[MissionItem]) -> None:
+        """Store a mission of items that begin with the first real one; none: clear it."""
+        self.ours.mission = None
+        self.ours.exchanging += 1
+        try:
+            if items:
+                await exchanges.upload(self.link, self._as_stored(tuple(items)))
+            else:
+                await exchanges.clear(self.link)
+        finally:
+            self.ours.exchanging -= 1
+        self.ours.mission = tuple(items)
+        self.heard.reached_sequence = None
+
+    def _as_stored(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
+        return items
+
+    async def downloaded(self) -> tuple[MissionItem, ...]:
+        """The mission that the vehicle has, as `upload` takes it."""
+        self.ours.exchanging += 1
+        try:
+            return (await exchanges.download(self.link))[self.home_items :]
+        finally:
+            self.ours.exchanging -= 1
+
+    # --- speed ----------------------------------------------------------------------------------
+
+    async def set_speed(self, speed_m_s: float) -> None:
+        """The speed over ground of what follows (of a plane: through the air)."""
+        air = self.kind is Kind.PLANE
+        type_ = dialect.SPEED_TYPE_AIRSPEED if air else dialect.SPEED_TYPE_GROUNDSPEED
+        await exchanges.command(
+            self.link, dialect.MAV_CMD_DO_CHANGE_SPEED, float(type_), speed_m_s, -1.0
+        )
+
+    async def command(self, command: int, *params: float) -> None:
+        """Any command that has no method of its own."""
+        await exchanges.command(self.link, command, *params)

@@ -1,0 +1,79 @@
+"""The exchanges that a vehicle is driven by, each in one call.
+
+Raises of all of them: `ExchangeError`, see the exchange.
+"""
+
+from collections.abc import Sequence
+
+from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
+from m2pem_plugin_mavlink.microservices.commands import Command, CommandPlace
+from m2pem_plugin_mavlink.microservices.intervals import RequestMessage, SetMessageInterval
+from m2pem_plugin_mavlink.microservices.mission_download import DownloadMission
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.microservices.mission_upload import UploadMission
+from m2pem_plugin_mavlink.microservices.missions import (
+    ClearMission,
+    ReadMissionItem,
+    SetCurrentItem,
+)
+from m2pem_plugin_mavlink.microservices.parameter_values import ParameterEncoding
+from m2pem_plugin_mavlink.microservices.parameters import ReadParameter
+from m2pem_plugin_mavlink.vehicle.identity import Firmware
+
+_ENCODINGS = {
+    Firmware.ARDUPILOT: ParameterEncoding.C_CAST,
+    Firmware.PX4: ParameterEncoding.BYTEWISE,
+}
+
+
+async def command(link: VehicleLink, command_id: int, *params: float) -> None:
+    """A command with its first parameters; the others are 0."""
+    await link.perform(Command(link.address, command_id, params))
+
+
+async def command_at(
+    link: VehicleLink, command_id: int, params: Sequence[float], place: CommandPlace
+) -> None:
+    """A command with a place."""
+    await link.perform(Command(link.address, command_id, params, place=place))
+
+
+async def message_interval(link: VehicleLink, message_id: int, interval_s: float) -> None:
+    """Have a message sent so often, by the vehicle's clock, or as often as it can be."""
+    await link.perform(SetMessageInterval(link.address, message_id, interval_s))
+
+
+async def request_message(link: VehicleLink, name: str) -> None:
+    """Have a message sent once; who listens to it hears it."""
+    await link.perform(RequestMessage(link.address, name, lambda message: message))
+
+
+async def upload(link: VehicleLink, items: Sequence[MissionItem]) -> None:
+    """Store a mission, as it is to be stored."""
+    await link.perform(UploadMission(link.address, items))
+
+
+async def download(link: VehicleLink) -> tuple[MissionItem, ...]:
+    """The mission that is stored, as it is stored."""
+    return await link.perform(DownloadMission(link.address))
+
+
+async def clear(link: VehicleLink) -> None:
+    """Store no mission."""
+    await link.perform(ClearMission(link.address))
+
+
+async def set_current(link: VehicleLink, sequence: int) -> None:
+    """Have the stored mission go on at an item."""
+    await link.perform(SetCurrentItem(link.address, sequence))
+
+
+async def mission_item(link: VehicleLink, sequence: int) -> MissionItem:
+    """One item of the stored mission, outside of a download."""
+    return await link.perform(ReadMissionItem(link.address, sequence))
+
+
+async def parameter(link: VehicleLink, firmware: Firmware, name: str) -> float:
+    """The value of a parameter."""
+    found = await link.perform(ReadParameter(link.address, name, _ENCODINGS[firmware]))
+    return found.value

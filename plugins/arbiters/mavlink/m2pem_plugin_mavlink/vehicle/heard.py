@@ -1,0 +1,66 @@
+"""What was heard of a vehicle last."""
+
+from dataclasses import dataclass, field
+
+from m2pem.api import GeoPosition
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode
+
+
+@dataclass(slots=True)
+class Heard:
+    """What was heard of a vehicle last; None: not heard yet. Frames and units as in VehicleState.
+
+    `changes` counts the messages that were taken in. By the link's clock: `at_s` and `heartbeat_s`
+    are when the last message and the last heartbeat came, `boot_s` when it was first heard since it
+    was switched on; `boots` counts how often that was. `landed`: stands on the ground
+    (EXTENDED_SYS_STATE, or where that is not sent, what the heights and speeds say).
+    """
+
+    # The vehicle
+    position: GeoPosition | None = None
+    altitude_above_home_m: float | None = None
+    altitude_above_terrain_m: float | None = None
+    velocity_enu_m_s: tuple[float, float, float] | None = None
+    roll_rad: float | None = None
+    pitch_rad: float | None = None
+    yaw_rad: float | None = None
+    home: GeoPosition | None = None
+    landed: bool | None = None
+    battery_fraction: float | None = None
+    # What it is about
+    custom_mode: int | None = None
+    mode: FlightMode = FlightMode.OTHER
+    armed: bool | None = None
+    mission_sequence: int | None = None
+    mission_total: int | None = None
+    reached_sequence: int | None = None
+    waypoint_distance_m: float | None = None
+    # Whether it is ready: GPS_FIX_TYPE, EKF_STATUS_FLAGS (the same as ESTIMATOR_STATUS_FLAGS as far
+    # as positions go), and the bit MAV_SYS_STATUS_PREARM_CHECK, None where it is not in use
+    gps_fix: int | None = None
+    estimator_flags: int | None = None
+    prearm_passed: bool | None = None
+    # The hearing itself
+    changes: int = 0
+    at_s: float | None = None
+    heartbeat_s: float | None = None
+    boot_s: float | None = None
+    boots: int = 0
+    messages_s: dict[int, float] = field(default_factory=dict)
+    """When each kind of message came last, by its id."""
+
+    @property
+    def speed_m_s(self) -> float:
+        """Over ground and in height; infinite while it is not known."""
+        if self.velocity_enu_m_s is None:
+            return float("inf")
+        east, north, up = self.velocity_enu_m_s
+        return float((east * east + north * north + up * up) ** 0.5)
+
+    def forget_the_last_boot(self) -> None:
+        """It was switched off in between: what it then was ready for it need not be now."""
+        self.gps_fix = self.estimator_flags = self.prearm_passed = None
+        self.position = self.home = self.velocity_enu_m_s = self.yaw_rad = None
+        self.altitude_above_home_m = self.altitude_above_terrain_m = None
+        self.landed = self.reached_sequence = None
+        self.messages_s.clear()

@@ -1,0 +1,73 @@
+"""Which autopilot a vehicle has, and what kind of vehicle it is: from its HEARTBEAT."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+
+class Firmware(StrEnum):
+    """Whose autopilot it is (MAV_AUTOPILOT)."""
+
+    ARDUPILOT = "ArduPilot"
+    PX4 = "PX4"
+
+
+class Kind(StrEnum):
+    """What flies, drives or swims, as far as autopilots drive them differently (MAV_TYPE)."""
+
+    COPTER = "copter"
+    PLANE = "plane"
+    VTOL = "vtol"
+    ROVER = "rover"
+    BOAT = "boat"
+    SUB = "sub"
+
+
+ON_THE_GROUND = frozenset({Kind.ROVER, Kind.BOAT, Kind.SUB})
+"""Kinds that never fly."""
+
+_FIRMWARES = {
+    dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: Firmware.ARDUPILOT,
+    dialect.MAV_AUTOPILOT_PX4: Firmware.PX4,
+}
+_KINDS = {
+    **dict.fromkeys(
+        (
+            dialect.MAV_TYPE_QUADROTOR,
+            dialect.MAV_TYPE_COAXIAL,
+            dialect.MAV_TYPE_HELICOPTER,
+            dialect.MAV_TYPE_HEXAROTOR,
+            dialect.MAV_TYPE_OCTOROTOR,
+            dialect.MAV_TYPE_TRICOPTER,
+            dialect.MAV_TYPE_DODECAROTOR,
+            dialect.MAV_TYPE_DECAROTOR,
+        ),
+        Kind.COPTER,
+    ),
+    dialect.MAV_TYPE_FIXED_WING: Kind.PLANE,
+    **dict.fromkeys(
+        range(dialect.MAV_TYPE_VTOL_DUOROTOR, dialect.MAV_TYPE_VTOL_RESERVED5 + 1),
+        Kind.VTOL,
+    ),
+    dialect.MAV_TYPE_GROUND_ROVER: Kind.ROVER,
+    dialect.MAV_TYPE_SURFACE_BOAT: Kind.BOAT,
+    dialect.MAV_TYPE_SUBMARINE: Kind.SUB,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What a heartbeat says of its sender."""
+
+    firmware: Firmware
+    kind: Kind
+
+    def __str__(self) -> str:
+        return f"{self.firmware} {self.kind}"
+
+
+def identity(autopilot: int, type_: int) -> Identity | None:
+    """Who sends a HEARTBEAT with these fields; None: no vehicle that can be driven here."""
+    firmware, kind = _FIRMWARES.get(autopilot), _KINDS.get(type_)
+    return None if firmware is None or kind is None else Identity(firmware, kind)

@@ -1,0 +1,193 @@
+"""How PX4 is driven."""
+
+import asyncio
+import math
+from collections.abc import Awaitable, Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.microservices.commands import CommandPlace
+from m2pem_plugin_mavlink.protocol.transaction import RefusedError
+from m2pem_plugin_mavlink.vehicle import exchanges
+from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot, cannot, not_now
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND
+
+SETPOINTS_BEFORE_S = 1.0
+SETPOINT_EVERY_S = 0.2
+"""OFFBOARD is entered only while setpoints come in, for some time before."""
+
+_CUSTOM = float(dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
+_AMSL: int = dialect.MAV_FRAME_GLOBAL
+_UNSUPPORTED = dialect.MAV_RESULT_UNSUPPORTED
+
+
+class Px4Driver(Autopilot):
+    """Drives a vehicle with PX4; see `Driver`.
+
+    It goes to places in AUTO.LOITER, so that this is also its mode for `FlightMode.GUIDED`;
+    OFFBOARD is entered by `move` alone.
+    """
+
+    home_items = 0
+
+    async def set_mode(self, mode: FlightMode) -> None:
+        """Change the mode; see `Autopilot`. It may be refused for a while: a mission that was
+        just uploaded is not yet known to be one."""
+        await super().set_mode(FlightMode.HOLD if mode is FlightMode.GUIDED else mode)
+
+    async def _command_mode(self, custom_mode: int) -> None:
+        main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
+        await exchanges.command(
+            self.link, dialect.MAV_CMD_DO_SET_MODE, _CUSTOM, float(main), float(sub)
+        )
+
+    async def _enter_arming_mode(self) -> None:
+        """A mode that holds its place: one for people may want a stick to be there."""
+        await self.set_mode(FlightMode.HOLD)
+
+    # --- up and down ----------------------------------------------------------------------------
+
+    async def take_off(self, altitude_m: float) -> None:
+        """Arm where needed, and climb to so much above home."""
+        if self.kind in ON_THE_GROUND:
+            raise cannot(f"a {self.kind} does not take off")
+        position = self.heard.position
+        if self.in_the_air and position is not None:
+            await self.go_to(Place(position.latitude_deg, position.longitude_deg, altitude_m))
+            return
+        await self.arm()
+        amsl_m = self._amsl(altitude_m, "relative")
+        nan = math.nan
+        takeoff = self.modes.number("AUTO.TAKEOFF")
+        await self._enter(
+            takeoff,
+            lambda: exchanges.command(
+                self.link, dialect.MAV_CMD_NAV_TAKEOFF, nan, nan, nan, nan, nan, nan, amsl_m
+            ),
+            lambda: self.heard.custom_mode == takeoff or self.in_the_air,
+            must_accept=True,
+        )
+
+    async def land(self) -> None:
+        """Land where it is."""
+        if self.kind in ON_THE_GROUND:
+            raise cannot(f"a {self.kind} does not land")
+        await self.set_mode(FlightMode.LAND)
+
+    async def return_home(self) -> None:
+        """Return to launch."""
+        if self.kind in ON_THE_GROUND:
+            await self._arm_to_drive()
+        await self.set_mode(FlightMode.RETURN)
+
+    async def stop(self) -> None:
+        """AUTO.LOITER, in which it brakes at once; one that is not armed stands already."""
+        if self.heard.armed is not False:
+            await self.set_mode(FlightMode.HOLD)
+
+    # --- to places ------------------------------------------------------------------------------
+
+    async def go_to(self, place: Place, speed_m_s: float | None = None) -> None:
+        """Go to a place and stay there."""
+        await self._arm_to_drive()
+        altitude_m = self._place_amsl(place)
+        heading = math.nan if place.heading_rad is None else place.heading_rad
+        await self._by_command(
+            "AUTO.LOITER",
+            lambda: exchanges.command_at(
+                self.link,
+                dialect.MAV_CMD_DO_REPOSITION,
+                (
+                    -1.0 if speed_m_s is None else speed_m_s,
+                    float(dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE),
+                    0.0,
+                    heading,
+                ),
+                CommandPlace(place.latitude_deg, place.longitude_deg, altitude_m, _AMSL),
+            ),
+        )
+
+    async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
+        """Circle a place without an end, clockwise, looking at it."""
+        if self.kind in ON_THE_GROUND:
+            return False
+        await self._arm_to_drive()
+        altitude_m = self._place_amsl(center)
+        try:
+            await self._by_command(
+                "POSCTL.ORBIT",
+                lambda: exchanges.command_at(
+                    self.link,
+                    dialect.MAV_CMD_DO_ORBIT,
+                    (
+                        radius_m,
+                        math.nan if speed_m_s is None else speed_m_s,
+                        float(dialect.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER),
+                        0.0,
+                    ),
+                    CommandPlace(center.latitude_deg, center.longitude_deg, altitude_m, _AMSL),
+                ),
+            )
+        except RefusedError as refused:
+            if refused.result == _UNSUPPORTED:
+                return False
+            raise
+        return True
+
+    async def _by_command(self, name: str, command: Callable[[], Awaitable[None]]) -> None:
+        number = self.modes.number(name)
+        await self._enter(
+            number, command, lambda: self.heard.custom_mode == number, must_accept=True
+        )
+
+    def _place_amsl(self, place: Place) -> float:
+        if place.altitude_m is None or self.kind in ON_THE_GROUND:
+            return math.nan
+        return self._amsl(place.altitude_m, place.altitude_frame)
+
+    def _amsl(self, altitude_m: float, frame: str) -> float:
+        """PX4 takes heights above the sea, whatever the frame of the command says."""
+        if frame == "amsl":
+            return altitude_m
+        if frame == "terrain":
+            raise cannot("PX4 goes to no height above terrain")
+        if self.heard.home is None:
+            raise not_now("its home is not known, and so no height above it")
+        return self.heard.home.altitude_m + altitude_m
+
+    async def move(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
+        """One velocity setpoint. It does not take the vehicle back from somebody who has left
+        OFFBOARD."""
+        offboard = self.modes.number("OFFBOARD")
+        if self.heard.custom_mode != offboard:
+            if self._left_by_somebody(offboard) and not self.ours.changing:
+                raise not_now(f"it is in mode {self.modes.name(self.heard.custom_mode or 0)} now")
+            await self._arm_to_drive()
+            await self._enter_offboard(offboard, velocity_ned_m_s)
+        self._send_velocity(velocity_ned_m_s)
+
+    async def _enter_offboard(
+        self, offboard: int, velocity_ned_m_s: tuple[float, float, float]
+    ) -> None:
+        setpoints = asyncio.get_running_loop().create_task(self._setpoints(velocity_ned_m_s))
+        try:
+            await self.vehicle.sleep(SETPOINTS_BEFORE_S)
+            await self._change_mode(offboard)
+        finally:
+            setpoints.cancel()
+            await asyncio.wait([setpoints])
+
+    async def _setpoints(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
+        while True:
+            self._send_velocity(velocity_ned_m_s)
+            await self.vehicle.sleep(SETPOINT_EVERY_S)
+
+    # --- missions -------------------------------------------------------------------------------
+
+    async def start_mission(self, first: int = 0) -> None:
+        """Fly the stored mission from an item on, arming where needed."""
+        await self.arm()
+        self.heard.reached_sequence = None
+        await exchanges.set_current(self.link, first)
+        await self.set_mode(FlightMode.MISSION)

@@ -1,0 +1,77 @@
+"""Whether a vehicle may be armed, and if not, why: in words for people.
+
+ArduPilot is believed on its estimator before its pre-arm bit: that is set in STABILIZE long before
+there is a position, and GUIDED cannot be armed without one.
+"""
+
+from collections.abc import Iterable, Iterator
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.vehicle.driver import Readiness
+from m2pem_plugin_mavlink.vehicle.heard import Heard
+from m2pem_plugin_mavlink.vehicle.identity import Firmware
+
+LOW_BATTERY = 0.15
+"""Below this share a vehicle does not set out."""
+
+TEXTS_WITHIN_S = 35.0
+"""An autopilot that cannot be armed says why every 30 s."""
+
+_HAS_POSITION = dialect.EKF_POS_HORIZ_ABS
+_NO_POSITION = dialect.EKF_CONST_POS_MODE
+_FIX_3D = dialect.GPS_FIX_TYPE_3D_FIX
+_REFUSALS = {
+    Firmware.ARDUPILOT: ("PreArm: ", "Arm: "),
+    Firmware.PX4: ("Preflight Fail: ", "Arming denied: ", "Arming denied! "),
+}
+
+
+def readiness(firmware: Firmware, heard: Heard, texts: Iterable[str], now_s: float) -> Readiness:
+    """Whether it may be armed now; `texts`: what it said in the last `TEXTS_WITHIN_S`, newest last.
+
+    A vehicle that is armed already is ready.
+    """
+    if heard.armed:
+        return Readiness(True)
+    if heard.heartbeat_s is None:
+        return Readiness(False, ("link: no heartbeat yet",))
+    reasons = (*unlocated(firmware, heard, now_s), *_reasons(firmware, heard, texts))
+    return Readiness(not reasons, reasons)
+
+
+def unlocated(firmware: Firmware, heard: Heard, now_s: float) -> tuple[str, ...]:
+    """Why it does not know where it is; none: it does. Unlike the rest that does not depend on the
+    mode that it is in."""
+    gps = heard.gps_fix is not None and heard.gps_fix < _FIX_3D
+    return (*(("GPS: no 3D fix",) if gps else ()), *_position_reasons(firmware, heard, now_s))
+
+
+def _reasons(firmware: Firmware, heard: Heard, texts: Iterable[str]) -> Iterator[str]:
+    if heard.prearm_passed is False:
+        said = list(dict.fromkeys(_refusals(firmware, texts)))
+        yield from (f"prearm: {text}" for text in said)
+        if not said:
+            yield "prearm: a check fails, the vehicle does not say which"
+    if heard.battery_fraction is not None and heard.battery_fraction < LOW_BATTERY:
+        yield f"battery at {heard.battery_fraction:.0%}".replace("%", " %")
+
+
+def _position_reasons(firmware: Firmware, heard: Heard, now_s: float) -> Iterator[str]:
+    """A PX4 that sends no ESTIMATOR_STATUS is believed on its pre-arm bit."""
+    waited_s = 0.0 if heard.boot_s is None else now_s - heard.boot_s
+    flags = heard.estimator_flags
+    if flags is None:
+        if firmware is Firmware.ARDUPILOT or heard.prearm_passed is None:
+            yield f"EKF: nothing heard of it yet, {waited_s:.0f} s"
+    elif not flags & _HAS_POSITION or flags & _NO_POSITION:
+        yield f"EKF: no position yet, {waited_s:.0f} s"
+    if firmware is Firmware.PX4 and heard.home is None:
+        yield f"home: not set yet, {waited_s:.0f} s"
+
+
+def _refusals(firmware: Firmware, texts: Iterable[str]) -> Iterator[str]:
+    for text in texts:
+        for prefix in _REFUSALS[firmware]:
+            if text.startswith(prefix):
+                yield text.removeprefix(prefix).strip()

@@ -1,0 +1,83 @@
+"""Which messages a vehicle is asked to send, how often, and when it must be asked again."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from m2pem_plugin_mavlink.protocol.messages import message_type
+from m2pem_plugin_mavlink.vehicle.identity import Firmware
+
+SILENT_INTERVALS = 4.0
+SILENT_AT_LEAST_S = 3.0
+"""A stream that has not come for this many of its intervals, and seconds, has stopped."""
+
+ASK_AGAIN_S = 5.0
+
+_COMMON = {
+    "SYS_STATUS": 1.0,
+    "GPS_RAW_INT": 1.0,
+    "ATTITUDE": 0.25,
+    "LOCAL_POSITION_NED": 0.25,
+    "GLOBAL_POSITION_INT": 0.25,
+    "MISSION_CURRENT": 1.0,
+    "NAV_CONTROLLER_OUTPUT": 1.0,
+    "BATTERY_STATUS": 2.0,
+    "HOME_POSITION": 2.0,
+    "EXTENDED_SYS_STATE": 0.5,
+}
+_OWN = {
+    Firmware.ARDUPILOT: {"EKF_STATUS_REPORT": 1.0, "TERRAIN_REPORT": 1.0},
+    Firmware.PX4: {"ESTIMATOR_STATUS": 1.0, "ALTITUDE": 1.0},
+}
+
+
+def telemetry_streams(firmware: Firmware) -> Mapping[int, float]:
+    """Ids of the messages that `Heard` is made of, and their intervals in seconds."""
+    named = {**_COMMON, **_OWN[firmware]}
+    return MappingProxyType({message_type(name).id: each for name, each in named.items()})
+
+
+class Streams:
+    """What was asked for and what of it comes, without I/O.
+
+    A vehicle forgets what it was asked for when it is switched off, and that may go unnoticed: so
+    what has stopped coming is asked for again, until it is refused. `refused` is not asked for
+    again until the next boot.
+    """
+
+    def __init__(self, wanted: Mapping[int, float]) -> None:
+        self.wanted = dict(wanted)
+        self.refused: set[int] = set()
+        self._asked_s: dict[int, float] = {}
+
+    def forget(self) -> None:
+        """The vehicle has lost what it was asked for."""
+        self.refused.clear()
+        self._asked_s.clear()
+
+    def due(self, came_s: Mapping[int, float], now_s: float) -> list[int]:
+        """The messages that must be asked for now; `came_s`: when each came last.
+
+        One that was asked for and never came is given time: it comes when there is something to
+        say (a home position, say).
+        """
+        due: list[int] = []
+        for id_, interval_s in self.wanted.items():
+            asked_s = self._asked_s.get(id_)
+            if id_ in self.refused:
+                continue
+            if asked_s is None:
+                due.append(id_)
+                continue
+            came = came_s.get(id_)
+            silent_s = max(SILENT_INTERVALS * interval_s, SILENT_AT_LEAST_S)
+            if came is not None and now_s - max(came, asked_s) > max(silent_s, ASK_AGAIN_S):
+                due.append(id_)
+        return due
+
+    def asked(self, id_: int, now_s: float) -> None:
+        """It was asked for a message, and will send it."""
+        self._asked_s[id_] = now_s
+
+    def unanswered(self, id_: int) -> None:
+        """It did not answer; it will be asked again."""
+        self._asked_s.pop(id_, None)

@@ -1,0 +1,426 @@
+"""Vehicles without a network: they move as they are told, in the time of the clock they are lent.
+
+What they are told is kept in `calls`, so that a test sees what was sent. A `Body` outlives the
+arbiter, as a vehicle outlives a restart.
+"""
+
+import asyncio
+import logging
+import math
+from dataclasses import dataclass, field
+
+from m2pem.api import ArbiterContext, Connection, GeoPosition, LinkState, ResourceId, VehicleState
+from m2pem_plugin_mavlink.behaviors.behavior import Job
+from m2pem_plugin_mavlink.behaviors.fingerprint import is_navigation
+from m2pem_plugin_mavlink.foreign import TakeoverWatch
+from m2pem_plugin_mavlink.plane import Plane
+from m2pem_plugin_mavlink.protocol.messages import Address
+from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError, RefusedError
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place, Readiness
+from m2pem_plugin_mavlink.vehicle.heard import Heard
+from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind
+from m2pem_plugin_mavlink.vehicle.ours import Ours
+from m2pem_plugin_mavlink.vehicle.waiters import Waiters
+
+HOME = (47.397742, 8.545594)
+HOME_ALTITUDE_M = 488.0
+STEP_S = 0.1
+SPEED_M_S = 5.0
+TELLS_S = 0.05
+
+MODES = list(FlightMode)
+
+
+@dataclass
+class Body:
+    """A vehicle: where it is and what it was told, east and north of home, up from its ground."""
+
+    domain: str = "air"
+    east: float = 0.0
+    north: float = 0.0
+    up: float = 0.0
+    yaw: float = 0.0
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mode: FlightMode = FlightMode.HOLD
+    armed: bool = False
+    target: tuple[float, float, float] | None = None
+    center: tuple[float, float, float, float] | None = None
+    speed: float = SPEED_M_S
+    mission: tuple = ()
+    current: int | None = None
+    reached: int | None = None
+    heard_by_us: bool = True
+    begun: int = 0
+    calls: list = field(default_factory=list)
+    texts: list = field(default_factory=list)
+    stuck: set = field(default_factory=set)
+    refuses: dict = field(default_factory=dict)
+    circles: bool = False
+    firmware: Firmware = Firmware.ARDUPILOT
+
+    @property
+    def landed(self) -> bool:
+        return self.domain != "air" or self.up < 0.1
+
+    def fly(self, up: float = 20.0) -> "Body":
+        """Have it hover already."""
+        self.up, self.armed, self.mode = up, True, FlightMode.GUIDED
+        return self
+
+    def drive(self) -> "Body":
+        self.armed, self.mode = True, FlightMode.GUIDED
+        return self
+
+    # --- motion ---------------------------------------------------------------------------------
+
+    def step(self, dt: float) -> None:
+        before = (self.east, self.north, self.up)
+        if self.armed:
+            self._move(dt)
+        now = (self.east, self.north, self.up)
+        self.velocity = tuple((b - a) / dt for a, b in zip(before, now, strict=True))
+
+    def _move(self, dt: float) -> None:
+        match self.mode:
+            case FlightMode.GUIDED if self.target:
+                self._towards(self.target, dt)
+            case FlightMode.MISSION:
+                self._follow_mission(dt)
+            case FlightMode.ORBIT if self.center:
+                self._circle(dt)
+            case FlightMode.RETURN:
+                if self._towards((0.0, 0.0, self.up), dt) and self.domain == "air":
+                    self._sink(dt)
+            case FlightMode.LAND:
+                self._sink(dt)
+
+    def _sink(self, dt: float) -> None:
+        self.up = max(0.0, self.up - 2.0 * dt)
+        if self.up == 0.0:
+            self.armed = False
+
+    def _towards(self, place: tuple[float, float, float], dt: float) -> bool:
+        place = place if self.domain == "air" else (place[0], place[1], 0.0)
+        here = (self.east, self.north, self.up)
+        away = math.dist(here, place)
+        if math.dist(here[:2], place[:2]) > 0.01 and self.domain != "air":
+            self.yaw = math.atan2(place[1] - here[1], place[0] - here[0])
+        part = min(1.0, self.speed * dt / away) if away else 1.0
+        self.east, self.north, self.up = (
+            a + (b - a) * part for a, b in zip(here, place, strict=True)
+        )
+        return part == 1.0
+
+    def _circle(self, dt: float) -> None:
+        east, north, up, radius = self.center
+        angle = math.atan2(self.north - north, self.east - east)
+        if abs(math.dist((self.east, self.north), (east, north)) - radius) > 0.5:
+            self._towards((east + radius * math.cos(angle), north + radius * math.sin(angle), up), dt)
+            return
+        angle -= self.speed * dt / radius
+        self.east, self.north = east + radius * math.cos(angle), north + radius * math.sin(angle)
+
+    def _follow_mission(self, dt: float) -> None:
+        while self.current is not None and self.current < len(self.mission):
+            item = self.mission[self.current]
+            if is_navigation(item):
+                level = Plane(HOME).level((item.latitude_deg, item.longitude_deg))
+                if self._towards((*level, item.altitude_m), dt):
+                    self.reached = self.current
+                    self._next()
+                return
+            if item.command == 178:
+                self.speed = item.params[1]
+            self._next()
+
+    def _next(self) -> None:
+        if self.current + 1 < len(self.mission):
+            self.current += 1
+        elif self.firmware is Firmware.PX4:
+            self.mode = FlightMode.HOLD
+
+
+class DoubleDriver:
+    """Tells a body what to do; each call takes a moment, or never ends if it is `stuck`."""
+
+    home_items = 0
+
+    def __init__(self, vehicle: "DoubleVehicle") -> None:
+        self.vehicle = vehicle
+        self.body = vehicle.body
+        self.name = str(self.body.firmware)
+
+    def mode_name(self, custom_mode: int) -> str:
+        return MODES[custom_mode].upper()
+
+    def flight_mode(self, custom_mode: int) -> FlightMode:
+        return MODES[custom_mode]
+
+    def readiness(self) -> Readiness:
+        return Readiness(True)
+
+    async def _tell(self, name: str, *args: object) -> None:
+        self.body.calls.append((name, *args))
+        if name in self.body.stuck:
+            await asyncio.Event().wait()
+        await self.vehicle.sleep(TELLS_S)
+        if not self.body.heard_by_us:
+            await self.vehicle.sleep(5.0)
+            raise NoAnswerError("no answer")
+        if name in self.body.refuses:
+            raise RefusedError(self.body.refuses[name], 4)
+
+    def _enter(self, mode: FlightMode) -> None:
+        self.body.mode = mode
+        self.vehicle.ours.custom_mode = MODES.index(mode)
+        self.vehicle.hear()
+
+    async def set_mode(self, mode: FlightMode) -> None:
+        await self._tell("set_mode", mode)
+        self._enter(mode)
+
+    async def arm(self) -> None:
+        await self._tell("arm")
+        self.body.armed = True
+        self.vehicle.hear()
+
+    async def disarm(self) -> None:
+        await self._tell("disarm")
+        self.vehicle.ours.disarming = True
+        self.body.armed = False
+
+    async def take_off(self, altitude_m: float) -> None:
+        await self._tell("take_off", altitude_m)
+        self.body.armed, self.body.begun = True, self.body.begun + 1
+        self.body.target = (self.body.east, self.body.north, altitude_m)
+        self._enter(FlightMode.GUIDED)
+
+    async def go_to(self, place: Place, speed_m_s: float | None = None) -> None:
+        await self._tell("go_to", place, speed_m_s)
+        self.body.armed = True
+        level = Plane(HOME).level((place.latitude_deg, place.longitude_deg))
+        up = self.body.up if place.altitude_m is None else place.altitude_m
+        if place.altitude_frame == "amsl" and place.altitude_m is not None:
+            up -= HOME_ALTITUDE_M
+        self.body.target, self.body.begun = (*level, up), self.body.begun + 1
+        self.body.speed = speed_m_s or SPEED_M_S
+        if place.heading_rad is not None:
+            self.body.yaw = math.pi / 2 - place.heading_rad
+        holds = self.body.firmware is Firmware.PX4
+        self._enter(FlightMode.HOLD if holds else FlightMode.GUIDED)
+        if holds:
+            self.body.mode = FlightMode.GUIDED  # it moves; what is heard says HOLD
+
+    async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
+        if not self.body.circles:
+            return False
+        await self._tell("orbit", center, radius_m, speed_m_s)
+        level = Plane(HOME).level((center.latitude_deg, center.longitude_deg))
+        self.body.center = (*level, center.altitude_m, radius_m)
+        self._enter(FlightMode.ORBIT)
+        return True
+
+    async def set_speed(self, speed_m_s: float) -> None:
+        await self._tell("set_speed", speed_m_s)
+        self.body.speed = speed_m_s
+
+    async def command(self, command: int, *params: float) -> None:
+        await self._tell("command", command, *params)
+
+    async def upload(self, items) -> None:
+        await self._tell("upload", len(items))
+        self.body.mission = self.vehicle.ours.mission = tuple(items)
+        self.body.reached = None
+
+    async def downloaded(self):
+        await self._tell("downloaded")
+        return self.body.mission
+
+    async def start_mission(self, first: int = 0) -> None:
+        await self._tell("start_mission", first)
+        self.body.armed, self.body.begun = True, self.body.begun + 1
+        self.body.current, self.body.reached = first, None
+        self._enter(FlightMode.MISSION)
+
+    @property
+    def current_item(self) -> int | None:
+        return self.body.current
+
+    @property
+    def reached_item(self) -> int | None:
+        return self.body.reached
+
+    async def stop(self) -> None:
+        await self._tell("stop")
+        if self.body.armed:
+            self._enter(FlightMode.HOLD)
+
+    async def return_home(self) -> None:
+        await self._tell("return_home")
+        self.body.armed, self.body.begun = True, self.body.begun + 1
+        self._enter(FlightMode.RETURN)
+
+    async def land(self) -> None:
+        await self._tell("land")
+        self.body.begun += 1
+        self._enter(FlightMode.LAND)
+
+
+class DoubleLink:
+    address = Address(1, 1)
+
+    def __init__(self, clock) -> None:
+        self._clock = clock
+
+    def now_s(self) -> float:
+        return self._clock.now_us() / 1e6
+
+    def listen(self, ids, listener):
+        return lambda: None
+
+
+class DoubleVehicle:
+    """A body as it is heard ten times a second."""
+
+    def __init__(self, resource: ResourceId, body: Body, clock) -> None:
+        self.resource, self.body, self.domain = resource, body, body.domain
+        kind = Kind.COPTER if body.domain == "air" else Kind.ROVER
+        self._is = Identity(body.firmware, kind)
+        self.link = DoubleLink(clock)
+        self.heard, self.ours = Heard(), Ours()
+        self.driver = DoubleDriver(self)
+        self._clock = clock
+        self._waiters = Waiters(clock)
+        self._watchers = []
+        if body.heard_by_us:
+            self.hear()
+
+    def hear(self) -> None:
+        body, heard = self.body, self.heard
+        if not body.heard_by_us:
+            return
+        latitude, longitude = Plane(HOME).place((body.east, body.north))
+        heard.position = GeoPosition(latitude, longitude, HOME_ALTITUDE_M + body.up)
+        heard.home = GeoPosition(*HOME, HOME_ALTITUDE_M)
+        heard.altitude_above_home_m = heard.altitude_above_terrain_m = body.up
+        heard.velocity_enu_m_s, heard.yaw_rad = body.velocity, body.yaw
+        mode = body.mode
+        if body.firmware is Firmware.PX4 and mode is FlightMode.GUIDED:
+            mode = FlightMode.HOLD
+        heard.mode, heard.custom_mode = mode, MODES.index(mode)
+        heard.armed, heard.landed = body.armed, body.landed
+        heard.at_s = heard.heartbeat_s = self.link.now_s()
+        heard.changes += 1
+        self._waiters.look()
+        for watcher in tuple(self._watchers):
+            watcher()
+
+    @property
+    def identity(self) -> Identity | None:
+        return None if self.heard.at_s is None else self._is
+
+    @property
+    def silent_s(self) -> float | None:
+        return None if self.heard.at_s is None else self.link.now_s() - self.heard.at_s
+
+    @property
+    def link_state(self) -> LinkState:
+        return LinkState.CONNECTED if self.body.heard_by_us else LinkState.LOST
+
+    def state(self) -> VehicleState:
+        heard = self.heard
+        return VehicleState(
+            self.resource,
+            self._clock.now_us(),
+            heard.position,
+            heard.altitude_above_home_m,
+            heard.velocity_enu_m_s,
+            yaw_rad=heard.yaw_rad,
+            mode=heard.mode.upper(),
+            armed=heard.armed,
+            link=self.link_state,
+        )
+
+    def watch(self, watcher):
+        self._watchers.append(watcher)
+        return lambda: self._watchers.remove(watcher)
+
+    async def identified(self, within_s: float) -> bool:
+        return await self.until(lambda: self.heard.at_s is not None, within_s)
+
+    async def until(self, true, within_s: float | None = None) -> bool:
+        return await self._waiters.wait(true, within_s)
+
+    async def sleep(self, seconds: float) -> None:
+        await self._clock.sleep(seconds)
+
+    def recent_texts(self, within_s: float = 5.0) -> tuple[str, ...]:
+        now_s = self.link.now_s()
+        return tuple(text for at_s, text in self.body.texts if now_s - at_s <= within_s)
+
+
+class DoubleStation:
+    """The station of an arbiter, over bodies that stay when it is closed."""
+
+    def __init__(self, bodies: dict[ResourceId, Body], context: ArbiterContext) -> None:
+        self.bodies, self._clock = bodies, context.clock
+        self.vehicles: dict[ResourceId, DoubleVehicle] = {}
+        self._task: asyncio.Task | None = None
+
+    async def open(self):
+        self.vehicles = {
+            resource: DoubleVehicle(resource, body, self._clock)
+            for resource, body in self.bodies.items()
+        }
+        self._task = asyncio.create_task(self._move())
+        return self.vehicles
+
+    def watch(self, vehicle):
+        return TakeoverWatch(vehicle)
+
+    async def _move(self) -> None:
+        while True:
+            await self._clock.sleep(STEP_S)
+            for vehicle in self.vehicles.values():
+                vehicle.body.step(STEP_S)
+                vehicle.hear()
+
+    async def close(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+
+
+class NoBus:
+    def __init__(self) -> None:
+        self.states = {}
+
+    def latest(self, resource):
+        return self.states.get(resource)
+
+    def publish(self, state) -> None:
+        self.states[state.resource] = state
+
+
+def connections(bodies: dict[ResourceId, Body], **more) -> dict[ResourceId, Connection]:
+    return {
+        resource: Connection(
+            resource,
+            body.domain,
+            {"url": "udpin://127.0.0.1:14550", "system_id": number},
+            **more,
+        )
+        for number, (resource, body) in enumerate(bodies.items(), 1)
+    }
+
+
+def job(vehicle: DoubleVehicle, bus=None, **parameters) -> Job:
+    return Job(vehicle, parameters, bus or NoBus(), (*HOME, 488.0), vehicle.link.now_s)
+
+
+def at(east: float, north: float) -> tuple[float, float]:
+    """A place so far from home, in metres."""
+    return Plane(HOME).place((east, north))
+
+
+LOGGER = logging.getLogger("test")

@@ -1,0 +1,414 @@
+import asyncio
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+from mavlink_vehicle_world import (
+    ACCEPTED,
+    AUTO,
+    BRAKE,
+    FAILED,
+    GUIDED,
+    LOITER,
+    READY_FLAGS,
+    RTL,
+    WAITING_FLAGS,
+    Playing,
+    ScriptedLink,
+    copter,
+    fly,
+    plane,
+    rover,
+)
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import Clock
+
+Run = Callable[[Callable[[Clock], Any]], Any]
+
+ARM, SET_MODE = dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_DO_SET_MODE
+TAKEOFF, REPOSITION = dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_DO_REPOSITION
+THERE = Place(47.4, 8.55, 20.0)
+
+
+def commands(link: ScriptedLink) -> list[int]:
+    """What was commanded, in order, without the asking for streams."""
+    named = [each for each in link.sent if each.TYPE.name in ("COMMAND_LONG", "COMMAND_INT")]
+    asking = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+    return [each.command for each in named if each.command != asking]
+
+
+async def in_the_air(link: ScriptedLink, vehicle: Vehicle) -> None:
+    fly(link)
+    await vehicle.until(lambda: vehicle.heard.landed is False and bool(vehicle.heard.armed), 5.0)
+
+
+def test_arming_waits_for_a_position_then_sets_guided_then_arms(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        link.says["EKF_STATUS_REPORT"] = {"flags": WAITING_FLAGS}
+        async with Playing((link, vehicle)):
+            arming = asyncio.get_running_loop().create_task(vehicle.driver.arm())
+            await vehicle.sleep(41.0)
+            assert commands(link) == []
+            link.says["EKF_STATUS_REPORT"] = {"flags": READY_FLAGS}
+            await arming
+            assert commands(link) == [SET_MODE, ARM]
+            assert (link.custom_mode, vehicle.heard.armed) == (GUIDED, True)
+            await vehicle.driver.arm()
+            assert commands(link) == [SET_MODE, ARM]
+
+    virtual(main)
+
+
+def test_a_vehicle_that_does_not_become_ready_is_not_armed_and_says_why(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        link.says["EKF_STATUS_REPORT"] = {"flags": WAITING_FLAGS}
+        async with Playing((link, vehicle)):
+            with pytest.raises(RefusedError, match=r"not ready: EKF: no position yet, 9\d s"):
+                await vehicle.driver.arm()
+            assert commands(link) == []
+
+    virtual(main)
+
+
+def test_a_check_that_fails_in_a_mode_that_cannot_be_armed_is_no_obstacle(virtual: Run) -> None:
+    """A copter that was held on the ground is in BRAKE, disarms itself, and must take off."""
+
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        bit = 0x10000000
+        used = {
+            "onboard_control_sensors_present": bit,
+            "onboard_control_sensors_enabled": bit,
+            "battery_remaining": 90,
+        }
+        accept = link.obey[SET_MODE]
+
+        def obey(message: Any) -> int | None:
+            link.says["SYS_STATUS"] = {**used, "onboard_control_sensors_health": bit}
+            return accept(message)
+
+        link.custom_mode, link.says["SYS_STATUS"], link.obey[SET_MODE] = BRAKE, used, obey
+        async with Playing((link, vehicle)):
+            assert vehicle.state().ready is False
+            await vehicle.driver.arm()
+            assert (link.custom_mode, vehicle.heard.armed) == (GUIDED, True)
+
+    virtual(main)
+
+
+def test_a_vehicle_whose_checks_fail_is_made_to_say_why(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        bit = 0x10000000
+        link.says["SYS_STATUS"] = {
+            "onboard_control_sensors_present": bit,
+            "onboard_control_sensors_enabled": bit,
+            "battery_remaining": 90,
+        }
+
+        def say(_: Any) -> int:
+            link.say("PreArm: Compass not calibrated")
+            return ACCEPTED
+
+        link.obey[dialect.MAV_CMD_RUN_PREARM_CHECKS] = say
+        async with Playing((link, vehicle)):
+            with pytest.raises(RefusedError, match="not ready: prearm: Compass not calibrated"):
+                await vehicle.driver.arm()
+            assert ARM not in commands(link)
+
+    virtual(main)
+
+
+def test_guided_is_repeated_until_the_heartbeat_shows_it(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            accept, tries = link.obey[SET_MODE], []
+
+            def obey(message: Any) -> int | None:
+                tries.append(message)
+                return accept(message) if len(tries) > 3 else FAILED
+
+            link.obey[SET_MODE] = obey
+            await vehicle.driver.set_mode(FlightMode.GUIDED)
+            assert (len(tries), vehicle.heard.custom_mode) == (4, GUIDED)
+            assert vehicle.ours.custom_mode == GUIDED
+
+    virtual(main)
+
+
+def test_a_mode_that_is_acknowledged_but_does_not_come_is_no_success(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            link.obey[SET_MODE] = lambda _: ACCEPTED
+            with pytest.raises(NoAnswerError, match="mode GUIDED was accepted, but does not come"):
+                await vehicle.driver.set_mode(FlightMode.GUIDED)
+
+    virtual(main)
+
+
+def test_a_mode_that_comes_without_an_acknowledgement_is_a_success(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            accept = link.obey[SET_MODE]
+
+            def obey(message: Any) -> None:
+                assert accept(message) == ACCEPTED
+
+            link.obey[SET_MODE] = obey
+            await vehicle.driver.set_mode(FlightMode.GUIDED)
+            assert vehicle.heard.mode is FlightMode.GUIDED
+
+    virtual(main)
+
+
+def test_a_mode_that_stays_refused_is_refused_and_not_ours(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            link.obey[SET_MODE] = lambda _: FAILED
+            with pytest.raises(RefusedError):
+                await vehicle.driver.set_mode(FlightMode.MISSION)
+            assert (vehicle.ours.custom_mode, vehicle.ours.changing) == (None, 0)
+
+    virtual(main)
+
+
+@pytest.mark.parametrize("mode", [FlightMode.MANUAL, FlightMode.OTHER, FlightMode.TAKEOFF])
+def test_modes_of_people_and_modes_that_are_not_there_are_not_commanded(
+    virtual: Run, mode: FlightMode
+) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            with pytest.raises(RefusedError):
+                await vehicle.driver.set_mode(mode)
+            assert commands(link) == []
+
+    virtual(main)
+
+
+def test_arming_is_tried_again_and_the_heartbeat_is_believed(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            answers: list[int | None] = [FAILED, FAILED]
+
+            def obey(message: Any) -> int | None:
+                if answers:
+                    return answers.pop()
+                link.armed = True
+                return None  # the acknowledgement is lost
+
+            link.obey[ARM] = obey
+            await vehicle.driver.arm()
+            assert vehicle.heard.armed is True
+
+    virtual(main)
+
+
+def test_a_copter_takes_off_in_guided_after_arming(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            await vehicle.driver.take_off(15.0)
+            assert commands(link) == [SET_MODE, ARM, SET_MODE, TAKEOFF]
+            assert link.of("COMMAND_LONG", TAKEOFF)[0].param7 == 15.0
+
+    virtual(main)
+
+
+def test_a_takeoff_that_is_refused_is_tried_again_with_arming(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+
+            def refuse(message: Any) -> int:
+                link.armed = False
+                link.heartbeat()
+                del link.obey[TAKEOFF]
+                return FAILED
+
+            link.obey[TAKEOFF] = refuse
+            await vehicle.driver.take_off(15.0)
+            assert commands(link).count(ARM) == 2
+            assert commands(link)[-1] == TAKEOFF
+
+    virtual(main)
+
+
+def test_a_takeoff_in_the_air_is_a_climb(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            await in_the_air(link, vehicle)
+            await vehicle.driver.take_off(30.0)
+            (there,) = link.of("COMMAND_INT", REPOSITION)
+            assert (there.x, there.y, there.z) == (473977420, 85455940, 30.0)
+            assert TAKEOFF not in commands(link)
+
+    virtual(main)
+
+
+def test_what_drives_neither_takes_off_nor_lands(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(rover(clock)) as (link, vehicle):
+            with pytest.raises(RefusedError, match="a rover does not take off"):
+                await vehicle.driver.take_off(10.0)
+            with pytest.raises(RefusedError, match="a rover does not land"):
+                await vehicle.driver.land()
+            assert commands(link) == []
+
+    virtual(main)
+
+
+@pytest.mark.parametrize(("frame", "number"), [("relative", 3), ("amsl", 0), ("terrain", 10)])
+def test_a_place_is_told_in_its_altitude_frame(virtual: Run, frame: str, number: int) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            await in_the_air(link, vehicle)
+            await vehicle.driver.go_to(Place(47.4, 8.55, 20.0, frame), 5.0)
+            (there,) = link.of("COMMAND_INT", REPOSITION)
+            assert (there.frame, there.x, there.y, there.z) == (
+                number, 474_000_000, 85_500_000, 20.0,
+            )  # fmt: skip
+            assert (there.param1, there.param2) == (5.0, 1.0)
+            assert commands(link) == [SET_MODE, dialect.MAV_CMD_DO_CHANGE_SPEED, REPOSITION]
+
+    virtual(main)
+
+
+def test_a_place_without_a_height_is_at_the_height_that_it_has(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            await in_the_air(link, vehicle)
+            await vehicle.driver.go_to(Place(47.4, 8.55, heading_rad=math.pi / 2))
+            (there,) = link.of("COMMAND_INT", REPOSITION)
+            assert (there.frame, there.z) == (0, 498.0)
+            (yaw,) = link.of("COMMAND_LONG", dialect.MAV_CMD_CONDITION_YAW)
+            assert yaw.param1 == pytest.approx(90.0)
+
+    virtual(main)
+
+
+def test_a_copter_on_the_ground_goes_nowhere_and_a_rover_is_armed(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            with pytest.raises(RefusedError, match="it must take off first"):
+                await vehicle.driver.go_to(THERE)
+            assert commands(link) == []
+        async with Playing(rover(clock)) as (link, vehicle):
+            await vehicle.driver.go_to(THERE)
+            assert link.armed
+            assert link.of("COMMAND_INT", REPOSITION)[0].z == 0.0
+
+    virtual(main)
+
+
+def test_a_copter_brakes_and_where_that_is_refused_loiters(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            await vehicle.driver.stop()
+            assert commands(link) == []  # it is not armed
+            await in_the_air(link, vehicle)
+            await vehicle.driver.stop()
+            await vehicle.driver.stop()
+            assert link.custom_mode == BRAKE
+            accept = link.obey[SET_MODE]
+            link.custom_mode = GUIDED
+            await vehicle.until(lambda: vehicle.heard.custom_mode == GUIDED)
+            link.obey[SET_MODE] = lambda each: FAILED if each.param2 == BRAKE else accept(each)
+            await vehicle.driver.stop()
+            assert link.custom_mode == LOITER
+
+    virtual(main)
+
+
+def test_orbits_are_for_planes(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            await in_the_air(link, vehicle)
+            assert await vehicle.driver.orbit(THERE, 30.0, None) is False
+            assert commands(link) == []
+        async with Playing(plane(clock)) as (link, vehicle):
+            await in_the_air(link, vehicle)
+            assert await vehicle.driver.orbit(THERE, 80.0, None) is True
+            assert link.of("COMMAND_INT", REPOSITION)[0].param3 == 80.0
+
+    virtual(main)
+
+
+def test_velocities_go_out_in_guided_and_do_not_fight_for_it(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            await in_the_air(link, vehicle)
+            await vehicle.driver.move((3.0, 1.0, -0.5))
+            (setpoint,) = link.of("SET_POSITION_TARGET_LOCAL_NED")
+            assert (setpoint.vx, setpoint.vy, setpoint.vz) == (3.0, 1.0, -0.5)
+            assert (setpoint.type_mask, setpoint.coordinate_frame) == (0xDC7, 1)
+            link.custom_mode = LOITER
+            await vehicle.until(lambda: vehicle.heard.custom_mode == LOITER)
+            with pytest.raises(ExchangeError, match="it is in mode LOITER now"):
+                await vehicle.driver.move((3.0, 1.0, -0.5))
+            assert link.custom_mode == LOITER
+
+    virtual(main)
+
+
+def test_a_return_is_rtl_and_a_disarming_is_noted_as_ours(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            await in_the_air(link, vehicle)
+            await vehicle.driver.return_home()
+            assert link.custom_mode == RTL
+            await vehicle.driver.disarm()
+            assert (link.armed, vehicle.ours.disarming) == (False, True)
+
+    virtual(main)
+
+
+def test_a_disarming_in_flight_is_refused_once(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            await in_the_air(link, vehicle)
+            link.obey[ARM] = lambda _: FAILED
+            with pytest.raises(RefusedError):
+                await vehicle.driver.disarm()
+            assert (commands(link), vehicle.ours.disarming) == ([ARM], False)
+
+    virtual(main)
+
+
+def test_a_mission_on_the_ground_is_started_armed_and_with_its_first_item(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            await vehicle.driver.start_mission()
+            assert (link.custom_mode, link.armed) == (AUTO, True)
+            assert commands(link)[-1] == dialect.MAV_CMD_MISSION_START
+
+    virtual(main)
+
+
+def test_a_plane_is_armed_last_since_it_sets_out_then(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(plane(clock)) as (link, vehicle):
+            await vehicle.driver.start_mission()
+            assert commands(link)[-1] == ARM
+            assert link.custom_mode == 10
+
+    virtual(main)
+
+
+def test_home_is_not_counted_among_the_items(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            driver = vehicle.driver
+            assert (driver.current_item, driver.reached_item) == (None, None)
+            link.says["MISSION_CURRENT"] = {"seq": 0, "total": 3}
+            await vehicle.until(lambda: vehicle.heard.mission_sequence == 0, 3.0)
+            assert driver.current_item is None
+            link.says["MISSION_CURRENT"] = {"seq": 3, "total": 3}
+            await vehicle.until(lambda: vehicle.heard.mission_sequence == 3, 3.0)
+            assert driver.current_item == 2
+
+    virtual(main)

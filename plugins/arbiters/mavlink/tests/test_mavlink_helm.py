@@ -1,0 +1,238 @@
+"""Taking over, being taken over, falling silent: who steers a vehicle."""
+
+import pytest
+
+from m2pem.api import BehaviorState, LinkState, Point, Route
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode
+from mavlink_double import Body, at
+from mavlink_play import V, after_a_restart, play
+
+FAILED, CANCELLED, RUNNING = BehaviorState.FAILED, BehaviorState.CANCELLED, BehaviorState.RUNNING
+FAR = Point((*at(800, 0), 20.0))
+WAY = Route(((*at(300, 0), 20.0), (*at(300, 300), 20.0)))
+
+
+async def flying(bench, behavior="goto", **parameters) -> None:
+    await bench.start("r1.b1", behavior, V, **(parameters or {"target": FAR}))
+    await bench.running("r1.b1")
+
+
+def test_a_cancel_stops_the_vehicle_and_says_so() -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        await bench.arbiter.cancel("r1.b1", 1)
+        assert (await bench.ended("r1.b1", 10)).state is CANCELLED
+        assert bench.body.mode is FlightMode.HOLD
+
+    play(Body().fly(), main)
+
+
+@pytest.mark.parametrize("stuck", ["upload", "start_mission"])
+def test_a_cancel_does_not_wait_for_an_exchange_in_flight(stuck) -> None:
+    async def main(bench) -> None:
+        bench.body.stuck.add(stuck)
+        await bench.start("r1.b1", "single_vehicle_routing", V, route=WAY)
+        await bench.clock.sleep(1)
+        await bench.arbiter.cancel("r1.b1", 1)
+        end = await bench.ended("r1.b1", 1.0)
+        assert end.state is CANCELLED
+
+    play(Body().fly(), main)
+
+
+def test_a_vehicle_that_does_not_stop_is_a_failure_within_the_bound() -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        bench.body.stuck.add("stop")
+        await bench.arbiter.cancel("r1.b1", 1)
+        end = await bench.ended("r1.b1", bench.arbiter.limits(V).cancel_timeout_s)
+        assert (end.state, end.code) == (FAILED, "TIMEOUT")
+
+    play(Body().fly(), main)
+
+
+def test_what_preempts_takes_over_without_a_stop() -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        target = Point((*at(0, 40), 20.0))
+        await bench.start("r1.b2", "goto", V, target=target, preempts=("r1.b1",))
+        assert (await bench.ended("r1.b2", 60)).state is BehaviorState.SUCCEEDED
+        assert bench.told == ["go_to", "go_to"]
+        assert bench.states_of("r1.b1")[-1] is CANCELLED
+
+    play(Body().fly(), main)
+
+
+def test_what_preempts_a_cancel_in_flight_takes_over() -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        bench.body.stuck.add("stop")
+        await bench.arbiter.cancel("r1.b1", 1)
+        target = Point((*at(0, 40), 20.0))
+        await bench.start("r1.b2", "goto", V, target=target, preempts=("r1.b1",))
+        assert (await bench.ended("r1.b2", 60)).state is BehaviorState.SUCCEEDED
+        assert bench.states_of("r1.b1") == [BehaviorState.ACCEPTED, RUNNING, CANCELLED]
+
+    play(Body().fly(), main)
+
+
+@pytest.mark.parametrize(
+    ("mode", "held"),
+    [
+        (FlightMode.MANUAL, False),
+        (FlightMode.HOLD, False),
+        (FlightMode.RETURN, False),
+        (FlightMode.MANUAL, True),
+        (FlightMode.GUIDED, True),
+    ],
+)
+def test_a_mode_that_nobody_here_asked_for_fails_the_behavior_and_is_not_fought(
+    mode, held
+) -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        if held:
+            await bench.arbiter.hold(V)
+        await bench.clock.sleep(3)
+        told = len(bench.told)
+        bench.body.mode = mode
+        end = await bench.ended("r1.b1", 10)
+        assert (end.state, end.code) == (FAILED, "TAKEN_OVER"), end
+        assert mode.upper() in end.reason
+        await bench.clock.sleep(20)
+        assert len(bench.told) == told, "nothing is sent any more"
+        assert bench.body.mode is mode
+
+    play(Body().fly(), main)
+
+
+def test_after_being_taken_over_it_can_be_commanded_again() -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        bench.body.mode = FlightMode.MANUAL
+        await bench.ended("r1.b1", 10)
+        await bench.start("r1.b2", "goto", V, target=Point((*at(30, 0), 20.0)))
+        assert (await bench.ended("r1.b2", 60)).state is BehaviorState.SUCCEEDED
+
+    play(Body().fly(), main)
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("Battery 1 low voltage failsafe", "BATTERY_LOW"),
+        ("GCS Failsafe", "FAILED"),
+        ("EKF Failsafe: changed to LAND Mode", "FAILED"),
+    ],
+)
+def test_a_failsafe_fails_the_behavior_with_its_text(text, code) -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        bench.body.texts.append((bench.clock.now_us() / 1e6, text))
+        bench.body.mode = FlightMode.RETURN
+        end = await bench.ended("r1.b1", 10)
+        assert (end.state, end.code) == (FAILED, code)
+        assert text in end.reason
+
+    play(Body().fly(), main)
+
+
+def test_a_mission_that_somebody_else_disarms_fails() -> None:
+    async def main(bench) -> None:
+        await flying(bench, "goto", target=Point((*at(300, 0), None)))
+        bench.body.armed = False
+        end = await bench.ended("r1.b1", 10)
+        assert (end.state, end.code) == (FAILED, "TAKEN_OVER")
+        assert "disarmed" in end.reason
+
+    play(Body("ground"), main)
+
+
+def test_a_silent_vehicle_is_lost_and_its_state_says_so() -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        bench.body.heard_by_us = False
+        end = await bench.ended("r1.b1", 3.0)
+        assert (end.state, end.code) == (BehaviorState.LOST, "LINK_LOST")
+        await bench.clock.sleep(1)
+        assert bench.latest(V).link is LinkState.LOST
+
+    play(Body().fly(), main)
+
+
+def test_a_vehicle_that_was_never_heard_is_lost() -> None:
+    async def main(bench) -> None:
+        end = await bench.do("goto", 10.0, target=FAR)
+        assert end.state is BehaviorState.LOST
+        assert bench.told == []
+
+    play(Body(heard_by_us=False), main)
+
+
+def test_a_lost_vehicle_that_comes_back_can_be_commanded() -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        bench.body.heard_by_us = False
+        await bench.ended("r1.b1", 5)
+        bench.body.heard_by_us = True
+        await bench.clock.sleep(1)
+        await bench.start("r1.b2", "goto", V, target=Point((*at(30, 0), 20.0)))
+        assert (await bench.ended("r1.b2", 60)).state is BehaviorState.SUCCEEDED
+
+    play(Body().fly(), main)
+
+
+def test_states_say_what_the_vehicle_does() -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        await bench.clock.sleep(1)
+        assert bench.latest(V).behavior == "goto"
+
+    play(Body().fly(), main)
+
+
+def test_a_start_whose_answer_was_lost_is_looked_for_before_it_is_sent_again() -> None:
+    """The executive crashed before it heard of the start, and so has no reference."""
+
+    async def main(bench, _: str) -> None:
+        await bench.arbiter.query("r1.b1", None)
+        await bench.start("r1.b1", "goto", V, target=FAR)
+        await bench.running("r1.b1")
+        assert bench.told == []
+        assert (await bench.ended("r1.b1", 300)).state is BehaviorState.SUCCEEDED
+
+    after_a_restart(Body().fly(), "goto", main, target=FAR)
+
+
+def test_an_executive_that_comes_back_finds_nothing_on_an_idle_vehicle_and_starts_it() -> None:
+    async def main(bench) -> None:
+        await bench.arbiter.query("r1.b1", None)
+        await flying(bench)
+        assert bench.told == ["go_to"]
+
+    play(Body().fly(), main)
+
+
+@pytest.mark.parametrize("reference", ["", "{}", "[1]", '{"v":9}', "nonsense", "null"])
+def test_a_reference_of_somebody_else_is_not_known(reference) -> None:
+    async def main(bench) -> None:
+        found = await bench.arbiter.query("r1.b1", reference)
+        assert found.state is BehaviorState.UNKNOWN
+        assert bench.told == []
+
+    play(Body().fly(), main)
+
+
+def test_what_is_held_on_the_ground_and_disarms_itself_takes_off_after_the_hold() -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "takeoff", V, altitude=20.0)
+        await bench.running("r1.b1")
+        await bench.arbiter.hold(V)
+        await bench.clock.sleep(1)
+        bench.body.up, bench.body.armed = 0.0, False
+        await bench.clock.sleep(20)
+        assert bench.states_of("r1.b1")[-1] is RUNNING
+        await bench.arbiter.resume(V)
+        assert (await bench.ended("r1.b1", 60)).state is BehaviorState.SUCCEEDED
+
+    play(Body(), main)

@@ -1,0 +1,181 @@
+import math
+
+import pytest
+from m2pem_plugin_mavlink.sim.specification import Kind
+from mavlink_bench import Bench
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+POSITION_ONLY = 0b1111_1111_1000
+VELOCITY_ONLY = 0b1111_1100_0111
+
+
+def velocity(north: float, east: float, down: float = 0.0, frame: int = 1, **more: float) -> object:
+    mask = VELOCITY_ONLY & ~(0x800 if "yaw_rate" in more else 0)
+    return dialect.MAVLink_set_position_target_local_ned_message(
+        0, 1, 1, frame, mask, 0, 0, 0, north, east, down, 0, 0, 0, 0, more.get("yaw_rate", 0)
+    )
+
+
+def test_a_takeoff_needs_guided_and_motors() -> None:
+    bench = Bench()
+    bench.run(10)
+    assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 4
+    bench.command(176, 1, 4)
+    assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 4
+    bench.command(400, 1)
+    assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 0
+
+
+def test_a_takeoff_that_is_repeated_is_accepted_and_begun_once() -> None:
+    bench = Bench().ready()
+    for _ in range(3):
+        assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 0
+        bench.run(1)
+    bench.run(10)
+    assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 0
+    assert bench.autopilot.chronicle.counts["takeoff"] == 1
+    assert abs(bench.autopilot.body.up_m - 10) < 0.5
+
+
+@pytest.mark.parametrize("height", [math.nan, math.inf, -5.0, 0.0])
+def test_a_takeoff_to_nowhere_fails(height: float) -> None:
+    assert Bench().ready().command(22, 0, 0, 0, 0, 0, 0, height) == 4
+
+
+def test_a_setpoint_leads_to_its_place_and_height() -> None:
+    bench = Bench().airborne()
+    latitude, longitude = bench.offset(50, -30)
+    x, y = round(latitude * 1e7), round(longitude * 1e7)
+    bench.tell(
+        dialect.MAVLink_set_position_target_global_int_message(
+            0, 1, 1, 6, POSITION_ONLY, x, y, 35.0, 0, 0, 0, 0, 0, 0, 0, 0
+        )
+    )
+    bench.run(25)
+    body = bench.autopilot.body
+    assert (body.north_m, body.east_m, body.up_m) == pytest.approx((50, -30, 35), abs=0.3)
+    assert not body.moving
+
+
+def test_reposition_works_in_guided_or_when_it_may_change_the_mode() -> None:
+    bench = Bench().airborne()
+    bench.command(176, 1, 5)
+    assert bench.command_int(192, -1, 0, at=(*bench.offset(40, 0), 20)) == 2
+    assert bench.command_int(192, -1, 1, at=(*bench.offset(40, 0), 20)) == 0
+    assert bench.autopilot.modes.mode.name == "GUIDED"
+    bench.run(15)
+    assert bench.autopilot.body.north_m == pytest.approx(40, abs=0.3)
+    assert bench.autopilot.chronicle.counts["motion"] == 1
+
+
+def test_the_same_place_again_is_no_new_motion() -> None:
+    bench = Bench().airborne()
+    for _ in range(3):
+        assert bench.command_int(192, -1, 1, at=(*bench.offset(40, 0), 20)) == 0
+    assert bench.autopilot.chronicle.counts["motion"] == 1
+
+
+def test_a_velocity_is_forgotten_after_three_seconds() -> None:
+    bench = Bench().airborne()
+    bench.tell(velocity(4, 0))
+    bench.run(2.5)
+    assert bench.autopilot.body.north_mps == pytest.approx(4)
+    bench.run(4)
+    assert not bench.autopilot.body.moving
+
+
+def test_a_velocity_that_is_renewed_goes_on() -> None:
+    bench = Bench().airborne()
+    for _ in range(10):
+        bench.tell(velocity(0, -4))
+        bench.run(1)
+    assert bench.autopilot.body.east_mps == pytest.approx(-4)
+    assert bench.autopilot.chronicle.counts["motion"] == 1
+
+
+def test_a_velocity_in_the_bodys_frame_turns_with_it() -> None:
+    bench = Bench(heading_deg=90).airborne()
+    bench.tell(velocity(3, 0, frame=8))
+    bench.run(2.5)
+    assert bench.autopilot.body.east_mps == pytest.approx(3, abs=0.1)
+
+
+def test_setpoints_that_are_no_numbers_are_ignored() -> None:
+    bench = Bench().airborne()
+    bench.tell(velocity(math.nan, 0))
+    bench.tell(velocity(math.inf, 0))
+    bench.run(1)
+    assert not bench.autopilot.body.moving
+    assert math.isfinite(bench.autopilot.body.north_m)
+
+
+def test_outside_guided_setpoints_do_nothing() -> None:
+    bench = Bench().airborne()
+    bench.command(176, 1, 5)
+    bench.tell(velocity(4, 0))
+    bench.run(2)
+    assert not bench.autopilot.body.moving
+
+
+def test_a_heading_is_taken() -> None:
+    bench = Bench().airborne()
+    assert bench.command(115, 90, 0, 1, 0) == 0
+    bench.run(5)
+    assert bench.autopilot.body.yaw_rad == pytest.approx(math.pi / 2, abs=0.05)
+    assert bench.command(115, 400, 0, 1, 0) == 4
+
+
+def test_a_speed_holds_until_the_mode_changes() -> None:
+    bench = Bench().airborne()
+    assert bench.command(178, 1, 3, -1) == 0
+    bench.command_int(192, -1, 1, at=(*bench.offset(100, 0), 20))
+    bench.run(8)
+    assert bench.autopilot.body.ground_speed_mps == pytest.approx(3, abs=0.1)
+    assert bench.command(178, 1, -2) == 4
+
+
+def test_a_pause_stops_it_and_continuing_takes_it_there() -> None:
+    bench = Bench().airborne()
+    bench.command_int(192, -1, 1, at=(*bench.offset(100, 0), 20))
+    bench.run(5)
+    assert bench.command(193, 0) == 0
+    bench.run(8)
+    assert not bench.autopilot.body.moving
+    assert bench.autopilot.body.north_m < 80
+    assert bench.command(193, 1) == 0
+    bench.run(25)
+    assert bench.autopilot.body.north_m == pytest.approx(100, abs=0.3)
+
+
+def test_a_rover_drives_to_a_place_behind_it_and_stands() -> None:
+    bench = Bench(Kind.ROVER).ready()
+    assert bench.command_int(192, -1, 1, at=(*bench.offset(-20, 15), 0)) == 0
+    bench.run(40)
+    body = bench.autopilot.body
+    assert math.hypot(body.north_m + 20, body.east_m - 15) < 2.5
+    assert not body.moving
+    assert bench.texts()[-1] == "Reached destination"
+
+
+def test_a_rover_backs_off_with_a_negative_speed() -> None:
+    bench = Bench(Kind.ROVER).ready()
+    bench.tell(velocity(-1, 0, frame=8, yaw_rate=0))
+    bench.run(2.5)
+    assert bench.autopilot.body.north_mps == pytest.approx(-1)
+    assert abs(bench.autopilot.body.yaw_rad) < 0.01
+
+
+def test_a_rover_can_drive_to_a_place_in_reverse() -> None:
+    bench = Bench(Kind.ROVER).ready()
+    assert bench.command(194, 1) == 0
+    assert bench.command_int(192, -1, 0, at=(*bench.offset(-20, 0), 0)) == 0
+    bench.run(5)
+    assert bench.autopilot.body.north_mps < -1
+    assert abs(bench.autopilot.body.yaw_rad) < 0.1
+
+
+def test_what_a_rover_cannot_do_it_does_not_support() -> None:
+    bench = Bench(Kind.ROVER).ready()
+    assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 3
+    assert bench.command(21) == 3
+    assert bench.command(34) == 3

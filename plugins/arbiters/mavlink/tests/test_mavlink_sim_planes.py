@@ -1,0 +1,46 @@
+import pytest
+from m2pem_plugin_mavlink.sim.geometry import Point
+from m2pem_plugin_mavlink.sim.specification import Kind
+from mavlink_bench import Bench
+
+
+def flying() -> Bench:
+    bench = Bench(Kind.PLANE)
+    bench.run(10)
+    assert bench.command(176, 1, 13) == 0
+    assert bench.command(400, 1) == 0
+    bench.run(40)
+    return bench
+
+
+def test_in_takeoff_mode_a_plane_climbs_to_its_height_and_circles() -> None:
+    bench = flying()
+    body = bench.autopilot.body
+    assert body.up_m == pytest.approx(50, abs=3)
+    assert body.ground_speed_mps == pytest.approx(22, abs=0.5)
+    assert abs(body.roll_rad) > 0.2
+    assert bench.autopilot.chronicle.counts["takeoff"] == 1
+
+
+def test_in_guided_a_plane_circles_the_place_it_was_sent_to() -> None:
+    bench = flying()
+    assert bench.command_int(192, -1, 1, at=(*bench.offset(500, 400), 90)) == 0
+    bench.run(90)
+    home = bench.autopilot.home.point
+    there = Point(home.north_m + 500, home.east_m + 400, 90)
+    assert bench.autopilot.position.distance_m(there) == pytest.approx(60, abs=6)
+    assert bench.autopilot.body.up_m == pytest.approx(90, abs=2)
+
+
+def test_rtl_brings_a_plane_home_where_it_circles() -> None:
+    bench = flying()
+    assert bench.command(20) == 0
+    bench.run(120)
+    distance_m = bench.autopilot.position.distance_m(bench.autopilot.home.point)
+    assert distance_m == pytest.approx(60, abs=6)
+    assert bench.autopilot.body.up_m == pytest.approx(100, abs=2)
+    assert bench.autopilot.arming.armed
+
+
+def test_a_plane_in_the_air_is_not_disarmed() -> None:
+    assert flying().command(400, 0) == 4

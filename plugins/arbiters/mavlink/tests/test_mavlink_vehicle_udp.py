@@ -1,0 +1,245 @@
+"""Vehicles and their drivers against simulated autopilots, over real UDP."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+from m2pem_plugin_mavlink import failsafe
+from m2pem_plugin_mavlink.foreign import Cause, TakeoverWatch
+from m2pem_plugin_mavlink.link.routed_link import open_link
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.protocol.messages import Address
+from m2pem_plugin_mavlink.protocol.transaction import RefusedError
+from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
+from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import LinkState, ResourceId
+from m2pem.executive.clock import SystemClock
+
+SPEED = 20.0
+OWN = Address(245, 190)
+
+
+@asynccontextmanager
+async def flying(
+    kind: Kind = Kind.COPTER, firmware: str = "ardupilot"
+) -> AsyncIterator[tuple[SimulatedVehicle, Vehicle]]:
+    spec = VehicleSpec(kind, firmware=firmware)
+    async with Simulator([spec], speed=SPEED, to=None) as simulator:
+        host, port = simulator[1].address
+        clock = SystemClock(SPEED)
+        link = await open_link(Address(1, 1), [f"udpout://{host}:{port}"], clock, OWN)
+        domain = "air" if kind is Kind.COPTER else "ground"
+        vehicle = Vehicle(ResourceId("uav1"), domain, link, clock)
+        vehicle.open()
+        try:
+            assert await vehicle.identified(20.0)
+            yield simulator[1], vehicle
+        finally:
+            await vehicle.close()
+            await link.close()
+
+
+async def test_a_copter_waits_for_its_estimator_takes_off_goes_and_returns() -> None:
+    async with flying() as (truth, vehicle):
+        assert vehicle.state().ready is False
+        driver = vehicle.driver
+        await driver.take_off(10.0)
+        assert (truth.armed, truth.takeoffs) == (True, 1)
+        assert await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0) > 9.0, 60.0)
+        assert vehicle.heard.landed is False
+        await driver.go_to(Place(47.3982, 8.545594, 20.0), 8.0)
+        there = 47.3982 - 2e-6
+        arrived = lambda: vehicle.heard.position.latitude_deg > there  # noqa: E731
+        assert await vehicle.until(arrived, 60.0)
+        assert truth.location.latitude_deg == pytest.approx(47.3982, abs=1e-5)
+        await driver.return_home()
+        assert await vehicle.until(lambda: vehicle.heard.armed is False, 120.0)
+        assert await vehicle.until(lambda: vehicle.heard.landed is True, 2.0)
+
+
+async def test_a_takeoff_that_was_stopped_on_the_ground_can_be_begun_again() -> None:
+    async with flying() as (truth, vehicle):
+        await vehicle.driver.take_off(6.0)
+        await vehicle.driver.stop()
+        assert await vehicle.until(lambda: vehicle.heard.armed is False, 60.0)
+        assert truth.mode == "BRAKE"
+        await vehicle.driver.take_off(6.0)
+        assert await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0) > 5.0, 60.0)
+
+
+async def test_a_copter_stands_soon_after_a_stop() -> None:
+    async with flying() as (truth, vehicle):
+        await vehicle.driver.take_off(10.0)
+        await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0) > 9.0, 60.0)
+        await vehicle.driver.go_to(Place(47.41, 8.545594, 10.0), 8.0)
+        assert await vehicle.until(lambda: 7.0 < vehicle.heard.speed_m_s < 20.0, 20.0)
+        await vehicle.driver.stop()
+        assert truth.mode == "BRAKE"
+        assert await vehicle.until(lambda: vehicle.heard.speed_m_s < 0.2, 5.0)
+
+
+async def test_velocities_move_it_while_they_are_repeated() -> None:
+    async with flying() as (_, vehicle):
+        await vehicle.driver.take_off(10.0)
+        await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0) > 9.0, 60.0)
+        for _ in range(12):
+            await vehicle.driver.move((0.0, 3.0, 0.0))
+            await vehicle.sleep(0.5)
+        velocity = vehicle.heard.velocity_enu_m_s
+        assert velocity is not None
+        assert velocity[0] == pytest.approx(3.0, abs=0.3)
+        assert velocity[1] == pytest.approx(0.0, abs=0.3)
+        assert await vehicle.until(lambda: vehicle.heard.speed_m_s < 0.2, 10.0)
+
+
+async def test_a_rover_is_armed_drives_holds_and_does_not_take_off() -> None:
+    async with flying(Kind.ROVER) as (truth, vehicle):
+        with pytest.raises(RefusedError, match="a rover does not take off"):
+            await vehicle.driver.take_off(10.0)
+        await vehicle.driver.go_to(Place(47.3982, 8.545594))
+        assert truth.mode == "GUIDED"
+        assert await vehicle.until(lambda: 1.0 < vehicle.heard.speed_m_s < 20.0, 30.0)
+        await vehicle.driver.stop()
+        assert truth.mode == "HOLD"
+        assert await vehicle.until(lambda: vehicle.heard.speed_m_s < 0.2, 5.0)
+        assert vehicle.heard.landed is True
+
+
+async def test_another_ground_station_is_noticed() -> None:
+    async with flying() as (truth, vehicle):
+        watch = TakeoverWatch(vehicle, OWN.system)
+        watch.open()
+        await vehicle.driver.take_off(10.0)
+        await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0) > 9.0, 60.0)
+        flying_modes = {FlightMode.GUIDED}
+        assert watch.taken_over(flying_modes) is None
+        host, port = truth.address
+        url = f"udpout://{host}:{port}"
+        link = await open_link(Address(1, 1), [url], SystemClock(SPEED), Address(254, 190))
+        other = Vehicle(ResourceId("qgc"), "air", link, SystemClock(SPEED))
+        other.open()
+        assert await other.identified(20.0)
+        await other.driver.set_mode(FlightMode.LAND)
+        assert await vehicle.until(lambda: watch.taken_over(flying_modes) is not None, 10.0)
+        takeover = watch.taken_over(flying_modes)
+        assert takeover is not None
+        assert takeover.cause is Cause.STATION
+        assert "from GUIDED to LAND" in takeover.reason
+        await other.close()
+        await link.close()
+        await watch.close()
+
+
+def waypoint(latitude_deg: float, altitude_m: float = 10.0) -> MissionItem:
+    frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
+    return MissionItem(16, frame, (0.0, 0.0, 0.0, 0.0), latitude_deg, 8.545594, altitude_m)
+
+
+TAKEOFF = MissionItem(22, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, altitude_m=10.0)
+ROUTE = (TAKEOFF, waypoint(47.3979), waypoint(47.3981), waypoint(47.3983))
+
+
+async def test_a_mission_is_stored_read_and_flown_from_the_ground() -> None:
+    async with flying() as (truth, vehicle):
+        driver = vehicle.driver
+        await driver.upload(ROUTE)
+        stored = await driver.downloaded()
+        assert len(stored) == len(ROUTE)
+        assert all(a.same_as(b) for a, b in zip(stored[1:], ROUTE[1:], strict=True))
+        await driver.start_mission()
+        assert (truth.mode, truth.armed) == ("AUTO", True)
+        assert await vehicle.until(lambda: driver.reached_item == 2, 120.0)
+        assert await vehicle.until(lambda: driver.current_item == 3, 5.0)
+        assert await vehicle.until(lambda: driver.reached_item == 3, 60.0)
+        await driver.start_mission(1)
+        assert driver.reached_item is None
+        assert await vehicle.until(lambda: driver.current_item == 1, 10.0)
+        await driver.stop()
+        await driver.upload(())
+        assert await driver.downloaded() == ()
+
+
+async def test_a_rover_drives_a_mission() -> None:
+    async with flying(Kind.ROVER) as (truth, vehicle):
+        await vehicle.driver.upload(ROUTE[1:])
+        await vehicle.driver.start_mission(1)
+        assert truth.mode == "AUTO"
+        assert await vehicle.until(lambda: vehicle.driver.reached_item == 1, 120.0)
+
+
+@pytest.mark.parametrize(
+    ("replaced", "words"),
+    [
+        (ROUTE[:2], "has replaced the mission: it has 2 items, ours 4"),
+        ((TAKEOFF, *(waypoint(47.396 - n / 1000) for n in range(3))), "is not ours"),
+    ],
+)
+async def test_another_mission_by_another_ground_station_is_noticed(
+    replaced: tuple[MissionItem, ...], words: str
+) -> None:
+    async with flying() as (truth, vehicle):
+        watch = TakeoverWatch(vehicle, OWN.system)
+        watch.open()
+        await vehicle.driver.upload(ROUTE)
+        await vehicle.driver.start_mission()
+        assert await vehicle.until(lambda: vehicle.driver.current_item == 1, 60.0)
+        mission_modes = {FlightMode.MISSION}
+        await vehicle.sleep(3.0)
+        assert watch.taken_over(mission_modes) is None
+        host, port = truth.address
+        url = f"udpout://{host}:{port}"
+        link = await open_link(Address(1, 1), [url], SystemClock(SPEED), Address(254, 190))
+        other = Vehicle(ResourceId("qgc"), "air", link, SystemClock(SPEED))
+        other.open()
+        assert await other.identified(20.0)
+        await other.driver.upload(replaced)
+        assert await vehicle.until(lambda: watch.taken_over(mission_modes) is not None, 120.0)
+        takeover = watch.taken_over(mission_modes)
+        assert takeover is not None
+        assert words in takeover.reason or "begun to replace the mission" in takeover.reason
+        await other.close()
+        await link.close()
+        await watch.close()
+
+
+async def test_failsafes_are_read_and_compared() -> None:
+    async with flying() as (truth, vehicle):
+        truth.autopilot.parameters["FS_GCS_ENABLE"] = 0.0
+        found = await failsafe.check(vehicle, "return_to_launch", OWN.system)
+        texts = [str(each) for each in found]
+        assert (
+            "uav1: fleet says return_to_launch on loss of link, FS_GCS_ENABLE is 0 (disabled): "
+            "set it to 1"
+        ) in texts
+        assert any("watches the ground station with system id 255" in text for text in texts)
+        truth.autopilot.parameters["FS_GCS_ENABLE"] = 1.0
+        found = await failsafe.check(vehicle, "return_to_launch", OWN.system)
+        assert "FS_GCS_ENABLE" not in [each.parameter for each in found]
+
+
+async def test_a_refusal_says_why() -> None:
+    async with flying() as (_, vehicle):
+        with pytest.raises(RefusedError, match=r"COMPONENT_ARM_DISARM: failed \(.*Arm: .+\)"):
+            await vehicle.driver.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+
+
+async def test_a_cut_link_is_lost_and_found_again() -> None:
+    async with flying() as (truth, vehicle):
+        await vehicle.until(lambda: vehicle.heard.home is not None, 30.0)
+        outward, truth.port.outward = truth.port.outward, _Nowhere()  # type: ignore[assignment]
+        assert await vehicle.until(lambda: vehicle.link_state is LinkState.LOST, 10.0)
+        truth.port.outward = outward
+        assert await vehicle.until(lambda: vehicle.link_state is LinkState.CONNECTED, 10.0)
+        assert vehicle.heard.boots == 1
+
+
+class _Nowhere:
+    def carry(self, *_: object) -> None:
+        pass
+
+    def step(self, _: float) -> None:
+        pass

@@ -1,0 +1,51 @@
+from collections.abc import Callable, Mapping
+from typing import cast
+
+import pytest
+
+from m2pem.api import Arbiter, ArbiterContext, Area, Connection, Route
+from m2pem.executive.arbiters import ArbiterPlugins, FleetArbiters
+from m2pem.model.catalogue import ResourceId
+from m2pem.resources.fleet import Domain, Fleet, Payload, Vehicle
+
+FIELD = Area((((47.0, 8.0, None), (47.0, 8.1, None), (47.1, 8.1, None), (47.0, 8.0, None)),))
+UAV1, CAMERA = ResourceId("uav1"), ResourceId("uav1/camera")
+
+
+class Nothing:
+    """An arbiter that offers nothing."""
+
+    def catalogue(self, resource: ResourceId) -> tuple[()]:
+        return ()
+
+
+class Plugins:
+    """Keeps the connections that an arbiter would be made with."""
+
+    def __init__(self) -> None:
+        self.connections: dict[ResourceId, Connection] = {}
+
+    def arbiter(self, name: str) -> Callable[..., Arbiter]:
+        def make(connections: Mapping[ResourceId, Connection], context: ArbiterContext) -> Arbiter:
+            self.connections.update(connections)
+            return cast("Arbiter", Nothing())
+
+        return make
+
+
+@pytest.mark.parametrize(("fence", "lent"), [("field", FIELD), ("", None)])
+def test_an_arbiter_is_told_the_failsafe_and_the_fence(fence: str, lent: Area | None) -> None:
+    vehicle = Vehicle(UAV1, Domain.AIR, "mavlink", {}, failsafe="return_to_launch")
+    fleet = Fleet(
+        "fleet",
+        "fleet.yaml",
+        {UAV1: vehicle},
+        {CAMERA: Payload(CAMERA, UAV1, "mavlink", {})},
+        geometries={"field": FIELD, "alpha": Route(((47.0, 8.0, None),))},
+        fence=fence,
+    )
+    plugins = Plugins()
+    FleetArbiters(fleet, cast("ArbiterPlugins", plugins), cast("ArbiterContext", object()))
+    for resource in (UAV1, CAMERA):
+        connection = plugins.connections[resource]
+        assert (connection.failsafe, connection.fence) == ("return_to_launch", lent)
