@@ -12,8 +12,8 @@ from typing import NoReturn
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.expression.calls import CallError, meaning, method_call
 from m2pem.model.expression.dialect import Dialect, Span
-from m2pem.model.expression.lexer import Kind, Token, tokenize
-from m2pem.model.expression.literals import read_number
+from m2pem.model.expression.lexer import CONSTANTS, Token, tokenize
+from m2pem.model.expression.literals import read_number, unescape
 from m2pem.model.expression.tree import (
     MAX_DEPTH,
     And,
@@ -57,6 +57,9 @@ _BINARY = {
 }
 """How strongly an operator after a value binds; `not` there begins `not in`."""
 
+_COMPARISONS = {each.value: each for each in Comparison}
+_OPERATIONS = {each.value: each for each in Operation}
+
 
 class Parser:
     """Reads one expression, which stands in `text` at `span`; FEEL's own words are `FeelParser`'s.
@@ -67,9 +70,10 @@ class Parser:
 
     def __init__(self, text: str, span: Span, dialect: Dialect) -> None:
         self._text = text
-        self._tokens = tokenize(text, span, dialect)
+        self._length = span.end - span.start
+        self._coming = iter(tokenize(text, span, dialect))
+        self._token = next(self._coming)
         self._dialect = dialect
-        self._index = 0
         self._nesting = 0
 
     def parse(self) -> Node:
@@ -79,9 +83,10 @@ class Parser:
         node = self._expression(LOWEST)
         if not self._ended:
             spaces = "; a name has no spaces (in FEEL it may: begin with '=')"
-            hint = spaces if self._token.kind is Kind.NAME else ""
+            hint = spaces if self._token.kind == "name" else ""
             self._fail(f"expected an operator or the end, found {self._found}{hint}")
-        for parts, (_, depth) in enumerate(walk(node)):
+        # What is no longer than that is no deeper either, and small enough.
+        for parts, (_, depth) in enumerate(walk(node) if self._length > MAX_DEPTH else ()):
             if depth > MAX_DEPTH:
                 self._fail(
                     f"nested deeper than {MAX_DEPTH} levels; use parentheses or fewer operators"
@@ -91,17 +96,13 @@ class Parser:
         return node
 
     @property
-    def _token(self) -> Token:
-        return self._tokens[self._index]
-
-    @property
     def _ended(self) -> bool:
-        return self._token.kind is Kind.END
+        return self._token.kind == "end"
 
     @property
     def _found(self) -> str:
         token = self._token
-        return token.text if token.kind is Kind.END else repr(token.text)
+        return token.text if token.kind == "end" else repr(token.text)
 
     def _expression(self, minimum: int) -> Node:
         """The longest expression whose operators bind more strongly than `minimum`."""
@@ -120,7 +121,7 @@ class Parser:
 
     def _strength(self) -> int:
         token = self._token
-        return _BINARY.get(token.text, LOWEST) if token.kind is Kind.OPERATOR else LOWEST
+        return _BINARY.get(token.text, LOWEST) if token.kind == "operator" else LOWEST
 
     def _binary(self, left: Node, strength: int) -> Node:
         if strength in (_OR, _AND):
@@ -139,8 +140,8 @@ class Parser:
             if operator in ("in", "not"):
                 member = In(left, right)
                 return Not(member) if negated else member
-            return Compare(Comparison(operator), left, right)
-        return Arithmetic(Operation(operator), left, right)
+            return Compare(_COMPARISONS[operator], left, right)
+        return Arithmetic(_OPERATIONS[operator], left, right)
 
     def _refuse_chain(self) -> None:
         if self._strength() == COMPARISON:
@@ -149,13 +150,13 @@ class Parser:
     def _prefix(self, minimum: int) -> Node:
         token = self._next()
         match token.kind:
-            case Kind.NUMBER:
-                return self._number(token, "")
-            case Kind.CONSTANT:
-                return Literal(token.value)
-            case Kind.NAME:
+            case "name":
                 return self._inside(self._name(token))
-            case Kind.END:
+            case "number":
+                return self._number(token, "")
+            case "constant":
+                return Literal(_constant(token.text))
+            case "end":
                 self._fail("expected a value, found the end", token)
         match token.text:
             case "(":
@@ -166,7 +167,7 @@ class Parser:
                 return self._inside(ListOf(self._items("]", token)))
             case "-":
                 number = self._token
-                if number.kind is Kind.NUMBER:
+                if number.kind == "number":
                     return self._number(self._next(), "-")
                 return Negate(self._expression(_UNARY))
             case "not":
@@ -212,22 +213,22 @@ class Parser:
 
     def _inside(self, node: Node) -> Node:
         """What follows a value to take something out of it: `[0]`, `['key']`, `.key`."""
-        while True:
-            if opening := self._take("["):
+        while self._token.text in ("[", "."):
+            opening = self._next()
+            if opening.text == "[":
                 key = self._key(opening)
                 self._expect("]", "to close '['", opening)
                 node = _taken(node, key)
-            elif self._take("."):
-                node = self._member(node)
             else:
-                return node
+                node = self._member(node)
+        return node
 
     def _key(self, opening: Token) -> Node:
         return self._expression(LOWEST)
 
     def _member(self, node: Node) -> Node:
         token = self._next()
-        if token.kind is not Kind.NAME:
+        if token.kind != "name":
             self._fail("expected a name after '.'", token)
         *keys, last = token.text.split(".")
         for key in keys:
@@ -251,16 +252,12 @@ class Parser:
 
     def _next(self) -> Token:
         token = self._token
-        if token.kind is not Kind.END:
-            self._index += 1
+        self._token = next(self._coming, token)
         return token
 
     def _take(self, operator: str) -> Token | None:
         token = self._token
-        if token.kind is Kind.OPERATOR and token.text == operator:
-            self._index += 1
-            return token
-        return None
+        return self._next() if token.text == operator and token.kind == "operator" else None
 
     def _expect(self, operator: str, why: str, opening: Token | None = None) -> Token:
         if token := self._take(operator):
@@ -270,6 +267,10 @@ class Parser:
 
     def _fail(self, message: str, token: Token | None = None) -> NoReturn:
         raise ExpressionSyntaxError(message, self._text, (token or self._token).position)
+
+
+def _constant(written: str) -> bool | str | None:
+    return unescape(written[1:-1]) if written[0] in "'\"" else CONSTANTS[written]
 
 
 def _taken(node: Node, key: Node) -> Node:
