@@ -92,11 +92,10 @@ def _read_child(
     """Read one child; gives back a subprocess, whose content is still to be read."""
     tag = child.tag
     container = frame.container
-    if not tag.startswith(BPMN):
-        return None
     rank = frame.shape.ranks.get(tag)
     if rank is None:
-        _refuse_unknown(reading, frame, child)
+        if tag.startswith(BPMN):
+            _refuse_unknown(reading, frame, child)
         return None
     if rank < frame.order.reached:
         frame.order.check(reading, frame.element, child, frame.shape, container.id)
