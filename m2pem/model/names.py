@@ -48,10 +48,10 @@ class _Store:
 
     def has(self, name: str) -> bool:
         """Whether the name, or a map that holds it, is written."""
-        if self.anything:
+        if self.anything or name in self.written:
             return True
         parts = name.split(".")
-        return any(".".join(parts[:count]) in self.written for count in range(len(parts), 0, -1))
+        return any(".".join(parts[:count]) in self.written for count in range(1, len(parts)))
 
 
 def unwritten(
@@ -70,7 +70,8 @@ def unwritten(
         begins = isinstance(node, StartEvent) and isinstance(node.container, Process)
         # A condition that begins a process reads the data of the main one.
         of_main = begins and node.container not in called
-        (stores[main] if of_main else store).reads += _conditions(node)
+        if isinstance(node, Event):
+            (stores[main] if of_main else store).reads += _conditions(node)
         for mapping in _data_mappings(node):
             store.written.add(mapping.target)
         _note_writes(node, store, service_writes)
@@ -91,8 +92,8 @@ def unwritten(
 def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Finding]:
     said: set[tuple[str, str]] = set()
     for read in store.reads:
-        for name in sorted(read.expression.names):
-            if store.has(name) or (read.element, name) in said:
+        for name in sorted(name for name in read.expression.names if not store.has(name)):
+            if (read.element, name) in said:
                 continue
             said.add((read.element, name))
             reader = mission.elements.get(
@@ -111,10 +112,10 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
             )
 
 
-def _data_mappings(node: FlowNode) -> Iterator[DataMapping]:
+def _data_mappings(node: FlowNode) -> tuple[DataMapping, ...]:
     if isinstance(node, Activity | Event):
-        yield from node.data_flow.inputs
-        yield from node.data_flow.outputs
+        return (*node.data_flow.inputs, *node.data_flow.outputs)
+    return ()
 
 
 def _reads(node: FlowNode) -> Iterator[Read]:
@@ -127,8 +128,8 @@ def _reads(node: FlowNode) -> Iterator[Read]:
                 yield Read(expression, node.id, node.line)
     if isinstance(node, ComplexGateway) and node.activation is not None:
         yield Read(node.activation, node.id, node.line)
-    if isinstance(node, Activity):
-        yield from _loop_reads(node)
+    if isinstance(node, Activity) and node.loop is not None:
+        yield from _loop_reads(node, node.loop)
     for flow in node.outgoing:
         if flow.condition is not None:
             yield Read(flow.condition, flow.id, flow.line)
@@ -148,18 +149,17 @@ def _reads(node: FlowNode) -> Iterator[Read]:
                 yield Read(definition.expression, node.id, definition.line)
 
 
-def _conditions(node: FlowNode) -> Iterator[Read]:
-    for definition in node.definitions if isinstance(node, Event) else ():
+def _conditions(node: Event) -> Iterator[Read]:
+    for definition in node.definitions:
         if isinstance(definition, ConditionalEventDefinition):
             yield Read(definition.condition, node.id, definition.line)
 
 
-def _loop_reads(node: Activity) -> Iterator[Read]:
-    loop = node.loop
-    found: list[Expression | None] = []
+def _loop_reads(node: Activity, loop: StandardLoop | MultiInstance) -> Iterator[Read]:
+    found: list[Expression | None]
     if isinstance(loop, StandardLoop):
         found = [loop.condition]
-    elif loop is not None:
+    else:
         found = [loop.cardinality, loop.collection, loop.completion]
         found += [each.condition for each in loop.complex]
         if loop.output is not None and loop.output.text not in loop.output.names:

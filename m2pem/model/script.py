@@ -42,7 +42,7 @@ def parse_script(text: str, line: int = 1) -> tuple[Script, list[tuple[int, str]
 
 
 def _statement(text: str, line: int) -> Assignment | ThrowError:
-    if throw := _THROW.fullmatch(text):
+    if text.startswith("throw") and (throw := _THROW.fullmatch(text)):
         if not _CODE.fullmatch(throw[1]):
             raise _StatementError(
                 f"{shorten(throw[1])!r} is no error code: letters, digits, '_', '-', '.' and ':'"

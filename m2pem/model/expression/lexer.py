@@ -105,8 +105,7 @@ def _pattern(dialect: Dialect) -> re.Pattern[str]:
         rf"|(?!(?:{unsupported})\b)(?P<name>{_ASCII_NAME.pattern}){_ALONE}"
         rf"|(?P<number>{NUMBER.pattern}){_ALONE}"
         rf"|(?P<constant>{_QUOTED})"
-        rf"|(?!\.[0-9])(?P<operator>{'|'.join(symbols)})"
-        r"|(?P<end>\Z))"
+        rf"|(?!\.[0-9])(?P<operator>{'|'.join(symbols)}))"
     )
 
 
@@ -114,7 +113,6 @@ def _meanings(dialect: Dialect) -> dict[str, tuple[str, str]]:
     """What is written, with what it is where that differs."""
     operators = {**SYMBOLS[dialect], **WORDS[dialect]}
     return {
-        "": ("end", "the end"),
         **{written: ("operator", name) for written, name in operators.items()},
         **{word: ("constant", word) for word in CONSTANTS},
     }
@@ -126,7 +124,7 @@ _MEANINGS = {dialect: _meanings(dialect) for dialect in SYMBOLS}
 
 def is_reserved(name: str, dialect: Dialect) -> bool:
     """Whether a name can never be read because the dialect gives it a meaning."""
-    return name in CONSTANTS or name in WORDS[dialect]
+    return name in _MEANINGS[dialect]
 
 
 def scan_name(text: str, position: int, end: int) -> int:
@@ -153,7 +151,7 @@ def _continues_name(character: str) -> bool:
 
 
 def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
-    """The tokens of `text` within `span`, closed by one of the kind "end".
+    """The tokens of `text` within `span`, closed by the end.
 
     Raises:
         ExpressionSyntaxError: something that is no token.
@@ -161,11 +159,11 @@ def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
     match, meanings = _PATTERNS[dialect].match, _MEANINGS[dialect]
     tokens: list[Token] = []
     position = span.start
-    kind = ""
-    while kind != "end":
-        found = match(text, position, span.end)
+    end = len(text[: span.end].rstrip())
+    while position < end:
+        found = match(text, position, end)
         if found is None:
-            kind, start, position = _Closely(text, span.end, dialect).read(position)
+            kind, start, position = _Closely(text, end, dialect).read(position)
         else:
             kind = found.lastgroup or ""
             start, position = found.span(kind)
@@ -175,6 +173,7 @@ def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
         elif written in meanings:
             kind, written = meanings[written]
         tokens.append(_new(Token, (kind, written, start)))
+    tokens.append(Token("end", "the end", span.end))
     return tokens
 
 

@@ -124,7 +124,7 @@ class Parser:
         return _BINARY.get(token.text, LOWEST) if token.kind == "operator" else LOWEST
 
     def _binary(self, left: Node, strength: int) -> Node:
-        if strength in (_OR, _AND):
+        if strength <= _AND:
             word = self._token.text
             operands = [left]
             while self._take(word):
