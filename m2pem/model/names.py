@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from m2pem.findings import Finding, Severity
 from m2pem.model.behavior import Assignment, Parameter
@@ -28,8 +29,7 @@ from m2pem.model.mission import Mission
 from m2pem.model.near import did_you_mean
 
 
-@dataclass(frozen=True, slots=True)
-class Read:
+class Read(NamedTuple):
     """An expression that is evaluated over a process's data, and where it stands."""
 
     expression: Expression

@@ -159,7 +159,7 @@ def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
     match, meanings = _PATTERNS[dialect].match, _MEANINGS[dialect]
     tokens: list[Token] = []
     position = span.start
-    end = len(text[: span.end].rstrip())
+    end = len(text[: span.stop].rstrip())
     while position < end:
         found = match(text, position, end)
         if found is None:
@@ -173,7 +173,7 @@ def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
         elif written in meanings:
             kind, written = meanings[written]
         tokens.append(_new(Token, (kind, written, start)))
-    tokens.append(Token("end", "the end", span.end))
+    tokens.append(_new(Token, ("end", "the end", span.stop)))
     return tokens
 
 

@@ -70,7 +70,7 @@ class Parser:
 
     def __init__(self, text: str, span: Span, dialect: Dialect) -> None:
         self._text = text
-        self._length = span.end - span.start
+        self._length = span.stop - span.start
         self._coming = iter(tokenize(text, span, dialect))
         self._token = next(self._coming)
         self._dialect = dialect
