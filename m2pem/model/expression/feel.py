@@ -1,8 +1,8 @@
 """Parses what FEEL alone has: its words, ranges, names with spaces (DMN 1.3, clause 10.3.1.2)."""
 
 from m2pem.model.expression.dialect import Dialect, Span
-from m2pem.model.expression.lexer import Token
-from m2pem.model.expression.parser import COMPARISON, LOWEST, Parser
+from m2pem.model.expression.lexer import COMPARISON, LOWEST, Token
+from m2pem.model.expression.parser import Parser
 from m2pem.model.expression.tree import (
     And,
     Call,
@@ -52,7 +52,7 @@ class FeelParser(Parser):
         text = token.text
         while self._token.kind == "name":
             text += " " + self._next().text
-        return super()._name(Token("name", text, token.position))
+        return super()._name(token._replace(text=text))
 
     def _key(self, opening: Token) -> Node:
         """FEEL counts from 1, and takes a condition for a filter."""

@@ -8,22 +8,31 @@ from m2pem.model.expression.dialect import Dialect, Span
 from m2pem.model.expression.literals import NUMBER, unescape
 
 
-
 class Token(NamedTuple):
     """A "number", "constant", "name", "operator" or the "end".
 
     An "operator" may also be a bracket, a comma or one of the words `and or not in`. `text` is
     its name in the bare dialect; of others, what was written. `position` is the offset in the
-    whole text.
+    whole text. `strength`: how strongly it binds as an operator after a value.
     """
 
     kind: str
     text: str
     position: int
+    strength: int
 
 
 _new = tuple.__new__  # takes half as long as calling the class
 
+LOWEST, OR, AND, NOT, COMPARISON, SUM, PRODUCT, UNARY = range(8)
+_BINARY = {
+    "or": OR,
+    "and": AND,
+    **dict.fromkeys(("in", "between", "not"), COMPARISON),  # `not` begins `not in`
+    **dict.fromkeys(("==", "!=", "<", "<=", ">", ">="), COMPARISON),
+    **dict.fromkeys("+-", SUM),
+    **dict.fromkeys("*/", PRODUCT),
+}
 CONSTANTS = {"true": True, "false": False, "null": None}
 _SYMBOLS = {
     s: s for s in ("!=", "<=", ">=", "<", ">", "+", "-", "*", "/", "(", ")", "[", "]", ",", ".")
@@ -80,9 +89,7 @@ _HINTS = {
 _CALLED = {
     Dialect.FEEL: r"date and time(?=\s*\()",
     Dialect.JUEL: r"(?:var|vars|variables):\w+(?=\s*\()",
-    Dialect.XPATH: (
-        r"(?!(?:and|or|div)\s*+\()(?:[^\W\d][\w.-]*+:)?+[^\W\d][\w-]*+(?=\s*+\()"
-    ),
+    Dialect.XPATH: (r"(?!(?:and|or|div)\s*+\()(?:[^\W\d][\w.-]*+:)?+[^\W\d][\w-]*+(?=\s*+\()"),
 }
 """Names of functions that are no names of the store."""
 
@@ -109,12 +116,12 @@ def _pattern(dialect: Dialect) -> re.Pattern[str]:
     )
 
 
-def _meanings(dialect: Dialect) -> dict[str, tuple[str, str]]:
-    """What is written, with what it is where that differs."""
+def _meanings(dialect: Dialect) -> dict[str, tuple[str, str, int]]:
+    """The kind, text and strength of what is written, where it has a meaning of its own."""
     operators = {**SYMBOLS[dialect], **WORDS[dialect]}
     return {
-        **{written: ("operator", name) for written, name in operators.items()},
-        **{word: ("constant", word) for word in CONSTANTS},
+        **{w: ("operator", name, _BINARY.get(name, LOWEST)) for w, name in operators.items()},
+        **{word: ("constant", word, LOWEST) for word in CONSTANTS},
     }
 
 
@@ -168,12 +175,13 @@ def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
             kind = found.lastgroup or ""
             start, position = found.span(kind)
         written = text[start:position]
+        strength = LOWEST
         if kind == "called":
             kind = "name"
         elif written in meanings:
-            kind, written = meanings[written]
-        tokens.append(_new(Token, (kind, written, start)))
-    tokens.append(_new(Token, ("end", "the end", span.stop)))
+            kind, written, strength = meanings[written]
+        tokens.append(_new(Token, (kind, written, start, strength)))
+    tokens.append(_new(Token, ("end", "the end", span.stop, LOWEST)))
     return tokens
 
 

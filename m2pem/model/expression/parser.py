@@ -12,7 +12,16 @@ from typing import NoReturn
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.expression.calls import CallError, meaning, method_call
 from m2pem.model.expression.dialect import Dialect, Span
-from m2pem.model.expression.lexer import CONSTANTS, Token, tokenize
+from m2pem.model.expression.lexer import (
+    AND,
+    COMPARISON,
+    CONSTANTS,
+    LOWEST,
+    NOT,
+    UNARY,
+    Token,
+    tokenize,
+)
 from m2pem.model.expression.literals import read_number, unescape
 from m2pem.model.expression.tree import (
     MAX_DEPTH,
@@ -42,21 +51,6 @@ MAX_PARTS = 20_000
 """Nodes of a tree. A value in a range is there twice, so ranges in each other double it."""
 
 _IDENTIFIER = re.compile(r"[^\W\d]\w*")
-LOWEST, _OR, _AND, _NOT, COMPARISON, _SUM, _PRODUCT, _UNARY = range(8)
-_BINARY = {
-    "or": _OR,
-    "and": _AND,
-    "in": COMPARISON,
-    "between": COMPARISON,
-    "not": COMPARISON,
-    "+": _SUM,
-    "-": _SUM,
-    "*": _PRODUCT,
-    "/": _PRODUCT,
-    **{comparison.value: COMPARISON for comparison in Comparison},
-}
-"""How strongly an operator after a value binds; `not` there begins `not in`."""
-
 _COMPARISONS = {each.value: each for each in Comparison}
 _OPERATIONS = {each.value: each for each in Operation}
 
@@ -78,10 +72,10 @@ class Parser:
 
     def parse(self) -> Node:
         """The tree."""
-        if self._ended:
+        if self._token.kind == "end":
             self._fail("an expression is missing")
         node = self._expression(LOWEST)
-        if not self._ended:
+        if self._token.kind != "end":
             spaces = "; a name has no spaces (in FEEL it may: begin with '=')"
             hint = spaces if self._token.kind == "name" else ""
             self._fail(f"expected an operator or the end, found {self._found}{hint}")
@@ -96,10 +90,6 @@ class Parser:
         return node
 
     @property
-    def _ended(self) -> bool:
-        return self._token.kind == "end"
-
-    @property
     def _found(self) -> str:
         token = self._token
         return token.text if token.kind == "end" else repr(token.text)
@@ -110,7 +100,7 @@ class Parser:
         if self._nesting > MAX_DEPTH:
             self._fail(f"nested deeper than {MAX_DEPTH} levels")
         node = self._prefix(minimum)
-        while (strength := self._strength()) > minimum:
+        while (strength := self._token.strength) > minimum:
             node = self._binary(node, strength)
         if minimum == LOWEST and self._take("?"):
             then = self._expression(LOWEST)
@@ -119,12 +109,8 @@ class Parser:
         self._nesting -= 1
         return node
 
-    def _strength(self) -> int:
-        token = self._token
-        return _BINARY.get(token.text, LOWEST) if token.kind == "operator" else LOWEST
-
     def _binary(self, left: Node, strength: int) -> Node:
-        if strength <= _AND:
+        if strength <= AND:
             word = self._token.text
             operands = [left]
             while self._take(word):
@@ -144,7 +130,7 @@ class Parser:
         return Arithmetic(_OPERATIONS[operator], left, right)
 
     def _refuse_chain(self) -> None:
-        if self._strength() == COMPARISON:
+        if self._token.strength == COMPARISON:
             self._fail("comparisons do not chain; write 'a < b and b < c', or use parentheses")
 
     def _prefix(self, minimum: int) -> Node:
@@ -169,24 +155,24 @@ class Parser:
                 number = self._token
                 if number.kind == "number":
                     return self._number(self._next(), "-")
-                return Negate(self._expression(_UNARY))
+                return Negate(self._expression(UNARY))
             case "not":
                 return self._not(token, minimum)
             case "empty":
-                node = Call("is_empty", (self._expression(_UNARY),))
+                node = Call("is_empty", (self._expression(UNARY),))
                 return self._unambiguous(node, token)
         self._fail(f"expected a value, found {token.text!r}", token)
 
     def _not(self, token: Token, minimum: int) -> Node:
         if self._dialect is Dialect.BARE:
-            if minimum > _NOT:
+            if minimum > NOT:
                 self._fail("put 'not ...' into parentheses here", token)
-            return Not(self._expression(_NOT))
-        return self._unambiguous(Not(self._expression(_UNARY)), token)
+            return Not(self._expression(NOT))
+        return self._unambiguous(Not(self._expression(UNARY)), token)
 
     def _unambiguous(self, node: Node, token: Token) -> Node:
         # JUEL reads '!a == b' as '(!a) == b', most people as '!(a == b)'.
-        if self._strength() >= COMPARISON:
+        if self._token.strength >= COMPARISON:
             self._fail(
                 f"'{token.text}' is ambiguous before '{self._token.text}'; use parentheses", token
             )
