@@ -28,6 +28,9 @@ from m2pem.model.reach import begins_by_itself, instantiates
 
 _set = object.__setattr__
 
+_NO_TARGETS = (StartEvent, BoundaryEvent)
+"""No sequence flow leads to them."""
+
 
 def link(reading: Reading) -> dict[str, Element]:
     """Link all elements; gives back processes, flow nodes and sequence flows by id."""
@@ -71,7 +74,7 @@ def _link_flows(reading: Reading, nodes: dict[str, FlowNode]) -> None:
             continue
         outgoing[source.index].append(flow)
         incoming[target.index].append(flow)
-        if isinstance(target, StartEvent | BoundaryEvent) or isinstance(source, EndEvent):
+        if isinstance(target, _NO_TARGETS) or isinstance(source, EndEvent):
             _wrong_end(reading, flow, source, target)
     for node, comes, goes in zip(reading.nodes, incoming, outgoing, strict=True):
         _set(node, "incoming", tuple(comes))
