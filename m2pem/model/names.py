@@ -13,6 +13,7 @@ from m2pem.model.elements import (
     AdHocSubProcess,
     CallActivity,
     ComplexGateway,
+    Container,
     Event,
     FlowNode,
     Process,
@@ -20,6 +21,7 @@ from m2pem.model.elements import (
     SendTask,
     ServiceTask,
     StartEvent,
+    SubProcess,
     UserTask,
 )
 from m2pem.model.events import ConditionalEventDefinition, TimerEventDefinition
@@ -58,14 +60,17 @@ def unwritten(
     mission: Mission, known_names: Iterable[str], service_writes: Mapping[str, Sequence[str]]
 ) -> Iterator[Finding]:
     """A warning for each name that a process reads and nothing writes; it would be null."""
-    stores = {process: _Store() for process in mission.processes}
+    within: dict[Container, _Store] = {process: _Store() for process in mission.processes}
+    stores = {process: within[process] for process in mission.processes}
     everywhere = {*known_names, *mission.associated}
     for store in stores.values():
         store.written |= everywhere
     main = mission.process()
     called = {node.called for node in mission.nodes if isinstance(node, CallActivity)}
     for node in mission.nodes:
-        store = stores[node.container.process]
+        store = within[node.container]
+        if isinstance(node, SubProcess):
+            within[node] = store
         store.reads += _reads(node)
         begins = isinstance(node, StartEvent) and isinstance(node.container, Process)
         # A condition that begins a process reads the data of the main one.
