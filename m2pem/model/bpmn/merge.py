@@ -38,11 +38,13 @@ def merge(files: Files, reached: set[Process]) -> Mission:
     flows = [ends.flow for part in parts for ends in part.reading.flows if ends.container in inside]
     processes = [p for part in parts for p in part.reading.processes if p in reached]
     for index, node in enumerate(nodes):
-        _set(node, "index", index)
+        if node.index != index:
+            _set(node, "index", index)
         if isinstance(node, CallActivity):
             _set(node, "called_id", node.called.id)
     for index, flow in enumerate(flows):
-        _set(flow, "index", index)
+        if flow.index != index:
+            _set(flow, "index", index)
     readings = [part.reading for part in parts]
     main = files.main.reading
     return Mission(

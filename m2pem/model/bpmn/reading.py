@@ -356,6 +356,8 @@ def association(element: etree._Element) -> Association:
 
 def text_of(element: etree._Element) -> str:
     """All text inside an element, without the space around it."""
+    if not len(element):
+        return (element.text or "").strip()
     return "".join(map(str, element.itertext())).strip()
 
 
