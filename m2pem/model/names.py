@@ -71,14 +71,16 @@ def unwritten(
         store = within[node.container]
         if isinstance(node, SubProcess):
             within[node] = store
+        for mapping in _data_mappings(node):
+            store.written.add(mapping.target)
+            if mapping.source.text not in mapping.source.names:  # a copy may well copy nothing
+                store.reads.append(Read(mapping.source, node.id, mapping.line))
         store.reads += _reads(node)
         begins = isinstance(node, StartEvent) and isinstance(node.container, Process)
         # A condition that begins a process reads the data of the main one.
         of_main = begins and node.container not in called
         if isinstance(node, Event):
             (stores[main] if of_main else store).reads += _conditions(node)
-        for mapping in _data_mappings(node):
-            store.written.add(mapping.target)
         _note_writes(node, store, service_writes)
         if isinstance(node, CallActivity):
             _note_mappings(node, store, stores[node.called])
@@ -97,6 +99,8 @@ def unwritten(
 def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Finding]:
     said: set[tuple[str, str]] = set()
     for read in store.reads:
+        if read.expression.names <= store.written:
+            continue
         for name in sorted(name for name in read.expression.names if not store.has(name)):
             if (read.element, name) in said:
                 continue
@@ -124,9 +128,6 @@ def _data_mappings(node: FlowNode) -> tuple[DataMapping, ...]:
 
 
 def _reads(node: FlowNode) -> Iterator[Read]:
-    for mapping in _data_mappings(node):
-        if mapping.source.text not in mapping.source.names:  # a copy may well copy nothing
-            yield Read(mapping.source, node.id, mapping.line)
     if isinstance(node, AdHocSubProcess):
         for expression in (node.completion, node.active_elements):
             if expression is not None:
