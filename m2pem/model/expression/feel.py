@@ -1,7 +1,7 @@
 """Parses what FEEL alone has: its words, ranges, names with spaces (DMN 1.3, clause 10.3.1.2)."""
 
 from m2pem.model.expression.dialect import Dialect, Span
-from m2pem.model.expression.lexer import COMPARISON, LOWEST, Token
+from m2pem.model.expression.lexer import Token
 from m2pem.model.expression.parser import Parser
 from m2pem.model.expression.tree import (
     And,
@@ -16,6 +16,7 @@ from m2pem.model.expression.tree import (
     Not,
     Some,
 )
+from m2pem.model.expression.vocabulary import COMPARISON, LOWEST
 
 
 class FeelParser(Parser):

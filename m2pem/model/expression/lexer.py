@@ -1,4 +1,4 @@
-"""Splits an expression into tokens. The operators of all dialects get one name each here."""
+"""Splits an expression into tokens."""
 
 import re
 from typing import NamedTuple, NoReturn
@@ -6,6 +6,7 @@ from typing import NamedTuple, NoReturn
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.expression.dialect import Dialect, Span
 from m2pem.model.expression.literals import NUMBER, unescape
+from m2pem.model.expression.vocabulary import LOWEST, MEANINGS, SYMBOLS, UNSUPPORTED
 
 
 class Token(NamedTuple):
@@ -24,48 +25,6 @@ class Token(NamedTuple):
 
 _new = tuple.__new__  # takes half as long as calling the class
 
-LOWEST, OR, AND, NOT, COMPARISON, SUM, PRODUCT, UNARY = range(8)
-_BINARY = {
-    "or": OR,
-    "and": AND,
-    **dict.fromkeys(("in", "between", "not"), COMPARISON),  # `not` begins `not in`
-    **dict.fromkeys(("==", "!=", "<", "<=", ">", ">="), COMPARISON),
-    **dict.fromkeys("+-", SUM),
-    **dict.fromkeys("*/", PRODUCT),
-}
-CONSTANTS = {"true": True, "false": False, "null": None}
-_SYMBOLS = {
-    s: s for s in ("!=", "<=", ">=", "<", ">", "+", "-", "*", "/", "(", ")", "[", "]", ",", ".")
-}
-_TERNARY = {"?": "?", ":": ":"}
-_WORDS = {"and": "and", "or": "or", "not": "not", "in": "in"}
-
-SYMBOLS = {
-    Dialect.BARE: {**_SYMBOLS, **_TERNARY, "==": "=="},
-    Dialect.JUEL: {**_SYMBOLS, **_TERNARY, "==": "==", "&&": "and", "||": "or", "!": "not"},
-    Dialect.FEEL: {**_SYMBOLS, "=": "==", "..": ".."},
-    Dialect.XPATH: {s: s for s in _SYMBOLS if s not in "/[]."} | {"=": "=="},
-}
-WORDS = {
-    Dialect.BARE: _WORDS,
-    Dialect.JUEL: {
-        **_WORDS,
-        "eq": "==",
-        "ne": "!=",
-        "lt": "<",
-        "le": "<=",
-        "gt": ">",
-        "ge": ">=",
-        "div": "/",
-        "empty": "empty",
-    },
-    Dialect.FEEL: {
-        **_WORDS,
-        **{word: word for word in ("between", "else", "every", "if", "satisfies", "some", "then")},
-    },
-    Dialect.XPATH: {"and": "and", "or": "or", "div": "/"},
-}
-_UNSUPPORTED = {Dialect.FEEL: ("for", "function", "instance")}
 _HINTS = {
     "=": "'=' compares nothing here; write '==' (or a leading '=' for FEEL)",
     "&": "write 'and'",
@@ -85,16 +44,16 @@ _HINTS = {
     "\N{RIGHT SINGLE QUOTATION MARK}": "write straight quotes",
 }
 
-
 _CALLED = {
     Dialect.FEEL: r"date and time(?=\s*\()",
     Dialect.JUEL: r"(?:var|vars|variables):\w+(?=\s*\()",
-    Dialect.XPATH: (r"(?!(?:and|or|div)\s*+\()(?:[^\W\d][\w.-]*+:)?+[^\W\d][\w-]*+(?=\s*+\()"),
+    Dialect.XPATH: r"(?!(?:and|or|div)\s*+\()(?:[^\W\d][\w.-]*+:)?+[^\W\d][\w-]*+(?=\s*+\()",
 }
 """Names of functions that are no names of the store."""
 
 _ASCII_NAME = re.compile(r"(?a:[A-Za-z_]\w*+(?:\.\w++)*+)")
 _QUOTED = r"""'[^'\\]*+(?:\\[nt'"\\][^'\\]*+)*+'|"[^"\\]*+(?:\\[nt'"\\][^"\\]*+)*+\""""
+_NOTHING = "(?!)"
 _ALONE = r"(?![\w.]|[^\x00-\x7f])"
 
 
@@ -104,8 +63,8 @@ def _pattern(dialect: Dialect) -> re.Pattern[str]:
     It does not match what is left to `_Closely`: a name or number right before a point or a
     character beyond ASCII, a word that is not supported, a wrong text, and what is no token.
     """
-    called = _CALLED.get(dialect, "(?!)")
-    unsupported = "|".join(_UNSUPPORTED.get(dialect, ())) or "(?!)"
+    called = _CALLED.get(dialect, _NOTHING)
+    unsupported = "|".join(UNSUPPORTED.get(dialect, ())) or _NOTHING
     symbols = sorted(map(re.escape, SYMBOLS[dialect]), key=len, reverse=True)
     return re.compile(
         rf"\s*+(?:(?P<called>{called})"
@@ -116,22 +75,7 @@ def _pattern(dialect: Dialect) -> re.Pattern[str]:
     )
 
 
-def _meanings(dialect: Dialect) -> dict[str, tuple[str, str, int]]:
-    """The kind, text and strength of what is written, where it has a meaning of its own."""
-    operators = {**SYMBOLS[dialect], **WORDS[dialect]}
-    return {
-        **{w: ("operator", name, _BINARY.get(name, LOWEST)) for w, name in operators.items()},
-        **{word: ("constant", word, LOWEST) for word in CONSTANTS},
-    }
-
-
 _PATTERNS = {dialect: _pattern(dialect) for dialect in SYMBOLS}
-_MEANINGS = {dialect: _meanings(dialect) for dialect in SYMBOLS}
-
-
-def is_reserved(name: str, dialect: Dialect) -> bool:
-    """Whether a name can never be read because the dialect gives it a meaning."""
-    return name in _MEANINGS[dialect]
 
 
 def scan_name(text: str, position: int, end: int) -> int:
@@ -163,7 +107,7 @@ def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
     Raises:
         ExpressionSyntaxError: something that is no token.
     """
-    match, meanings = _PATTERNS[dialect].match, _MEANINGS[dialect]
+    match, meanings = _PATTERNS[dialect].match, MEANINGS[dialect]
     tokens: list[Token] = []
     position = span.start
     end = len(text[: span.stop].rstrip())
@@ -212,7 +156,7 @@ class _Closely:
         word = self._text[start:end]
         if self._text.startswith(".", end) and end < self._end and not self._is_range(end):
             self._fail("a part of the name is missing after '.'", end)
-        if word in _UNSUPPORTED.get(self._dialect, ()):
+        if word in UNSUPPORTED.get(self._dialect, ()):
             self._fail(f"FEEL's '{word}' is not supported", start)
         return end
 

@@ -12,16 +12,7 @@ from typing import NoReturn
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.expression.calls import CallError, meaning, method_call
 from m2pem.model.expression.dialect import Dialect, Span
-from m2pem.model.expression.lexer import (
-    AND,
-    COMPARISON,
-    CONSTANTS,
-    LOWEST,
-    NOT,
-    UNARY,
-    Token,
-    tokenize,
-)
+from m2pem.model.expression.lexer import Token, tokenize
 from m2pem.model.expression.literals import read_number, unescape
 from m2pem.model.expression.tree import (
     MAX_DEPTH,
@@ -42,6 +33,14 @@ from m2pem.model.expression.tree import (
     Operation,
     Or,
     walk,
+)
+from m2pem.model.expression.vocabulary import (
+    AND,
+    COMPARISON,
+    CONSTANTS,
+    LOWEST,
+    NOT,
+    UNARY,
 )
 
 MAX_ITEMS = 1_000
@@ -79,15 +78,19 @@ class Parser:
             spaces = "; a name has no spaces (in FEEL it may: begin with '=')"
             hint = spaces if self._token.kind == "name" else ""
             self._fail(f"expected an operator or the end, found {self._found}{hint}")
-        # What is no longer than that is no deeper either, and small enough.
-        for parts, (_, depth) in enumerate(walk(node) if self._length > MAX_DEPTH else ()):
+        # Each level takes a character at least, and what doubles the parts takes ten.
+        if self._length > MAX_DEPTH:
+            self._limit(node)
+        return node
+
+    def _limit(self, node: Node) -> None:
+        for parts, (_, depth) in enumerate(walk(node)):
             if depth > MAX_DEPTH:
                 self._fail(
                     f"nested deeper than {MAX_DEPTH} levels; use parentheses or fewer operators"
                 )
             if parts > MAX_PARTS:
                 self._fail("too large, written out; use fewer ranges in each other")
-        return node
 
     @property
     def _found(self) -> str:
