@@ -134,6 +134,30 @@ def test_a_place_without_a_height_is_at_the_present_one_and_turns_it() -> None:
     assert bench.autopilot.body.yaw_rad == pytest.approx(1.5, abs=0.05)
 
 
+def test_on_its_way_it_is_stopped_by_a_reposition_to_nowhere_and_not_by_the_mode() -> None:
+    bench = Px4Bench().airborne()
+    place = (*bench.offset(500, 0), GROUND_M + 20)
+    assert bench.command_int(REPOSITION, -1, 1, 0, NAN, at=place) == ACCEPTED
+    bench.run(5)
+    assert bench.enter(4, 3) == ACCEPTED
+    bench.run(5)
+    assert bench.autopilot.body.moving
+    assert bench.command(REPOSITION, -1, 1, 0, NAN, NAN, NAN, NAN) == ACCEPTED
+    bench.run(5)
+    assert not bench.autopilot.body.moving
+    assert bench.autopilot.body.north_m < 100
+
+
+def test_a_height_alone_does_not_change_where_it_goes() -> None:
+    bench = Px4Bench().airborne()
+    place = (*bench.offset(50, 0), GROUND_M + 20)
+    bench.command_int(REPOSITION, -1, 1, 0, NAN, at=place)
+    bench.run(2)
+    assert bench.command(REPOSITION, -1, 1, 0, NAN, NAN, NAN, GROUND_M + 30) == ACCEPTED
+    bench.run(30)
+    assert bench.autopilot.position == pytest.approx((50, 0, 30), abs=0.5)
+
+
 def test_a_place_without_a_change_of_mode_is_unsupported() -> None:
     bench = Px4Bench().airborne()
     place = (*bench.offset(20, 0), GROUND_M + 20)

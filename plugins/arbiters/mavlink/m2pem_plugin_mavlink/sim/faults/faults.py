@@ -20,8 +20,8 @@ from m2pem_plugin_mavlink.sim.troubles import Refusal
 
 Action = Callable[["Faults"], None]
 
-LOW = 0.06
-"""So full is a low battery: below the thresholds of ArduPilot and PX4."""
+LOW = 0.069
+"""So full is a low battery: below ArduPilot's threshold, and critical for PX4."""
 
 
 class Direction(StrEnum):

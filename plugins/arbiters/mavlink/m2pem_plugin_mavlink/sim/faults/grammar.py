@@ -137,7 +137,7 @@ ACTIONS: Mapping[str, tuple[str, Callable[[re.Match[str]], Made]]] = {
     "lose gps": (r"lose gps", lambda _: (Faults.lose_gps, Faults.find_gps)),
     'refuse arming, refuse arming "text"': (r"refuse arming(?:\s+\"([^\"]+)\")?", _refuse_arming),
     "refuse command 22": (r"refuse command\s+(\d+)", _refuse_command),
-    "mode LOITER": (r"mode\s+(\S+)", _mode),
+    "mode LOITER at 40 s": (r"mode\s+(\S+)", _mode),
 }
 """How an action is written, its pattern, and what it does."""
 
@@ -164,6 +164,8 @@ def parse(text: str) -> PlannedFault:
         if for_s is not None and end is None:
             raise FaultError(f"fault {text!r}: {what!r} has no end; leave 'for ... s' out")
         mode = match[1].upper() if make is _mode else None
+        if mode is not None and at_s is None:
+            raise FaultError(f"fault {text!r}: say when, such as 'mode {mode} at 40 s'")
         return PlannedFault(text, systems, begin, end, at_s, for_s, mode)
     known = "; ".join(ACTIONS)
     raise FaultError(

@@ -100,7 +100,11 @@ class Px4Commands(Part):
         maneuver = pilot.modes.maneuver
         if result is not Result.ACCEPTED or not isinstance(maneuver, Hold):
             return result
-        point = self._place(command)
+        aimless = not command.has_position
+        if aimless and not math.isfinite(command.z) and not math.isfinite(command.param4):
+            maneuver.pause()
+            return result
+        point = self._place(command, maneuver.destination)
         if pilot.guided.refusal(point) is not None:
             pilot.warn("Reposition is outside geofence")
             return result
@@ -135,7 +139,7 @@ class Px4Commands(Part):
         if first > 0:
             pilot.mission.set_current(first)
         started = pilot.modes.switch(MISSION) and pilot.arming.arm()
-        return Result.ACCEPTED if started else Result.DENIED
+        return Result.ACCEPTED if started else Result.TEMPORARILY_REJECTED
 
     def _up_m(self, amsl_m: float) -> float | None:
         """Above the frame's origin."""
@@ -143,13 +147,15 @@ class Px4Commands(Part):
             return None
         return amsl_m - self.autopilot.frame.origin.altitude_amsl_m
 
-    def _place(self, command: Command) -> Point:
-        """Where it says; NaN or nothing means here, and at the height that it has."""
+    def _place(self, command: Command, before: Point | None = None) -> Point:
+        """Where it says; NaN or nothing means where it was to go before (None: here), at the height
+        that it has."""
         pilot = self.autopilot
-        point = pilot.position
+        point = before or pilot.position
         if command.has_position:
             location = Location(command.latitude_deg, command.longitude_deg, 0.0)
-            point = pilot.frame.to_point(location).at_height(point.up_m)
+            point = pilot.frame.to_point(location)
+        point = point.at_height(pilot.body.up_m)
         up_m = self._up_m(command.z)
         if up_m is not None and pilot.spec.kind is Kind.COPTER:
             point = point.at_height(up_m)

@@ -1,4 +1,7 @@
-"""AUTO.LOITER of PX4: stay, or go to the place that was asked for and stay there."""
+"""AUTO.LOITER of PX4: stay, or go to the place that was asked for and stay there.
+
+To enter the mode once more does not stop it on its way; only a reposition to nowhere does.
+"""
 
 from m2pem_plugin_mavlink.sim.demands import Demand, Rest
 from m2pem_plugin_mavlink.sim.geometry import Point
@@ -26,6 +29,11 @@ class Hold(Maneuver):
             self.autopilot.note("motion", f"{place.latitude_deg:.7f},{place.longitude_deg:.7f}")
             self._arrived = False
         self.destination, self.yaw_rad = point, yaw_rad
+
+    def pause(self) -> None:
+        """Brake, and stay there."""
+        self.destination = self.yaw_rad = None
+        self._stay = Stay(self.autopilot)
 
     def keep(self, point: Point) -> None:
         """Stay there, which is where it is, or nearly."""

@@ -1,0 +1,118 @@
+"""pymavlink's mavutil with simulated PX4s and with bad links, over UDP."""
+
+import asyncio
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+
+import pytest
+from m2pem_plugin_mavlink.sim.faults import Direction, every
+from m2pem_plugin_mavlink.sim.simulator import Simulator
+from m2pem_plugin_mavlink.sim.specification import ZURICH, VehicleSpec
+from mavlink_bench import item
+from mavlink_ground import Ground
+
+NAN = float("nan")
+ARMED = 128
+
+
+@pytest.fixture
+def ground() -> Iterator[Ground]:
+    station = Ground("udpin:127.0.0.1:0")
+    yield station
+    station.close()
+
+
+async def at(
+    ground: Ground, scene: Callable[[Simulator], None], *specs: VehicleSpec, speed: float = 20
+) -> Simulator:
+    """Play a scene in a thread, while vehicles send to the ground station."""
+    async with Simulator(specs, speed=speed, to=("127.0.0.1", ground.port)) as sim:
+        await asyncio.to_thread(scene, sim)
+        return sim
+
+
+PX4 = VehicleSpec(firmware="px4")
+
+
+async def test_a_px4_is_flown_by_its_modes_and_a_mission(ground: Ground) -> None:
+    plan = [item(0, 22, ZURICH[:2], 10.0), item(1, 16, (47.39790, 8.5456), 10.0), item(2, 20)]
+
+    def scene(sim: Simulator) -> None:
+        ground.link.wait_heartbeat(timeout=10)
+        ground.wait("HOME_POSITION")
+        ground.wait("ESTIMATOR_STATUS", that=lambda m: m.flags & 0x10 and not m.flags & 0x80)
+        assert ground.command(400, 1) == 0
+        assert ground.command(22, NAN, NAN, NAN, NAN, NAN, NAN, 498) == 0
+        ground.wait("HEARTBEAT", that=lambda m: m.custom_mode == 4 << 16 | 2 << 24)
+        ground.wait("HEARTBEAT", that=lambda m: m.custom_mode == 4 << 16 | 3 << 24)
+        ground.link.mav.mission_count_send(1, 1, len(plan))
+        for each in plan:
+            assert ground.wait("MISSION_REQUEST_INT").seq == each.seq
+            ground.link.mav.send(each)
+        assert ground.wait("MISSION_ACK").type == 0
+        refused = 0
+        while ground.command(300) != 0:
+            refused += 1
+        assert refused
+        ground.wait("MISSION_ITEM_REACHED", that=lambda m: m.seq == 1)
+        ground.wait("HEARTBEAT", that=lambda m: not m.base_mode & ARMED)
+
+    sim = await at(ground, scene, PX4)
+    assert (sim[1].takeoffs, sim[1].missions_begun) == (1, 1)
+    assert sim[1].location[:2] == pytest.approx(ZURICH[:2], abs=1e-5)
+
+
+async def test_an_ardupilot_and_a_px4_share_a_port(ground: Ground) -> None:
+    def scene(sim: Simulator) -> None:
+        ground.wait("HEARTBEAT", that=lambda m: (m.get_srcSystem(), m.autopilot) == (1, 12))
+        ground.wait("HEARTBEAT", that=lambda m: (m.get_srcSystem(), m.autopilot) == (2, 3))
+
+    await at(ground, scene, PX4, VehicleSpec(system=2))
+
+
+async def test_a_link_that_is_cut_is_silent_and_comes_back(ground: Ground) -> None:
+    def scene(sim: Simulator) -> None:
+        ground.link.wait_heartbeat(timeout=10)
+        times_s = [ground.wait("SYSTEM_TIME").time_boot_ms / 1000]
+        sim[1].faults.cut_link(seconds=40)
+        while times_s[-1] - times_s[0] < 45:
+            times_s.append(ground.wait("SYSTEM_TIME").time_boot_ms / 1000)
+        gaps_s = [after - before for before, after in pairwise(times_s)]
+        assert 39 < max(gaps_s) < 45
+
+    await at(ground, scene, PX4)
+
+
+@pytest.mark.parametrize("frames", [2, 3, 7])
+@pytest.mark.parametrize("direction", list(Direction)[:2])
+async def test_an_upload_over_a_link_that_loses_frames_is_asked_for_again(
+    ground: Ground, frames: int, direction: Direction
+) -> None:
+    plan = [item(n, 16, (47.3978, 8.5456), 10.0) for n in range(5)]
+
+    def scene(sim: Simulator) -> None:
+        ground.link.wait_heartbeat(timeout=10)
+        ids = {39, 40, 51, 73}  # items, and the requests for them
+        sim[1].faults.set_link(direction, drop=every(frames, frames - 1), only=ids)
+        ground.link.mav.mission_count_send(1, 1, len(plan))
+        while (message := ground.wait("MISSION_REQUEST_INT", "MISSION_ACK")).get_msgId() != 47:
+            ground.link.mav.send(plan[message.seq])
+        assert message.type == 0
+
+    sim = await at(ground, scene, PX4)
+    assert len(sim[1].autopilot.plans[0]) == 5
+    assert sim[1].faults.lost_frames >= 5 // frames
+
+
+async def test_frames_that_are_spoiled_double_or_swapped_do_no_harm(ground: Ground) -> None:
+    def scene(sim: Simulator) -> None:
+        ground.link.wait_heartbeat(timeout=10)
+        bad = {"corrupt": every(5), "duplicate": every(3), "reorder": every(4)}
+        sim[1].faults.set_link(**bad)
+        ground.wait("ESTIMATOR_STATUS", that=lambda m: m.flags & 0x10 and not m.flags & 0x80)
+        ground.link.arducopter_arm()
+        while not ground.wait("HEARTBEAT").base_mode & ARMED:
+            ground.link.mav.command_long_send(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
+
+    sim = await at(ground, scene, PX4)
+    assert sim[1].autopilot.chronicle.counts["armed"] == 1
