@@ -25,3 +25,8 @@ class TestMavsdkRovers(_Mavsdk, over_udp.TestSimulatedRovers):
 
 class TestMavsdkCopters(_Mavsdk, over_udp.TestSimulatedCopters):
     pass
+
+
+@pytest.mark.long
+class TestMavsdkPx4Copters(_Mavsdk, over_udp.TestSimulatedCopters):
+    firmware = "px4"

@@ -175,6 +175,23 @@ def test_velocities_do_not_fight_for_offboard(virtual: Run) -> None:
     virtual(main)
 
 
+def test_a_stop_ends_a_way_to_a_place_too(virtual: Run) -> None:
+    """It goes to places in the mode in which it holds: to enter that mode would stop nothing."""
+
+    async def main(clock: Clock) -> None:
+        async with Playing(px4(clock)) as (link, vehicle):
+            await in_the_air(link, vehicle)
+            await vehicle.driver.go_to(Place(47.4, 8.55, 20.0))
+            await vehicle.driver.stop()
+            (nowhere,) = link.of("COMMAND_LONG", REPOSITION)
+            assert link.sent[-1] is nowhere
+            assert nowhere.param2 == dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+            place = (nowhere.param4, nowhere.param5, nowhere.param6, nowhere.param7)
+            assert all(map(math.isnan, place))
+
+    virtual(main)
+
+
 def test_items_are_counted_from_the_first_real_one(virtual: Run) -> None:
     async def main(clock: Clock) -> None:
         async with Playing(px4(clock)) as (link, vehicle):

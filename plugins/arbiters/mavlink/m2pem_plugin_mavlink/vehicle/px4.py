@@ -82,9 +82,13 @@ class Px4Driver(Autopilot):
         await self.set_mode(FlightMode.RETURN)
 
     async def stop(self) -> None:
-        """AUTO.LOITER, in which it brakes at once; one that is not armed stands already."""
+        """AUTO.LOITER, in which it brakes at once; one that is not armed stands already. As that is
+        also the mode in which it goes to places, it is then told to go nowhere."""
         if self.heard.armed is not False:
             await self.set_mode(FlightMode.HOLD)
+            change = float(dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
+            nowhere = (math.nan,) * 4
+            await self.command(dialect.MAV_CMD_DO_REPOSITION, -1.0, change, 0.0, *nowhere)
 
     # --- to places ------------------------------------------------------------------------------
 
