@@ -65,7 +65,8 @@ demo: python-packages ## run the paper's mission on simulated vehicles, in two w
 	echo "The second way: nothing is detected. Continue, and the route is driven to its end."; \
 	$(DEMO) --answers $(ANSWERS)_route$$operator.yaml
 
-AUTOPILOTS := $(BIN)/m2pem sim mavlink --copters 2 --rovers 1 --speed 10 --home 38.1075,-77.3192,60
+AUTOPILOTS := $(BIN)/m2pem sim mavlink --copters 2 --rovers 1 --speed 10 --home 38.1075,-77.3192,60 \
+  --set FS_GCS_ENABLE=1 --set FS_GCS_TIMEOUT=10 --set BATT_FS_LOW_ACT=2
 LINK_LOST := 1: cut link at 80 s for 600 s
 
 demo-air: python-packages ## survey a field with simulated MAVLink vehicles, one of which falls silent

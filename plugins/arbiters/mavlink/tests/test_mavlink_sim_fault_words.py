@@ -118,6 +118,8 @@ def test_a_simulator_knows_its_vehicles_and_their_modes() -> None:
     [
         (["--fault", "1: cut lnik"], "is no action"),
         (["--fault", "9: cut link"], "there is no vehicle 9"),
+        (["--set", "FS_GCS_ENABEL=1"], "did you mean FS_GCS_ENABLE?"),
+        (["--set", "FS_GCS_ENABLE=on"], "is not NAME=VALUE"),
         (["--firmware", "px4", "--planes", "1"], "a plane with PX4 is not simulated"),
     ],
 )

@@ -1,9 +1,10 @@
 """`m2pem sim mavlink`: simulated vehicles, until Ctrl-C."""
 
 import asyncio
+import difflib
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from urllib.parse import urlsplit
 
@@ -60,6 +61,26 @@ class Place(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
         if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
             self.fail(f"{value!r} is not on Earth", param, ctx)
         return Location(latitude, longitude, altitude)
+
+
+class Parameter(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """NAME=VALUE."""
+
+    name = "name=value"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, float]:
+        """The parameter's name and number."""
+        if isinstance(value, tuple):
+            return value
+        name, equals, number = str(value).partition("=")
+        try:
+            if name and equals and math.isfinite(float(number)):
+                return name.strip(), float(number)
+        except ValueError:
+            pass
+        self.fail(f"{value!r} is not NAME=VALUE, such as FS_GCS_ENABLE=1", param, ctx)
 
 
 class Duration(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
@@ -140,6 +161,13 @@ class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
     show_default=True,
     help="As which autopilot all vehicles speak.",
 )
+@click.option(
+    "--set",
+    "parameters",
+    type=Parameter(),
+    multiple=True,
+    help="A parameter of all vehicles, such as FS_GCS_ENABLE=1. May be given more than once.",
+)
 @click.option("--camera", is_flag=True, help="All vehicles have a camera (component 100).")
 @click.option(
     "--fault",
@@ -161,6 +189,7 @@ def mavlink(
     estimator_s: float,
     first_system: int,
     firmware: str,
+    parameters: tuple[tuple[str, float], ...],
     camera: bool,
     faults: tuple[PlannedFault, ...],
 ) -> None:
@@ -176,11 +205,18 @@ def mavlink(
         raise click.UsageError("no vehicles: say how many, such as --copters 2")
     if first_system + len(kinds) - 1 > MOST_SYSTEMS:
         raise click.UsageError(f"system ids go to {MOST_SYSTEMS}: these are too many vehicles")
-    like = VehicleSpec(home=home, estimator_s=estimator_s, firmware=firmware, camera=camera)
+    like = VehicleSpec(
+        home=home,
+        estimator_s=estimator_s,
+        firmware=firmware,
+        parameters=dict(parameters),
+        camera=camera,
+    )
     try:
         specs = list(_specs(kinds, like, first_system))
         simulator = Simulator(specs, speed=speed, to=None if listen else to, listen=listen)
         simulator.plan(faults)
+        _check_parameters(simulator, like.parameters)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     try:
@@ -194,6 +230,16 @@ def _specs(kinds: list[Kind], like: VehicleSpec, first_system: int) -> Iterator[
     for number, kind in enumerate(kinds):
         place = frame.to_location(Point(0.0, number * APART_M, 0.0))
         yield replace(like, kind=kind, system=first_system + number, home=place)
+
+
+def _check_parameters(simulator: Simulator, names: Iterable[str]) -> None:
+    """A name of no vehicle is a mistake; of some of them, not: a rover has less than a copter."""
+    known = {name for vehicle in simulator for name in vehicle.autopilot.firmware.parameters()}
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise ValueError(f"--set {name}: no simulated vehicle has that parameter{hint}")
 
 
 async def _run(simulator: Simulator) -> None:
