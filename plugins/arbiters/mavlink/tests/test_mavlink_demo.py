@@ -1,0 +1,92 @@
+"""`make demo-air`: the mission of two copters and a rover, with real processes over real UDP."""
+
+import json
+import socket
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[4]
+MISSION = REPOSITORY / "missions" / "survey_pair.bpmn"
+FLEETS = REPOSITORY / "fleet_configs"
+SPEED = "15"
+ENDED_WITHIN_S = 100
+
+
+@pytest.fixture
+def port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        free: int = taken.getsockname()[1]
+        return free
+
+
+@pytest.fixture
+def fleet(tmp_path: Path, port: int) -> Path:
+    text = (FLEETS / "survey_pair.yaml").read_text(encoding="utf-8")
+    (tmp_path / "geo").symlink_to(FLEETS / "geo")
+    file = tmp_path / "fleet.yaml"
+    file.write_text(text.replace("14550", str(port)), encoding="utf-8")
+    return file
+
+
+def m2pem(*words: object) -> list[str]:
+    return [sys.executable, "-m", "m2pem", *map(str, words)]
+
+
+def test_the_second_copter_takes_over_what_the_first_one_leaves(
+    fleet: Path, port: int, tmp_path: Path
+) -> None:
+    autopilots = subprocess.Popen(
+        m2pem(
+            *("sim", "mavlink", "--copters", 2, "--rovers", 1, "--speed", SPEED),
+            *("--home", "38.1075,-77.3192,60", "--to", f"udp://127.0.0.1:{port}"),
+            *("--set", "FS_GCS_ENABLE=1", "--set", "FS_GCS_TIMEOUT=20"),
+            *("--fault", "1: cut link at 60 s for 900 s"),
+        ),
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        done = subprocess.run(
+            m2pem(
+                *("run", MISSION, "--fleet", fleet, "--speed", SPEED, "--ocu", "none"),
+                *("--journal", tmp_path / "journal.db", "--format", "json"),
+            ),
+            capture_output=True,
+            text=True,
+            timeout=ENDED_WITHIN_S,
+            check=False,
+        )
+    finally:
+        autopilots.terminate()
+        autopilots.communicate()
+    assert done.returncode == 0, done.stderr
+    records = [json.loads(line) for line in done.stdout.splitlines()]
+    assert records[-1]["record"] == "RunEnded"
+    assert records[-1]["outcome"] == "completed"
+    assert ends(records) == Counter(
+        {
+            ("takeoff", "uav1", "SUCCEEDED"): 1,
+            ("takeoff", "uav2", "SUCCEEDED"): 1,
+            ("goto", "rover1", "SUCCEEDED"): 1,
+            ("return_to_launch", "rover1", "SUCCEEDED"): 1,
+            ("area_survey", "uav1", "LOST"): 1,
+            ("area_survey", "uav2", "SUCCEEDED"): 2,
+            ("return_to_launch", "uav2", "SUCCEEDED"): 1,
+        }
+    )
+
+
+def ends(records: list[dict[str, Any]]) -> Counter[tuple[str, str, str]]:
+    """How each behavior of each vehicle has ended."""
+    asked = {each["behavior"]: each for each in records if each["record"] == "BehaviorRequested"}
+    return Counter(
+        (asked[each["behavior"]]["name"], asked[each["behavior"]]["resources"][0], each["state"])
+        for each in records
+        if each["record"] == "BehaviorEnded"
+    )
