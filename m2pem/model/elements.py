@@ -60,8 +60,8 @@ class SequenceFlow(Element):
 class FlowNode(Element):
     """A node that tokens visit. Flows are in the order of the XML."""
 
-    incoming: "tuple[SequenceFlow, ...]" = field(init=False, repr=False, default=())
-    outgoing: "tuple[SequenceFlow, ...]" = field(init=False, repr=False, default=())
+    incoming: "tuple[SequenceFlow, ...]" = field(init=False, repr=False)
+    outgoing: "tuple[SequenceFlow, ...]" = field(init=False, repr=False)
     container: "Container" = field(init=False, repr=False)
     index: int = field(init=False, repr=False)
     """Place in `Mission.nodes`."""

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from m2pem.findings import Finding, Severity
+from m2pem.model.bpmn import collector
 from m2pem.model.bpmn.graph import unreachable
 from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.elements import (
@@ -48,13 +49,14 @@ def lint(
     `known_names`: names that are written from outside (`--data`). `service_writes`: what each
     registered service class writes; a class that is not there may write anything.
     """
-    findings = [
-        *_unreachable(mission),
-        *_undecided_gateways(mission),
-        *_outside_only(mission),
-        *_recursion(mission),
-        *unwritten(mission, known_names, service_writes or {}),
-    ]
+    with collector.paused():
+        findings = [
+            *_unreachable(mission),
+            *_undecided_gateways(mission),
+            *_outside_only(mission),
+            *_recursion(mission),
+            *unwritten(mission, known_names, service_writes or {}),
+        ]
     order = by_file(mission)
     return sorted(findings, key=lambda finding: (order(finding), finding.line))
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from m2pem.findings import Finding, Severity
 from m2pem.model.behavior import Assignment, Parameter
@@ -12,6 +13,7 @@ from m2pem.model.elements import (
     AdHocSubProcess,
     CallActivity,
     ComplexGateway,
+    Container,
     Event,
     FlowNode,
     Process,
@@ -19,6 +21,7 @@ from m2pem.model.elements import (
     SendTask,
     ServiceTask,
     StartEvent,
+    SubProcess,
     UserTask,
 )
 from m2pem.model.events import ConditionalEventDefinition, TimerEventDefinition
@@ -28,8 +31,7 @@ from m2pem.model.mission import Mission
 from m2pem.model.near import did_you_mean
 
 
-@dataclass(frozen=True, slots=True)
-class Read:
+class Read(NamedTuple):
     """An expression that is evaluated over a process's data, and where it stands."""
 
     expression: Expression
@@ -48,31 +50,37 @@ class _Store:
 
     def has(self, name: str) -> bool:
         """Whether the name, or a map that holds it, is written."""
-        if self.anything:
+        if self.anything or name in self.written:
             return True
         parts = name.split(".")
-        return any(".".join(parts[:count]) in self.written for count in range(len(parts), 0, -1))
+        return any(".".join(parts[:count]) in self.written for count in range(1, len(parts)))
 
 
 def unwritten(
     mission: Mission, known_names: Iterable[str], service_writes: Mapping[str, Sequence[str]]
 ) -> Iterator[Finding]:
     """A warning for each name that a process reads and nothing writes; it would be null."""
-    stores = {process: _Store() for process in mission.processes}
+    within: dict[Container, _Store] = {process: _Store() for process in mission.processes}
+    stores = {process: within[process] for process in mission.processes}
     everywhere = {*known_names, *mission.associated}
     for store in stores.values():
         store.written |= everywhere
     main = mission.process()
     called = {node.called for node in mission.nodes if isinstance(node, CallActivity)}
     for node in mission.nodes:
-        store = stores[node.container.process]
+        store = within[node.container]
+        if isinstance(node, SubProcess):
+            within[node] = store
+        for mapping in _data_mappings(node):
+            store.written.add(mapping.target)
+            if mapping.source.text not in mapping.source.names:  # a copy may well copy nothing
+                store.reads.append(Read(mapping.source, node.id, mapping.line))
         store.reads += _reads(node)
         begins = isinstance(node, StartEvent) and isinstance(node.container, Process)
         # A condition that begins a process reads the data of the main one.
         of_main = begins and node.container not in called
-        (stores[main] if of_main else store).reads += _conditions(node)
-        for mapping in _data_mappings(node):
-            store.written.add(mapping.target)
+        if isinstance(node, Event):
+            (stores[main] if of_main else store).reads += _conditions(node)
         _note_writes(node, store, service_writes)
         if isinstance(node, CallActivity):
             _note_mappings(node, store, stores[node.called])
@@ -91,8 +99,10 @@ def unwritten(
 def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Finding]:
     said: set[tuple[str, str]] = set()
     for read in store.reads:
-        for name in sorted(read.expression.names):
-            if store.has(name) or (read.element, name) in said:
+        if read.expression.names <= store.written:
+            continue
+        for name in sorted(name for name in read.expression.names if not store.has(name)):
+            if (read.element, name) in said:
                 continue
             said.add((read.element, name))
             reader = mission.elements.get(
@@ -111,24 +121,21 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
             )
 
 
-def _data_mappings(node: FlowNode) -> Iterator[DataMapping]:
+def _data_mappings(node: FlowNode) -> tuple[DataMapping, ...]:
     if isinstance(node, Activity | Event):
-        yield from node.data_flow.inputs
-        yield from node.data_flow.outputs
+        return (*node.data_flow.inputs, *node.data_flow.outputs)
+    return ()
 
 
 def _reads(node: FlowNode) -> Iterator[Read]:
-    for mapping in _data_mappings(node):
-        if mapping.source.text not in mapping.source.names:  # a copy may well copy nothing
-            yield Read(mapping.source, node.id, mapping.line)
     if isinstance(node, AdHocSubProcess):
         for expression in (node.completion, node.active_elements):
             if expression is not None:
                 yield Read(expression, node.id, node.line)
     if isinstance(node, ComplexGateway) and node.activation is not None:
         yield Read(node.activation, node.id, node.line)
-    if isinstance(node, Activity):
-        yield from _loop_reads(node)
+    if isinstance(node, Activity) and node.loop is not None:
+        yield from _loop_reads(node, node.loop)
     for flow in node.outgoing:
         if flow.condition is not None:
             yield Read(flow.condition, flow.id, flow.line)
@@ -148,18 +155,17 @@ def _reads(node: FlowNode) -> Iterator[Read]:
                 yield Read(definition.expression, node.id, definition.line)
 
 
-def _conditions(node: FlowNode) -> Iterator[Read]:
-    for definition in node.definitions if isinstance(node, Event) else ():
+def _conditions(node: Event) -> Iterator[Read]:
+    for definition in node.definitions:
         if isinstance(definition, ConditionalEventDefinition):
             yield Read(definition.condition, node.id, definition.line)
 
 
-def _loop_reads(node: Activity) -> Iterator[Read]:
-    loop = node.loop
-    found: list[Expression | None] = []
+def _loop_reads(node: Activity, loop: StandardLoop | MultiInstance) -> Iterator[Read]:
+    found: list[Expression | None]
     if isinstance(loop, StandardLoop):
         found = [loop.condition]
-    elif loop is not None:
+    else:
         found = [loop.cardinality, loop.collection, loop.completion]
         found += [each.condition for each in loop.complex]
         if loop.output is not None and loop.output.text not in loop.output.names:

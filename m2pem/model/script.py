@@ -9,8 +9,9 @@ import re
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.behavior import Assignment, Script, ThrowError
 from m2pem.model.expression import Dialect, parse
-from m2pem.model.expression.lexer import is_reserved, scan_name
+from m2pem.model.expression.lexer import scan_name
 from m2pem.model.expression.literals import shorten
+from m2pem.model.expression.vocabulary import is_reserved
 
 _THROW = re.compile(r"throw\s+error\s+(\S+)")
 _CODE = re.compile(r"[\w.:-]+")
@@ -42,7 +43,7 @@ def parse_script(text: str, line: int = 1) -> tuple[Script, list[tuple[int, str]
 
 
 def _statement(text: str, line: int) -> Assignment | ThrowError:
-    if throw := _THROW.fullmatch(text):
+    if text.startswith("throw") and (throw := _THROW.fullmatch(text)):
         if not _CODE.fullmatch(throw[1]):
             raise _StatementError(
                 f"{shorten(throw[1])!r} is no error code: letters, digits, '_', '-', '.' and ':'"

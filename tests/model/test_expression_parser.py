@@ -4,7 +4,9 @@ import pytest
 
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.expression import Dialect, parse, template
+from m2pem.model.expression.parser import MAX_PARTS
 from m2pem.model.expression.tree import (
+    MAX_DEPTH,
     And,
     Arithmetic,
     Call,
@@ -124,6 +126,21 @@ def test_what_a_range_doubles_is_bounded():
         text = f"= ({text[2:]}) between 1 and 2"
     with pytest.raises(ExpressionSyntaxError, match="too large, written out"):
         parse(text)
+
+
+@pytest.mark.parametrize(
+    ("levels", "text"),
+    [
+        (9, "= {}a{}".format("(" * 9, " in(1..2))" * 9)),
+        (4, "= {}a{}".format("every x in " * 4, " satisfies b" * 4)),
+        (98, "-" * 98 + "a"),
+    ],
+)
+def test_a_short_text_is_within_the_limits_without_being_measured(levels, text):
+    assert len(text) <= MAX_DEPTH + len("= ")
+    parts = list(walk(parse(text).tree))
+    assert levels < max(depth for _, depth in parts) <= MAX_DEPTH
+    assert len(parts) <= MAX_PARTS
 
 
 def test_feel_names_may_hold_spaces():

@@ -1,6 +1,6 @@
 """Collaborations and lanes: kept for display, so what is wrong in them is a warning."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 
 from lxml import etree
 
@@ -38,8 +38,9 @@ def read_collaboration(reading: Reading, collaboration: etree._Element) -> None:
         )
 
 
-def check_collaborations(reading: Reading, elements: Mapping[str, Element]) -> None:
+def check_collaborations(reading: Reading) -> None:
     """Warn of participants, message flows and lanes that refer to nothing."""
+    elements = _drawn(reading) if reading.message_flows or reading.lanes else set()
     processes = {process.id for process in reading.processes}
     pools = {participant.id for participant in reading.participants}
     for participant in reading.participants:
@@ -55,6 +56,13 @@ def check_collaborations(reading: Reading, elements: Mapping[str, Element]) -> N
         for node_id in lane.node_ids:
             if node_id not in elements and node_id not in reading.ids:
                 _warn(reading, lane, "flowNodeRef", node_id, elements)
+
+
+def _drawn(reading: Reading) -> set[str]:
+    """Ids of processes, flow nodes and sequence flows."""
+    elements: list[Element] = [*reading.processes, *reading.nodes]
+    elements += [ends.flow for ends in reading.flows]
+    return {element.id for element in elements}
 
 
 def _check(

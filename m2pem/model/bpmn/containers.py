@@ -57,17 +57,13 @@ def read_process(reading: Reading, element: etree._Element) -> None:
     stack = [_frame(reading, process, element)]
     while stack:
         frame = stack[-1]
-        child = next(frame.children, None)
-        if child is None:
-            stack.pop()
-            if isinstance(frame.container, SubProcess):
-                read_data_flow(reading, frame.marks, frame.container)
-                read_loop(reading, frame.marks, frame.container)
-            continue
-        inner = _read_child(reading, process, frame, child)
-        if inner is None:
-            continue
-        if len(stack) > MAX_DEPTH:
+        for child in frame.children:
+            inner = _read_child(reading, process, frame, child)
+            if inner is None:
+                continue
+            if len(stack) <= MAX_DEPTH:
+                stack.append(_frame(reading, inner, child))
+                break
             reading.broken.add(inner)
             reading.report.error(
                 child,
@@ -77,7 +73,10 @@ def read_process(reading: Reading, element: etree._Element) -> None:
                 "move inner subprocesses to processes of their own and call them",
             )
         else:
-            stack.append(_frame(reading, inner, child))
+            stack.pop()
+            if isinstance(frame.container, SubProcess):
+                read_data_flow(reading, frame.marks, frame.container)
+                read_loop(reading, frame.marks, frame.container)
 
 
 def _frame(reading: Reading, container: Container, element: etree._Element) -> _Frame:
@@ -92,11 +91,10 @@ def _read_child(
     """Read one child; gives back a subprocess, whose content is still to be read."""
     tag = child.tag
     container = frame.container
-    if not tag.startswith(BPMN):
-        return None
     rank = frame.shape.ranks.get(tag)
     if rank is None:
-        _refuse_unknown(reading, frame, child)
+        if tag.startswith(BPMN):
+            _refuse_unknown(reading, frame, child)
         return None
     if rank < frame.order.reached:
         frame.order.check(reading, frame.element, child, frame.shape, container.id)

@@ -12,7 +12,6 @@ from m2pem.model.elements import (
     ComplexGateway,
     Container,
     DataObject,
-    Element,
     EndEvent,
     ExclusiveGateway,
     FlowNode,
@@ -28,9 +27,12 @@ from m2pem.model.reach import begins_by_itself, instantiates
 
 _set = object.__setattr__
 
+_NO_TARGETS = (StartEvent, BoundaryEvent)
+"""No sequence flow leads to them."""
 
-def link(reading: Reading) -> dict[str, Element]:
-    """Link all elements; gives back processes, flow nodes and sequence flows by id."""
+
+def link(reading: Reading) -> None:
+    """Link all elements."""
     nodes: dict[str, FlowNode] = {}
     for index, (node, container) in enumerate(zip(reading.nodes, reading.containers, strict=True)):
         _set(node, "index", index)
@@ -41,12 +43,9 @@ def link(reading: Reading) -> dict[str, Element]:
             reading.broken.add(container)
     _link_flows(reading, nodes)
     _link_containers(reading)
-    flows = {ends.flow.id: ends.flow for ends in reversed(reading.flows)}
-    _link_defaults(reading, flows)
+    _link_defaults(reading)
     _link_boundary(reading, nodes)
     resolve_links(reading)
-    processes = {process.id: process for process in reversed(reading.processes)}
-    return {**flows, **nodes, **processes}
 
 
 def _link_flows(reading: Reading, nodes: dict[str, FlowNode]) -> None:
@@ -71,7 +70,7 @@ def _link_flows(reading: Reading, nodes: dict[str, FlowNode]) -> None:
             continue
         outgoing[source.index].append(flow)
         incoming[target.index].append(flow)
-        if isinstance(target, StartEvent | BoundaryEvent) or isinstance(source, EndEvent):
+        if isinstance(target, _NO_TARGETS) or isinstance(source, EndEvent):
             _wrong_end(reading, flow, source, target)
     for node, comes, goes in zip(reading.nodes, incoming, outgoing, strict=True):
         _set(node, "incoming", tuple(comes))
@@ -173,7 +172,8 @@ def _begins(reading: Reading, node: FlowNode) -> bool:
     )
 
 
-def _link_defaults(reading: Reading, flows: dict[str, SequenceFlow]) -> None:
+def _link_defaults(reading: Reading) -> None:
+    flows = {ends.flow.id for ends in reading.flows} if reading.defaults else set()
     for node, ref, line in reading.defaults:
         flow = next((flow for flow in node.outgoing if flow.id == ref), None)
         if flow is not None:

@@ -12,10 +12,12 @@ from typing import TypeVar
 from m2pem.model.bpmn.files import Files, Part
 from m2pem.model.elements import (
     CallActivity,
+    Container,
     Element,
     FlowNode,
     Process,
     SequenceFlow,
+    SubProcess,
 )
 from m2pem.model.events import CorrelationProperty, Message, RootElement, Signal
 from m2pem.model.mission import Mission
@@ -31,20 +33,18 @@ def merge(files: Files, reached: set[Process]) -> Mission:
     parts = [part for part in files.parts if part.is_read]
     for part in files.parts[1:]:
         _qualify(part)
-    nodes = [node for part in parts for node in part.reading.nodes if _in(reached, node)]
-    flows = [
-        ends.flow
-        for part in parts
-        for ends in part.reading.flows
-        if ends.container.process in reached
-    ]
+    inside = _inside(reached, parts)
+    nodes = [node for part in parts for node in part.reading.nodes if node.container in inside]
+    flows = [ends.flow for part in parts for ends in part.reading.flows if ends.container in inside]
     processes = [p for part in parts for p in part.reading.processes if p in reached]
     for index, node in enumerate(nodes):
-        _set(node, "index", index)
+        if node.index != index:
+            _set(node, "index", index)
         if isinstance(node, CallActivity):
             _set(node, "called_id", node.called.id)
     for index, flow in enumerate(flows):
-        _set(flow, "index", index)
+        if flow.index != index:
+            _set(flow, "index", index)
     readings = [part.reading for part in parts]
     main = files.main.reading
     return Mission(
@@ -71,8 +71,10 @@ def merge(files: Files, reached: set[Process]) -> Mission:
     )
 
 
-def _in(reached: set[Process], node: FlowNode) -> bool:
-    return node.container.process in reached
+def _inside(reached: set[Process], parts: list[Part]) -> set[Container]:
+    """Those processes, and the subprocesses in them."""
+    inner = [each for part in parts for each in part.reading.nodes if isinstance(each, SubProcess)]
+    return {*reached, *(each for each in inner if each.process in reached)}
 
 
 def _qualify(part: Part) -> None:

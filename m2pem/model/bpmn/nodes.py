@@ -10,7 +10,7 @@ from m2pem.model.bpmn.data_flow import read_data_flow
 from m2pem.model.bpmn.events import read_event
 from m2pem.model.bpmn.gateways import GATEWAYS, read_gateway
 from m2pem.model.bpmn.loops import read_loop
-from m2pem.model.bpmn.names import BPMN, a, kind, local
+from m2pem.model.bpmn.names import BPMN, a, attribute_names, kind, local
 from m2pem.model.bpmn.prompts import read_user_task
 from m2pem.model.bpmn.reading import Reading, reference
 from m2pem.model.bpmn.scan import Scan, scan
@@ -40,6 +40,10 @@ _QUANTITIES = {
     "start_quantity": ("startQuantity", "start-quantity"),
     "completion_quantity": ("completionQuantity", "completion-quantity"),
 }
+
+_MARKS = frozenset(
+    {"default", "isForCompensation", *(attribute for attribute, _ in _QUANTITIES.values())}
+)
 
 _TASKS: dict[str, Callable[[Reading, Scan], Activity]] = {
     BPMN + "task": read_plain_task,
@@ -133,6 +137,8 @@ def not_executed(
 
 
 def _check_activity(reading: Reading, element: etree._Element, node: Activity) -> None:
+    if _MARKS.isdisjoint(attribute_names(element)):
+        return
     _note_default(reading, element, node)
     if reading.boolean(element, "isForCompensation", False, node.id):
         reading.undoing.add(node)

@@ -227,7 +227,10 @@ class Reading:
 
     def check_attributes(self, element: etree._Element, shape: Shape, identifier: str) -> None:
         """Warn of attributes that neither BPMN nor m2pem defines for the element."""
-        for key in attribute_names(element):
+        keys = attribute_names(element)
+        if shape.attributes.issuperset(keys):
+            return
+        for key in keys:
             if key in shape.attributes:
                 continue
             if key[0] != "{":
@@ -353,6 +356,8 @@ def association(element: etree._Element) -> Association:
 
 def text_of(element: etree._Element) -> str:
     """All text inside an element, without the space around it."""
+    if not len(element):
+        return (element.text or "").strip()
     return "".join(map(str, element.itertext())).strip()
 
 

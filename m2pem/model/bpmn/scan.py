@@ -45,7 +45,12 @@ def scan(reading: Reading, element: etree._Element, identifier: str) -> Scan:
     order = Order()
     for child in element:
         name = child.tag
-        order.check(reading, element, child, shape, identifier)
+        rank = shape.ranks.get(name)
+        if rank is None or rank < order.reached:
+            order.check(reading, element, child, shape, identifier)
+        else:
+            order.reached = rank
+            order.last = name
         if name not in _FLOW_REFERENCES:
             result.children.setdefault(name, []).append(child)
     return result
@@ -98,6 +103,8 @@ def own_extensions(
 ) -> dict[str, list[etree._Element]]:
     """The m2pem extension elements by local name; warns of those that have no effect here."""
     result: dict[str, list[etree._Element]] = {}
+    if EXTENSIONS not in found.children:
+        return result
     for child in found.extensions():
         if not isinstance(child.tag, str) or not child.tag.startswith(M2PEM):
             continue

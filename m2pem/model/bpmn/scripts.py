@@ -87,7 +87,7 @@ def _script(
         return _text_behavior(reading, found, script, text), None
     first = reading.report.line(script)
     statements, problems = parse_script(text, first)
-    lines = text.replace("\r\n", "\n").split("\n")
+    lines = text.replace("\r\n", "\n").split("\n") if problems else []
     for line, message in problems:
         reading.report.error(
             line,

@@ -1,9 +1,9 @@
 """Which dialect a text is written in, and where in it the expressions stand."""
 
 import re
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
+from typing import TypeAlias
 
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.expression.literals import shorten
@@ -20,12 +20,8 @@ class Dialect(StrEnum):
     TEXT = "text"
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
-    """Where an expression stands: `text[start:end]`, without its marks."""
-
-    start: int
-    end: int
+Span: TypeAlias = "slice[int, int, None]"
+"""Where an expression stands in its text, without its marks."""
 
 
 MAX_LENGTH = 10_000
@@ -47,7 +43,7 @@ def locate(text: str, language: str | None) -> tuple[Dialect, Span]:
     spoken = _spoken(language)
     stripped = text.strip()
     start = len(text) - len(text.lstrip())
-    whole = Span(start, start + len(stripped))
+    whole = slice(start, start + len(stripped))
     if language and spoken is None:
         raise ExpressionSyntaxError(
             f"the expression language {shorten(language)!r} is not supported; {_ACCEPTED}",
@@ -58,21 +54,21 @@ def locate(text: str, language: str | None) -> tuple[Dialect, Span]:
         return Dialect.BARE, whole
     if stripped.startswith(("${", "#{")):
         span = _close(text, start)
-        if span.end + 1 != whole.end:
+        if span.stop + 1 != whole.stop:
             raise ExpressionSyntaxError(
                 "an expression is one '${...}': put all of it between the braces",
                 text,
-                span.end + 1,
+                span.stop + 1,
             )
         return Dialect.JUEL, span
     if stripped.startswith("="):
-        return Dialect.FEEL, Span(start + 1, whole.end)
+        return Dialect.FEEL, slice(start + 1, whole.stop)
     if spoken is None and _XPATH_MARK.search(stripped):
         return Dialect.XPATH, whole
     return spoken or Dialect.BARE, whole
 
 
-def split(text: str) -> list[str | Span]:
+def split(text: str) -> "list[str | Span]":
     """The literal parts of a text (`\\${` stands for `${`) and its `${...}` parts, in order.
 
     Raises:
@@ -93,7 +89,7 @@ def split(text: str) -> list[str | Span]:
             literal = ""
         span = _close(text, mark.start())
         parts.append(span)
-        position = span.end + 1
+        position = span.stop + 1
     literal += text[position:]
     return [*parts, literal] if literal else parts
 
@@ -118,7 +114,7 @@ def _close(text: str, mark: int) -> Span:
         elif character in "'\"":
             quote = character
         elif character == "}":
-            return Span(mark + 2, position)
+            return slice(mark + 2, position)
         position += 1
     raise ExpressionSyntaxError(f"'{text[mark : mark + 2]}' is not closed by '}}'", text, mark)
 

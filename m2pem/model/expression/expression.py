@@ -105,13 +105,13 @@ def template(text: str) -> Expression:
     if stripped.startswith("="):
         return parse(text)
     parts = split(text)
-    spans = [part for part in parts if isinstance(part, Span)]
+    spans = [part for part in parts if isinstance(part, slice)]
     if not spans:
         return Expression(text, Dialect.TEXT, Literal("".join(map(str, parts))))
-    if len(spans) == 1 and text[spans[0].start - 2 : spans[0].end + 1] == stripped:
+    if len(spans) == 1 and text[spans[0].start - 2 : spans[0].stop + 1] == stripped:
         return parse(text)
     nodes = tuple(
-        _tree(text, part, Dialect.JUEL) if isinstance(part, Span) else Literal(part)
+        _tree(text, part, Dialect.JUEL) if isinstance(part, slice) else Literal(part)
         for part in parts
     )
     return Expression(text, Dialect.TEMPLATE, Join(nodes))

@@ -1,8 +1,8 @@
 """Parses what FEEL alone has: its words, ranges, names with spaces (DMN 1.3, clause 10.3.1.2)."""
 
 from m2pem.model.expression.dialect import Dialect, Span
-from m2pem.model.expression.lexer import Kind, Token
-from m2pem.model.expression.parser import COMPARISON, LOWEST, Parser
+from m2pem.model.expression.lexer import Token
+from m2pem.model.expression.parser import Parser
 from m2pem.model.expression.tree import (
     And,
     Call,
@@ -16,6 +16,7 @@ from m2pem.model.expression.tree import (
     Not,
     Some,
 )
+from m2pem.model.expression.vocabulary import COMPARISON, LOWEST
 
 
 class FeelParser(Parser):
@@ -26,7 +27,7 @@ class FeelParser(Parser):
 
     def _prefix(self, minimum: int) -> Node:
         token = self._token
-        if token.kind is Kind.OPERATOR and token.text in ("if", "some", "every"):
+        if token.kind == "operator" and token.text in ("if", "some", "every"):
             self._next()
             return self._if(token) if token.text == "if" else self._quantified(token)
         return super()._prefix(minimum)
@@ -50,9 +51,9 @@ class FeelParser(Parser):
     def _name(self, token: Token) -> Node:
         # Two names in a row can only be one that holds spaces.
         text = token.text
-        while self._token.kind is Kind.NAME:
+        while self._token.kind == "name":
             text += " " + self._next().text
-        return super()._name(Token(Kind.NAME, text, token.position))
+        return super()._name(token._replace(text=text))
 
     def _key(self, opening: Token) -> Node:
         """FEEL counts from 1, and takes a condition for a filter."""
@@ -70,7 +71,7 @@ class FeelParser(Parser):
 
     def _quantified(self, token: Token) -> Node:
         variable = self._next()
-        if variable.kind is not Kind.NAME:
+        if variable.kind != "name":
             self._fail(f"expected a name after '{token.text}'", variable)
         self._expect("in", f"after '{token.text}'")
         collection = self._expression(LOWEST)
@@ -108,7 +109,7 @@ class FeelParser(Parser):
         if self._take(".."):
             high = self._expression(LOWEST)
             closing = self._next()
-            if closing.kind is not Kind.OPERATOR or closing.text not in ("]", ")", "["):
+            if closing.kind != "operator" or closing.text not in ("]", ")", "["):
                 self._fail("expected ']' or ')' to close the range", closing)
             above = Comparison.GREATER_EQUAL if opening.text == "[" else Comparison.GREATER
             below = Comparison.LESS_EQUAL if closing.text == "]" else Comparison.LESS

@@ -12,8 +12,8 @@ from typing import NoReturn
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.model.expression.calls import CallError, meaning, method_call
 from m2pem.model.expression.dialect import Dialect, Span
-from m2pem.model.expression.lexer import Kind, Token, tokenize
-from m2pem.model.expression.literals import read_number
+from m2pem.model.expression.lexer import Token, tokenize
+from m2pem.model.expression.literals import read_number, unescape
 from m2pem.model.expression.tree import (
     MAX_DEPTH,
     And,
@@ -34,6 +34,14 @@ from m2pem.model.expression.tree import (
     Or,
     walk,
 )
+from m2pem.model.expression.vocabulary import (
+    AND,
+    COMPARISON,
+    CONSTANTS,
+    LOWEST,
+    NOT,
+    UNARY,
+)
 
 MAX_ITEMS = 1_000
 """Items of a list as written, and arguments of a call."""
@@ -42,20 +50,8 @@ MAX_PARTS = 20_000
 """Nodes of a tree. A value in a range is there twice, so ranges in each other double it."""
 
 _IDENTIFIER = re.compile(r"[^\W\d]\w*")
-LOWEST, _OR, _AND, _NOT, COMPARISON, _SUM, _PRODUCT, _UNARY = range(8)
-_BINARY = {
-    "or": _OR,
-    "and": _AND,
-    "in": COMPARISON,
-    "between": COMPARISON,
-    "not": COMPARISON,
-    "+": _SUM,
-    "-": _SUM,
-    "*": _PRODUCT,
-    "/": _PRODUCT,
-    **{comparison.value: COMPARISON for comparison in Comparison},
-}
-"""How strongly an operator after a value binds; `not` there begins `not in`."""
+_COMPARISONS = {each.value: each for each in Comparison}
+_OPERATIONS = {each.value: each for each in Operation}
 
 
 class Parser:
@@ -67,20 +63,27 @@ class Parser:
 
     def __init__(self, text: str, span: Span, dialect: Dialect) -> None:
         self._text = text
-        self._tokens = tokenize(text, span, dialect)
+        self._length = span.stop - span.start
+        self._coming = iter(tokenize(text, span, dialect))
+        self._token = next(self._coming)
         self._dialect = dialect
-        self._index = 0
         self._nesting = 0
 
     def parse(self) -> Node:
         """The tree."""
-        if self._ended:
+        if self._token.kind == "end":
             self._fail("an expression is missing")
         node = self._expression(LOWEST)
-        if not self._ended:
+        if self._token.kind != "end":
             spaces = "; a name has no spaces (in FEEL it may: begin with '=')"
-            hint = spaces if self._token.kind is Kind.NAME else ""
+            hint = spaces if self._token.kind == "name" else ""
             self._fail(f"expected an operator or the end, found {self._found}{hint}")
+        # Each level takes a character at least, and what doubles the parts takes ten.
+        if self._length > MAX_DEPTH:
+            self._limit(node)
+        return node
+
+    def _limit(self, node: Node) -> None:
         for parts, (_, depth) in enumerate(walk(node)):
             if depth > MAX_DEPTH:
                 self._fail(
@@ -88,20 +91,11 @@ class Parser:
                 )
             if parts > MAX_PARTS:
                 self._fail("too large, written out; use fewer ranges in each other")
-        return node
-
-    @property
-    def _token(self) -> Token:
-        return self._tokens[self._index]
-
-    @property
-    def _ended(self) -> bool:
-        return self._token.kind is Kind.END
 
     @property
     def _found(self) -> str:
         token = self._token
-        return token.text if token.kind is Kind.END else repr(token.text)
+        return token.text if token.kind == "end" else repr(token.text)
 
     def _expression(self, minimum: int) -> Node:
         """The longest expression whose operators bind more strongly than `minimum`."""
@@ -109,7 +103,7 @@ class Parser:
         if self._nesting > MAX_DEPTH:
             self._fail(f"nested deeper than {MAX_DEPTH} levels")
         node = self._prefix(minimum)
-        while (strength := self._strength()) > minimum:
+        while (strength := self._token.strength) > minimum:
             node = self._binary(node, strength)
         if minimum == LOWEST and self._take("?"):
             then = self._expression(LOWEST)
@@ -118,12 +112,8 @@ class Parser:
         self._nesting -= 1
         return node
 
-    def _strength(self) -> int:
-        token = self._token
-        return _BINARY.get(token.text, LOWEST) if token.kind is Kind.OPERATOR else LOWEST
-
     def _binary(self, left: Node, strength: int) -> Node:
-        if strength in (_OR, _AND):
+        if strength <= AND:
             word = self._token.text
             operands = [left]
             while self._take(word):
@@ -139,23 +129,23 @@ class Parser:
             if operator in ("in", "not"):
                 member = In(left, right)
                 return Not(member) if negated else member
-            return Compare(Comparison(operator), left, right)
-        return Arithmetic(Operation(operator), left, right)
+            return Compare(_COMPARISONS[operator], left, right)
+        return Arithmetic(_OPERATIONS[operator], left, right)
 
     def _refuse_chain(self) -> None:
-        if self._strength() == COMPARISON:
+        if self._token.strength == COMPARISON:
             self._fail("comparisons do not chain; write 'a < b and b < c', or use parentheses")
 
     def _prefix(self, minimum: int) -> Node:
         token = self._next()
         match token.kind:
-            case Kind.NUMBER:
-                return self._number(token, "")
-            case Kind.CONSTANT:
-                return Literal(token.value)
-            case Kind.NAME:
+            case "name":
                 return self._inside(self._name(token))
-            case Kind.END:
+            case "number":
+                return self._number(token, "")
+            case "constant":
+                return Literal(_constant(token.text))
+            case "end":
                 self._fail("expected a value, found the end", token)
         match token.text:
             case "(":
@@ -166,26 +156,26 @@ class Parser:
                 return self._inside(ListOf(self._items("]", token)))
             case "-":
                 number = self._token
-                if number.kind is Kind.NUMBER:
+                if number.kind == "number":
                     return self._number(self._next(), "-")
-                return Negate(self._expression(_UNARY))
+                return Negate(self._expression(UNARY))
             case "not":
                 return self._not(token, minimum)
             case "empty":
-                node = Call("is_empty", (self._expression(_UNARY),))
+                node = Call("is_empty", (self._expression(UNARY),))
                 return self._unambiguous(node, token)
         self._fail(f"expected a value, found {token.text!r}", token)
 
     def _not(self, token: Token, minimum: int) -> Node:
         if self._dialect is Dialect.BARE:
-            if minimum > _NOT:
+            if minimum > NOT:
                 self._fail("put 'not ...' into parentheses here", token)
-            return Not(self._expression(_NOT))
-        return self._unambiguous(Not(self._expression(_UNARY)), token)
+            return Not(self._expression(NOT))
+        return self._unambiguous(Not(self._expression(UNARY)), token)
 
     def _unambiguous(self, node: Node, token: Token) -> Node:
         # JUEL reads '!a == b' as '(!a) == b', most people as '!(a == b)'.
-        if self._strength() >= COMPARISON:
+        if self._token.strength >= COMPARISON:
             self._fail(
                 f"'{token.text}' is ambiguous before '{self._token.text}'; use parentheses", token
             )
@@ -212,22 +202,22 @@ class Parser:
 
     def _inside(self, node: Node) -> Node:
         """What follows a value to take something out of it: `[0]`, `['key']`, `.key`."""
-        while True:
-            if opening := self._take("["):
+        while self._token.text in ("[", "."):
+            opening = self._next()
+            if opening.text == "[":
                 key = self._key(opening)
                 self._expect("]", "to close '['", opening)
                 node = _taken(node, key)
-            elif self._take("."):
-                node = self._member(node)
             else:
-                return node
+                node = self._member(node)
+        return node
 
     def _key(self, opening: Token) -> Node:
         return self._expression(LOWEST)
 
     def _member(self, node: Node) -> Node:
         token = self._next()
-        if token.kind is not Kind.NAME:
+        if token.kind != "name":
             self._fail("expected a name after '.'", token)
         *keys, last = token.text.split(".")
         for key in keys:
@@ -251,16 +241,12 @@ class Parser:
 
     def _next(self) -> Token:
         token = self._token
-        if token.kind is not Kind.END:
-            self._index += 1
+        self._token = next(self._coming, token)
         return token
 
     def _take(self, operator: str) -> Token | None:
         token = self._token
-        if token.kind is Kind.OPERATOR and token.text == operator:
-            self._index += 1
-            return token
-        return None
+        return self._next() if token.text == operator and token.kind == "operator" else None
 
     def _expect(self, operator: str, why: str, opening: Token | None = None) -> Token:
         if token := self._take(operator):
@@ -270,6 +256,10 @@ class Parser:
 
     def _fail(self, message: str, token: Token | None = None) -> NoReturn:
         raise ExpressionSyntaxError(message, self._text, (token or self._token).position)
+
+
+def _constant(written: str) -> bool | str | None:
+    return unescape(written[1:-1]) if written[0] in "'\"" else CONSTANTS[written]
 
 
 def _taken(node: Node, key: Node) -> Node:

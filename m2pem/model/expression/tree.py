@@ -175,18 +175,28 @@ Node: TypeAlias = Union[
 def children(node: Node) -> tuple[Node, ...]:
     """The nodes directly below, in the order they are evaluated."""
     match node:
+        case Compare() | Arithmetic():
+            return (node.left, node.right)
         case Literal() | Name():
             return ()
-        case ListOf(nodes) | And(nodes) | Or(nodes) | Join(nodes) | Call(_, nodes):
-            return nodes
-        case Not(operand) | Negate(operand):
-            return (operand,)
-        case Compare(_, left, right) | In(left, right) | Arithmetic(_, left, right):
-            return (left, right)
-        case Index(left, right) | Some(_, left, right):
-            return (left, right)
-        case If(condition, then, otherwise):
-            return (condition, then, otherwise)
+        case Call():
+            return node.arguments
+        case And() | Or():
+            return node.operands
+        case Not() | Negate():
+            return (node.operand,)
+        case In():
+            return (node.item, node.container)
+        case Index():
+            return (node.container, node.key)
+        case ListOf():
+            return node.items
+        case If():
+            return (node.condition, node.then, node.otherwise)
+        case Some():
+            return (node.collection, node.condition)
+        case Join():
+            return node.parts
 
 
 def walk(node: Node) -> Iterator[tuple[Node, int]]:
@@ -200,20 +210,21 @@ def walk(node: Node) -> Iterator[tuple[Node, int]]:
             waiting += [(child, depth + 1) for child in reversed(below)]
 
 
-_NO_NAMES: frozenset[str] = frozenset()
-
-
 def names(node: Node) -> frozenset[str]:
     """The dotted names that the tree reads from the store."""
-    if isinstance(node, Name):
-        return frozenset({node.name})
-    if isinstance(node, Literal):
-        return _NO_NAMES
-    found = _NO_NAMES.union(*map(names, children(node)))
-    if isinstance(node, Some):
-        inside = frozenset(name for name in names(node.condition) if binds(node.variable, name))
-        return names(node.collection) | (found - inside)
-    return found
+    found: set[str] = set()
+    waiting = [node]
+    while waiting:
+        current = waiting.pop()
+        if isinstance(current, Name):
+            found.add(current.name)
+        elif isinstance(current, Some):
+            waiting.append(current.collection)
+            inside = names(current.condition)
+            found.update(name for name in inside if not binds(current.variable, name))
+        elif not isinstance(current, Literal):
+            waiting += children(current)
+    return frozenset(found)
 
 
 def binds(variable: str, name: str) -> bool:

@@ -54,6 +54,10 @@ _NAMED_BY_READERS = NODES | names("sequenceFlow process")
 _TRUE = frozenset({"true", "1"})
 
 
+def _named(text: str) -> str:
+    return text.rpartition(":")[2] if ":" in text else text
+
+
 class Tree:
     """The tree, and the findings about it."""
 
@@ -62,12 +66,22 @@ class Tree:
         self._report = report
         self._source = source
         self._target = root.get("targetNamespace", "")
+        self._owners: dict[str, set[etree._Element]] = {}
 
     # --- what is there --------------------------------------------------------------------------
 
     def mentions(self, name: str) -> bool:
         """Whether the name may stand in the file: a rare attribute is not looked for in vain."""
         return name.encode() in self._source or b"\0" in self._source[:100]  # UTF-16, UTF-32
+
+    def has_one_before(self, element: etree._Element) -> bool:
+        """Whether it is not the first of its tag in its parent; elements come in their order."""
+        owners = self._owners.setdefault(element.tag, set())
+        owner = parent(element)
+        if owner in owners:
+            return True
+        owners.add(owner)
+        return False
 
     @cached_property
     def ids(self) -> dict[str, etree._Element]:
@@ -89,12 +103,8 @@ class Tree:
         into: dict[str, list[etree._Element]] = {}
         out: dict[str, list[etree._Element]] = {}
         for flow in self.flows:
-            for ends, text in ((out, flow.get("sourceRef", "")), (into, flow.get("targetRef", ""))):
-                name = text.rpartition(":")[2] if ":" in text else text
-                if name in ends:
-                    ends[name].append(flow)
-                else:
-                    ends[name] = [flow]
+            out.setdefault(_named(flow.get("sourceRef", "")), []).append(flow)
+            into.setdefault(_named(flow.get("targetRef", "")), []).append(flow)
         return into, out
 
     def into(self, element: etree._Element) -> list[etree._Element]:

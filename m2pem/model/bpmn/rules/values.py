@@ -90,7 +90,7 @@ def _process(tree: Tree, element: etree._Element) -> None:
 
 
 def _once(tree: Tree, element: etree._Element) -> None:
-    if next(element.itersiblings(element.tag, preceding=True), None) is not None:
+    if tree.has_one_before(element):
         owner = kind(parent(element).tag)
         tree.say(REPEATED, element, f"'{name_of(element)}' in {a(owner)}")
 

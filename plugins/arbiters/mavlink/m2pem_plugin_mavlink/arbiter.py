@@ -15,6 +15,7 @@ from m2pem.api import (
     Connection,
     Ledger,
     Limits,
+    LinkState,
     Mailbox,
     PayloadState,
     ResourceId,
@@ -43,6 +44,9 @@ HEARD_WITHIN_S = 5.0
 """Vehicles that are there say so every second; `connect` waits for them no longer."""
 
 TELEMETRY_EVERY_S = 0.2
+LATE = 2.0
+"""So many times as long as that since the last look: this process was held up."""
+
 STATES_WAITING = 1000
 
 
@@ -317,22 +321,24 @@ class MavlinkArbiter:
     async def _attend(self, resource: ResourceId) -> None:
         """Tell how a vehicle is, and notice when it falls silent."""
         helm, clock = self._helms[resource], self._context.clock
+        vehicle = helm.vehicle
         bound_s = self.limits(resource).lost_after_s * SILENT_SHARE
-        began_us, told = clock.now_us(), -1
-        state: VehicleState | None = None
+        began_us = looked_us = clock.now_us()
+        told, link, was_late = -1, LinkState.CONNECTED, False
         while True:
-            vehicle = helm.vehicle
+            now_us = clock.now_us()
+            # After a pause of our own, what the vehicle said meanwhile is still to be read.
+            late = not was_late and now_us - looked_us > LATE * TELEMETRY_EVERY_S * 1e6
+            looked_us, was_late = now_us, late
             silent_s = vehicle.silent_s
             if silent_s is None:
-                silent_s = (clock.now_us() - began_us) / 1e6
-            if silent_s >= bound_s and self._ledger.holder(resource) is not None:
+                silent_s = (now_us - began_us) / 1e6
+            if silent_s >= bound_s and not late and self._ledger.holder(resource) is not None:
                 helm.drop()
                 self._ledger.lose(resource, f"not heard for {silent_s:.1f} s")
-            changes = vehicle.heard.changes
-            if changes != told or (state is not None and vehicle.link_state != state.link):
-                told = changes
-                state = replace(vehicle.state(), behavior=helm.behavior)
-                self._states.put(state)
+            if vehicle.heard.changes != told or vehicle.link_state != link:
+                told, link = vehicle.heard.changes, vehicle.link_state
+                self._states.put(replace(vehicle.state(), behavior=helm.behavior))
             await clock.sleep(TELEMETRY_EVERY_S)
 
 

@@ -16,6 +16,9 @@ from m2pem.testing.contracts.bench import ArbiterBench, context
 
 HOME = (47.397742, 8.545594)
 HOME_ALTITUDE_M = 488.0
+PATIENT = {"lost_after_s": 10.0}
+"""Half a second of the wall clock, at twenty times its speed: tests share their processors."""
+
 DOMAINS = {Kind.COPTER: "air", Kind.ROVER: "ground", Kind.PLANE: "air", Kind.BOAT: "surface"}
 
 
@@ -41,7 +44,7 @@ def specs(*kinds: Kind, **more: Any) -> list[VehicleSpec]:
 def connections(
     simulator: Simulator, driver: str = "pymavlink", **more: Any
 ) -> dict[ResourceId, Connection]:
-    """The vehicles of a simulator, as v1, v2 and so on."""
+    """The vehicles of a simulator, as v1, v2 and so on; `more`: of their connections."""
     made = {}
     for vehicle in simulator:
         number, kind = vehicle.autopilot.spec.system, vehicle.autopilot.spec.kind
@@ -49,7 +52,7 @@ def connections(
         host, port = vehicle.address
         url = f"udpout://{host}:{port}"
         settings = {"driver": driver, "url": url, "system_id": number}
-        made[resource] = Connection(resource, DOMAINS[kind], settings, **more)
+        made[resource] = Connection(resource, DOMAINS[kind], settings, **{**PATIENT, **more})
     return made
 
 

@@ -245,7 +245,7 @@ def test_over_a_link_that_loses_frames_all_is_begun_once(every: int) -> None:
         await bench.do("r1.b3", "return_to_launch")
         assert (bench.truth().takeoffs, bench.truth().missions_begun) == (1, 1)
 
-    fly(main, COPTER, speed=15.0, lost_after_s=10.0)
+    fly(main, COPTER, speed=15.0)
 
 
 def lose(port, every: int) -> None:

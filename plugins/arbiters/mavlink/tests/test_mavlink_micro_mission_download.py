@@ -68,6 +68,12 @@ def test_without_faults_each_item_is_asked_for_once_and_the_vehicle_is_thanked()
     assert vehicle.acknowledged == [dialect.MAV_MISSION_ACCEPTED]
 
 
+def test_a_link_that_doubles_makes_it_ask_no_more_often() -> None:
+    played = run(DownloadMission(VEHICLE), storing(), lambda *_: (0.0, 0.0))
+    assert played.result == ITEMS
+    assert len(played.sent) == 1 + len(ITEMS) + 1
+
+
 def test_an_empty_mission_has_no_items() -> None:
     assert run(DownloadMission(VEHICLE), storing(())).result == ()
 

@@ -231,9 +231,7 @@ def test_an_item_that_is_asked_for_over_and_over_is_an_end() -> None:
 
 def test_a_vehicle_that_asks_slowly_and_for_ever_is_left_in_time() -> None:
     class Drips(Silent):
-        def hear(self, message: Message, now_s: float) -> Sequence[Message]:
-            self.next_s = now_s + SILENCE_S - 0.1
-            return ()
+        next_s = 1.0
 
         def wake(self, now_s: float) -> Sequence[Message]:
             self.next_s = now_s + SILENCE_S - 0.1
@@ -242,7 +240,8 @@ def test_a_vehicle_that_asks_slowly_and_for_ever_is_left_in_time() -> None:
     upload = UploadMission(VEHICLE, ITEMS)
     played = run(upload, Drips())
     assert isinstance(played.error, NoAnswerError)
-    assert played.ended_s <= upload.bound_s
+    assert played.error.reason == "upload of the mission: not done within 75 s"
+    assert played.ended_s == upload.bound_s == 75.0
 
 
 @pytest.mark.parametrize(

@@ -108,6 +108,7 @@ class RoutedLink:
 
     async def perform(self, transaction: Transaction[T]) -> T:
         """See `VehicleLink.perform`. Cancelling it ends the exchange: nothing more is sent."""
+        transaction.source = self.source
         async with self._routes[0].turns.turn((self.source, transaction.key)):
             if self._closed:
                 raise ExchangeError("the link was closed")
