@@ -23,6 +23,7 @@ class TestMavsdkRovers(_Mavsdk, over_udp.TestSimulatedRovers):
     pass
 
 
+@pytest.mark.long
 class TestMavsdkCopters(_Mavsdk, over_udp.TestSimulatedCopters):
     pass
 
