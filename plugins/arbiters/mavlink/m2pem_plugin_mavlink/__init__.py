@@ -21,13 +21,7 @@ def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], N
 
 @hookimpl
 def m2pem_register_commands(cli: "click.Group") -> None:
-    """Add `sim mavlink`; the group `sim` may be there already, of another plugin."""
-    import click  # noqa: PLC0415  # starting up must be fast
+    """Add `sim mavlink`."""
+    from m2pem_plugin_mavlink.commands import add_to  # noqa: PLC0415  # starting up must be fast
 
-    from m2pem_plugin_mavlink.sim.command_line import mavlink  # noqa: PLC0415
-
-    group = cli.commands.get("sim")
-    if not isinstance(group, click.Group):
-        group = click.Group("sim", help="Simulate vehicles that speak as real ones do.")
-        cli.add_command(group)
-    group.add_command(mavlink)
+    add_to(cli.commands)
