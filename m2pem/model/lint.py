@@ -112,8 +112,9 @@ def _outside_only(mission: Mission) -> Iterator[Finding]:
     thrown: set[tuple[str, str]] = set()
     caught: dict[tuple[str, str], tuple[Signal | Message, list[FlowNode]]] = {}
     for node in mission.nodes:
-        for root in _thrown_by_instances(node):
-            thrown.add((type(root).__name__, root.id))
+        if isinstance(node, Activity) and isinstance(node.loop, MultiInstance):
+            for root in _thrown_by_instances(node.loop):
+                thrown.add((type(root).__name__, root.id))
         for root in _roots(node):
             key = (type(root).__name__, root.id)
             if isinstance(node, EndEvent | IntermediateThrowEvent | SendTask):
@@ -148,12 +149,10 @@ def _roots(node: FlowNode) -> Iterator[Signal | Message]:
         yield from _named(node.definitions)
 
 
-def _thrown_by_instances(node: FlowNode) -> Iterator[Signal | Message]:
-    loop = node.loop if isinstance(node, Activity) else None
-    if isinstance(loop, MultiInstance):
-        yield from _named(loop.events)
-        for each in loop.complex:
-            yield from _named(each.events)
+def _thrown_by_instances(loop: MultiInstance) -> Iterator[Signal | Message]:
+    yield from _named(loop.events)
+    for each in loop.complex:
+        yield from _named(each.events)
 
 
 def _named(definitions: Iterable[EventDefinition]) -> Iterator[Signal | Message]:
