@@ -85,6 +85,21 @@ def _reaction(journal: str, bound_ms: float) -> Program:
     return Program(size, command, ("reaction", journal, "20", "5"), goals)
 
 
+def _mavlink_command(journal: str, bound_ms: float | None) -> Program:
+    signal = f"signal to the MAVLink vehicle's socket, {journal} journal"
+    pause = f"pause to the MAVLink vehicle's socket, {journal} journal"
+    goals = (
+        Goal("p50_ms", f"{signal}, p50", "ms"),
+        Goal("p99_ms", f"{signal}, p99", "ms", bound_ms),
+        Goal("pause_p50_ms", f"{pause}, p50", "ms"),
+        Goal("pause_p99_ms", f"{pause}, p99", "ms", bound_ms),
+        Goal("cpu_percent", f"an executive with all that, {journal} journal, of a core", "%"),
+    )
+    command = ("mavlink_command", journal, "100", "50", "500")
+    quick = ("mavlink_command", "sqlite", "5", "200", "10")
+    return Program("100 vehicles, 50 messages/s each", command, quick, goals)
+
+
 PROGRAMS = (
     Program(
         "100 runs",
@@ -173,4 +188,6 @@ PROGRAMS = (
             Goal("p99_ms", "MAVLink command to the vehicle's socket, p99", "ms", 5),
         ),
     ),
+    _mavlink_command("memory", 5),
+    _mavlink_command("sqlite", None),
 )
