@@ -5,7 +5,8 @@ CODE = """
 import sys
 from m2pem.cli.entry import run_command_line
 assert run_command_line(["sim", "--help"]) == 0
-print(*(name for name in ("asyncio", "pymavlink", "m2pem_plugin_mavlink.sim") if name in sys.modules))
+heavy = ("asyncio", "pymavlink", "m2pem_plugin_mavlink.sim")
+print(*(name for name in heavy if name in sys.modules))
 """
 
 
