@@ -24,7 +24,7 @@ PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
 EXAMPLES = sorted((REPOSITORY / "examples").rglob("README.md"))
 MAKE_TARGETS = {
     *("setup", "demo", "demo-air", "test", "test-long", "fuzz", "lint", "format", "docs", "pictures"),
-    *("conformance", "bench", "bench-quick", "clean"),
+    *("conformance", "bench", "bench-quick", "ros", "test-ros", "clean"),
 }
 
 BLOCKS = {

@@ -19,8 +19,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from wheel.wheelfile import WheelFile
+
 PACKAGE = Path(__file__).resolve().parent.parent
-SOURCES = ("package.xml", "CMakeLists.txt", "pyproject.toml", "msg", "srv", "action", "wheel_backend")
+SOURCES = (
+    "package.xml",
+    "CMakeLists.txt",
+    "pyproject.toml",
+    "msg",
+    "srv",
+    "action",
+    "wheel_backend",
+)
 PREFIX_FOLDERS = ("lib", "share", "include")
 
 Settings = Mapping[str, object] | None
@@ -28,7 +38,7 @@ Settings = Mapping[str, object] | None
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """What is built. `ros_name` is that of package.xml, `stem` what names of archives begin with."""
+    """What is built. `ros_name` is that of package.xml; names of archives begin with `stem`."""
 
     ros_name: str
     stem: str
@@ -44,8 +54,6 @@ def build_wheel(
         SystemExit: a compiler, Python's headers or the wheels of ROS are missing.
         subprocess.CalledProcessError: the build failed; it has said why.
     """
-    from wheel.wheelfile import WheelFile
-
     project = _project()
     tag = _tag()
     with tempfile.TemporaryDirectory(prefix="rosidl_wheel_") as folder:
@@ -117,7 +125,9 @@ def _build(project: Project, folder: Path) -> Path:
         "CMAKE_BUILD_TYPE": "Release",
         "BUILD_TESTING": "OFF",
         "CMAKE_INSTALL_PREFIX": installed,
-        f"CMAKE_PROJECT_{project.ros_name}_INCLUDE": Path(__file__).with_name("present_includes.cmake"),
+        f"CMAKE_PROJECT_{project.ros_name}_INCLUDE": Path(__file__).with_name(
+            "present_includes.cmake"
+        ),
         "Python3_EXECUTABLE": sys.executable,
         "PYTHON_EXECUTABLE": sys.executable,
     }
@@ -161,6 +171,11 @@ def _arrange(project: Project, installed: Path, content: Path, tag: str) -> Path
     info = content / f"{project.stem}.dist-info"
     info.mkdir()
     (info / "METADATA").write_text(project.metadata, encoding="utf-8")
-    wheel = ("Wheel-Version: 1.0", "Generator: rosidl_wheel", "Root-Is-Purelib: false", f"Tag: {tag}")
+    wheel = (
+        "Wheel-Version: 1.0",
+        "Generator: rosidl_wheel",
+        "Root-Is-Purelib: false",
+        f"Tag: {tag}",
+    )
     (info / "WHEEL").write_text("\n".join(wheel) + "\n", encoding="utf-8")
     return content
