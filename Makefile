@@ -19,8 +19,8 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages demo demo-air test test-long fuzz lint format docs pictures
-.PHONY: bench bench-quick conformance clean
+.PHONY: help setup python-packages npm-packages demo demo-air test test-long test-ros fuzz lint format docs pictures
+.PHONY: bench bench-quick conformance clean ros
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 12
@@ -52,6 +52,46 @@ $(JS)/node_modules/.package-lock.json: $(JS)/package-lock.json $(JS)/.npmrc
 	@echo "Installing the npm packages of $(JS)"
 	@cd $(JS) && npm ci --loglevel=error >/dev/null
 	@touch $@
+
+# The wheels of ROS make every Python of their environment start twice (docs/ros.md): they get one of their own.
+ROS := .venv-ros
+ROS_PYTHON := $(ROS)/bin/python
+ROS_PLUGINS := $(wildcard plugins/arbiters/ros plugins/ocu/mocu)
+ROS_PIP := PIP_CONSTRAINT=ros/constraints.txt PIP_BUILD_CONSTRAINT=ros/constraints.txt \
+  $(ROS_PYTHON) -m pip --quiet --disable-pip-version-check
+ROS_INTERFACES := $(sort $(shell find ros/m2pem_interfaces -type f -not -name '*.pyc'))
+ROS_CACHE := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/m2pem/ros
+ROS_IDENTITY := $(strip $(CURDIR) $(shell $(PYTHON) -V 2>&1))
+ifneq ($(shell $(ROS_PYTHON) -c '' 2>/dev/null && cat $(ROS)/created 2>/dev/null),$(ROS_IDENTITY))
+.PHONY: $(ROS)/created
+endif
+
+ros: $(ROS)/interfaces $(ROS)/installed ## make .venv-ros: m2pem, ROS 2 and the plugins that need it
+
+$(ROS)/created: ros/constraints.txt
+	@$(PYTHON) -m venv --clear $(ROS)
+	@echo '$(ROS_IDENTITY)' > $@
+
+# They take minutes to compile: what the same Python built of the same files is kept.
+$(ROS)/interfaces: $(ROS)/created $(ROS_INTERFACES)
+	@kept=$(ROS_CACHE)/$$({ $(ROS_PYTHON) -VV; sha256sum ros/constraints.txt $(ROS_INTERFACES); } | sha256sum | cut -c 1-16); \
+	if [ ! -d "$$kept" ]; then \
+	  echo "Building ros/m2pem_interfaces; this takes minutes, once"; \
+	  mkdir -p "$(ROS_CACHE)"; building=$$(mktemp -d "$(ROS_CACHE)/building.XXXXXX"); trap 'rm -rf "$$building"' EXIT; \
+	  $(ROS_PIP) wheel --no-deps --wheel-dir "$$building" ./ros/m2pem_interfaces; \
+	  mv -T "$$building" "$$kept" 2>/dev/null || [ -d "$$kept" ]; \
+	fi; \
+	$(ROS_PIP) install --no-deps --force-reinstall "$$kept"/*.whl
+	@touch $@
+
+$(ROS)/installed: $(ROS)/created pyproject.toml constraints.txt $(PLUGINS:%=%/pyproject.toml) | $(ROS)/interfaces
+	@echo "Installing m2pem and ROS 2 into $(ROS)"
+	@$(ROS_PIP) install --editable '.[dev]' $(patsubst %,--editable %,$(filter-out $(ROS_PLUGINS),$(PLUGINS))) \
+	  $(ROS_PLUGINS:%=--editable '%[wheels]')
+	@touch $@
+
+test-ros: ros ## check the plugins that need ROS, over DDS on 127.0.0.1
+	@$(ROS_PYTHON) -m pytest -n 2 -m "not long" $(ROS_PLUGINS:%=%/tests)
 
 DEMO := $(BIN)/m2pem run missions/vignette1.bpmn --fleet fleet_configs/vignette1.yaml --simulate --speed 20
 ANSWERS := missions/answers/vignette1
@@ -87,9 +127,11 @@ format: setup ## put the code into shape
 
 test: lint bench-quick ## check all but the long tests
 	@$(BIN)/pytest -n 2 -m "not long"
+	@$(MAKE) --silent test-ros
 
-test-long: lint ## check everything: fuzzing, large random counts, foreign corpora too
+test-long: lint ros ## check everything: fuzzing, large random counts, foreign corpora too
 	@$(BIN)/pytest -n 2 --timeout 1800
+	@$(ROS_PYTHON) -m pytest -n 2 --timeout 1800 $(ROS_PLUGINS:%=%/tests)
 
 FUZZ_S := 600
 
@@ -121,6 +163,6 @@ $(PEERS)/installed: tests/conformance/spiffworkflow.txt
 	@touch $@
 
 clean: ## remove all that can be made again
-	@rm -rf $(VENV) $(PEERS) $(JS)/node_modules build dist site
+	@rm -rf $(VENV) $(ROS) $(PEERS) $(JS)/node_modules build dist site
 	@rm -rf .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache .coverage
 	@find . -name __pycache__ -prune -exec rm -rf {} +

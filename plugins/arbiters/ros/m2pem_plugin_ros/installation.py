@@ -1,0 +1,95 @@
+"""Says what to install where ROS 2, or a package of interfaces, is not there or not usable."""
+
+import importlib
+import importlib.metadata
+import importlib.util
+import os
+import sys
+from pathlib import Path
+from types import ModuleType
+
+from m2pem.errors import PluginError
+
+WHEELS = "pip install 'm2pem-plugin-ros[wheels]'"
+SOURCED = "a machine with ROS 2: source /opt/ros/jazzy/setup.bash before m2pem starts"
+
+
+class RosError(PluginError):
+    """ROS 2 is not there, or cannot be used as it is; the message says what would be right."""
+
+    exit_status = 2
+
+
+def require_ros() -> None:
+    """Make sure that rclpy can be imported, and finds its own files.
+
+    Raises:
+        RosError: it is missing, its libraries are, or there are two of it.
+    """
+    wheels = _has_wheels()
+    sourced = _sourced_prefixes()
+    if wheels and sourced:
+        raise RosError(
+            f"ROS 2 is here twice: as wheels in {sys.prefix}, and sourced from {sourced[0]}; the "
+            "two do not mix: start m2pem without sourcing ROS, or where its wheels are not there"
+        )
+    if wheels:
+        os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)  # what sourcing sets elsewhere
+    try:
+        importlib.import_module("rclpy")
+    except ModuleNotFoundError as error:
+        raise RosError(
+            f"ROS 2 is not installed for this Python ({error}). With {SOURCED}. Without: {WHEELS}. "
+            "Never both"
+        ) from error
+    except ImportError as error:
+        raise RosError(
+            f"rclpy is installed, but cannot be loaded: {error}{_hint(wheels)}"
+        ) from error
+
+
+def require_interfaces(package: str) -> ModuleType:
+    """A package of interfaces, such as m2pem_interfaces or nav2_msgs, with its msg, srv and action.
+
+    Raises:
+        RosError: it is not installed.
+    """
+    require_ros()
+    try:
+        module = importlib.import_module(package)
+        for part in ("msg", "srv", "action"):
+            if importlib.util.find_spec(f"{package}.{part}"):
+                importlib.import_module(f"{package}.{part}")
+    except ImportError as error:
+        how = f"apt-get install ros-jazzy-{package.replace('_', '-')}, then source ROS again"
+        if package == "m2pem_interfaces":
+            how = (
+                "with the wheels: pip install ./ros/m2pem_interfaces of m2pem's sources; "
+                "with a sourced ROS: colcon build that folder, and source what it made"
+            )
+        raise RosError(f"the ROS package {package} is not installed ({error}); {how}") from error
+    return module
+
+
+def _has_wheels() -> bool:
+    try:
+        importlib.metadata.distribution("ros-rclpy")
+    except importlib.metadata.PackageNotFoundError:
+        return False
+    return True
+
+
+def _sourced_prefixes() -> list[str]:
+    """Where a ROS other than that of this environment is, as sourcing it has said."""
+    prefixes = [p for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
+    own = Path(sys.prefix).resolve()
+    return [p for p in prefixes if Path(p).resolve() != own and Path(p, "share", "rclpy").is_dir()]
+
+
+def _hint(wheels: bool) -> str:
+    if not wheels:
+        return f"; with {SOURCED}, and run m2pem with the Python that this ROS was built for"
+    return (
+        "; LD_LIBRARY_PATH is another environment's: unset it and _ROS_WHEELS_BOOTSTRAP_COMPLETE, "
+        "and start again"
+    )

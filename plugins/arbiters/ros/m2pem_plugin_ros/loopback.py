@@ -1,0 +1,53 @@
+"""Keeps DDS on this machine: for simulated vehicles, demos and tests.
+
+Of itself, DDS looks for peers on every network. The profile restricts it to the interface
+127.0.0.1, where peers find each other by multicast. The range LOCALHOST of ROS would not do: with
+it, DDS opens sockets of all interfaces.
+"""
+
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from m2pem_plugin_ros.installation import RosError
+
+PROFILE = Path(__file__).with_name("loopback.xml")
+
+
+def environment(domain_id: int | None = None) -> Mapping[str, str]:
+    """The variables that keep a process of ROS on 127.0.0.1, whatever its own are.
+
+    `domain_id`: the ROS domain, 0 to 101; None leaves it to the process.
+    """
+    variables = {
+        "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(PROFILE),
+        "FASTDDS_DEFAULT_PROFILES_FILE": str(PROFILE),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT",  # as the profile says
+        "ROS_LOCALHOST_ONLY": "",
+        "ROS_STATIC_PEERS": "",
+    }
+    if domain_id is not None:
+        variables["ROS_DOMAIN_ID"] = str(domain_id)
+    return variables
+
+
+def keep_on_loopback() -> None:
+    """Keep this process, and those that it starts, on 127.0.0.1. May be called again.
+
+    Raises:
+        RosError: rclpy was imported before, and may use other networks already.
+    """
+    if is_kept():
+        return
+    if "rclpy" in sys.modules:
+        raise RosError(
+            "DDS can be kept on 127.0.0.1 only before rclpy is imported, which it is already"
+        )
+    os.environ.update(environment())
+
+
+def is_kept() -> bool:
+    """Whether this process is kept on 127.0.0.1."""
+    return all(os.environ.get(name) == value for name, value in environment().items())

@@ -1,0 +1,11 @@
+"""rclpy within asyncio. Importing this raises RosError where ROS 2 is not usable, and says why."""
+
+from m2pem_plugin_ros.installation import RosError, require_ros
+
+require_ros()
+
+from m2pem_plugin_ros.runtime import qos  # noqa: E402  # rclpy is there, as was just checked
+from m2pem_plugin_ros.runtime.calls import RosTimeoutError  # noqa: E402
+from m2pem_plugin_ros.runtime.ros_runtime import RosRuntime  # noqa: E402
+
+__all__ = ["RosError", "RosRuntime", "RosTimeoutError", "qos"]

@@ -1,0 +1,288 @@
+"""rclpy within an asyncio program: one thread for ROS, everything else on the event loop."""
+
+import asyncio
+import logging
+import os
+import threading
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
+from typing import Any, Self
+from uuid import UUID
+
+import rclpy
+from rclpy.action import ActionClient, ActionServer
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.context import Context
+from rclpy.exceptions import InvalidHandle
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.signals import SignalHandlerOptions
+from unique_identifier_msgs import msg as unique_identifier
+
+from m2pem_plugin_ros.installation import RosError
+from m2pem_plugin_ros.runtime import qos as qualities
+from m2pem_plugin_ros.runtime.calls import Calls
+from m2pem_plugin_ros.runtime.inbox import Inbox
+
+JOIN_S = 5.0
+WAITING = 1000
+
+logger = logging.getLogger(__name__)
+
+
+class RosRuntime:
+    """A connection to ROS with a context of its own: nothing global is touched, no signal handled.
+
+    Made on a running event loop, which it belongs to. What ROS calls back runs on that loop;
+    publishing and creating entities is done from it directly. `async with` closes it.
+
+    `domain_id`: None takes ROS_DOMAIN_ID. `arguments`: of ROS, such as
+    `["--ros-args", "--remap", "a:=b"]`.
+
+    Raises:
+        RosError: ROS cannot be started like that, for example with DDS security and no keys.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        namespace: str = "",
+        domain_id: int | None = None,
+        arguments: Sequence[str] = (),
+    ) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._calls = Calls(self._loop)
+        self._nodes: list[Node] = []
+        self._tasks: set[asyncio.Task[Any]] = set()
+        self._closing: asyncio.Task[None] | None = None
+        self.context = Context()
+        try:
+            rclpy.init(
+                context=self.context,
+                domain_id=domain_id,
+                args=list(arguments),
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
+        except Exception as error:  # rclpy has no base class for what it raises
+            raise RosError(f"ROS cannot be started: {error}{_security()}") from error
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self._thread = threading.Thread(target=self._spin, name=f"ros-{name}", daemon=True)
+        try:
+            self.node = self.make_node(name, namespace)
+        except RosError:
+            self._let_go()
+            raise
+        self._thread.start()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    # --- nodes and topics -----------------------------------------------------------------------
+
+    def make_node(self, name: str, namespace: str = "", **options: Any) -> Node:
+        """Another node of the same connection. Options are those of `rclpy.create_node`.
+
+        Raises:
+            RosError: the name is not one of ROS, or DDS refuses.
+        """
+        try:
+            node = rclpy.create_node(name, context=self.context, namespace=namespace, **options)
+        except Exception as error:  # rclpy has no base class for what it raises
+            what = f"the node '{namespace}/{name}' cannot be made"
+            raise RosError(f"{what}: {error}{_security()}") from error
+        self.executor.add_node(node)
+        self._nodes.append(node)
+        return node
+
+    def subscribe(
+        self,
+        message_type: Any,
+        topic: str,
+        callback: Callable[[Any], None],
+        qos: QoSProfile,
+        *,
+        node: Node | None = None,
+        waiting: int = WAITING,
+    ) -> Any:
+        """Subscribe with a callback on the loop; of more than `waiting` messages the oldest go."""
+        inbox = Inbox(self._loop, callback, waiting)
+        return (node or self.node).create_subscription(message_type, topic, inbox.put, qos)
+
+    # --- services and actions that others offer -------------------------------------------------
+
+    def client(self, service_type: Any, name: str, *, node: Node | None = None) -> Any:
+        """A client for `call`, which keeps to the bound of calls in flight."""
+        create = (node or self.node).create_client
+        return create(service_type, name, qos_profile=qualities.SERVICES)
+
+    async def call(self, client: Any, request: Any, timeout_s: float) -> Any:
+        """Call a service, also one that is not there yet, and return its response.
+
+        Raises:
+            RosTimeoutError: no answer within `timeout_s`, counted from now.
+        """
+        what = f"service {client.srv_name}"
+        return await self._calls.ask(
+            client, client.service_is_ready, lambda: client.call_async(request), timeout_s, what
+        )
+
+    async def send_goal(
+        self,
+        client: Any,
+        goal: Any,
+        timeout_s: float,
+        *,
+        goal_id: UUID,
+        feedback: Callable[[Any], None] | None = None,
+    ) -> Any:
+        """Send a goal to an action server; returns the handle (`accepted` says whether it was).
+
+        `feedback` gets the feedback messages, on the loop.
+
+        Raises:
+            RosTimeoutError: no answer within `timeout_s`, counted from now.
+        """
+        uuid = unique_identifier.UUID(uuid=list(goal_id.bytes))
+        hear = Inbox(self._loop, feedback, WAITING).put if feedback is not None else None
+        what = f"goal {goal_id}"
+        return await self._calls.ask(
+            client,
+            client.server_is_ready,
+            lambda: client.send_goal_async(goal, feedback_callback=hear, goal_uuid=uuid),
+            timeout_s,
+            what,
+        )
+
+    async def wait(self, future: Any, timeout_s: float | None = None) -> Any:
+        """The result of a future of rclpy, such as `handle.get_result_async()`.
+
+        Raises:
+            RosTimeoutError: it did not come within `timeout_s`.
+        """
+        return await self._calls.wait(future, "ROS", timeout_s)
+
+    # --- services and actions that we offer -----------------------------------------------------
+
+    def serve(
+        self,
+        service_type: Any,
+        name: str,
+        handler: Callable[[Any, Any], Awaitable[Any]],
+        *,
+        node: Node | None = None,
+    ) -> Any:
+        """Offer a service. `handler(request, response)` is a coroutine function on the loop.
+
+        Several requests are handled at once. A handler that raises is logged, and an empty response
+        is sent, with the error in its `message` if it has one.
+        """
+
+        async def answer(request: Any, response: Any) -> Any:
+            try:
+                return await handler(request, response)
+            except Exception as error:
+                logger.exception("service %s failed", name)
+                empty = service_type.Response()
+                if hasattr(empty, "message"):
+                    empty.message = f"internal error: {error!r}"
+                return empty
+
+        return (node or self.node).create_service(
+            service_type,
+            name,
+            self.coroutine(answer),
+            qos_profile=qualities.SERVICES,
+            callback_group=ReentrantCallbackGroup(),
+        )
+
+    def coroutine(
+        self, handler: Callable[..., Coroutine[Any, Any, Any]]
+    ) -> Callable[..., Coroutine[Any, Any, Any]]:
+        """A callback for rclpy, of a coroutine function that runs on the loop.
+
+        It is for what gives an answer: services, and `execute_callback` of an action server. Its
+        entity needs a ReentrantCallbackGroup, or one call waits for the other.
+        """
+
+        async def callback(*arguments: Any) -> Any:
+            answer = rclpy.Future(executor=self.executor)
+            self._loop.call_soon_threadsafe(self._run, handler, arguments, answer)
+            return await answer
+
+        return callback
+
+    def _run(
+        self,
+        handler: Callable[..., Coroutine[Any, Any, Any]],
+        arguments: tuple[Any, ...],
+        answer: Any,
+    ) -> None:
+        task = self._loop.create_task(handler(*arguments))
+        self._tasks.add(task)
+        task.add_done_callback(lambda done: self._hand_back(done, answer))
+
+    def _hand_back(self, task: asyncio.Task[Any], answer: Any) -> None:
+        self._tasks.discard(task)
+        if task.cancelled():  # at the end; who asked hears nothing, as if we were gone already
+            return
+        if (error := task.exception()) is not None:
+            answer.set_exception(error)
+        else:
+            answer.set_result(task.result())
+        if self.context.ok():
+            self.executor.wake()  # a result alone does not wake an executor that waits
+
+    # --- the thread, and its end ----------------------------------------------------------------
+
+    async def close(self) -> None:
+        """Let go of everything. May be called again."""
+        if self._closing is None:
+            self._closing = self._loop.create_task(self._close())
+        await asyncio.shield(self._closing)
+
+    async def _close(self) -> None:
+        self._calls.close()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        # The thread first: what it waits for must not be destroyed under it.
+        rclpy.try_shutdown(context=self.context)
+        await asyncio.to_thread(self._thread.join, JOIN_S)
+        self._let_go()
+
+    def _let_go(self) -> None:
+        for node in self._nodes:
+            for waitable in list(node.waitables):
+                if isinstance(waitable, ActionClient | ActionServer):  # nodes forget about these
+                    waitable.destroy()
+            node.destroy_node()
+        self._nodes.clear()
+        self.executor.shutdown(timeout_sec=0)
+        rclpy.try_shutdown(context=self.context)
+        self.context.destroy()
+
+    def _spin(self) -> None:
+        while self.context.ok():
+            try:
+                self.executor.spin_once()
+            except (ExternalShutdownException, ShutdownException):
+                return
+            except InvalidHandle:  # destroyed on the loop just when its turn came
+                continue
+            except Exception:  # one bad message must not deafen us to the others
+                if self._closing is None:
+                    logger.exception("ROS brought what cannot be handled")
+
+
+def _security() -> str:
+    """What an error may have to do with DDS security, if that is asked for."""
+    if os.environ.get("ROS_SECURITY_ENABLE", "").lower() != "true":
+        return ""
+    return (
+        "; ROS_SECURITY_ENABLE asks for DDS security: it needs keys (ROS_SECURITY_KEYSTORE), and a "
+        "ROS that is built with it, which the wheels are not; or keep others off the network"
+    )

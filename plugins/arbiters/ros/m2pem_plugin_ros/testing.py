@@ -1,0 +1,100 @@
+"""For tests over real DDS: a ROS domain that no other test has, and peers in other processes.
+
+In a conftest: `keep_on_loopback()` of m2pem_plugin_ros.loopback first, then
+`from m2pem_plugin_ros.testing import ros_domain  # noqa: F401`.
+"""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import pytest
+
+from m2pem_plugin_ros import loopback
+
+DOMAINS = range(1, 101)
+"""On Linux, the ports of higher ones are where the system picks free ports from."""
+
+FIRST_PORT = 18500
+STOP_WITHIN_S = 10
+
+
+@contextmanager
+def reserved_domain() -> Iterator[int]:
+    """A ROS domain for the block, of nobody else on this machine who asks in this way.
+
+    A socket of 127.0.0.1 is the reservation, so that it ends with its process in any case.
+    """
+    for domain in DOMAINS:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as reservation:
+            try:
+                reservation.bind(("127.0.0.1", FIRST_PORT + domain))
+            except OSError:
+                continue
+            yield domain
+            return
+    raise RuntimeError(f"all {len(DOMAINS)} ROS domains are reserved")
+
+
+@pytest.fixture
+def ros_domain() -> Iterator[int]:
+    """A ROS domain for one test."""
+    with reserved_domain() as domain:
+        yield domain
+
+
+class Peer:
+    """A Python program in a process of its own, kept on 127.0.0.1, in a ROS domain.
+
+    The block begins when it has printed a line that is "ready". It ends by SIGTERM, or `kill`.
+    """
+
+    def __init__(self, program: Path | str, domain: int, arguments: Sequence[str] = ()) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, str(program), *arguments],
+            env={**os.environ, **loopback.environment(domain)},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def __enter__(self) -> Self:
+        self.wait_for("ready")
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.process.send_signal(signal.SIGTERM)
+        try:
+            self.process.wait(STOP_WITHIN_S)
+        except subprocess.TimeoutExpired:
+            self.kill()
+        if self.process.stdout is not None:
+            self.process.stdout.close()
+
+    def wait_for(self, line: str) -> None:
+        """Read what it prints until that line.
+
+        Raises:
+            RuntimeError: it ended before.
+        """
+        assert self.process.stdout is not None
+        for printed in self.process.stdout:
+            if printed.strip() == line:
+                return
+        raise RuntimeError(f"the peer ended with {self.process.wait()} before it was '{line}'")
+
+    def kill(self) -> None:
+        """End it as a power failure would."""
+        self.process.kill()
+        self.process.wait()

@@ -1,0 +1,55 @@
+"""What is said where ROS is missing, is there twice, or cannot be loaded."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from m2pem_plugin_ros import installation
+from m2pem_plugin_ros.installation import RosError, require_interfaces, require_ros
+
+
+def test_what_is_installed_is_found() -> None:
+    require_ros()
+    assert require_interfaces("m2pem_interfaces").msg.KeyValue(key="a").key == "a"
+
+
+def test_the_runtime_says_what_to_install_where_there_is_no_ros() -> None:
+    # As in an environment without it: no module of that name is found.
+    program = (
+        "import sys; sys.modules['rclpy'] = None\n"
+        "from m2pem_plugin_ros.installation import RosError\n"
+        "try:\n    import m2pem_plugin_ros.runtime\n"
+        "except RosError as error:\n    print(error)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, check=True
+    )
+    assert "ROS 2 is not installed for this Python" in ended.stdout
+    assert "source /opt/ros/jazzy/setup.bash" in ended.stdout
+    assert "pip install 'm2pem-plugin-ros[wheels]'" in ended.stdout
+
+
+def test_wheels_and_a_sourced_ros_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "share" / "rclpy").mkdir(parents=True)
+    monkeypatch.setattr(installation, "_has_wheels", lambda: True)
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{tmp_path}")
+    with pytest.raises(RosError, match=f"twice: as wheels in .*, and sourced from {tmp_path}"):
+        require_ros()
+
+
+def test_libraries_that_are_not_found_are_explained(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "rclpy.py").write_text("raise ImportError('librcl.so: cannot open')")
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    monkeypatch.delitem(sys.modules, "rclpy", raising=False)
+    with pytest.raises(RosError, match=r"cannot be loaded: librcl\.so: cannot open; "):
+        require_ros()
+
+
+def test_interfaces_that_are_missing_are_named() -> None:
+    with pytest.raises(RosError, match=r"nav3_msgs is not installed .* ros-jazzy-nav3-msgs"):
+        require_interfaces("nav3_msgs")
