@@ -22,6 +22,7 @@ from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_typ
 from m2pem_plugin_mavlink.protocol.url import parse_url
 from mavlink_wire import HandClock, until
 
+FORGED_IN = 10_000
 LONG_S = float(os.environ.get("M2PEM_FUZZ_S", "300"))
 SHORT_ROUNDS = 150
 GROWTH_BLOCKS = 2_000
@@ -107,7 +108,7 @@ def listen_to_frames(seconds: float | None) -> None:
 
     datagrams, stream = Inbound(meet), Inbound(meet)
     now_s = 0.0
-    before = 0
+    before = missed = 0
     for number in rounds(seconds):
         for _ in range(20):
             now_s += rng.choice([0.001, 0.1, 2.0])
@@ -124,7 +125,10 @@ def listen_to_frames(seconds: float | None) -> None:
         for _ in range(3):
             stream.stream(sent, now_s)
             now_s += 1.1
-        assert mode in heard[1:]
+        missed += mode not in heard[1:]
+        # Of hostile bytes that look like a frame and take others for their own, one in 65,536 has
+        # the right checksum by chance.
+        assert missed <= 1 + number // FORGED_IN
         assert max(len(datagrams.senders), len(stream.senders)) <= MOST_SENDERS
         if number == SHORT_ROUNDS // 2:
             before = blocks()
