@@ -110,6 +110,20 @@ class TestSimulatedCoptersOnARoute(_OnARoute, _Airborne):
     pass
 
 
+class TestSimulatedPx4Copters(_Airborne):
+    firmware = "px4"
+
+
+@pytest.mark.long
+class TestSimulatedPx4Rovers(_Simulated):
+    firmware = "px4"
+
+
+@pytest.mark.long
+class TestSimulatedPx4CoptersOnARoute(_OnARoute, _Airborne):
+    firmware = "px4"
+
+
 @pytest.mark.long
 class TestSimulatedRoversOnARoute(_OnARoute):
     pass
