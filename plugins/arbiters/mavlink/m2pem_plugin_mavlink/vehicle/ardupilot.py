@@ -98,6 +98,7 @@ class ArdupilotDriver(Autopilot):
         if self.in_the_air:
             await self.go_to(self._here(altitude_m))
             return
+        await self._locate()  # its mission begins where it stands
         here = self._here(altitude_m)
         vtol = self.kind is Kind.VTOL
         takeoff = dialect.MAV_CMD_NAV_VTOL_TAKEOFF if vtol else dialect.MAV_CMD_NAV_TAKEOFF
