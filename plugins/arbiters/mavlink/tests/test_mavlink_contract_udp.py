@@ -110,6 +110,20 @@ class TestSimulatedCoptersOnARoute(_OnARoute, _Airborne):
     pass
 
 
+class TestSimulatedPx4Copters(_Airborne):
+    firmware = "px4"
+
+
+@pytest.mark.long
+class TestSimulatedPx4Rovers(_Simulated):
+    firmware = "px4"
+
+
+@pytest.mark.long
+class TestSimulatedPx4CoptersOnARoute(_OnARoute, _Airborne):
+    firmware = "px4"
+
+
 @pytest.mark.long
 class TestSimulatedRoversOnARoute(_OnARoute):
     pass
@@ -118,6 +132,47 @@ class TestSimulatedRoversOnARoute(_OnARoute):
 @pytest.mark.long
 class TestSimulatedCopters(_Airborne):
     pass
+
+
+class _Winged(_Airborne):
+    """What a hold and a resume are for planes: test_mavlink_planes.py."""
+
+    kind = Kind.PLANE
+    unsupported: ClassVar = {
+        **_Simulated.unsupported,
+        "hold": "a plane that is held circles: it never stands",
+    }
+
+
+@pytest.mark.long
+class TestSimulatedPlanes(_Winged):
+    @pytest.fixture
+    def case(self):
+        return ArbiterCase(
+            vehicle=A,
+            other=B,
+            long=("goto", {"target": Point((*at(4000.0, 0.0), 40.0)), "speed": 20.0}),
+            short=("goto", {"target": Point((*at(250.0, 0.0), 40.0)), "speed": 20.0}),
+            bad=("speed", -1.0),
+            short_s=50.0,
+        )
+
+
+@pytest.mark.long
+class TestSimulatedPlanesOnARoute(_Winged):
+    @pytest.fixture
+    def case(self):
+        def way(*easts: float) -> dict:
+            return {"route": Route(tuple((*at(east, 0.0), 40.0) for east in easts)), "speed": 20.0}
+
+        return ArbiterCase(
+            vehicle=A,
+            other=B,
+            long=("single_vehicle_routing", way(500.0, 4000.0)),
+            short=("single_vehicle_routing", way(200.0, 300.0)),
+            bad=("speed", -1.0),
+            short_s=60.0,
+        )
 
 
 @pytest.mark.long
@@ -159,5 +214,7 @@ async def take_off(truth, number: int) -> None:
     assert await vehicle.identified(20.0)
     await vehicle.driver.take_off(10.0)
     assert await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0.0) > 9.5, 60.0)
+    if truth.autopilot.spec.kind is Kind.PLANE:
+        await vehicle.driver.stop()  # it took off by a mission, which would still go on
     await vehicle.close()
     await link.close()

@@ -1,7 +1,7 @@
 import pytest
 from m2pem_plugin_mavlink.sim.geometry import Point
 from m2pem_plugin_mavlink.sim.specification import Kind
-from mavlink_bench import Bench
+from mavlink_bench import Bench, item
 
 
 def flying() -> Bench:
@@ -44,3 +44,21 @@ def test_rtl_brings_a_plane_home_where_it_circles() -> None:
 
 def test_a_plane_in_the_air_is_not_disarmed() -> None:
     assert flying().command(400, 0) == 4
+
+
+def test_a_reposition_says_how_far_from_the_place_a_plane_circles() -> None:
+    bench = flying()
+    assert bench.command_int(192, -1, 1, 120, 0, at=(*bench.offset(500, 400), 90)) == 0
+    bench.run(120)
+    home = bench.autopilot.home.point
+    there = Point(home.north_m + 500, home.east_m + 400, 90)
+    assert bench.autopilot.position.distance_m(there) == pytest.approx(120, abs=6)
+
+
+def test_at_the_end_of_its_mission_a_plane_goes_home() -> None:
+    bench = flying()
+    place = bench.offset(600, 0)
+    assert bench.upload([item(0, 16), item(1, 16, place, 60.0)]) == 0
+    assert bench.command(176, 1, 10) == 0
+    bench.run_until(lambda: bench.autopilot.modes.mode.name == "RTL")
+    assert "Mission complete, changing mode to RTL" in bench.texts()

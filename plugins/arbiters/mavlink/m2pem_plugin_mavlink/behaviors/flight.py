@@ -1,5 +1,7 @@
 """Up, down and home."""
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from m2pem.api import BehaviorState
 from m2pem_plugin_mavlink.behaviors.behavior import ANY_MODE, Behavior, BehaviorFailedError, Job
 from m2pem_plugin_mavlink.behaviors.going import TOLERANCES_M
@@ -9,14 +11,18 @@ from m2pem_plugin_mavlink.behaviors.looking import (
     away_m,
     heads_for,
     height_m,
+    height_reach_m,
     on_the_ground,
+    reach_m,
     stands,
     unless_airborne,
     where,
 )
 from m2pem_plugin_mavlink.behaviors.wishes import AMSL, Wishes
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.landing import landing_begins
 
+TAKEOFFS = (dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_VTOL_TAKEOFF)
 LEAST_TAKEOFF_M = 0.5
 LEVEL_M_S = 0.5
 """Climbing or sinking by less is hovering."""
@@ -63,6 +69,7 @@ class ChangeAltitude(Behavior):
         if height is None:
             raise BehaviorFailedError(f"its height above {self._frame} is not known")
         near_m = min(1.0, max(0.3, 0.1 * abs(self._altitude_m)))
+        near_m = height_reach_m(self.vehicle, near_m)
         return abs(height - self._altitude_m) <= near_m and self._is_level()
 
     def _is_level(self) -> bool:
@@ -82,10 +89,15 @@ class ChangeAltitude(Behavior):
 
 
 class Takeoff(ChangeAltitude):
-    """Take off and climb; one that flies already only climbs."""
+    """Take off and climb; one that flies already only climbs. Planes take off by a mission."""
 
     name = "takeoff"
     modes = frozenset({FlightMode.GUIDED, FlightMode.TAKEOFF})
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        if self.vehicle.heard.circle_m is not None:
+            self.modes |= {FlightMode.MISSION}
 
     def refusal(self) -> str:
         """The height must be above its home."""
@@ -115,7 +127,8 @@ class Takeoff(ChangeAltitude):
         wished = self._above_home_m()
         if height is None or wished is None:
             return False
-        return height >= wished - min(1.0, max(0.3, 0.1 * wished)) and self._is_level()
+        near_m = height_reach_m(self.vehicle, min(1.0, max(0.3, 0.1 * wished)))
+        return height >= wished - near_m and self._is_level()
 
     def _above_home_m(self) -> float | None:
         heard = self.vehicle.heard
@@ -128,18 +141,34 @@ class Takeoff(ChangeAltitude):
         return self._altitude_m - heard.position.altitude_m + heard.altitude_above_home_m
 
     async def recognised(self) -> BehaviorState:
-        """As for a change of altitude; or it is in a mode for takeoffs."""
+        """As for a change of altitude; or it is in a mode for takeoffs, or flies a mission that
+        is one."""
         state = await super().recognised()
+        if state is not BehaviorState.UNKNOWN or not self.vehicle.heard.armed:
+            return state
         mode = self.vehicle.heard.mode
-        climbs = self.vehicle.heard.armed and mode is FlightMode.TAKEOFF
-        return BehaviorState.RUNNING if state is BehaviorState.UNKNOWN and climbs else state
+        climbs = mode is FlightMode.TAKEOFF or (
+            mode is FlightMode.MISSION and accepts(self, mode) and await self._has_its_mission()
+        )
+        return BehaviorState.RUNNING if climbs else state
+
+    async def _has_its_mission(self) -> bool:
+        mission, wished = await self.vehicle.driver.downloaded(), self._above_home_m()
+        if not mission or wished is None or mission[0].command not in TAKEOFFS:
+            return False
+        return abs(mission[0].altitude_m - wished) < LEAST_TAKEOFF_M
 
 
 class Land(Behavior):
-    """Land where it is."""
+    """Land where it is; a plane by the landing of its mission."""
 
     name = "land"
     modes = frozenset({FlightMode.LAND})
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        if self.vehicle.heard.circle_m is not None:
+            self.modes |= {FlightMode.MISSION}
 
     async def begin(self) -> None:
         """Unless it has landed already."""
@@ -162,10 +191,14 @@ class Land(Behavior):
         return self.vehicle.heard.landed is True and self.vehicle.heard.armed is False
 
     async def recognised(self) -> BehaviorState:
-        """By its mode, or because it is down."""
+        """By its mode, or because it is down; a mission must have come to its landing."""
         if self._down():
             return BehaviorState.SUCCEEDED
-        lands = accepts(self, self.vehicle.heard.mode)
+        mode = self.vehicle.heard.mode
+        lands = accepts(self, mode)
+        if lands and mode is FlightMode.MISSION:
+            begins = landing_begins(await self.vehicle.driver.downloaded())
+            lands = begins is not None and (self.vehicle.driver.current_item or 0) >= begins
         return BehaviorState.RUNNING if lands else BehaviorState.UNKNOWN
 
 
@@ -178,7 +211,7 @@ async def disarm_when_down(behavior: Behavior) -> None:
 
 
 class ReturnToLaunch(Behavior):
-    """Go home; an aircraft lands there, unless it is set up to hover."""
+    """Go home; an aircraft lands there, unless it is set up to hover or circle."""
 
     name = "return_to_launch"
     modes = frozenset({FlightMode.RETURN, FlightMode.LAND})
@@ -224,12 +257,16 @@ class ReturnToLaunch(Behavior):
         return heard.home is not None and self._home_m() <= self._near_m and stands(self.vehicle)
 
     def finished(self) -> bool:
-        """At home: an aircraft down and disarmed (or hovering for long), others standing."""
+        """At home: an aircraft down and disarmed (or hovering, or circling, for long), others
+        standing."""
         if self._is_there_already():
             return True
-        standing_s = self._standing.seconds()
+        home, radius_m = self.vehicle.heard.home, self.vehicle.heard.home_circle_m
+        place = (home.latitude_deg, home.longitude_deg) if home is not None else None
+        standing_s = self._standing.seconds(place, radius_m)
         if self.vehicle.domain == "air":
-            at_home = self.vehicle.heard.landed is False and self._home_m() <= self._near_m
+            near_m = reach_m(self.vehicle, self._near_m, radius_m)
+            at_home = self.vehicle.heard.landed is False and self._home_m() <= near_m
             return at_home and standing_s >= HOVERS_AT_HOME_S
         return self.vehicle.heard.home is None and standing_s >= DISARMS_WITHIN_S
 

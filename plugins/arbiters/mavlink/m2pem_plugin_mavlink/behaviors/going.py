@@ -10,15 +10,18 @@ from m2pem_plugin_mavlink.behaviors.looking import (
     Standing,
     accepts,
     away_m,
+    flies_on,
     heads_for,
+    height_reach_m,
     off_height_m,
     on_the_ground,
-    stands,
+    reach_m,
+    stays,
     unless_airborne,
     where,
 )
 from m2pem_plugin_mavlink.behaviors.wishes import Wishes
-from m2pem_plugin_mavlink.plane import distance_m
+from m2pem_plugin_mavlink.plane import LatLon, distance_m
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 
 TOLERANCES_M = {"air": 2.0, "ground": 2.5, "surface": 5.0, "subsurface": 3.0}
@@ -97,15 +100,17 @@ class Goto(Behavior):
                 await self.vehicle.driver.go_to(new, self.wishes.speed_m_s)
 
     def finished(self) -> bool:
-        """Within the tolerance and turned; or it stands, as near as its autopilot goes.
+        """Within the tolerance and turned; or it stands, as near as its autopilot goes. What cannot
+        stand still is there when it circles the place.
 
         Raises:
             BehaviorFailedError: it stands outside of a tolerance that was asked for.
         """
         place = self._place or self.target()
         away = away_m(self.vehicle, (place.latitude_deg, place.longitude_deg))
-        high = off_height_m(self.vehicle, place) <= max(self._tolerance_m, HEIGHT_TOLERANCE_M)
-        if away <= self._tolerance_m and high:
+        height_m = height_reach_m(self.vehicle, max(self._tolerance_m, HEIGHT_TOLERANCE_M))
+        high = off_height_m(self.vehicle, place) <= height_m
+        if away <= reach_m(self.vehicle, self._tolerance_m) and high:
             return self._turned(place)
         if self._standing.seconds() < SETTLED_S or away > SETTLED_WITHIN_M or not high:
             return False
@@ -119,6 +124,8 @@ class Goto(Behavior):
     def _turned(self, place: Place) -> bool:
         yaw = self.vehicle.heard.yaw_rad
         if place.heading_rad is None or self.vehicle.domain != "air" or yaw is None:
+            return True
+        if flies_on(self.vehicle):
             return True
         off = math.remainder(math.pi / 2 - place.heading_rad - yaw, math.tau)
         return abs(off) <= TURNED_RAD or self._standing.seconds() >= TURN_S
@@ -140,7 +147,7 @@ def _apart_m(a: Place, b: Place) -> float:
 
 
 class Hold(Behavior):
-    """Stand for a time, or until it stands."""
+    """Stand for a time, or until it stands; what cannot, circles where it was."""
 
     name = "hold"
     modes = frozenset({FlightMode.HOLD})
@@ -149,9 +156,11 @@ class Hold(Behavior):
         super().__init__(job)
         self._left_s = Wishes(job).number("duration") or 0.0
         self._since_s: float | None = None
+        self._at: LatLon | None = None
 
     async def begin(self) -> None:
         """Stop it; what is not armed stands."""
+        self._at = where(self.vehicle)
         if on_the_ground(self.vehicle) or self.vehicle.heard.armed is False:
             self.modes = frozenset(FlightMode)  # it stands already, in whatever mode
         else:
@@ -172,12 +181,13 @@ class Hold(Behavior):
         """Standing, and the time is over."""
         now_s = self.job.now_s()
         over = self._since_s is not None and now_s - self._since_s >= self._left_s
-        return over and stands(self.vehicle)
+        return over and stays(self.vehicle, self._at)
 
     async def recognised(self) -> BehaviorState:
         """By its mode."""
         if self.vehicle.heard.armed and not accepts(self, self.vehicle.heard.mode):
             return BehaviorState.UNKNOWN
+        self._at = where(self.vehicle)
         self._since_s = self.job.now_s()
         if self.vehicle.heard.armed is False:
             self.modes = frozenset(FlightMode)

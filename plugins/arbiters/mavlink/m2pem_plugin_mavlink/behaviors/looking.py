@@ -12,6 +12,13 @@ STANDS_BELOW_M_S = 0.3
 """Positions of a vehicle that stands drift; a gust moves one that hovers."""
 
 HEIGHT_TOLERANCE_M = 1.0
+CIRCLING_HEIGHT_TOLERANCE_M = 5.0
+"""What circles climbs and sinks on its circle, in every gust."""
+
+NEAR_THE_CIRCLE = 0.25
+"""Of its radius; and so many metres at least:"""
+
+NEAR_THE_CIRCLE_M = 5.0
 
 LOOKS_FOR_S = 4.0
 """After a restart: a vehicle that is on its way has turned and moves by then."""
@@ -26,10 +33,10 @@ class Standing:
         self._job = job
         self._since_s: float | None = None
 
-    def seconds(self) -> float:
-        """Up to now; 0 while it moves."""
+    def seconds(self, circled: LatLon | None = None, radius_m: float | None = None) -> float:
+        """Up to now; 0 while it moves. `circled`, `radius_m`: as for `stays`."""
         now_s = self._job.now_s()
-        if self._job.vehicle.heard.speed_m_s >= STANDS_BELOW_M_S:
+        if not stays(self._job.vehicle, circled, radius_m):
             self._since_s = None
             return 0.0
         if self._since_s is None:
@@ -44,6 +51,40 @@ class Standing:
 def stands(vehicle: Vehicle) -> bool:
     """Whether it hardly moves."""
     return vehicle.heard.speed_m_s < STANDS_BELOW_M_S
+
+
+def stays(vehicle: Vehicle, at: LatLon | None, radius_m: float | None = None) -> bool:
+    """Whether it hardly moves; what cannot stand still in the air stays at a place when it is on
+    its circle around it, or within. `radius_m`: of that circle, None: the one that it has been set
+    to."""
+    if stands(vehicle):
+        return True
+    if at is None or not flies_on(vehicle):
+        return False
+    return away_m(vehicle, at) <= reach_m(vehicle, 0.0, radius_m)
+
+
+def flies_on(vehicle: Vehicle) -> bool:
+    """Whether it is in the air and cannot stand still there."""
+    return vehicle.heard.circle_m is not None and vehicle.heard.landed is not True
+
+
+def near_the_circle_m(radius_m: float) -> float:
+    """How far off a circle still counts as on it."""
+    return max(NEAR_THE_CIRCLE_M, NEAR_THE_CIRCLE * radius_m)
+
+
+def reach_m(vehicle: Vehicle, tolerance_m: float, radius_m: float | None = None) -> float:
+    """How near to a place a vehicle is there: within a tolerance, or what circles on its circle."""
+    radius = vehicle.heard.circle_m if radius_m is None else radius_m
+    if radius is None or not flies_on(vehicle):
+        return tolerance_m
+    return radius + max(tolerance_m, near_the_circle_m(radius))
+
+
+def height_reach_m(vehicle: Vehicle, tolerance_m: float) -> float:
+    """The same of heights."""
+    return max(tolerance_m, CIRCLING_HEIGHT_TOLERANCE_M) if flies_on(vehicle) else tolerance_m
 
 
 def where(vehicle: Vehicle) -> LatLon | None:

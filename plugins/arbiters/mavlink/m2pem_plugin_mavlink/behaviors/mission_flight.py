@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -9,11 +10,18 @@ from m2pem.api import BehaviorState
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError, Job, Memory
 from m2pem_plugin_mavlink.behaviors.fingerprint import Fingerprint, fingerprint
 from m2pem_plugin_mavlink.behaviors.going import TOLERANCES_M
-from m2pem_plugin_mavlink.behaviors.looking import Standing, away_m, unless_airborne, where
+from m2pem_plugin_mavlink.behaviors.looking import (
+    Standing,
+    away_m,
+    reach_m,
+    unless_airborne,
+    where,
+)
 from m2pem_plugin_mavlink.behaviors.wishes import AMSL, RELATIVE, TERRAIN, Wishes
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.plane import LatLon
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
+from m2pem_plugin_mavlink.vehicle.landing import without_landing
 
 FRAMES = {
     RELATIVE: dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
@@ -33,6 +41,12 @@ def waypoint(place: LatLon, altitude_m: float, frame: str) -> MissionItem:
     return MissionItem(
         dialect.MAV_CMD_NAV_WAYPOINT, FRAMES[frame], (0.0, 0.0, 0.0, nan), *place, altitude_m
     )
+
+
+def circle_for_ever(last: MissionItem) -> MissionItem:
+    """Stay at the place of another item, for what cannot stand still there: an ArduPlane would go
+    home at the end of its mission, and go on into a landing that stands behind it."""
+    return replace(last, command=dialect.MAV_CMD_NAV_LOITER_UNLIM)
 
 
 def speed_item(speed_m_s: float) -> MissionItem:
@@ -69,15 +83,17 @@ class MissionFlight(Behavior):
 
     @property
     def items(self) -> tuple[MissionItem, ...]:
-        """What is uploaded: the speed, if one was asked for, then the waypoints."""
+        """What is uploaded: the speed, if one was asked for, then the waypoints; for a plane also
+        a circle at the last of them."""
         if self._items is None:
             way = tuple(self.way())
             speed = self.wishes.speed_m_s
-            self._items = way if speed is None else (speed_item(speed), *way)
+            items = way if speed is None else (speed_item(speed), *way)
+            last = items[-1]
+            self._end = (len(items) - 1, (last.latitude_deg, last.longitude_deg))
+            circles = self.vehicle.heard.circle_m is not None
+            self._items = (*items, circle_for_ever(last)) if circles else items
             self._kept = fingerprint(self._items)
-            last = self._items[-1]
-            end = (last.latitude_deg, last.longitude_deg)
-            self._end = (len(self._items) - 1, end)
         return self._items
 
     def refusal(self) -> str:
@@ -85,9 +101,10 @@ class MissionFlight(Behavior):
         if reason := unless_airborne(self.vehicle):
             return reason
         speeds = 0 if self.wishes.speed_m_s is None else 1
-        way = [(item.latitude_deg, item.longitude_deg) for item in self.items[speeds:]]
-        if self.job.fence is None:
+        items = self.items
+        if self.job.fence is None or self._end is None:
             return ""
+        way = [(item.latitude_deg, item.longitude_deg) for item in items[speeds : self._end[0] + 1]]
         start = where(self.vehicle)
         if reason := self.job.fence.breach(way, start, self.named):
             return reason
@@ -132,10 +149,11 @@ class MissionFlight(Behavior):
             return True
         if current is None or current < last:
             return False
-        if away_m(self.vehicle, place) > 2 * TOLERANCES_M.get(self.vehicle.domain, 2.5):
+        near_m = 2 * TOLERANCES_M.get(self.vehicle.domain, 2.5)
+        if away_m(self.vehicle, place) > reach_m(self.vehicle, near_m):
             return False
         over = self.vehicle.heard.mode is FlightMode.HOLD  # PX4 holds at the end of a mission
-        return over or self._standing.seconds() >= STANDS_AT_END_S
+        return over or self._standing.seconds(place) >= STANDS_AT_END_S
 
     def finished(self) -> bool:
         """At the last waypoint; a loop never is."""
@@ -146,7 +164,7 @@ class MissionFlight(Behavior):
         if self._kept is None or self._end is None:
             return BehaviorState.UNKNOWN
         stored = await self.vehicle.driver.downloaded()
-        if not fingerprint(stored).fits(self._kept):
+        if not fingerprint(without_landing(stored)).fits(self._kept):
             return BehaviorState.UNKNOWN
         if self.finished() or await self._stands_at_the_end():
             return BehaviorState.SUCCEEDED
@@ -154,7 +172,8 @@ class MissionFlight(Behavior):
         return BehaviorState.RUNNING if flies else BehaviorState.UNKNOWN
 
     async def _stands_at_the_end(self) -> bool:
-        if self.loop or self._end is None or self.vehicle.driver.current_item != self._end[0]:
+        current = self.vehicle.driver.current_item
+        if self.loop or self._end is None or current is None or current < self._end[0]:
             return False
         return await self.vehicle.until(self.at_the_end, STANDS_AT_END_S + 0.5)
 

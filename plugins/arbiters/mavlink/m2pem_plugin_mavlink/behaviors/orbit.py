@@ -5,7 +5,13 @@ from collections.abc import Sequence
 
 from m2pem.api import BehaviorState
 from m2pem_plugin_mavlink.behaviors.behavior import BehaviorFailedError, Job, Memory
-from m2pem_plugin_mavlink.behaviors.looking import away_m, unless_airborne, where
+from m2pem_plugin_mavlink.behaviors.looking import (
+    away_m,
+    near_the_circle_m,
+    reach_m,
+    unless_airborne,
+    where,
+)
 from m2pem_plugin_mavlink.behaviors.mission_flight import MissionFlight, waypoint
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.plane import Plane
@@ -15,10 +21,6 @@ RADIUS_M = 30.0
 MOST_ITEMS = 400
 """More laps than fit are begun anew each."""
 
-NEAR_THE_CIRCLE = 0.25
-"""Of its radius; and so many metres at least:"""
-
-NEAR_THE_CIRCLE_M = 5.0
 LOOK_EVERY_S = 0.2
 
 
@@ -41,6 +43,8 @@ class Orbit(MissionFlight):
         self._turned_rad = 0.0
         self._bearing_rad: float | None = None
         self._done = False
+        if self.vehicle.heard.circle_m is not None:
+            self.modes |= {FlightMode.GUIDED}  # a plane is sent to a place with a radius
 
     ends = True
     """Whether it ends after one turn when nobody says otherwise."""
@@ -146,8 +150,11 @@ class Orbit(MissionFlight):
         """Add to what was turned; whether it is on the circle."""
         center = (self.center.latitude_deg, self.center.longitude_deg)
         here = where(self.vehicle)
-        near_m = max(NEAR_THE_CIRCLE_M, NEAR_THE_CIRCLE * self._radius_m)
-        if here is None or abs(away_m(self.vehicle, center) - self._radius_m) > near_m:
+        near_m, away = near_the_circle_m(self._radius_m), away_m(self.vehicle, center)
+        # A plane that cannot turn as tightly as it is asked to goes round as it can.
+        wide_m = max(self._radius_m, self.vehicle.heard.circle_m or 0.0)
+        farthest_m = max(self._radius_m + near_m, reach_m(self.vehicle, 0.0, wide_m))
+        if here is None or not self._radius_m - near_m <= away <= farthest_m:
             self._bearing_rad = None
             return False
         east, north = Plane(center).level(here)
@@ -167,7 +174,9 @@ class Orbit(MissionFlight):
 
     async def recognised(self) -> BehaviorState:
         """By its mode and its distance from the centre, or by its mission."""
-        if self.vehicle.heard.mode is FlightMode.ORBIT:
+        plane = self.vehicle.heard.circle_m is not None
+        by_place = plane and self.vehicle.heard.mode is FlightMode.GUIDED
+        if by_place or self.vehicle.heard.mode is FlightMode.ORBIT:
             self._by_command = True
             near = self._look() or self._bearing_rad is not None
             return BehaviorState.RUNNING if near else BehaviorState.UNKNOWN

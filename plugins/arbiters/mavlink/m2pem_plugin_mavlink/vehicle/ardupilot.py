@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+from collections.abc import Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -10,8 +11,10 @@ from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot, cannot, not_now
+from m2pem_plugin_mavlink.vehicle.circling import WINGED
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 from m2pem_plugin_mavlink.vehicle.identity import Kind
+from m2pem_plugin_mavlink.vehicle.landing import NO_LANDING, landing, landing_begins
 
 STOP_WITHIN_S = 3.0
 """The mode in which it stops is commanded for so long before another one is tried."""
@@ -33,7 +36,6 @@ _STOP_MODES = {
     Kind.BOAT: ("LOITER", "HOLD"),
     Kind.SUB: ("POSHOLD", "ALT_HOLD"),
 }
-_WINGED = frozenset({Kind.PLANE, Kind.VTOL})
 
 
 class ArdupilotDriver(Autopilot):
@@ -53,7 +55,7 @@ class ArdupilotDriver(Autopilot):
         """GUIDED, which is refused as long as there is no position: an arming in STABILIZE would
         succeed without one, and the takeoff then fail. A plane that is armed in GUIDED would set
         out at once; it is armed in the mode that it is in."""
-        if self.kind not in _WINGED:
+        if self.kind not in WINGED:
             await self.set_mode(FlightMode.GUIDED)
 
     async def _have_it_checked(self) -> None:
@@ -96,6 +98,7 @@ class ArdupilotDriver(Autopilot):
         if self.in_the_air:
             await self.go_to(self._here(altitude_m))
             return
+        await self._locate()  # its mission begins where it stands
         here = self._here(altitude_m)
         vtol = self.kind is Kind.VTOL
         takeoff = dialect.MAV_CMD_NAV_VTOL_TAKEOFF if vtol else dialect.MAV_CMD_NAV_TAKEOFF
@@ -121,8 +124,10 @@ class ArdupilotDriver(Autopilot):
             case Kind.COPTER | Kind.VTOL:
                 await self.set_mode(FlightMode.LAND)
             case Kind.PLANE:
-                await exchanges.command(self.link, dialect.MAV_CMD_DO_LAND_START)
-                self.ours.custom_mode = self.modes.number("AUTO")
+                begins = landing_begins(await self.downloaded())
+                if begins is None:
+                    raise cannot(NO_LANDING)
+                await self.start_mission(begins)
             case _:
                 raise cannot(f"a {self.kind} does not land")
 
@@ -156,7 +161,8 @@ class ArdupilotDriver(Autopilot):
         await self.set_mode(FlightMode.GUIDED)
         if speed_m_s is not None:
             await self.set_speed(speed_m_s)
-        await self._reposition(place, speed_m_s, 0.0)
+        # Unless it is told, a plane circles as far from there as from the place before.
+        await self._reposition(place, speed_m_s, self.heard.circle_m or 0.0)
         if place.heading_rad is not None and self.kind is Kind.COPTER:
             await exchanges.command(
                 self.link,
@@ -191,7 +197,7 @@ class ArdupilotDriver(Autopilot):
     async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
         """Only planes can be told to circle a place; the CIRCLE of copters and rovers has no
         command for its center."""
-        if self.kind not in _WINGED:
+        if self.kind not in WINGED:
             return False
         await self._arm_to_drive()
         await self.set_mode(FlightMode.GUIDED)
@@ -203,7 +209,7 @@ class ArdupilotDriver(Autopilot):
     async def move(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
         """One velocity setpoint, which holds for 3 s. It does not take the vehicle back from
         somebody who has left GUIDED."""
-        if self.kind in _WINGED:
+        if self.kind in WINGED:
             raise cannot(f"a {self.kind} takes no velocities")
         guided = self.modes.number("GUIDED")
         if self.heard.custom_mode != guided:
@@ -224,16 +230,23 @@ class ArdupilotDriver(Autopilot):
         frame = dialect.MAV_FRAME_GLOBAL
         return (MissionItem(dialect.MAV_CMD_NAV_WAYPOINT, frame, (0.0,) * 4, *place), *items)
 
+    async def upload(self, items: Sequence[MissionItem]) -> None:
+        """Store a mission. The landing of the one before stays behind it, unless it has its own;
+        the mission must not run into it."""
+        if self.kind is Kind.PLANE and items and landing_begins(items) is None:
+            items = (*items, *landing(await self.downloaded()))
+        await super().upload(items)
+
     async def start_mission(self, first: int = 0) -> None:
         """Fly the stored mission from an item on, arming where needed. From the ground a copter
         wants a mission that begins with a takeoff, and MISSION_START; a plane sets out when it is
         armed, and so is armed last."""
-        if self.kind not in _WINGED:
+        if self.kind not in WINGED:
             await self.arm()
         self.heard.reached_sequence = None
         await exchanges.set_current(self.link, first + self.home_items)
         await self.set_mode(FlightMode.MISSION)
-        if self.kind in _WINGED:
+        if self.kind in WINGED:
             await self.arm()
         elif self.kind is Kind.COPTER and not self.in_the_air:
             await exchanges.command(self.link, dialect.MAV_CMD_MISSION_START)

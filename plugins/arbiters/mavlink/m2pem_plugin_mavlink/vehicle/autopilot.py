@@ -199,8 +199,7 @@ class Autopilot(ABC):
         """
         if self.heard.armed:
             return
-        if not await self.vehicle.until(self._is_located, LOCATED_WITHIN_S):
-            raise self._not_ready()
+        await self._locate()
         # What its other checks say may be of the mode that it is in: some cannot be armed.
         await self._enter_arming_mode()
         if not self.readiness().ready:
@@ -208,6 +207,11 @@ class Autopilot(ABC):
         if not await self.vehicle.until(lambda: self.readiness().ready, CHECKED_WITHIN_S):
             raise self._not_ready()
         await self._arm()
+
+    async def _locate(self) -> None:
+        """Wait until it knows where it is."""
+        if not await self.vehicle.until(self._is_located, LOCATED_WITHIN_S):
+            raise self._not_ready()
 
     def _is_located(self) -> bool:
         return not unlocated(self.identity.firmware, self.heard, self.link.now_s())

@@ -35,6 +35,9 @@ class Heard:
     mission_total: int | None = None
     reached_sequence: int | None = None
     waypoint_distance_m: float | None = None
+    # How far it circles from a place where it is to stay, and from home; None: it can stand still
+    circle_m: float | None = None
+    home_circle_m: float | None = None
     # Whether it is ready: GPS_FIX_TYPE, EKF_STATUS_FLAGS (the same as ESTIMATOR_STATUS_FLAGS as far
     # as positions go), and the bit MAV_SYS_STATUS_PREARM_CHECK, None where it is not in use
     gps_fix: int | None = None

@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.protocol.transaction import RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot, cannot, not_now
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
-from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND
+from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Kind
 
 SETPOINTS_BEFORE_S = 1.0
 SETPOINT_EVERY_S = 0.2
@@ -114,7 +114,7 @@ class Px4Driver(Autopilot):
 
     async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
         """Circle a place without an end, clockwise, looking at it."""
-        if self.kind in ON_THE_GROUND:
+        if self.kind in ON_THE_GROUND or self.kind is Kind.PLANE:
             return False
         await self._arm_to_drive()
         altitude_m = self._place_amsl(center)

@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
 from m2pem_plugin_mavlink.microservices.texts import StatusTexts
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
-from m2pem_plugin_mavlink.vehicle import exchanges
+from m2pem_plugin_mavlink.vehicle import circling, exchanges
 from m2pem_plugin_mavlink.vehicle.driver import Driver
 from m2pem_plugin_mavlink.vehicle.drivers import driver_of
 from m2pem_plugin_mavlink.vehicle.heard import Heard
@@ -26,6 +26,9 @@ from m2pem_plugin_mavlink.vehicle.waiters import Waiters
 _HEARTBEAT = message_type("HEARTBEAT").id
 _STATUSTEXT = message_type("STATUSTEXT").id
 _HOME = message_type("HOME_POSITION").id
+
+RADII_EVERY_S = 10.0
+"""A vehicle that does not tell how far it circles is asked again so often."""
 
 HOME_EVERY_S = 5.0
 """A home position that is not sent by itself is asked for so often, until it is there."""
@@ -184,6 +187,9 @@ class Vehicle:
         self._driver = driver_of(self, found)
         self._streams = Streams(telemetry_streams(found.firmware))
         self._intake = Intake(self.heard, modes_of(found), flies=flies)
+        if circling.circles(found):
+            circling.suppose(self.heard, found)
+            self._go(self._ask_for_radii(found))
         self._hear(message, sender)
         self._deafen.append(self.link.listen(self._intake.wants, self._hear))
 
@@ -273,6 +279,16 @@ class Vehicle:
             self._logger.debug("%s: does not tell its home: %s", self.resource, error)
         finally:
             self._asking = False
+
+    async def _ask_for_radii(self, found: Identity) -> None:
+        while True:
+            try:
+                await circling.ask(self.heard, found, self.link)
+            except ExchangeError as error:
+                self._logger.debug("%s: does not tell how it circles: %s", self.resource, error)
+                await self._clock.sleep(RADII_EVERY_S)
+            else:
+                return
 
     def _go(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.get_running_loop().create_task(work)

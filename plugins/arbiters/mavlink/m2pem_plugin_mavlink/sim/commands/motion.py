@@ -82,6 +82,8 @@ class MotionCommands(Part):
             return Result.FAILED
         if command.param1 > 0:
             pilot.modes.set_speed(command.param1)
+        if math.isfinite(command.param3) and command.param3 > 0:
+            guided.radius_m = command.param3
         guided.go_to(point)
         return Result.ACCEPTED
 

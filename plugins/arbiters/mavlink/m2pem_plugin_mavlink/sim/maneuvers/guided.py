@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from m2pem_plugin_mavlink.sim.demands import Demand, Drive, Go, Reach, Rest
+from m2pem_plugin_mavlink.sim.demands import Circle, Demand, Drive, Go, Reach, Rest
 from m2pem_plugin_mavlink.sim.geometry import Point
 from m2pem_plugin_mavlink.sim.maneuvers.maneuver import Maneuver
 from m2pem_plugin_mavlink.sim.maneuvers.standing import Stay
@@ -16,11 +16,13 @@ TAKEN_OFF_M = 0.3
 class Guided(Maneuver):
     """What was last asked for: a takeoff, a place, a velocity; without any, it stays.
 
+    `radius_m`: a plane circles the place so far away (0: WP_LOITER_RAD), until the mode is left.
     A velocity is forgotten after `tuning.setpoint_timeout_s` (ArduPilot: 3 s, GUID_TIMEOUT).
     """
 
     takeoff_up_m: float | None = None
     taking_off = False
+    radius_m = 0.0
     destination: Point | None = None
     paused = False
 
@@ -92,7 +94,8 @@ class Guided(Maneuver):
         pilot = self.autopilot
         match pilot.spec.kind:
             case Kind.PLANE:
-                return self.stay(destination)
+                radius_m = self.radius_m or pilot.tuning.loiter_radius_m
+                return Circle(destination, radius_m, pilot.modes.speed_mps)
             case Kind.ROVER | Kind.BOAT:
                 if pilot.position.distance_m(destination) <= pilot.tuning.acceptance_m:
                     self.destination = None

@@ -102,6 +102,10 @@ class Auto(Maneuver):
         self._index = following
         if following is None:
             progress.complete = True
+            if pilot.spec.kind is Kind.PLANE:
+                pilot.say("Mission complete, changing mode to RTL")
+                pilot.modes.switch(pilot.firmware.roles.back)
+                return
             pilot.say("Mission complete")
             if pilot.body.on_ground and pilot.spec.kind is Kind.COPTER:
                 pilot.arming.disarm_after_landing()

@@ -1,0 +1,204 @@
+"""Planes never stand still. Simulated ones, over real UDP, judged by where they really are."""
+
+import asyncio
+import math
+from itertools import pairwise
+
+import pytest
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.sim.specification import Kind
+from mavlink_simulated import at, fly
+
+from m2pem.api import Area, BehaviorState, Point, Route
+
+CIRCLE_M = 60.0
+RELATIVE = 3
+DO_LAND_START, WAYPOINT, LAND, TAKEOFF = 189, 16, 21, 22
+
+
+def point(east: float, north: float, altitude: float | None = None) -> Point:
+    return Point((*at(east, north), altitude))
+
+
+def with_a_plane(main) -> None:
+    async def flying(bench) -> None:
+        await bench.do("r1.up", "takeoff", altitude=60.0)
+        await main(bench)
+
+    fly(flying, Kind.PLANE)
+
+
+async def circles(bench, place: tuple[float, float], radius_m: float = CIRCLE_M) -> None:
+    """It goes all the way round the place, at the radius, and does nothing else."""
+    await bench.clock.sleep(30)  # what was just begun comes onto its circle
+    bearings = []
+    for _ in range(60):
+        east, north = bench.level()
+        away = (east - place[0], north - place[1])
+        assert math.hypot(*away) == pytest.approx(radius_m, abs=15)
+        bearings.append(math.atan2(away[1], away[0]))
+        await bench.clock.sleep(0.5)
+    turned = sum(abs(math.remainder(b - a, math.tau)) for a, b in pairwise(bearings))
+    assert turned > math.tau
+
+
+def test_it_takes_off_and_circles_at_its_height() -> None:
+    async def main(bench) -> None:
+        assert bench.truth().takeoffs == 1
+        assert bench.truth().up_m == pytest.approx(60, abs=6)
+        await circles(bench, (0, 0))
+        assert bench.truth().up_m == pytest.approx(60, abs=3)
+
+    with_a_plane(main)
+
+
+def test_it_goes_to_a_place_and_circles_there() -> None:
+    async def main(bench) -> None:
+        await bench.do("r1.b1", "goto", target=point(400, 300, 80.0), heading=1.0, tolerance=2.0)
+        assert math.dist(bench.level(), (400, 300)) < CIRCLE_M + 20
+        assert bench.truth().up_m == pytest.approx(80, abs=6)
+        await circles(bench, (400, 300))
+        await bench.do("r1.b2", "change_altitude", altitude=100.0)
+        assert bench.truth().up_m == pytest.approx(100, abs=6)
+
+    with_a_plane(main)
+
+
+def test_a_hold_ends_while_it_circles_where_it_was() -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "goto", "v1", target=point(3000, 0))
+        assert await bench.until(lambda: bench.level()[0] > 300, 60)
+        await bench.arbiter.cancel("r1.b1", 1)
+        assert (await bench.ended("r1.b1", 10)).state is BehaviorState.CANCELLED
+        began_us = bench.clock.now_us()
+        await bench.do("r1.b2", "hold", duration=20.0)
+        assert (bench.clock.now_us() - began_us) / 1e6 < 60
+        assert bench.truth().mode == "LOITER"
+        await bench.do("r1.b3", "hold")
+
+    with_a_plane(main)
+
+
+def test_held_it_circles_and_goes_on_when_resumed() -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "goto", "v1", target=point(900, 0))
+        assert await bench.until(lambda: bench.level()[0] > 200, 60)
+        held = bench.level()
+        await bench.arbiter.hold("v1")
+        bound_s = bench.arbiter.limits("v1").hold_within_s
+        assert await bench.until(lambda: bench.truth().mode == "LOITER", bound_s)
+        await bench.clock.sleep(60)
+        assert math.dist(bench.level(), held) < 2 * CIRCLE_M + 30
+        assert bench.states_of("r1.b1")[-1] is BehaviorState.RUNNING
+        await bench.arbiter.resume("v1")
+        assert (await bench.ended("r1.b1", 120)).state is BehaviorState.SUCCEEDED
+        assert math.dist(bench.level(), (900, 0)) < CIRCLE_M + 20
+
+    with_a_plane(main)
+
+
+def test_it_comes_home_and_circles_there() -> None:
+    async def main(bench) -> None:
+        await bench.do("r1.b1", "goto", target=point(500, 0))
+        await bench.do("r1.b2", "return_to_launch")
+        assert math.dist(bench.level(), (0, 0)) < CIRCLE_M + 20
+        await circles(bench, (0, 0))
+
+    with_a_plane(main)
+
+
+def test_it_flies_a_route_and_circles_at_its_end() -> None:
+    async def main(bench) -> None:
+        way = [(400.0, 0.0), (400.0, 400.0), (0.0, 400.0)]
+        places = tuple((*at(*place), 80.0) for place in way)
+        passed: list[tuple[float, float]] = []
+
+        async def look() -> None:
+            while True:
+                passed.append(bench.level())
+                await bench.clock.sleep(0.5)
+
+        looking = asyncio.create_task(look())
+        await bench.do("r1.b1", "single_vehicle_routing", route=Route(places), speed=25.0)
+        looking.cancel()
+        for place in way:
+            assert min(math.dist(place, each) for each in passed) < 95  # WP_RADIUS is 90
+        assert bench.truth().mode == "AUTO"
+        await circles(bench, way[-1])
+
+    with_a_plane(main)
+
+
+def test_it_surveys_an_area() -> None:
+    async def main(bench) -> None:
+        corners = [(0, 200), (600, 200), (600, 700), (0, 700), (0, 200)]
+        area = Area((tuple((*at(*corner), None) for corner in corners),))
+        await bench.do("r1.b1", "area_survey", area=area, spacing=250.0, altitude=80.0)
+        assert bench.truth().up_m == pytest.approx(80, abs=6)
+
+    with_a_plane(main)
+
+
+@pytest.mark.parametrize(("asked", "flown", "turns"), [(100.0, 100.0, 3.0), (20.0, 49.0, 6.0)])
+def test_an_orbit_goes_round_as_tightly_as_it_can(asked: float, flown: float, turns: float) -> None:
+    async def main(bench) -> None:
+        center = point(400, 0, 80.0)
+        await bench.start("r1.b1", "orbit", "v1", target=center, radius=asked, turns=turns)
+        await bench.running("r1.b1")
+        assert await bench.until(lambda: math.dist(bench.level(), (400, 0)) < flown + 10, 60)
+        await circles(bench, (400, 0), flown)
+        assert (await bench.ended("r1.b1", 180)).state is BehaviorState.SUCCEEDED
+        await bench.do("r1.b2", "goto", target=point(400, 0))
+        await circles(bench, (400, 0))
+
+    with_a_plane(main)
+
+
+def test_a_place_is_watched_for_a_time() -> None:
+    async def main(bench) -> None:
+        await bench.do("r1.b1", "area_observe", target=point(300, 0, 80.0), duration=20.0)
+        assert math.dist(bench.level(), (300, 0)) < CIRCLE_M + 20
+
+    with_a_plane(main)
+
+
+# --- landing ------------------------------------------------------------------------------------
+
+
+def stored(command: int, east: float, north: float, up: float) -> MissionItem:
+    return MissionItem(command, RELATIVE, (0.0,) * 4, *at(east, north), up)
+
+
+LANDING = [
+    MissionItem(DO_LAND_START, 2),
+    stored(WAYPOINT, 600, 0, 40),
+    stored(WAYPOINT, 300, 0, 20),
+    stored(LAND, 0, 0, 0),
+]
+
+
+def test_without_a_landing_stored_it_says_what_it_needs() -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "land", "v1")
+        end = await bench.ended("r1.b1", 30)
+        assert end.state is BehaviorState.FAILED
+        assert "DO_LAND_START" in end.reason
+        assert bench.truth().mode == "LOITER"
+
+    with_a_plane(main)
+
+
+def test_it_lands_by_the_landing_it_had_stored_before_it_flew_something_else() -> None:
+    async def main(bench) -> None:
+        vehicle = bench.arbiter._helms["v1"].vehicle
+        assert await vehicle.identified(10)
+        await vehicle.driver.upload([stored(WAYPOINT, 0, 900, 50), *LANDING])
+        await bench.do("r1.b1", "takeoff", altitude=60.0)
+        await bench.do("r1.b2", "single_vehicle_routing", route=Route(((*at(300, 300), 60.0),)))
+        await circles(bench, (300, 300))
+        await bench.do("r1.b3", "land")
+        assert not bench.truth().armed
+        assert bench.truth().up_m == pytest.approx(0, abs=0.3)
+        assert math.dist(bench.level(), (0, 0)) < 150
+
+    fly(main, Kind.PLANE)
