@@ -188,6 +188,7 @@ class Dispatcher:
                 command.parameters,
                 lambda name: self._geometries(run, name),
                 self._arbiters.fleet.vehicles,
+                self._arbiters.fleet.origin,
             )
         except ParameterError as error:
             self._refuse(command.behavior, "REJECTED", str(error))

@@ -176,7 +176,9 @@ class _Check:
         literal = {p.name: p.value for p in behavior.parameters if isinstance(p.value, str)}
         deferred = [p.name for p in behavior.parameters if not isinstance(p.value, str)]
         geometry = self.fleet.geometries.get
-        _, problems = examine(taker.spec, literal, geometry, self.fleet.vehicles, deferred)
+        _, problems = examine(
+            taker.spec, literal, geometry, self.fleet.vehicles, deferred, self.fleet.origin
+        )
         for problem in problems:
             warning = problem.rule == "unknown-geometry"
             findings.add(

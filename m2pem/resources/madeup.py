@@ -16,6 +16,7 @@ from m2pem.model.mission import Mission
 from m2pem.resources.behaviors import SHARED
 from m2pem.resources.check import DETECTOR_SERVICE
 from m2pem.resources.fleet import Domain, Fleet, Payload, Team, Vehicle
+from m2pem.resources.local_positions import is_local
 
 ORIGIN = (38.1075, -77.3192, 60.0)
 ARBITER = "sim"
@@ -162,12 +163,13 @@ def _names(behavior: Behavior) -> Iterator[tuple[str, ParameterKind | None]]:
     """Parameter values that may be names (no expressions, no coordinates), and of what."""
     spec = SHARED.get((behavior.name, behavior.type))
     for parameter in behavior.parameters:
-        if not isinstance(parameter.value, str) or parameter.value.lstrip().startswith("["):
+        value = parameter.value
+        if not isinstance(value, str) or value.lstrip().startswith("[") or is_local(value):
             continue
         if spec is None:
-            yield parameter.value, _KIND_BY_NAME.get(parameter.name)
+            yield value, _KIND_BY_NAME.get(parameter.name)
         elif parameter.name in spec.by_name:
-            yield parameter.value, spec.by_name[parameter.name].kind
+            yield value, spec.by_name[parameter.name].kind
 
 
 def _at(east_m: float, north_m: float) -> Coordinate:

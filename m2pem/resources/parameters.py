@@ -15,6 +15,7 @@ from m2pem.model.geometry import Geometry, Point, VehiclePosition
 from m2pem.model.values import Value
 from m2pem.resources.behaviors import ALTITUDE_FRAME, takes_altitude
 from m2pem.resources.geojson import GeometryError, coordinate, kind_of
+from m2pem.resources.local_positions import NO_ORIGIN, Origin, is_local, local_point
 from m2pem.resources.nearmiss import did_you_mean, suggest
 from m2pem.resources.units import UNITS, Dimension, UnitError, article, plain_number, quantity
 
@@ -74,16 +75,18 @@ def resolve(
     raw: Mapping[str, Value],
     geometry: FindGeometry,
     vehicles: Collection[str],
+    origin: Origin | None = None,
 ) -> dict[str, ResolvedValue]:
     """The values that an arbiter gets: SI numbers, geometries for names, defaults filled in.
 
-    A null counts as not given. A position is the name of a point or vehicle, or `[latitude,
-    longitude, altitude]` as a list or as text.
+    A null counts as not given. A position is the name of a point or vehicle, `[latitude,
+    longitude, altitude]` as a list or as text, or the text `enu [east, north, up]`: metres in the
+    ENU frame (REP-103) at `origin`, the fleet's.
 
     Raises:
         ParameterError: with all problems.
     """
-    values, problems = examine(spec, raw, geometry, vehicles)
+    values, problems = examine(spec, raw, geometry, vehicles, origin=origin)
     if problems:
         raise ParameterError(spec.name, problems)
     return values
@@ -95,6 +98,7 @@ def examine(
     geometry: FindGeometry,
     vehicles: Collection[str],
     deferred: Collection[str] = (),
+    origin: Origin | None = None,
 ) -> tuple[dict[str, ResolvedValue], list[ParameterProblem]]:
     """As `resolve`, but the problems are returned beside the values that are right.
 
@@ -104,7 +108,7 @@ def examine(
     names = {name for name, value in raw.items() if value is not None} | set(deferred)
     problems = [_unknown(name, spec, specs) for name in (*raw, *deferred) if name not in specs]
     problems += _missing(spec, names)
-    reader = _Reader(geometry, vehicles, raw.get(ALTITUDE_FRAME.name))
+    reader = _Reader(geometry, vehicles, raw.get(ALTITUDE_FRAME.name), origin)
     values: dict[str, ResolvedValue] = {}
     for name, parameter in specs.items():
         if name in names and name not in deferred:
@@ -151,6 +155,7 @@ class _Reader:
     geometry: FindGeometry
     vehicles: Collection[str]
     frame: Value
+    origin: Origin | None
 
     def read(self, spec: ParameterSpec, value: Value) -> ResolvedValue:
         match spec.kind:
@@ -179,6 +184,8 @@ class _Reader:
         return found
 
     def _position(self, value: Value) -> Geometry:
+        if isinstance(value, str) and is_local(value):
+            return self._local(value)
         if isinstance(value, str) and value.lstrip().startswith("["):
             try:
                 value = json.loads(value)
@@ -199,6 +206,15 @@ class _Reader:
             message = f"there is no point or vehicle named {value!r}"
             hint = did_you_mean(str(value), self.vehicles)
             raise _ProblemError("unknown-geometry", message, hint) from None
+
+    def _local(self, value: str) -> Point:
+        if self.origin is None or self.origin == NO_ORIGIN:
+            message = f"{value!r} counts from the origin of the fleet, which has none"
+            raise _ProblemError("bad-value", message, "give the fleet an `origin`")
+        try:
+            return local_point(value, self.origin)
+        except GeometryError as error:
+            raise _ProblemError("bad-value", str(error), "write enu [east, north, up]") from None
 
     def _coordinates(self, value: list[Value]) -> Point:
         if not 2 <= len(value) <= 3:
