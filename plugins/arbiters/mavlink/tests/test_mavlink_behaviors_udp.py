@@ -6,24 +6,22 @@ from contextlib import asynccontextmanager
 from itertools import count, pairwise
 
 import pytest
-from m2pem_plugin_mavlink.link.routed_link import open_link
-from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
-from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.sim.specification import Kind
-from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+from mavlink_ground import Ground
 from mavlink_simulated import at, fly
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import (
     Area,
     BehaviorState,
     Point,
-    ResourceId,
     Route,
     VehiclePosition,
     VehicleState,
 )
 
 COPTER, ROVER = Kind.COPTER, Kind.ROVER
+DO_SET_MODE, LAND_MODE, ACCEPTED = 176, 9, 0
 
 
 def point(east: float, north: float, altitude: float | None = None, frame="relative") -> Point:
@@ -290,9 +288,8 @@ def test_another_ground_station_that_replaces_the_mission_is_reported_and_not_fo
         await bench.running("r1.b1")
         await bench.clock.sleep(5)
         async with another_station(bench) as other:
-            await other.driver.upload(
-                [MissionItem(16, 3, (0.0,) * 4, *at(0, 50), 0.0) for _ in range(4)]
-            )
+            items = [waypoint(number, 0, 50) for number in range(5)]
+            assert await asyncio.to_thread(other.upload, *items) == ACCEPTED
             end = await bench.ended("r1.b1", 20)
         assert (end.state, end.code) == (BehaviorState.FAILED, "TAKEN_OVER"), end
         assert "mission" in end.reason
@@ -307,7 +304,7 @@ def test_another_ground_station_that_changes_the_mode_is_reported_and_not_fought
         await bench.start("r1.b2", "goto", "v1", target=point(300, 0))
         await bench.running("r1.b2")
         async with another_station(bench) as other:
-            await other.driver.land()
+            assert await asyncio.to_thread(other.command, DO_SET_MODE, 1, LAND_MODE) == ACCEPTED
             end = await bench.ended("r1.b2", 20)
         assert (end.state, end.code) == (BehaviorState.FAILED, "TAKEN_OVER"), end
         assert "LAND" in end.reason
@@ -319,14 +316,20 @@ def test_another_ground_station_that_changes_the_mode_is_reported_and_not_fought
 
 @asynccontextmanager
 async def another_station(bench):
+    """pymavlink's own client, which speaks to the vehicle from elsewhere."""
     host, port = bench.truth().address
-    url = f"udpout://{host}:{port}"
-    link = await open_link(Address(1, 1), [url], bench.clock, Address(201, 190))
-    vehicle = Vehicle(ResourceId("seen"), "ground", link, bench.clock)
-    vehicle.open()
-    assert await vehicle.identified(10)
+    other = Ground(f"udpout:{host}:{port}", system=201)
     try:
-        yield vehicle
+        other.link.mav.heartbeat_send(6, 8, 0, 0, 0)
+        await asyncio.to_thread(other.link.wait_heartbeat, timeout=10)
+        yield other
     finally:
-        await vehicle.close()
-        await link.close()
+        other.close()
+
+
+def waypoint(number: int, east_m: float, north_m: float):
+    latitude, longitude = at(east_m, north_m)
+    x, y = round(latitude * 1e7), round(longitude * 1e7)
+    return dialect.MAVLink_mission_item_int_message(
+        1, 1, number, 3, 16, 0, 1, 0.0, 0.0, 0.0, 0.0, x, y, 0.0
+    )
