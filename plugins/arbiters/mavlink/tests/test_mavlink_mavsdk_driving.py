@@ -75,7 +75,7 @@ async def test_it_goes_where_it_is_told_and_holds(rover):
     await rover.action.hold()
     await first(rover.telemetry.subscribe_flight_mode(), lambda mode: mode is FlightMode.HOLD)
     stopped = north_m(rover)
-    await asyncio.sleep(0.5)
+    await really(lambda: not rover.real.autopilot.body.moving)
     assert north_m(rover) - stopped < 3.0
 
 

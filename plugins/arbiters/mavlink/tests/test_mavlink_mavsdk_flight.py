@@ -177,7 +177,7 @@ async def test_it_holds(copter):
     await mode_told(copter, FlightMode.HOLD)
     assert copter.real.mode == "BRAKE"
     before = away_m(copter)[0]
-    await asyncio.sleep(1.0)
+    await really(lambda: not copter.real.autopilot.body.moving)
     assert away_m(copter)[0] - before < 30.0
 
 
@@ -229,7 +229,7 @@ async def test_offboard_flies_by_velocity_until_it_is_stopped(copter):
     await copter.offboard.stop()
     await really(lambda: copter.real.mode == "BRAKE")
     stopped = away_m(copter)[1]
-    await asyncio.sleep(1.0)
+    await really(lambda: not copter.real.autopilot.body.moving)
     assert away_m(copter)[1] - stopped < 5.0
 
 
@@ -247,6 +247,6 @@ async def test_a_velocity_that_is_not_repeated_runs_out(copter):
     await really(lambda: away_m(copter)[1] > 5.0)
     copter.offboard.destroy()  # it repeats its setpoint no more, and changes nothing else
     at = away_m(copter)[1]
-    await asyncio.sleep(1.0)  # of which its setpoints last three simulated seconds: 0.15
+    await really(lambda: not copter.real.autopilot.body.moving)
     assert copter.real.mode == "GUIDED"
     assert away_m(copter)[1] - at < 10.0

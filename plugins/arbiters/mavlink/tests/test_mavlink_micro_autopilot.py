@@ -6,8 +6,6 @@ from typing import Any
 import pytest
 from m2pem_plugin_mavlink.microservices.autopilot import (
     ReadAutopilotVersion,
-    make_of,
-    type_of,
     version_of,
 )
 from m2pem_plugin_mavlink.microservices.parameter_values import ParameterEncoding
@@ -57,18 +55,3 @@ def test_capabilities_tell_how_parameters_are_carried() -> None:
     assert both.parameter_encoding is ParameterEncoding.BYTEWISE
     assert both.has(dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT)
     assert version_of(VERSION.make()).parameter_encoding is None
-
-
-@pytest.mark.parametrize(
-    ("autopilot", "type_", "make", "kind"),
-    [
-        (3, 2, "ArduPilot", "quadrotor"),
-        (12, 10, "PX4", "ground rover"),
-        (8, 30, "", "camera"),
-        (9, 1, "PPZ", "fixed wing"),
-        (200, 250, "autopilot 200", "type 250"),
-    ],
-)
-def test_heartbeats_tell_make_and_type(autopilot: int, type_: int, make: str, kind: str) -> None:
-    heartbeat = message_type("HEARTBEAT").make(autopilot=autopilot, type=type_)
-    assert (make_of(heartbeat), type_of(heartbeat)) == (make, kind)

@@ -16,10 +16,6 @@ _STAGES: dict[int, str] = {
     dialect.FIRMWARE_VERSION_TYPE_RC: "-rc",
     dialect.FIRMWARE_VERSION_TYPE_OFFICIAL: "",
 }
-_MAKES: dict[int, str] = {
-    dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: "ArduPilot",
-    dialect.MAV_AUTOPILOT_PX4: "PX4",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,20 +57,3 @@ def version_of(message: Message) -> AutopilotVersion:
     major, minor, patch, stage = message.flight_sw_version.to_bytes(4, "big")
     words = _STAGES.get(stage, f"-{stage}")
     return AutopilotVersion((major, minor, patch), words, message.capabilities, message.uid)
-
-
-def make_of(heartbeat: Message) -> str:
-    """Whose autopilot sends a HEARTBEAT: "ArduPilot", "PX4"; "" for what is no autopilot."""
-    autopilot = heartbeat.autopilot
-    if autopilot == dialect.MAV_AUTOPILOT_INVALID:
-        return ""
-    known = dialect.enums["MAV_AUTOPILOT"].get(autopilot)
-    name = known.name.removeprefix("MAV_AUTOPILOT_") if known else f"autopilot {autopilot}"
-    return _MAKES.get(autopilot, name)
-
-
-def type_of(heartbeat: Message) -> str:
-    """What kind of thing sends a HEARTBEAT: "quadrotor", "ground rover", "camera"."""
-    known = dialect.enums["MAV_TYPE"].get(heartbeat.type)
-    name = known.name.removeprefix("MAV_TYPE_") if known else f"type {heartbeat.type}"
-    return str(name).replace("_", " ").lower()

@@ -25,7 +25,6 @@ HEADER_V2 = Struct("<xBBxBHHB")  # length, flags, sequence, sender, lower and up
 AROUND_V1 = 8
 AROUND_V2 = 12
 SIGNATURE = 13
-LONGEST = 255 + AROUND_V2 + SIGNATURE
 CRC_START = 0xFFFF
 NEVER = sys.maxsize
 

@@ -34,7 +34,6 @@ class Heard:
     mission_sequence: int | None = None
     mission_total: int | None = None
     reached_sequence: int | None = None
-    waypoint_distance_m: float | None = None
     # How far it circles from a place where it is to stay, and from home; None: it can stand still
     circle_m: float | None = None
     home_circle_m: float | None = None

@@ -61,7 +61,6 @@ class Intake:
             "GLOBAL_POSITION_INT": self._global_position,
             "MISSION_CURRENT": self._mission_current,
             "MISSION_ITEM_REACHED": self._mission_item_reached,
-            "NAV_CONTROLLER_OUTPUT": self._nav_controller,
             "EKF_STATUS_REPORT": self._estimator,
             "ESTIMATOR_STATUS": self._estimator,
             "BATTERY_STATUS": self._battery,
@@ -164,9 +163,6 @@ class Intake:
 
     def _mission_item_reached(self, message: Any) -> None:
         self.heard.reached_sequence = message.seq
-
-    def _nav_controller(self, message: Any) -> None:
-        self.heard.waypoint_distance_m = float(message.wp_dist)
 
     def _estimator(self, message: Any) -> None:
         self.heard.estimator_flags = message.flags
