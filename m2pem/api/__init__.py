@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from m2pem.api.arbiter import (
+        AdjustingArbiter,
         Arbiter,
         ArbiterContext,
         BehaviorId,
@@ -64,8 +65,8 @@ if TYPE_CHECKING:
 # Loaded when asked for: an arbiter's module need not pay for what an OCU imports.
 _MODULES = {
     "m2pem.api.arbiter": (
-        "Arbiter ArbiterContext BehaviorId BehaviorReport BehaviorRequest Connection Limits"
-        " ResolvedValue"
+        "AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport BehaviorRequest"
+        " Connection Limits ResolvedValue"
     ),
     "m2pem.api.bus": "FleetBus",
     "m2pem.api.clock": "Clock",
@@ -97,6 +98,7 @@ _LAZY = {name: module for module, names in _MODULES.items() for name in names.sp
 
 __all__ = [
     "SHARED",
+    "AdjustingArbiter",
     "Arbiter",
     "ArbiterContext",
     "Area",

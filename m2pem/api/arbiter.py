@@ -6,7 +6,8 @@ checks every promise made here.
 
 from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
+from uuid import UUID, uuid4
 
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
@@ -32,7 +33,8 @@ class Connection:
 
     `behaviors`: the names that the fleet allows; None means all that the arbiter offers.
     `failsafe`: the fleet's word for what the vehicle does by itself when its link is lost, or "".
-    `fence`: the area that the vehicle may not leave; None: the fleet has none.
+    `fence`: the area that the vehicle may not leave; None: the fleet has none. `sitl`: software in
+    the loop: what answers is a simulation on this machine.
     """
 
     resource: ResourceId
@@ -43,6 +45,7 @@ class Connection:
     lost_after_s: float | None = None
     failsafe: str = ""
     fence: Area | None = None
+    sitl: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +53,8 @@ class ArbiterContext:
     """What the executive lends to an arbiter. All time goes through `clock`.
 
     `origin`: of the local ENU frame, (latitude in degrees, longitude in degrees, altitude in
-    metres). `teams`: members of each team, the lead first.
+    metres). `teams`: members of each team, the lead first. `journal`: names the journal that the
+    ids of behaviors belong to; with it, they are unique for ever. It is the same after a restart.
     """
 
     clock: "Clock"
@@ -58,6 +62,7 @@ class ArbiterContext:
     logger: "logging.Logger"
     origin: tuple[float, float, float]
     teams: Mapping[str, tuple[ResourceId, ...]] = field(default_factory=dict)
+    journal: UUID = field(default_factory=uuid4)
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,4 +154,18 @@ class Arbiter(Protocol):
 
     async def close(self) -> None:
         """Let go of everything. Vehicles keep doing what they do."""
+        ...
+
+
+@runtime_checkable
+class AdjustingArbiter(Protocol):
+    """An arbiter that can also change a behavior which goes on. Teams keep their spacing by it."""
+
+    async def adjust(
+        self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
+    ) -> None:
+        """Go on with these parameters, such as `speed`, in place of those of the same names.
+
+        What cannot be changed on the way, and a behavior that has ended, is left as it is.
+        """
         ...

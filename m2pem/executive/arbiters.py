@@ -55,6 +55,7 @@ class FleetArbiters:
                 lost_after_s=vehicle.lost_after_s,
                 failsafe=vehicle.failsafe,
                 fence=fence,
+                sitl=vehicle.sitl,
             )
         for payload in fleet.payloads.values():
             name = SIMULATED if simulated else payload.arbiter
@@ -68,6 +69,7 @@ class FleetArbiters:
                 lost_after_s=owner.lost_after_s,
                 failsafe=owner.failsafe,
                 fence=fence,
+                sitl=owner.sitl,
             )
         self.by_name: dict[str, Arbiter] = {
             name: plugins.arbiter(name)(group, context) for name, group in connections.items()

@@ -113,6 +113,7 @@ class Executive:
             logging.getLogger("m2pem.arbiter"),
             fleet.origin,
             {team.name: spelled_out(team) for team in fleet.teams.values()},
+            journal.identity,
         )
         self.arbiters = FleetArbiters(
             fleet, plugins, context, simulated=simulated, settings=settings

@@ -6,6 +6,7 @@
 from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
+from uuid import UUID
 
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record, RunOutcome
@@ -71,6 +72,11 @@ class RunLine:
 
 class Journal(Protocol):
     """Opened by its constructor's `open` class method; one per executive."""
+
+    @property
+    def identity(self) -> UUID:
+        """Tells this journal from every other one; the same each time that it is opened."""
+        ...
 
     async def create(self, header: RunHeader) -> str:
         """Make a run, durable on return, claimed with epoch 1; the id is r1, r2, ..."""

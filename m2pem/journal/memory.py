@@ -5,6 +5,7 @@ from bisect import bisect_right
 from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
+from uuid import UUID, uuid4
 
 from m2pem.errors import InternalError, JournalError
 from m2pem.journal.base import Entry, RunHeader, RunLine
@@ -32,8 +33,14 @@ class MemoryJournal:
 
     def __init__(self, keep: int | None = None) -> None:
         self._keep = keep
+        self._identity = uuid4()
         self._runs: list[_Run] = []
         self._closed = False
+
+    @property
+    def identity(self) -> UUID:
+        """See `Journal.identity`."""
+        return self._identity
 
     async def create(self, header: RunHeader) -> str:
         """See `Journal.create`."""

@@ -7,6 +7,7 @@ A step that was released is never changed; what has to change becomes a new step
 import sqlite3
 from collections.abc import Callable
 from pathlib import Path
+from uuid import uuid4
 
 from m2pem.errors import JournalError
 
@@ -59,9 +60,16 @@ def other_files_of_missions(connection: sqlite3.Connection) -> None:
     connection.execute("ALTER TABLE runs ADD COLUMN library TEXT NOT NULL DEFAULT '[]'")
 
 
+def identity_of_the_journal(connection: sqlite3.Connection) -> None:
+    """0.3: a name of its own, so that what vehicles are told apart by is unique for ever."""
+    connection.execute("CREATE TABLE identity (uuid TEXT NOT NULL)")
+    connection.execute("INSERT INTO identity VALUES (?)", (str(uuid4()),))
+
+
 MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
     runs_standings_and_entries,
     other_files_of_missions,
+    identity_of_the_journal,
 )
 
 

@@ -8,6 +8,7 @@ from contextlib import ExitStack, closing, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
+from uuid import UUID
 
 from m2pem.errors import JournalError
 from m2pem.journal.base import Entry, RunHeader, RunLine
@@ -45,6 +46,7 @@ class SqliteJournal:
         locks: RunLocks,
     ) -> None:
         self._path = path
+        self._identity = UUID(writing.execute("SELECT uuid FROM identity").fetchone()[0])
         self._locks = locks
         self._writing = writing
         self._reading = reading
@@ -70,6 +72,11 @@ class SqliteJournal:
                 raise JournalError(f"{error.filename} can't be opened: {error.strerror}") from error
             undo.pop_all()
         return cls(path, writing, reading, locks)
+
+    @property
+    def identity(self) -> UUID:
+        """See `Journal.identity`. A copy of the file has it, too: use one of the two."""
+        return self._identity
 
     @property
     def commits(self) -> int:

@@ -35,3 +35,7 @@ async def test_reading_what_was_not_kept_is_refused_rather_than_left_out():
     journal, run = await filled(keep=10)
     with pytest.raises(JournalError, match=r"r1: only what comes after record \d+ was kept"):
         await written(journal, run)
+
+
+def test_two_journals_are_told_apart():
+    assert MemoryJournal().identity != MemoryJournal().identity

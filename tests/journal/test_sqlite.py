@@ -196,3 +196,12 @@ async def test_a_damaged_entry_is_named(open_journal, tmp_path):
         reading = journal.read(run)
         with pytest.raises(JournalError, match=r"journal\.db: r1, record 2: .*newer m2pem"):
             _ = [found async for found in reading]
+
+
+async def test_a_journal_keeps_its_name_and_another_has_another(open_journal, tmp_path):
+    async with opened(open_journal) as journal:
+        identity = journal.identity
+    async with opened(open_journal) as again:
+        assert again.identity == identity
+    async with opened(lambda: SqliteJournal.open(tmp_path / "other.db")) as other:
+        assert other.identity != identity
