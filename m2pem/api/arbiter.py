@@ -12,6 +12,7 @@ from uuid import UUID, uuid4
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.model.geometry import Area
+from m2pem.model.values import Value
 from m2pem.resources import parameters
 
 if TYPE_CHECKING:
@@ -99,6 +100,8 @@ class BehaviorReport:
     ACCEPTED comes before RUNNING, exactly one terminal state comes last. `code` is an error code
     of docs/missions.md ("ROUTE_BLOCKED", ...), "" unless it failed; `reason` is for people.
     `native_ref`: the arbiter's own name for it, handed back to `query` after a restart.
+    `outputs`: of a terminal report: what the mission's data store gets, under names that the
+    behavior's `BehaviorSpec.writes` declares, such as `picture.files`.
     """
 
     id: BehaviorId
@@ -107,6 +110,7 @@ class BehaviorReport:
     code: str = ""
     reason: str = ""
     native_ref: str | None = None
+    outputs: Mapping[str, Value] = field(default_factory=dict)
 
 
 class Arbiter(Protocol):

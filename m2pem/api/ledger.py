@@ -1,7 +1,7 @@
 """The bookkeeping of an arbiter: which behaviors it was given, and what it has reported of them."""
 
 import logging
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from m2pem.api import refusal as parameters
@@ -9,6 +9,7 @@ from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.epochs import Epochs
 from m2pem.api.mailbox import Mailbox
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.model.values import Value
 from m2pem.resources.nearmiss import suggest
 
 REMEMBERED = 10_000
@@ -114,11 +115,17 @@ class Ledger:
             self._report(entry, BehaviorState.RUNNING)
 
     def end(
-        self, behavior: BehaviorId | None, state: BehaviorState, code: str = "", reason: str = ""
+        self,
+        behavior: BehaviorId | None,
+        state: BehaviorState,
+        code: str = "",
+        reason: str = "",
+        outputs: Mapping[str, Value] | None = None,
     ) -> None:
         """It has ended, and its resources are free; nothing happens if it is unknown or over.
 
-        A `code` that is left out is FAILED, REJECTED or LINK_LOST, as the state says.
+        A `code` that is left out is FAILED, REJECTED or LINK_LOST, as the state says. `outputs` as
+        in `BehaviorReport`.
         """
         entry = self._entries.get(behavior) if behavior is not None else None
         if behavior is None or entry is None or entry.last.state.terminal:
@@ -126,7 +133,7 @@ class Ledger:
         for resource in entry.resources:
             if self._holders.get(resource) == behavior:
                 del self._holders[resource]
-        self._report(entry, state, code or _DEFAULT_CODES.get(state, ""), reason)
+        self._report(entry, state, code or _DEFAULT_CODES.get(state, ""), reason, outputs)
 
     def lose(self, resource: ResourceId, reason: str) -> None:
         """The resource is not heard any more: what it does is reported LOST."""
@@ -184,11 +191,18 @@ class Ledger:
         self._reports.put(report)
 
     def _report(
-        self, entry: _Entry, state: BehaviorState, code: str = "", reason: str = ""
+        self,
+        entry: _Entry,
+        state: BehaviorState,
+        code: str = "",
+        reason: str = "",
+        outputs: Mapping[str, Value] | None = None,
     ) -> None:
         last = entry.last
         number = 3 if state.terminal else 2
-        entry.last = BehaviorReport(last.id, number, state, code, reason, last.native_ref)
+        entry.last = BehaviorReport(
+            last.id, number, state, code, reason, last.native_ref, outputs or {}
+        )
         self._reports.put(entry.last)
 
     def _forget(self) -> None:

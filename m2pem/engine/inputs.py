@@ -74,7 +74,8 @@ class GiveUp(_Input, frozen=True):
 
 
 class BehaviorReported(_Input, frozen=True):
-    """An arbiter's report. `number` rises with each report of one behavior."""
+    """An arbiter's report. `number` rises with each report of one behavior. `outputs`: what is
+    written for its task when it has ended."""
 
     behavior: str
     number: int
@@ -82,6 +83,7 @@ class BehaviorReported(_Input, frozen=True):
     code: str = ""
     reason: str = ""
     native_ref: str | None = None
+    outputs: dict[str, Value] = msgspec.field(default_factory=dict)
 
 
 class BehaviorMissing(_Input, frozen=True):

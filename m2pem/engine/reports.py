@@ -10,6 +10,7 @@ from m2pem.engine.records import RunOutcome
 from m2pem.engine.state import Behavior, BehaviorPhase
 from m2pem.engine.throwing import throw_error
 from m2pem.model.catalogue import BehaviorState, ResumePolicy
+from m2pem.model.values import Value
 
 DEFAULT_CODES: dict[BehaviorState, str] = {
     BehaviorState.FAILED: "FAILED",
@@ -40,11 +41,16 @@ def reported(x: Execution, item: i.BehaviorReported) -> None:
             return
         x.emit(r.BehaviorProgressed(item.behavior, item.number, item.state, item.native_ref))
         return
-    _ended(x, behavior, item.state, item.code, item.reason)
+    _ended(x, behavior, item.state, item.code, item.reason, item.outputs)
 
 
 def _ended(
-    x: Execution, behavior: Behavior, state: BehaviorState, code: str = "", reason: str = ""
+    x: Execution,
+    behavior: Behavior,
+    state: BehaviorState,
+    code: str = "",
+    reason: str = "",
+    outputs: dict[str, Value] | None = None,
 ) -> None:
     if state is BehaviorState.SUCCEEDED:
         code = ""
@@ -69,6 +75,7 @@ def _ended(
     )
     if token is None:
         return
+    x.write_all(token, outputs or {})  # also of one that failed: the pictures it took are there
     if state is BehaviorState.SUCCEEDED:
         complete(x, token)
     else:

@@ -20,7 +20,7 @@ from m2pem.api.clock import Clock
 from m2pem.api.control import RunId, SimulationResult
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import LinkState
-from m2pem.engine.inputs import BehaviorReported, GeometrySet, ResourceFault, StartRun, StopRun
+from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
 from m2pem.engine.records import Record
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
@@ -32,6 +32,7 @@ from m2pem.executive.handover import Handover
 from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
 from m2pem.executive.notices import Notices
 from m2pem.executive.recovery import replay, take_over
+from m2pem.executive.reporting import reported
 from m2pem.executive.runner import Outside, Runner
 from m2pem.executive.script import Script
 from m2pem.executive.services import Services
@@ -338,16 +339,7 @@ class Executive:
             # After a restart an arbiter may report before its run is taken up, which then asks it.
             log.info("a report for %s, which no run here asked for", report.id)
             return
-        runner.post(
-            BehaviorReported(
-                report.id,
-                report.number,
-                report.state,
-                report.code,
-                report.reason,
-                report.native_ref,
-            )
-        )
+        runner.post(reported(report, runner.run.state.behaviors.get(report.id), self.arbiters))
 
     def _fault(self, fault: ResourceFault) -> None:
         log.warning("%s: %s: %s", fault.resource, fault.code, fault.reason)

@@ -1,6 +1,7 @@
 """Getting a mission: from a path, a URL or bytes; and checking it against the fleet."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
@@ -14,6 +15,7 @@ from m2pem.model.elements import ServiceTask
 from m2pem.model.lint import by_file, lint
 from m2pem.model.mission import Mission
 from m2pem.model.near import did_you_mean
+from m2pem.resources.behaviors import SHARED
 from m2pem.resources.check import check_mission
 
 if TYPE_CHECKING:
@@ -84,7 +86,7 @@ def findings_for(
     `data`: names given at start (`--data`). `arbiters` None: no fleet, so roles are not checked.
     """
     writes = {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
-    findings = [*mission.warnings, *lint(mission, data, writes)]
+    findings = [*mission.warnings, *lint(mission, data, writes, _behavior_writes(arbiters))]
     beginning = [each.id for each in mission.processes if not each.global_task]
     if process is not None and process not in beginning:
         findings.append(
@@ -105,6 +107,15 @@ def findings_for(
     findings += plugins.check_mission(mission, fleet)
     order = by_file(mission)
     return sorted(findings, key=lambda each: (order(each), each.line, each.element, each.rule))
+
+
+def _behavior_writes(arbiters: FleetArbiters | None) -> dict[str, tuple[str, ...]]:
+    """What behaviors write, by name: those that all arbiters share, and those of the fleet."""
+    offered = [] if arbiters is None else list(arbiters.catalogue().values())
+    writes: dict[str, tuple[str, ...]] = {}
+    for spec in chain(SHARED.values(), *offered):
+        writes[spec.name] = (*writes.get(spec.name, ()), *spec.writes)
+    return writes
 
 
 def _unprovided(mission: Mission, services: Collection[str]) -> list[Finding]:

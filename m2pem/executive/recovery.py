@@ -9,15 +9,15 @@ import logging
 
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.engine import commands as c
-from m2pem.engine.inputs import BehaviorMissing, BehaviorReported, ClaimRun, Input, ResourceFault
+from m2pem.engine.inputs import BehaviorMissing, ClaimRun, Input, ResourceFault
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import Behavior, BehaviorPhase
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.dispatch import Dispatcher
+from m2pem.executive.reporting import reported, spec_of
 from m2pem.executive.runner import Runner
 from m2pem.executive.script import Script
 from m2pem.journal.base import Journal
-from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import BehaviorState, ResourceId, ResumePolicy
 
 log = logging.getLogger("m2pem.resume")
@@ -99,16 +99,9 @@ def _what_to_post(
     if report.state is BehaviorState.UNKNOWN:
         reason = report.reason or "its arbiter no longer knows it"
         return BehaviorMissing(behavior.id, _policy(arbiters, behavior), report.state, reason)
-    return BehaviorReported(
-        behavior.id,
-        max(report.number, behavior.number + 1),
-        report.state,
-        report.code,
-        report.reason,
-        report.native_ref,
-    )
+    return reported(report, behavior, arbiters, behavior.number + 1)
 
 
 def _policy(arbiters: FleetArbiters, behavior: Behavior) -> ResumePolicy:
-    spec = arbiters.graph.spec(behavior.resources[0], behavior.name, BehaviorType(behavior.type))
+    spec = spec_of(behavior, arbiters)
     return spec.resume if spec is not None else ResumePolicy.HOLD

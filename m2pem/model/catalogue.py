@@ -76,7 +76,7 @@ class BehaviorSpec:
 
     `required_one_of`: groups of parameter names of which at least one group must be given whole
     (`ptz_point_at`: target, or bearing and elevation). `ends`: whether it ends by itself when
-    no parameter says so.
+    no parameter says so. `writes`: dotted names of the data store that it writes when it ends.
     """
 
     name: str
@@ -86,6 +86,7 @@ class BehaviorSpec:
     resume: ResumePolicy = ResumePolicy.HOLD
     ends: bool = True
     doc: str = ""
+    writes: tuple[str, ...] = ()
     by_name: Mapping[str, ParameterSpec] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -43,11 +43,13 @@ def lint(
     mission: Mission,
     known_names: Iterable[str] = (),
     service_writes: Mapping[str, Sequence[str]] | None = None,
+    behavior_writes: Mapping[str, Sequence[str]] | None = None,
 ) -> list[Finding]:
     """Look over a whole mission; findings are sorted by file and line.
 
     `known_names`: names that are written from outside (`--data`). `service_writes`: what each
     registered service class writes; a class that is not there may write anything.
+    `behavior_writes`: what behaviors write, by their names.
     """
     with collector.paused():
         findings = [
@@ -55,7 +57,7 @@ def lint(
             *_undecided_gateways(mission),
             *_outside_only(mission),
             *_recursion(mission),
-            *unwritten(mission, known_names, service_writes or {}),
+            *unwritten(mission, known_names, service_writes or {}, behavior_writes or {}),
         ]
     order = by_file(mission)
     return sorted(findings, key=lambda finding: (order(finding), finding.line))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from m2pem.findings import Finding, Severity
-from m2pem.model.behavior import Assignment, Parameter
+from m2pem.model.behavior import Assignment, Behavior, Parameter
 from m2pem.model.behavior import Mapping as DataMapping
 from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.elements import (
@@ -57,7 +57,10 @@ class _Store:
 
 
 def unwritten(
-    mission: Mission, known_names: Iterable[str], service_writes: Mapping[str, Sequence[str]]
+    mission: Mission,
+    known_names: Iterable[str],
+    service_writes: Mapping[str, Sequence[str]],
+    behavior_writes: Mapping[str, Sequence[str]],
 ) -> Iterator[Finding]:
     """A warning for each name that a process reads and nothing writes; it would be null."""
     within: dict[Container, _Store] = {process: _Store() for process in mission.processes}
@@ -82,6 +85,9 @@ def unwritten(
         if isinstance(node, Event):
             (stores[main] if of_main else store).reads += _conditions(node)
         _note_writes(node, store, service_writes)
+        behavior = getattr(node, "behavior", None)
+        if isinstance(behavior, Behavior):
+            store.written.update(behavior_writes.get(behavior.name, ()))
         if isinstance(node, CallActivity):
             _note_mappings(node, store, stores[node.called])
     shared = {

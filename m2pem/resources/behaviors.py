@@ -65,10 +65,11 @@ def _behavior(
     required_one_of: tuple[tuple[str, ...], ...] = (),
     resume: ResumePolicy = ResumePolicy.HOLD,
     ends: bool = True,
+    writes: tuple[str, ...] = (),
 ) -> BehaviorSpec:
     if takes_altitude(parameters):
         parameters = (*parameters, ALTITUDE_FRAME)
-    return BehaviorSpec(name, type_, parameters, required_one_of, resume, ends, doc)
+    return BehaviorSpec(name, type_, parameters, required_one_of, resume, ends, doc, writes)
 
 
 def takes_altitude(parameters: tuple[ParameterSpec, ...]) -> bool:
@@ -307,6 +308,7 @@ def _payload_behaviors() -> tuple[BehaviorSpec, ...]:
                 "interval", ParameterKind.DURATION, minimum=0.0, default=1.0, doc="Between them."
             ),
             resume=restart,
+            writes=("picture.file", "picture.files", "picture.position", "picture.time"),
         ),
         _behavior(
             payload,
@@ -315,6 +317,7 @@ def _payload_behaviors() -> tuple[BehaviorSpec, ...]:
             _DURATION,
             resume=restart,
             ends=False,
+            writes=("video.file", "video.time"),
         ),
     )
 

@@ -17,6 +17,7 @@ from m2pem.api.arbiter import (
 )
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.model.values import Value
 from m2pem.resources.behaviors import SHARED
 
 
@@ -54,11 +55,18 @@ class FakeArbiter:
     # --- for the test ---------------------------------------------------------------------------
 
     def report(
-        self, behavior: BehaviorId, state: BehaviorState, code: str = "", reason: str = ""
+        self,
+        behavior: BehaviorId,
+        state: BehaviorState,
+        code: str = "",
+        reason: str = "",
+        outputs: Mapping[str, Value] | None = None,
     ) -> None:
         """Have the arbiter report."""
         number = self._numbers[behavior] = self._numbers.get(behavior, 0) + 1
-        self._reports.put_nowait(BehaviorReport(behavior, number, state, code, reason))
+        self._reports.put_nowait(
+            BehaviorReport(behavior, number, state, code, reason, outputs=outputs or {})
+        )
 
     def say(self, state: VehicleState | PayloadState) -> None:
         """Have a vehicle or payload send telemetry."""
