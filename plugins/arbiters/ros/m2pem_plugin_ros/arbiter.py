@@ -292,7 +292,7 @@ class RosArbiter:
             vehicle.leave(order)
         return BehaviorReport(
             behavior,
-            3 if outcome.state.terminal else 0,
+            3 if outcome.is_end else 0,
             outcome.state,
             outcome.code,
             outcome.reason,

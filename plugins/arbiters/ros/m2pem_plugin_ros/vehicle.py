@@ -93,7 +93,7 @@ class Vehicle:
                 if self._cancelled == request.id:
                     self._ask("end", lambda: self.driver.end(order.goal))
                 return
-            if outcome.state.terminal:
+            if outcome.is_end:
                 self.ended(order.goal, outcome)
                 return
             if self._cancelled == request.id:
@@ -205,7 +205,7 @@ class Vehicle:
         behavior = self._behavior(goal)
         if behavior is None:
             return
-        if not outcome.state.terminal:
+        if not outcome.is_end:
             self._ignored.add("an end that is none", f"{behavior} is {outcome.state}")
             return
         if self._order is not None and self._order.goal == goal:

@@ -36,6 +36,11 @@ class Outcome:
     code: str = ""
     reason: str = ""
 
+    @property
+    def is_end(self) -> bool:
+        """Whether the goal was known, and has ended."""
+        return self.state.terminal and self.state is not BehaviorState.UNKNOWN
+
 
 @dataclass(frozen=True, slots=True)
 class Health:
