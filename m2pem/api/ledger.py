@@ -84,11 +84,11 @@ class Ledger:
 
     def may_cancel(self, behavior: BehaviorId, epoch: int) -> bool:
         """Whether to do what `Arbiter.cancel` was asked: it goes on, and the epoch is not past."""
-        entry = self._entries.get(behavior)
-        if not self._epochs.admit(behavior, epoch):
-            self._logger.warning("cancel of %s ignored: epoch %d is past", behavior, epoch)
-            return False
-        return entry is not None and not entry.last.state.terminal
+        return self._may("cancel", behavior, epoch)
+
+    def may_adjust(self, behavior: BehaviorId, epoch: int) -> bool:
+        """The same for what `AdjustingArbiter.adjust` was asked."""
+        return self._may("adjustment", behavior, epoch)
 
     def last(self, behavior: BehaviorId) -> BehaviorReport:
         """What `Arbiter.query` answers: the last report; UNKNOWN, with number 0, without one."""
@@ -161,6 +161,13 @@ class Ledger:
         known = self._entries.get(request.id)
         # A higher epoch that starts an ended behavior again means it: it is another executive.
         return known is None or (known.last.state.terminal and request.epoch > known.epoch > 0)
+
+    def _may(self, what: str, behavior: BehaviorId, epoch: int) -> bool:
+        entry = self._entries.get(behavior)
+        if not self._epochs.admit(behavior, epoch):
+            self._logger.warning("%s of %s ignored: epoch %d is past", what, behavior, epoch)
+            return False
+        return entry is not None and not entry.last.state.terminal
 
     def _misfit(self, request: BehaviorRequest) -> str:
         for resource in request.resources:

@@ -93,3 +93,14 @@ def test_a_reference_is_not_made_for_what_is_refused(virtual) -> None:
     assert made == []
     assert book.admit(request("r1.b2"), make)
     assert [report.native_ref for report in reported(book, virtual)] == [None, "native"]
+
+
+def test_what_goes_on_may_be_adjusted_by_its_own_executive_only(caplog) -> None:
+    book = ledger()
+    assert not book.may_adjust("r1.b1", 2)
+    assert book.admit(request("r1.b1", epoch=2))
+    assert book.may_adjust("r1.b1", 2)
+    assert not book.may_adjust("r1.b1", 1)
+    assert "adjustment of r1.b1 ignored: epoch 1 is past" in caplog.text
+    book.end("r1.b1", BehaviorState.SUCCEEDED)
+    assert not book.may_adjust("r1.b1", 2)

@@ -49,8 +49,8 @@ def test_a_mission_that_asks_for_what_is_not_there(
 
 def test_real_vehicles_keep_real_time(m2pem: CommandLine, tmp_path: Path) -> None:
     fleet, _ = fleet_with_state(tmp_path)
-    fleet.write_text(fleet.read_text(encoding="utf-8").replace("arbiter: sim", "arbiter: ros"))
-    assert_refused(m2pem, MISSION, fleet, "arbiter 'ros'")
+    fleet.write_text(fleet.read_text(encoding="utf-8").replace("arbiter: sim", "arbiter: boat"))
+    assert_refused(m2pem, MISSION, fleet, "arbiter 'boat'")
     status, _, errors = m2pem.run("run", MISSION, "--fleet", fleet, "--speed", "2")
     assert status == 2
     assert "--speed 2: evsg1, evsg2" in errors

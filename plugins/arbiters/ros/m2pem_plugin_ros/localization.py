@@ -1,9 +1,24 @@
 """Where one vehicle is: from its odometry and its satellite receiver."""
 
-from typing import Protocol
+import math
+from typing import TYPE_CHECKING, Any, Protocol
 
-from m2pem.api import GeoPosition
+from m2pem.api import ArbiterContext, GeoPosition, ResourceId
+from m2pem_plugin_ros.frames import yaw_of_quaternion
+from m2pem_plugin_ros.ignored import Ignored
 from m2pem_plugin_ros.pose import Pose, Twist
+from m2pem_plugin_ros.settings import OdomFrame, Settings
+from m2pem_plugin_ros.whereabouts import FARTHEST_M, Whereabouts
+
+if TYPE_CHECKING:
+    from m2pem_plugin_ros.runtime import RosRuntime
+
+FASTEST_M_S = 1_000.0
+FASTEST_RAD_S = 1_000.0
+FIX_IS_OLD_S = 5.0
+
+_NO_FIX = -1
+_STATUS_NOT_SET = -2
 
 
 class Localization(Protocol):
@@ -28,3 +43,117 @@ class Localization(Protocol):
     def age_s(self) -> float:
         """How long ago, on the arbiter's clock, the pose was heard; infinite before the first."""
         ...
+
+
+class TopicLocalization:
+    """Implements `Localization` with nav_msgs/Odometry and sensor_msgs/NavSatFix.
+
+    Subscribed from the beginning, until the runtime is closed. What cannot be true (NaN, a latitude
+    of 91 degrees, a stamp that was there already) is ignored, and counted by its cause.
+    """
+
+    def __init__(
+        self,
+        ros: "RosRuntime",
+        resource: ResourceId,
+        settings: Settings,
+        context: ArbiterContext,
+    ) -> None:
+        from nav_msgs.msg import Odometry  # noqa: PLC0415  # it is loaded where ROS is only
+        from sensor_msgs.msg import NavSatFix  # noqa: PLC0415
+
+        from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415
+
+        self.changes = 0
+        self.ignored = Ignored(context.logger, resource)
+        self._clock = context.clock
+        self._frame = settings.odom_frame
+        self._where = Whereabouts(settings.odom_frame, context.origin)
+        self._stamp = (0, 0)
+        self._posed_us: int | None = None
+        self._fixed_us: int | None = None
+        topics = settings.topics
+        ros.subscribe(Odometry, settings.topic(topics.odom), self._hear_odometry, qos.TELEMETRY)
+        ros.subscribe(NavSatFix, settings.topic(topics.fix), self._hear_fix, qos.TELEMETRY)
+
+    @property
+    def pose(self) -> Pose | None:
+        """In the fleet's local frame."""
+        return self._where.pose
+
+    @property
+    def twist(self) -> Twist | None:
+        """In the vehicle's own frame."""
+        return self._where.twist
+
+    @property
+    def position(self) -> GeoPosition | None:
+        """WGS-84; from the pose, or without one from the last fix."""
+        return self._where.position
+
+    @property
+    def age_s(self) -> float:
+        """How long ago odometry was heard; infinite as long as there is no pose."""
+        if self._posed_us is None or self._where.pose is None:
+            return math.inf
+        return (self._clock.now_us() - self._posed_us) / 1e6
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """What is missing to know well where it is, for people."""
+        troubles = []
+        if self._posed_us is None:
+            troubles.append("no odometry was heard yet")
+        if self._frame is OdomFrame.ODOM:
+            if self._fixed_us is None:
+                troubles.append("no satellite fix was heard yet")
+            elif (self._clock.now_us() - self._fixed_us) / 1e6 > FIX_IS_OLD_S:
+                troubles.append("the last satellite fix is old")
+        return tuple(troubles)
+
+    def _hear_odometry(self, message: Any) -> None:
+        stamp = (message.header.stamp.sec, message.header.stamp.nanosec)
+        if stamp == self._stamp and stamp != (0, 0):
+            self.ignored.add("odometry that was there already", f"stamp {stamp[0]}.{stamp[1]:09}")
+            return
+        place, turn = message.pose.pose.position, message.pose.pose.orientation
+        linear, angular = message.twist.twist.linear, message.twist.twist.angular
+        if not _within(FARTHEST_M, place.x, place.y, place.z):
+            cause = "odometry with a place that cannot be"
+            self.ignored.add(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
+            return
+        speeds_are_sane = _within(FASTEST_M_S, linear.x, linear.y)
+        if not speeds_are_sane or not _within(FASTEST_RAD_S, angular.z):
+            cause = "odometry with a speed that cannot be"
+            self.ignored.add(cause, f"({linear.x:g}, {linear.y:g}) m/s, {angular.z:g} rad/s")
+            return
+        try:
+            yaw_rad = yaw_of_quaternion(turn)
+        except ValueError as error:
+            self.ignored.add("odometry with an orientation that cannot be", str(error))
+            return
+        self._stamp = stamp
+        self._posed_us = self._clock.now_us()
+        self.changes += 1
+        self._where.odometry(
+            Pose(place.x, place.y, yaw_rad, place.z), Twist(linear.x, angular.z, linear.y)
+        )
+
+    def _hear_fix(self, message: Any) -> None:
+        status = message.status.status
+        if status == _NO_FIX:
+            return  # the receiver says so itself
+        latitude, longitude = message.latitude, message.longitude
+        is_unset = status == _STATUS_NOT_SET and latitude == longitude == 0.0
+        if is_unset or not (_within(90.0, latitude) and _within(180.0, longitude)):
+            self.ignored.add("a fix that cannot be", f"({latitude:g}, {longitude:g})")
+            return
+        altitude = message.altitude if _within(FARTHEST_M, message.altitude) else math.nan
+        self._fixed_us = self._clock.now_us()
+        self.changes += 1
+        self._where.fix(GeoPosition(latitude, longitude, altitude))
+
+
+def _within(bound: float, *numbers: float) -> bool:
+    """All are finite, and none is beyond the bound."""
+    return all(-bound <= number <= bound for number in numbers)

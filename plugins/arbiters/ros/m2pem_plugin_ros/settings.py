@@ -1,10 +1,16 @@
 """What a fleet says of the connection to a ROS vehicle, or to a detector on it (docs/ros.md)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
+from typing import Any
 
-from m2pem.api import Connection, ResourceId
+from m2pem.api import Connection, Dimension, ResourceId
+from m2pem.errors import PluginError
+from m2pem_plugin_ros.connection_reader import ConnectionReader
+
+DOMAINS = ("ground", "surface")
+"""Of the vehicles that this arbiter commands."""
 
 
 class DriverName(StrEnum):
@@ -20,6 +26,27 @@ class Via(StrEnum):
 
     TOPICS = "topics"
     ACTION = "action"
+
+
+class RouteAction(StrEnum):
+    """By which action of Nav2 a route is driven."""
+
+    THROUGH = "through"
+    WAYPOINTS = "waypoints"
+
+
+class OdomFrame(StrEnum):
+    """What the odometry of a vehicle is relative to (REP-105)."""
+
+    MAP = "map"
+    ODOM = "odom"
+
+
+class DetectorMessage(StrEnum):
+    """What a detector publishes: m2pem_interfaces/msg/Detection, or std_msgs/msg/String."""
+
+    DETECTION = "detection"
+    STRING = "string"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,29 +75,56 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Of a vehicle. `odom_frame`: "map": its odometry is in the fleet's local frame; "odom": it
-    begins anywhere, and NavSatFix says where (REP-105). `stamped`: cmd_vel is a TwistStamped.
-    `hardware_id`: the vehicle's in /diagnostics."""
+    """Of a vehicle. `namespace`: with its leading "/", "" is the root. `odom_frame`: "map": its
+    odometry is in the fleet's local frame; "odom": it begins anywhere, and NavSatFix says where
+    (REP-105). `stamped`: cmd_vel is a TwistStamped. `hardware_id`: the vehicle's in /diagnostics;
+    its name in the fleet, if the fleet does not say."""
 
     namespace: str
     domain_id: int | None = None
     driver: DriverName = DriverName.NODE
     via: Via = Via.TOPICS
     topics: Topics = field(default_factory=Topics)
-    odom_frame: str = "map"
+    odom_frame: OdomFrame = OdomFrame.MAP
     stamped: bool = False
     bounds: Bounds = field(default_factory=Bounds)
     hardware_id: str = ""
+    route_action: RouteAction = RouteAction.THROUGH
+
+    def topic(self, name: str) -> str:
+        """The full name of a topic, action or service of the vehicle."""
+        return in_namespace(self.namespace, name)
 
 
 @dataclass(frozen=True, slots=True)
 class DetectorSettings:
-    """Of a payload: the topic with its detections, of m2pem_interfaces/msg/Detection."""
+    """Of a payload: the full name of the topic with its detections, and their type where the
+    messages do not say one."""
 
     namespace: str
     topic: str
     domain_id: int | None = None
     type: str = ""
+    message: DetectorMessage = DetectorMessage.DETECTION
+
+
+def in_namespace(namespace: str, name: str) -> str:
+    """The full name; one that begins with "/" is full already."""
+    return name if name.startswith("/") else f"{namespace}/{name}"
+
+
+_KEYS = (*(each.name for each in fields(Settings)), "sim")
+"""`sim` is what a simulated vehicle is like; whoever simulates it reads that."""
+
+_DETECTOR_KEYS = ("namespace", "domain_id", "topic", "message", "type", "sim")
+_BOUNDS = {
+    "speed": "speed_m_s",
+    "reverse_speed": "reverse_m_s",
+    "acceleration": "acceleration_m_s2",
+    "yaw_rate": "yaw_rate_rad_s",
+    "turn_radius": "turn_radius_m",
+    "lateral_acceleration": "lateral_m_s2",
+}
 
 
 def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[ResourceId, Settings]:
@@ -79,15 +133,104 @@ def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[Resource
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
     """
-    raise NotImplementedError
+    read = {
+        resource: _read_vehicle(connection)
+        for resource, connection in connections.items()
+        if "/" not in resource
+    }
+    reached: dict[tuple[int | None, str], ResourceId] = {}
+    for resource, settings in read.items():
+        other = reached.setdefault((settings.domain_id, settings.namespace), resource)
+        if other != resource:
+            problem = f"{settings.namespace or '/'} is that of {other}, too"
+            raise ConnectionReader(resource, {}).error("namespace", problem)
+    return read
 
 
 def read_detectors(
     connections: Mapping[ResourceId, Connection],
 ) -> dict[ResourceId, DetectorSettings]:
-    """The settings of all payloads.
+    """The settings of all payloads that detect: they have a `topic`, or `detector: true`.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
     """
-    raise NotImplementedError
+    return {
+        resource: _read_detector(connection, _inherited(connection, connections))
+        for resource, connection in connections.items()
+        if "/" in resource and (connection.detector or "topic" in connection.settings)
+    }
+
+
+def _read_vehicle(connection: Connection) -> Settings:
+    resource = connection.resource
+    if connection.domain not in DOMAINS:
+        raise PluginError(
+            f"{resource}: domain: the arbiter 'ros' commands vehicles of the domains "
+            f"{' and '.join(DOMAINS)}, not {connection.domain}; the arbiter 'mavlink' does"
+        )
+    reader = ConnectionReader(resource, connection.settings)
+    reader.refuse_others(_KEYS)
+    reader.inner("sim", "{heading: 60 deg}")
+    driver = reader.choice("driver", DriverName, DriverName.NODE)
+    for key, of in (("via", DriverName.NODE), ("route_action", DriverName.NAV2)):
+        if key in connection.settings and driver is not of:
+            raise reader.error(key, f"it is for the driver {of} only, and this one is {driver}")
+    return Settings(
+        reader.namespace(),
+        reader.domain_id(),
+        driver,
+        reader.choice("via", Via, Via.TOPICS),
+        _topics(reader.inner("topics", "{odom: odometry/global}")),
+        reader.choice("odom_frame", OdomFrame, OdomFrame.MAP),
+        reader.flag("stamped", False),
+        _bounds(reader.inner("bounds", "{speed: 2 m/s}")),
+        reader.text("hardware_id", resource),
+        reader.choice("route_action", RouteAction, RouteAction.THROUGH),
+    )
+
+
+def _topics(reader: ConnectionReader) -> Topics:
+    usual = {each.name: str(each.default) for each in fields(Topics)}
+    reader.refuse_others(usual)
+    return Topics(**{key: reader.topic(key, default) for key, default in usual.items()})
+
+
+def _bounds(reader: ConnectionReader) -> Bounds:
+    reader.refuse_others(_BOUNDS)
+    usual = Bounds()
+    return Bounds(
+        reader.number("speed", usual.speed_m_s, Dimension.SPEED),
+        reader.number("reverse_speed", usual.reverse_m_s, Dimension.SPEED),
+        reader.acceleration("acceleration", usual.acceleration_m_s2),
+        reader.number("yaw_rate", usual.yaw_rate_rad_s, Dimension.ANGULAR_SPEED),
+        reader.number("turn_radius", usual.turn_radius_m, Dimension.DISTANCE, zero=True),
+        reader.acceleration("lateral_acceleration", usual.lateral_m_s2),
+    )
+
+
+def _inherited(
+    connection: Connection, connections: Mapping[ResourceId, Connection]
+) -> Mapping[str, Any] | None:
+    """What a payload's connection has of its vehicle's; None: that is another arbiter's."""
+    vehicle = connections.get(ResourceId(connection.resource.partition("/")[0]))
+    return vehicle.settings if vehicle is not None else None
+
+
+def _read_detector(connection: Connection, inherited: Mapping[str, Any] | None) -> DetectorSettings:
+    values = connection.settings
+    own = {
+        key: value
+        for key, value in values.items()
+        if key in _DETECTOR_KEYS
+        or (inherited is not None and (key not in inherited or inherited[key] != value))
+    }
+    reader = ConnectionReader(connection.resource, own)
+    reader.refuse_others(_DETECTOR_KEYS)
+    topic = reader.topic("topic", "detections")
+    namespace = reader.namespace("" if topic.startswith("/") else None)
+    message = reader.choice("message", DetectorMessage, DetectorMessage.DETECTION)
+    type_ = reader.text("type", "")
+    return DetectorSettings(
+        namespace, in_namespace(namespace, topic), reader.domain_id(), type_, message
+    )

@@ -6,13 +6,15 @@ return at once or soon: what becomes of an order is told later, and as often as 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 from uuid import UUID
 
 from m2pem.api import ArbiterContext, BehaviorRequest, BehaviorState, Connection, ResolvedValue
 from m2pem_plugin_ros.localization import Localization
-from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.settings import Settings
+
+if TYPE_CHECKING:
+    from m2pem_plugin_ros.runtime import RosRuntime
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,11 @@ class Outcome:
     state: BehaviorState
     code: str = ""
     reason: str = ""
+
+    @property
+    def is_end(self) -> bool:
+        """Whether the goal was known, and has ended."""
+        return self.state.terminal and self.state is not BehaviorState.UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +75,7 @@ class Seat:
     connection: Connection
     settings: Settings
     context: ArbiterContext
-    ros: RosRuntime
+    ros: "RosRuntime"
     localization: Localization
     told: Told
 

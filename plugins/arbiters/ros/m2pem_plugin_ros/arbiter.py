@@ -1,0 +1,344 @@
+"""The arbiter of ROS vehicles. Its catalogue needs no ROS, and no connection."""
+
+import asyncio
+import math
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from dataclasses import replace
+
+from m2pem.api import (
+    ArbiterContext,
+    BehaviorId,
+    BehaviorReport,
+    BehaviorRequest,
+    BehaviorSpec,
+    BehaviorState,
+    Connection,
+    Ledger,
+    Limits,
+    LinkState,
+    Mailbox,
+    PayloadState,
+    ResolvedValue,
+    ResourceId,
+    VehicleState,
+)
+from m2pem_plugin_ros.catalogue import offered
+from m2pem_plugin_ros.drivers.choice import make_driver as driver_of_the_fleet
+from m2pem_plugin_ros.drivers.driver import Driver, Seat
+from m2pem_plugin_ros.ignored import Ignored
+from m2pem_plugin_ros.instruments import Installation, Station
+from m2pem_plugin_ros.native_ref import Kept, native_ref, read_native_ref
+from m2pem_plugin_ros.settings import DriverName, read_detectors, read_settings
+from m2pem_plugin_ros.vehicle import Post, Vehicle
+
+LOST_AFTER_S = 3.0
+HOLD_WITHIN_S = 6.0
+BRAKING_BEGINS_WITHIN_S = 2.0
+CANCEL_TIMEOUT_S = 10.0
+
+HEARD_WITHIN_S = 5.0
+"""In real time, as DDS takes it to find who is there; `connect` waits for vehicles no longer."""
+
+ATTEND_EVERY_S = 0.2
+PAYLOADS_EVERY = 5
+"""Times that vehicles are attended to for each time that their payloads are told of."""
+
+LATE = 2.0
+"""So many times as long as that since the last look: this process was held up."""
+
+STATES_WAITING = 1000
+
+MakeStation = Callable[[Installation], Station]
+
+
+def _station(installation: Installation) -> Station:
+    from m2pem_plugin_ros.station import DdsStation  # noqa: PLC0415  # starting up must be fast
+
+    return DdsStation(installation)
+
+
+class RosArbiter:
+    """Implements `m2pem.api.AdjustingArbiter`. What a fleet may say of it: docs/ros.md.
+
+    `make_driver` and `make_station` are for tests without ROS.
+
+    Raises:
+        PluginError: a connection cannot be used; the text names the resource and the key.
+    """
+
+    def __init__(
+        self,
+        connections: Mapping[ResourceId, Connection],
+        context: ArbiterContext,
+        make_driver: Callable[[Seat], Driver] = driver_of_the_fleet,
+        make_station: MakeStation = _station,
+    ) -> None:
+        self._connections = connections
+        self._context = context
+        self._settings = read_settings(connections)
+        self._detectors = read_detectors(connections)
+        self._make_driver = make_driver
+        self._make_station = make_station
+        self._station: Station | None = None
+        self._ledger = Ledger(self._taken, context.logger)
+        self._states: Mailbox[VehicleState | PayloadState] = Mailbox(STATES_WAITING, _may_be_missed)
+        self._vehicles: dict[ResourceId, Vehicle] = {}
+        self._asked: set[BehaviorId] = set()
+        self._attending: asyncio.Task[None] | None = None
+
+    # --- what is offered ------------------------------------------------------------------------
+
+    def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+        """What a vehicle can do, by its driver and domain; payloads are carried, no more."""
+        if resource not in self._settings:
+            return ()
+        return offered(self._settings[resource].driver, self._connections[resource].domain)
+
+    def _taken(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+        """A payload may be held by what its vehicle does."""
+        return self.catalogue(ResourceId(resource.partition("/")[0]))
+
+    def limits(self, resource: ResourceId) -> Limits:
+        """The bounds that hold for a vehicle. Detectors may be silent for ever."""
+        if resource not in self._settings:
+            return Limits(math.inf, HOLD_WITHIN_S, CANCEL_TIMEOUT_S)
+        own = self._connections[resource].lost_after_s
+        settings = self._settings[resource]
+        hold_within_s = HOLD_WITHIN_S
+        if settings.driver is DriverName.BASE:
+            braking_s = settings.bounds.speed_m_s / settings.bounds.acceleration_m_s2
+            hold_within_s = max(hold_within_s, BRAKING_BEGINS_WITHIN_S + braking_s)
+        cancel_timeout_s = max(CANCEL_TIMEOUT_S, 1.5 * hold_within_s)
+        return Limits(LOST_AFTER_S if own is None else own, hold_within_s, cancel_timeout_s)
+
+    # --- life -----------------------------------------------------------------------------------
+
+    async def connect(self) -> None:
+        """Listen to all vehicles; returns when all were heard, or soon.
+
+        Raises:
+            RosError: ROS, or a package of it that a driver needs, is not installed or not usable.
+        """
+        self._station = self._make_station(
+            Installation(
+                self._connections,
+                self._settings,
+                self._detectors,
+                self._context,
+                self._states.put,
+            )
+        )
+        try:
+            instruments = await self._station.open()
+            for resource, settings in self._settings.items():
+                connection, limits = self._connections[resource], self.limits(resource)
+                post = Post(connection, settings, self._context, self._ledger, limits)
+                self._vehicles[resource] = Vehicle(post, instruments[resource], self._make_driver)
+            for vehicle in self._vehicles.values():
+                await vehicle.open()
+        except BaseException:
+            await self._disconnect()
+            raise
+        await self._until_heard()
+        for vehicle in self._vehicles.values():
+            vehicle.listen_from_now()
+        self._attending = asyncio.get_running_loop().create_task(self._attend())
+
+    async def close(self) -> None:
+        """Listen no more. Vehicles keep doing what they do."""
+        await self._disconnect()
+        self._states.close()
+        self._ledger.close()
+
+    # --- behaviors ------------------------------------------------------------------------------
+
+    async def start(self, request: BehaviorRequest) -> None:
+        """Start a behavior; see `BehaviorRequest`."""
+        asked = request.id in self._asked
+        self._asked.discard(request.id)
+        kept = Kept(request.resources, request.behavior, request.epoch, request.parameters)
+        if self._ledger.admit(request, lambda: native_ref(kept), self._refusal):
+            vehicle = self._vehicles[_vehicles(request.resources)[0]]
+            await vehicle.take(request, look_first=asked)
+
+    async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
+        """Stop the vehicle that does it."""
+        if self._ledger.may_cancel(behavior, epoch):
+            for vehicle in self._doing(behavior):
+                vehicle.cancel(behavior)
+
+    async def adjust(
+        self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
+    ) -> None:
+        """Go on with these parameters; those that have no sense are left as they are."""
+        if self._ledger.may_adjust(behavior, epoch):
+            sane = {name: value for name, value in parameters.items() if _is_sane(value)}
+            for vehicle in self._doing(behavior) if sane else ():
+                vehicle.adjust(behavior, sane)
+
+    async def hold(self, resource: ResourceId) -> None:
+        """Have a vehicle stand still at once."""
+        if resource in self._vehicles:
+            self._vehicles[resource].hold()
+
+    async def resume(self, resource: ResourceId) -> None:
+        """Have a vehicle go on."""
+        if resource in self._vehicles:
+            self._vehicles[resource].resume()
+
+    async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
+        """What is known; after a restart, what the vehicle itself says. Nothing is begun."""
+        known = self._ledger.last(behavior)
+        if known.state is not BehaviorState.UNKNOWN:
+            return known
+        kept = read_native_ref(native_ref) if native_ref else None
+        if kept is None:
+            return await self._search(behavior, known)
+        resource = next(iter(_vehicles(kept.resources)), ResourceId(""))
+        if resource not in self._vehicles:
+            return replace(known, reason=f"there is no vehicle '{resource}' any more")
+        return await self._look(self._vehicles[resource], behavior, kept, native_ref)
+
+    # --- streams --------------------------------------------------------------------------------
+
+    def reports(self) -> AsyncIterator[BehaviorReport]:
+        """Reports as they come, for one reader, until `close`."""
+        return self._ledger.reports()
+
+    def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
+        """States as they come, for one reader, until `close`; a slow one misses old states, but no
+        detection."""
+        return self._states.read()
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    async def _until_heard(self) -> None:
+        waits = [asyncio.ensure_future(v.heard_once.wait()) for v in self._vehicles.values()]
+        if not waits:
+            return
+        try:
+            await asyncio.wait(waits, timeout=HEARD_WITHIN_S)
+        finally:
+            for wait in waits:
+                wait.cancel()
+            await asyncio.gather(*waits, return_exceptions=True)
+        for resource, vehicle in self._vehicles.items():
+            if not vehicle.heard_once.is_set():
+                self._context.logger.warning("%s: it was not heard yet", resource)
+
+    async def _disconnect(self) -> None:
+        attending, self._attending = self._attending, None
+        if attending is not None:
+            attending.cancel()
+            await asyncio.gather(attending, return_exceptions=True)
+        vehicles, self._vehicles = self._vehicles, {}
+        await asyncio.gather(*(vehicle.close() for vehicle in vehicles.values()))
+        station, self._station = self._station, None
+        if station is not None:
+            await station.close()
+
+    def _refusal(self, request: BehaviorRequest) -> str:
+        vehicles = _vehicles(request.resources)
+        if len(vehicles) != 1:
+            return f"{request.behavior} takes one vehicle, and has {len(vehicles)}"
+        resource = vehicles[0]
+        allowed = self._connections[resource].behaviors
+        if allowed is not None and request.behavior not in allowed:
+            return f"the fleet does not allow {resource} the behavior '{request.behavior}'"
+        if resource not in self._vehicles:
+            return "the arbiter is not connected"
+        return self._vehicles[resource].refusal(request)
+
+    def _doing(self, behavior: BehaviorId) -> list[Vehicle]:
+        return [
+            vehicle
+            for resource, vehicle in self._vehicles.items()
+            if self._ledger.holder(resource) == behavior
+        ]
+
+    async def _search(self, behavior: BehaviorId, unknown: BehaviorReport) -> BehaviorReport:
+        """Nothing was kept of it: ask every vehicle that could do it without us."""
+        self._asked.add(behavior)
+        candidates = [
+            vehicle
+            for resource, vehicle in self._vehicles.items()
+            if vehicle.settings.driver is not DriverName.BASE
+            and self._ledger.holder(resource) is None
+        ]
+        looks = []
+        for vehicle in candidates:
+            kept = Kept((vehicle.resource,), "", 0, {})
+            looks.append(self._look(vehicle, behavior, kept, None))
+        for found in await asyncio.gather(*looks):
+            if found.state is not BehaviorState.UNKNOWN:
+                self._asked.discard(behavior)
+                return found
+        return unknown
+
+    async def _look(
+        self, vehicle: Vehicle, behavior: BehaviorId, kept: Kept, reference: str | None
+    ) -> BehaviorReport:
+        """Ask a vehicle. Nothing is awaited between its answer and what follows from it, so that
+        no end of the behavior is missed."""
+        order = vehicle.order_for(behavior, kept.epoch, kept.behavior, kept.parameters)
+        outcome = await vehicle.look(order)
+        if self._ledger.last(behavior).state is not BehaviorState.UNKNOWN:
+            return self._ledger.last(behavior)  # it was asked for twice at the same time
+        if outcome.state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING):
+            self._ledger.adopt(behavior, kept.resources, reference)
+            vehicle.adopt(order)
+            return self._ledger.last(behavior)
+        if outcome.state is BehaviorState.UNKNOWN:
+            vehicle.leave(order)
+        return BehaviorReport(
+            behavior,
+            3 if outcome.is_end else 0,
+            outcome.state,
+            outcome.code,
+            outcome.reason,
+            reference,
+        )
+
+    async def _attend(self) -> None:
+        """Look after all vehicles, again and again."""
+        clock = self._context.clock
+        ignored = Ignored(self._context.logger, "the arbiter of ROS vehicles")
+        looked_us, was_late, turn = clock.now_us(), False, 0
+        while True:
+            now_us = clock.now_us()
+            # After a pause of our own, what vehicles said meanwhile is still to be read.
+            late = not was_late and now_us - looked_us > LATE * ATTEND_EVERY_S * 1e6
+            looked_us, was_late = now_us, late
+            for vehicle in self._vehicles.values():
+                try:
+                    state = vehicle.attend(may_lose=not late)
+                except Exception as error:  # one vehicle's bug must not stop the others
+                    ignored.add(f"{vehicle.resource} cannot be attended to", repr(error))
+                else:
+                    if state is not None:
+                        self._states.put(state)
+            if self._station is not None:
+                self._station.retry()
+            if turn % PAYLOADS_EVERY == 0:
+                self._tell_of_payloads(now_us)
+            turn += 1
+            await clock.sleep(ATTEND_EVERY_S)
+
+    def _tell_of_payloads(self, now_us: int) -> None:
+        for resource in self._connections:
+            if resource not in self._settings:
+                vehicle = self._vehicles.get(ResourceId(resource.partition("/")[0]))
+                link = LinkState.CONNECTED if vehicle is None else vehicle.link
+                self._states.put(PayloadState(resource, now_us, link=link))
+
+
+def _vehicles(resources: Sequence[ResourceId]) -> list[ResourceId]:
+    return [resource for resource in resources if "/" not in resource]
+
+
+def _may_be_missed(state: VehicleState | PayloadState) -> bool:
+    return not (isinstance(state, PayloadState) and state.detections)
+
+
+def _is_sane(value: ResolvedValue) -> bool:
+    return value is not None and not (isinstance(value, float) and not math.isfinite(value))

@@ -1,0 +1,60 @@
+"""What the parts of vehicles say is wrong with them: diagnostic_msgs/DiagnosticArray."""
+
+from typing import TYPE_CHECKING, Any
+
+from m2pem.api import Clock
+
+if TYPE_CHECKING:
+    from m2pem_plugin_ros.runtime import RosRuntime
+
+OLD_AFTER_S = 5.0
+"""Parts say how they are once a second; what one that fell silent said last no longer counts."""
+
+OWN = "m2pem:"
+"""So begin the names of what m2pem itself says of the vehicles; it is no news to it."""
+
+_ERROR = 2
+MOST_PARTS = 1000
+
+
+class Diagnostics:
+    """One topic with the diagnostics of many vehicles, heard once for all of them.
+
+    `watch` each of them; what is said of others is not kept.
+    """
+
+    def __init__(self, ros: "RosRuntime", topic: str, clock: Clock) -> None:
+        from diagnostic_msgs.msg import (  # noqa: PLC0415  # it is loaded where ROS is only
+            DiagnosticArray,
+        )
+
+        from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415
+
+        self._clock = clock
+        self._errors: dict[str, dict[str, tuple[str, int]]] = {}
+        ros.subscribe(DiagnosticArray, topic, self._hear, qos.TELEMETRY)
+
+    def watch(self, hardware_id: str) -> None:
+        """Keep what is said of a vehicle from now on."""
+        self._errors.setdefault(hardware_id, {})
+
+    def errors(self, hardware_id: str) -> tuple[str, ...]:
+        """What is wrong with a vehicle now, for people, in the order of the parts' names."""
+        said = self._errors.get(hardware_id)
+        if not said:
+            return ()
+        oldest_us = self._clock.now_us() - round(OLD_AFTER_S * 1e6)
+        for name in [name for name, (_, at_us) in said.items() if at_us < oldest_us]:
+            del said[name]
+        return tuple(said[name][0] for name in sorted(said))
+
+    def _hear(self, message: Any) -> None:
+        now_us = self._clock.now_us()
+        for status in message.status:
+            said = self._errors.get(status.hardware_id)
+            if said is None or status.name.startswith(OWN):
+                continue
+            if ord(status.level) < _ERROR:
+                said.pop(status.name, None)
+            elif status.name in said or len(said) < MOST_PARTS:
+                said[status.name] = (f"{status.name}: {status.message or 'error'}", now_us)

@@ -1,0 +1,81 @@
+"""What the arbiter has of ROS: for each vehicle what is heard of it beside its driver."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from m2pem.api import ArbiterContext, Connection, PayloadState, ResourceId, VehicleState
+from m2pem_plugin_ros.localization import Localization
+from m2pem_plugin_ros.settings import DetectorSettings, Settings
+
+if TYPE_CHECKING:
+    from m2pem_plugin_ros.runtime import RosRuntime
+
+
+class Senses(Protocol):
+    """What a vehicle's sensors say."""
+
+    @property
+    def localization(self) -> Localization:
+        """Where it is."""
+        ...
+
+    @property
+    def battery_fraction(self) -> float | None:
+        """Of a full one; None: not said."""
+        ...
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """What is wrong with its parts, for people."""
+        ...
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """What is missing to know well how it is, for people."""
+        ...
+
+    @property
+    def changes(self) -> int:
+        """Another number whenever something was heard."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Instruments:
+    """Of one vehicle. `show_target` tells it where a vehicle is that it goes to or follows."""
+
+    ros: "RosRuntime"
+    senses: Senses
+    show_target: Callable[[VehicleState], None]
+
+
+class Station(Protocol):
+    """All connections to ROS of one arbiter."""
+
+    async def open(self) -> Mapping[ResourceId, Instruments]:
+        """Listen; returns at once, whoever is there.
+
+        Raises:
+            RosError: ROS cannot be used; the text says what would be right.
+        """
+        ...
+
+    def retry(self) -> None:
+        """Tell of detections whose place was not known before, if it is now."""
+        ...
+
+    async def close(self) -> None:
+        """Let go of everything."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Installation:
+    """What a station is made for. `hear` is given the states of payloads that detect."""
+
+    connections: Mapping[ResourceId, Connection]
+    vehicles: Mapping[ResourceId, Settings]
+    detectors: Mapping[ResourceId, DetectorSettings]
+    context: ArbiterContext
+    hear: Callable[[PayloadState], None]

@@ -1,0 +1,82 @@
+"""What is kept of a behavior outside of this process: enough to ask its vehicle after a restart.
+
+A short text of JSON: which resources, which behavior, and its parameters but for areas, and for
+routes that are long.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from m2pem.api import Point, ResolvedValue, ResourceId, Route, VehiclePosition
+
+LONGEST_ROUTE = 300
+"""In waypoints. Every report carries the text."""
+
+_VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What a reference says."""
+
+    resources: tuple[ResourceId, ...]
+    behavior: str
+    epoch: int
+    parameters: Mapping[str, ResolvedValue]
+
+
+def native_ref(kept: Kept) -> str:
+    """The text."""
+    encoded = {name: _encoded(value) for name, value in kept.parameters.items()}
+    whole = {
+        "v": _VERSION,
+        "resources": list(kept.resources),
+        "behavior": kept.behavior,
+        "epoch": kept.epoch,
+        "parameters": {name: value for name, value in encoded.items() if value is not None},
+    }
+    return json.dumps(whole, separators=(",", ":"))
+
+
+def read_native_ref(text: str) -> Kept | None:
+    """What a text says; None: it was not made by `native_ref`."""
+    try:
+        whole = json.loads(text)
+        if whole["v"] != _VERSION:
+            return None
+        resources = tuple(ResourceId(str(resource)) for resource in whole["resources"])
+        parameters = {str(name): _decoded(value) for name, value in whole["parameters"].items()}
+        return Kept(resources, str(whole["behavior"]), int(whole["epoch"]), parameters)
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return None
+
+
+def _encoded(value: ResolvedValue) -> Any:
+    match value:
+        case Point():
+            return {"point": list(value.position), "frame": value.altitude_frame}
+        case Route() if len(value.waypoints) <= LONGEST_ROUTE:
+            return {"route": [list(w) for w in value.waypoints], "frame": value.altitude_frame}
+        case VehiclePosition():
+            return {"vehicle": value.vehicle}
+        case bool() | int() | float() | str():
+            return value
+        case _:
+            return None
+
+
+def _decoded(value: Any) -> ResolvedValue:
+    if not isinstance(value, dict):
+        return value  # type: ignore[no-any-return]  # a number or text of JSON
+    if "vehicle" in value:
+        return VehiclePosition(str(value["vehicle"]))
+    if "route" in value:
+        return Route(tuple(_coordinate(each) for each in value["route"]), str(value["frame"]))
+    return Point(_coordinate(value["point"]), str(value["frame"]))
+
+
+def _coordinate(value: Any) -> tuple[float, float, float | None]:
+    latitude, longitude, altitude = value
+    return float(latitude), float(longitude), None if altitude is None else float(altitude)

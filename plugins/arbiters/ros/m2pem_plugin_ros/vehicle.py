@@ -1,0 +1,315 @@
+"""One vehicle of the arbiter: its driver, what it was given, and when it was heard."""
+
+import asyncio
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from uuid import UUID
+
+from m2pem.api import (
+    ArbiterContext,
+    BehaviorId,
+    BehaviorRequest,
+    BehaviorState,
+    Connection,
+    Ledger,
+    Limits,
+    LinkState,
+    ResolvedValue,
+    ResourceId,
+    VehiclePosition,
+    VehicleState,
+)
+from m2pem_plugin_ros.drivers.driver import Driver, Health, Order, Outcome, Seat
+from m2pem_plugin_ros.goal_ids import goal_id, run_id
+from m2pem_plugin_ros.ignored import Ignored
+from m2pem_plugin_ros.instruments import Instruments
+from m2pem_plugin_ros.settings import DriverName, Settings
+from m2pem_plugin_ros.telemetry import SILENT_SHARE, link_state, vehicle_state
+
+LOOK_WITHIN_S = 3.0
+"""In real time: so long may a vehicle take to say how it stands to a goal."""
+
+CANCEL_SHARE = 0.8
+"""Of the time in which a cancelled vehicle must be free: one that takes longer has failed to."""
+
+CLOSE_WITHIN_S = 5.0
+REMEMBERED = 1_000
+
+_GOES_ON = (BehaviorState.ACCEPTED, BehaviorState.RUNNING)
+
+
+@dataclass(frozen=True, slots=True)
+class Post:
+    """What a vehicle is made with."""
+
+    connection: Connection
+    settings: Settings
+    context: ArbiterContext
+    ledger: Ledger
+    limits: Limits
+
+
+class Vehicle:
+    """Implements `Told`. Whatever its driver raises stays here, and is told as a failure."""
+
+    def __init__(
+        self, post: Post, instruments: Instruments, make_driver: Callable[[Seat], Driver]
+    ) -> None:
+        self.resource: ResourceId = post.connection.resource
+        self.settings = post.settings
+        self.link = LinkState.CONNECTED
+        self.heard_once = asyncio.Event()
+        self._context = post.context
+        self._ledger = post.ledger
+        self._limits = post.limits
+        self._instruments = instruments
+        self._ignored = Ignored(post.context.logger, self.resource)
+        self._behaviors: dict[UUID, BehaviorId] = {}
+        self._order: Order | None = None
+        self._cancelled: BehaviorId = ""
+        self._left: dict[UUID, None] = {}
+        self._heard_us = post.context.clock.now_us()
+        self._heard = 0
+        self._told: tuple[object, ...] = ()
+        self._tasks: set[asyncio.Task[None]] = set()
+        localization = instruments.senses.localization
+        self.driver = make_driver(
+            Seat(post.connection, post.settings, post.context, instruments.ros, localization, self)
+        )
+
+    # --- what the arbiter asks ------------------------------------------------------------------
+
+    async def take(self, request: BehaviorRequest, *, look_first: bool = False) -> None:
+        """Do this, in place of what it does. `look_first`: it may have been begun already."""
+        order = self._order_for(request)
+        self._keep(order)
+        # A plain base does nothing while nobody drives it.
+        if look_first and self.settings.driver is not DriverName.BASE:
+            outcome = await self.look(order)
+            if self._ledger.last(request.id).state.terminal:
+                return  # the vehicle was lost meanwhile, or it has ended
+            if outcome.state in _GOES_ON:
+                self.progress(order.goal)
+                if self._cancelled == request.id:
+                    self._ask("end", lambda: self.driver.end(order.goal))
+                return
+            if outcome.is_end:
+                self.ended(order.goal, outcome)
+                return
+            if self._cancelled == request.id:
+                self._ledger.end(request.id, BehaviorState.CANCELLED)
+                return
+        self._left.clear()
+        if wrong := self._ask("begin", lambda: self.driver.begin(order)):
+            self._ledger.end(request.id, BehaviorState.FAILED, reason=wrong)
+
+    def cancel(self, behavior: BehaviorId) -> None:
+        """Stop doing it, within the limit that was promised."""
+        goal = goal_id(self._context.journal, behavior)
+        self._cancelled = behavior
+        task = asyncio.get_running_loop().create_task(self._give_up(behavior))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        if wrong := self._ask("end", lambda: self.driver.end(goal)):
+            self._leave(behavior)
+            self._ledger.end(behavior, BehaviorState.FAILED, reason=wrong)
+
+    def adjust(self, behavior: BehaviorId, parameters: Mapping[str, ResolvedValue]) -> None:
+        """Go on with these parameters."""
+        order, goal = self._order, goal_id(self._context.journal, behavior)
+        if order is not None and order.goal == goal:
+            request = order.request
+            merged = {**request.parameters, **parameters}
+            self._order = replace(order, request=replace(request, parameters=merged))
+        self._ask("adjust", lambda: self.driver.adjust(goal, parameters))
+
+    def hold(self) -> None:
+        """Stand still, and keep the behavior."""
+        self._ask("hold", self.driver.hold)
+
+    def resume(self) -> None:
+        """Go on."""
+        self._ask("resume", self.driver.resume)
+
+    def refusal(self, request: BehaviorRequest) -> str:
+        """Why it cannot be done now; "" if it can."""
+        try:
+            return self.driver.refusal(request)
+        except Exception as error:
+            self._context.logger.exception("%s: refusal", self.resource)
+            return _bug(error)
+
+    async def look(self, order: Order) -> Outcome:
+        """How the vehicle stands to a goal; UNKNOWN also if it does not say soon."""
+        try:
+            async with asyncio.timeout(LOOK_WITHIN_S):
+                return await self.driver.look(order)
+        except TimeoutError:
+            reason = f"{self.resource} did not say within {LOOK_WITHIN_S:g} s whether it does it"
+        except Exception as error:
+            self._context.logger.exception("%s: look", self.resource)
+            reason = f"{self.resource} could not be asked: {error}"
+        return Outcome(BehaviorState.UNKNOWN, reason=reason)
+
+    def adopt(self, order: Order) -> None:
+        """It was found doing this, and its driver has it."""
+        self._keep(order)
+
+    def order_for(
+        self,
+        behavior: BehaviorId,
+        epoch: int = 0,
+        name: str = "",
+        parameters: Mapping[str, ResolvedValue] | None = None,
+    ) -> Order:
+        """An order that may have been given before a restart; of an unknown name it is ""."""
+        request = BehaviorRequest(behavior, epoch, name, parameters or {}, (self.resource,))
+        return self._order_for(request)
+
+    def leave(self, order: Order) -> None:
+        """It may still do this, and is to stop doing it when it is given something else."""
+        self._left[order.goal] = None
+
+    async def open(self) -> None:
+        """Have the driver listen."""
+        await self.driver.open()
+
+    async def close(self) -> None:
+        """Let go; the vehicle keeps doing what it does."""
+        tasks = list(self._tasks)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        try:
+            async with asyncio.timeout(CLOSE_WITHIN_S):
+                await self.driver.close()
+        except Exception:
+            self._context.logger.exception("%s: its driver does not close", self.resource)
+
+    # --- what the driver tells ------------------------------------------------------------------
+
+    def heard(self) -> None:
+        """The vehicle, or what steers it there, is alive."""
+        self._heard_us = self._context.clock.now_us()
+        self._heard += 1
+        self.heard_once.set()
+
+    def progress(self, goal: UUID) -> None:
+        """The vehicle does it."""
+        if (behavior := self._behavior(goal)) is not None:
+            self._ledger.progress(behavior)
+
+    def ended(self, goal: UUID, outcome: Outcome) -> None:
+        """It has ended, for good."""
+        self._left.pop(goal, None)
+        behavior = self._behavior(goal)
+        if behavior is None:
+            return
+        if not outcome.is_end:
+            self._ignored.add("an end that is none", f"{behavior} is {outcome.state}")
+            return
+        if self._order is not None and self._order.goal == goal:
+            self._order = None
+        if outcome.state is BehaviorState.SUCCEEDED:
+            self._ledger.progress(behavior)  # one that was done so soon ran all the same
+        self._ledger.end(behavior, outcome.state, outcome.code, outcome.reason)
+
+    # --- time -----------------------------------------------------------------------------------
+
+    def listen_from_now(self) -> None:
+        """Silence counts from now on."""
+        self._heard_us = self._context.clock.now_us()
+
+    def attend(self, *, may_lose: bool) -> VehicleState | None:
+        """Look after the vehicle; what the fleet is to be told, if there is news.
+
+        `may_lose`: what it said until now has been heard, so that silence means something.
+        """
+        now_us = self._context.clock.now_us()
+        silent_s = (now_us - self._heard_us) / 1e6
+        bound_s = self._limits.lost_after_s
+        is_silent = silent_s >= SILENT_SHARE * bound_s
+        holder = self._ledger.holder(self.resource)
+        if not self._heard:
+            self.link = LinkState.LOST
+        elif may_lose or not is_silent:
+            self.link = link_state(silent_s, bound_s)
+        if is_silent and may_lose and holder is not None:
+            self._lose(holder, silent_s)
+            holder = None
+        if holder is not None and self._order is not None:
+            self._show_targets(self._order)
+        news = (self._heard, self._instruments.senses.changes, self.link, holder)
+        still_lost = self.link is LinkState.LOST and self._told[2:3] == (self.link,)
+        if still_lost or news == self._told:
+            return None
+        self._told = news
+        health, behavior = self._health(), self._order.request.behavior if self._order else ""
+        senses = self._instruments.senses
+        return vehicle_state(self.resource, now_us, senses, health, self.link, behavior)
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _lose(self, holder: BehaviorId, silent_s: float) -> None:
+        self._leave(holder)
+        self._ask("forget", self.driver.forget)
+        self._ledger.lose(self.resource, f"not heard for {silent_s:.1f} s")
+
+    def _leave(self, behavior: BehaviorId) -> None:
+        self._left[goal_id(self._context.journal, behavior)] = None
+        self._order = None
+
+    async def _give_up(self, behavior: BehaviorId) -> None:
+        limit_s = CANCEL_SHARE * self._limits.cancel_timeout_s
+        await self._context.clock.sleep(limit_s)
+        if self._ledger.holder(self.resource) == behavior:
+            self._leave(behavior)
+            reason = f"it did not stop within {limit_s:g} s of the cancel"
+            self._ledger.end(behavior, BehaviorState.FAILED, "TIMEOUT", reason)
+
+    def _order_for(self, request: BehaviorRequest) -> Order:
+        journal = self._context.journal
+        goal = goal_id(journal, request.id)
+        others = [goal_id(journal, preempted) for preempted in request.preempts]
+        preempts = tuple(each for each in dict.fromkeys([*others, *self._left]) if each != goal)
+        return Order(request, goal, run_id(journal, request.id), preempts)
+
+    def _keep(self, order: Order) -> None:
+        self._order = order
+        self._behaviors.pop(order.goal, None)
+        self._behaviors[order.goal] = order.request.id
+        if len(self._behaviors) > REMEMBERED:
+            del self._behaviors[next(iter(self._behaviors))]
+
+    def _behavior(self, goal: UUID) -> BehaviorId | None:
+        behavior = self._behaviors.get(goal)
+        if behavior is None:
+            self._ignored.add("what it says of a goal that it was not given", str(goal))
+        return behavior
+
+    def _ask(self, what: str, call: Callable[[], None]) -> str:
+        """Returns "", or what went wrong."""
+        try:
+            call()
+        except Exception as error:
+            self._context.logger.exception("%s: %s", self.resource, what)
+            return _bug(error)
+        return ""
+
+    def _health(self) -> Health:
+        try:
+            return self.driver.health
+        except Exception as error:
+            self._ignored.add("what its driver says of its health", repr(error))
+            return Health()
+
+    def _show_targets(self, order: Order) -> None:
+        for value in order.request.parameters.values():
+            if isinstance(value, VehiclePosition):
+                state = self._context.bus.latest(ResourceId(value.vehicle))
+                if isinstance(state, VehicleState):
+                    self._instruments.show_target(state)
+
+
+def _bug(error: Exception) -> str:
+    return f"m2pem is wrong: {type(error).__name__}: {error}"

@@ -1,0 +1,257 @@
+"""Vehicles without ROS: they move as they are told, in the time of the clock that is lent.
+
+A `Body` outlives the arbiter and its driver, as a vehicle outlives a restart. What it is told is
+kept in `calls`.
+"""
+
+import asyncio
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from uuid import UUID
+
+from m2pem_plugin_ros.arbiter import RosArbiter
+from m2pem_plugin_ros.drivers.driver import Driver, Health, Order, Outcome, Seat
+from m2pem_plugin_ros.frames import to_geodetic, to_local
+from m2pem_plugin_ros.instruments import Installation, Instruments
+from m2pem_plugin_ros.pose import Pose, Twist
+
+from m2pem.api import (
+    ArbiterContext,
+    BehaviorRequest,
+    BehaviorState,
+    Connection,
+    GeoPosition,
+    Point,
+    ResolvedValue,
+    ResourceId,
+    VehicleState,
+)
+
+ORIGIN = (38.1075, -77.3192, 60.0)
+STEP_S = 0.1
+
+
+def at(east_m: float, north_m: float) -> Point:
+    position = to_geodetic(east_m, north_m, 0.0, ORIGIN)
+    return Point((position.latitude_deg, position.longitude_deg, None))
+
+
+@dataclass
+class Body:
+    """It drives straight to where it is to go, and can be made to misbehave."""
+
+    east: float = 0.0
+    north: float = 0.0
+    speed: float = 0.0
+    begun: int = 0
+    held: bool = False
+    linked: bool = True
+    answers_looks: bool = True
+    stops: bool = True
+    goal: UUID | None = None
+    target: tuple[float, float] = (0.0, 0.0)
+    wished: float = 5.0
+    driven_us: int = 0
+    outcomes: dict[UUID, Outcome] = field(default_factory=dict)
+    calls: list[tuple[object, ...]] = field(default_factory=list)
+    raises: set[str] = field(default_factory=set)
+    refuses: str = ""
+    shown: list[VehicleState] = field(default_factory=list)
+    health: Health = field(default_factory=lambda: Health("autonomous", True))
+    battery: float | None = None
+    errors: tuple[str, ...] = ()
+
+    def told(self, what: str, *arguments: object) -> None:
+        self.calls.append((what, *arguments))
+        if what in self.raises:
+            raise RuntimeError(f"{what} is broken")
+
+    def called(self, what: str) -> list[tuple[object, ...]]:
+        return [call for call in self.calls if call[0] == what]
+
+    def drive(self, now_us: int) -> None:
+        """Let the time until now pass."""
+        passed_s, self.driven_us = (now_us - self.driven_us) / 1e6, now_us
+        self.speed = 0.0
+        if self.goal is None or self.held:
+            return
+        east, north = self.target[0] - self.east, self.target[1] - self.north
+        distance = math.hypot(east, north)
+        step = min(distance, self.wished * passed_s)
+        if distance - step < 0.01:
+            self.east, self.north = self.target
+            self.finish(Outcome(BehaviorState.SUCCEEDED))
+        else:
+            self.speed = self.wished
+            self.east += east / distance * step
+            self.north += north / distance * step
+
+    def finish(self, outcome: Outcome) -> None:
+        if self.goal is not None:
+            self.outcomes[self.goal] = outcome
+        self.goal, self.held = None, False
+
+
+class DoubleDriver:
+    """Implements `Driver`."""
+
+    def __init__(self, seat: Seat, body: Body) -> None:
+        self.seat = seat
+        self.body = body
+        self.known: set[UUID] = set()
+        self._task: asyncio.Task[None] | None = None
+
+    async def open(self) -> None:
+        self.body.told("open")
+        self.body.driven_us = self.seat.context.clock.now_us()
+        self._task = asyncio.get_running_loop().create_task(self._run())
+
+    @property
+    def health(self) -> Health:
+        if "health" in self.body.raises:
+            raise RuntimeError("health is broken")
+        return self.body.health
+
+    def refusal(self, request: BehaviorRequest) -> str:
+        self.body.told("refusal")
+        return self.body.refuses
+
+    def begin(self, order: Order) -> None:
+        self.body.told("begin", order)
+        if order.goal in self.body.outcomes or order.goal == self.body.goal:
+            return  # a vehicle does what it is given once
+        target = order.request.parameters.get("target")
+        if isinstance(target, Point):
+            place = GeoPosition(target.position[0], target.position[1], ORIGIN[2])
+            self.body.target = to_local(place, ORIGIN)[:2]
+        self.body.wished = float(order.request.parameters.get("speed") or 5.0)
+        self.body.goal, self.body.held = order.goal, False
+        self.body.begun += 1
+        self.known.add(order.goal)
+
+    def end(self, goal: UUID) -> None:
+        self.body.told("end", goal)
+        if self.body.goal == goal and self.body.stops:
+            self.body.finish(Outcome(BehaviorState.CANCELLED))
+
+    def adjust(self, goal: UUID, parameters: Mapping[str, ResolvedValue]) -> None:
+        self.body.told("adjust", goal, dict(parameters))
+        if goal == self.body.goal and isinstance(parameters.get("speed"), float):
+            self.body.wished = float(parameters["speed"])
+
+    def hold(self) -> None:
+        self.body.told("hold")
+        self.body.held = True
+
+    def resume(self) -> None:
+        self.body.told("resume")
+        self.body.held = False
+
+    async def look(self, order: Order) -> Outcome:
+        self.body.told("look", order)
+        if not self.body.answers_looks:
+            await asyncio.Event().wait()
+        if order.goal == self.body.goal:
+            self.known.add(order.goal)
+            return Outcome(BehaviorState.RUNNING)
+        return self.body.outcomes.get(order.goal, Outcome(BehaviorState.UNKNOWN))
+
+    def forget(self) -> None:
+        self.body.told("forget")
+        self.known.clear()
+
+    async def close(self) -> None:
+        self.body.told("close")
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+
+    async def _run(self) -> None:
+        clock, told = self.seat.context.clock, self.seat.told
+        while True:
+            self.body.drive(clock.now_us())
+            if self.body.linked:
+                told.heard()
+                if self.body.goal in self.known:
+                    told.progress(self.body.goal)
+                for goal in self.known & set(self.body.outcomes):
+                    told.ended(goal, self.body.outcomes[goal])
+            await clock.sleep(STEP_S)
+
+
+class DoubleSenses:
+    """Implements `Senses` and, for the same body, `Localization`."""
+
+    def __init__(self, body: Body) -> None:
+        self.body = body
+        self.localization = self
+        self.age_s = 0.0
+        self.troubles = ()
+
+    @property
+    def pose(self) -> Pose:
+        return Pose(self.body.east, self.body.north, 0.0)
+
+    @property
+    def twist(self) -> Twist:
+        return Twist(self.body.speed)
+
+    @property
+    def position(self) -> GeoPosition:
+        return to_geodetic(self.body.east, self.body.north, 0.0, ORIGIN)
+
+    @property
+    def battery_fraction(self) -> float | None:
+        return self.body.battery
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        return self.body.errors
+
+    @property
+    def changes(self) -> int:
+        return len(self.body.calls)
+
+
+class DoubleStation:
+    """Implements `Station`."""
+
+    def __init__(self, bodies: Mapping[ResourceId, Body], installation: Installation) -> None:
+        self.bodies = bodies
+        self.installation = installation
+        self.is_open = False
+
+    async def open(self) -> dict[ResourceId, Instruments]:
+        self.is_open = True
+        return {
+            resource: Instruments(None, DoubleSenses(body), body.shown.append)
+            for resource, body in self.bodies.items()
+        }
+
+    def retry(self) -> None:
+        pass
+
+    async def close(self) -> None:
+        self.is_open = False
+
+
+def connections(bodies: Mapping[ResourceId, Body], **settings: object) -> dict:
+    return {
+        resource: Connection(resource, "ground", {"namespace": f"/{resource}", **settings})
+        for resource in bodies
+    }
+
+
+def arbiter(
+    bodies: Mapping[ResourceId, Body], context: ArbiterContext, **settings: object
+) -> RosArbiter:
+    def make_driver(seat: Seat) -> Driver:
+        return DoubleDriver(seat, bodies[seat.connection.resource])
+
+    return RosArbiter(
+        connections(bodies, **settings),
+        context,
+        make_driver,
+        lambda installation: DoubleStation(bodies, installation),
+    )

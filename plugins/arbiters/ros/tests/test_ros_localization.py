@@ -1,0 +1,125 @@
+"""Where a vehicle is, from its topics, over real DDS."""
+
+import logging
+import math
+from collections.abc import AsyncIterator, Iterator
+
+import pytest
+from m2pem_plugin_ros.ignored import Ignored
+from m2pem_plugin_ros.localization import TopicLocalization
+from m2pem_plugin_ros.pose import Pose, Twist
+from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros.settings import OdomFrame, Settings
+from m2pem_plugin_ros.testing import Peer, reserved_domain
+from ros_double import ORIGIN
+from ros_sensors import PEER, TOPICS, Sensors, V, fix, odometry, until
+
+from m2pem.executive.clock import SystemClock
+from m2pem.testing.contracts.bench import context
+
+NAN, INF = math.nan, math.inf
+
+
+@pytest.fixture(scope="module")
+def domain() -> Iterator[int]:
+    with reserved_domain() as domain, Peer(PEER, domain, TOPICS):
+        yield domain
+
+
+@pytest.fixture
+async def ros(domain: int) -> AsyncIterator[RosRuntime]:
+    async with RosRuntime("tested", domain_id=domain) as ros:
+        yield ros
+
+
+@pytest.fixture
+def teller(ros: RosRuntime) -> Sensors:
+    return Sensors(ros)
+
+
+def localization(ros: RosRuntime, frame: OdomFrame = OdomFrame.MAP) -> TopicLocalization:
+    settings = Settings("/evsg1", odom_frame=frame)
+    return TopicLocalization(ros, V, settings, context(SystemClock()))
+
+
+async def test_odometry_in_the_map_is_the_pose(ros: RosRuntime, teller: Sensors) -> None:
+    where = localization(ros)
+    assert (where.pose, where.twist, where.position, where.age_s) == (None, None, None, INF)
+    assert where.troubles == ("no odometry was heard yet",)
+    await teller.say(odometry(30.0, 40.0, yaw=1.0, forward=1.5))
+    await until(lambda: where.pose, "odometry is heard")
+    assert where.pose == Pose(30.0, 40.0, pytest.approx(1.0))
+    assert where.twist == Twist(1.5)
+    assert where.position.latitude_deg == pytest.approx(ORIGIN[0] + 40.0 / 110_990, abs=1e-6)
+    assert where.age_s < 20.0
+    assert where.troubles == ()
+
+
+async def test_what_cannot_be_is_ignored_and_logged_once_with_a_count(
+    ros: RosRuntime, teller: Sensors, caplog: pytest.LogCaptureFixture
+) -> None:
+    where = localization(ros)
+    zero = odometry(9.0, 9.0)
+    zero[1]["pose"]["pose"]["orientation"] = {"z": 0.0, "w": 0.0}
+    spins = odometry(9.0, 9.0)
+    spins[1]["twist"]["twist"]["angular"]["z"] = NAN
+    wrong = {
+        "odometry with a place that cannot be": [
+            odometry(NAN, 0.0),
+            odometry(0.0, INF),
+            odometry(2e6, 0.0),
+        ],
+        "odometry with an orientation that cannot be": [odometry(9.0, 9.0, yaw=NAN), zero],
+        "odometry with a speed that cannot be": [odometry(9.0, 9.0, forward=-INF), spins],
+        "a fix that cannot be": [fix(NAN, 0.0), fix(91.0, 0.0), fix(0.0, -181.0), fix(INF, 0.0)],
+    }
+    await teller.say(odometry(1.0, 2.0))
+    for cause, messages in wrong.items():
+        await teller.say(*messages)
+        counted = len(messages)
+        await until(lambda c=cause, n=counted: where.ignored.counts[c] == n, cause)
+    assert where.pose == Pose(1.0, 2.0, 0.0)
+    lines = [record.message for record in caplog.records if "ignored" in record.message]
+    assert len(lines) == len(wrong), lines
+    assert "evsg1: ignored: odometry with a place that cannot be: (nan, 0, 0)" in lines
+
+
+def test_what_goes_on_being_wrong_is_counted_in_few_lines(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    ignored = Ignored(logging.getLogger("m2pem.testing"), "evsg1")
+    for _ in range(2500):
+        ignored.add("a fix that cannot be", "(91, 0)")
+    assert [record.message for record in caplog.records] == [
+        "evsg1: ignored: a fix that cannot be: (91, 0)" + so_far
+        for so_far in ("", " (10 so far)", " (100 so far)", " (1000 so far)")
+    ]
+
+
+async def test_odometry_that_repeats_a_stamp_is_not_news(ros: RosRuntime, teller: Sensors) -> None:
+    where = localization(ros)
+    frozen = [odometry(5.0, 5.0, stamp=7)] * 3
+    await teller.say(odometry(1.0, 1.0, stamp=7), *frozen)
+    await until(lambda: where.ignored.counts["odometry that was there already"] == 3)
+    assert where.pose.east_m == 1.0
+    await teller.say(odometry(2.0, 2.0, stamp=3))
+    await until(lambda: where.pose.east_m == 2.0, "a robot that was restarted is believed")
+
+
+async def test_odometry_that_begins_anywhere_needs_a_fix(ros: RosRuntime, teller: Sensors) -> None:
+    where = localization(ros, OdomFrame.ODOM)
+    await teller.say(
+        fix(80.0, 170.0, status=-1),  # no fix, whatever it says
+        fix(0.0, 0.0, status=-2),  # of a receiver that has not begun
+        odometry(500.0, 500.0),
+    )
+    await until(lambda: where.twist, "odometry is heard")
+    await until(lambda: where.ignored.counts["a fix that cannot be"] == 1)
+    assert (where.pose, where.age_s) == (None, INF)
+    assert where.troubles == ("no satellite fix was heard yet",)
+    await teller.say(fix(*ORIGIN[:2], altitude=NAN, status=-2), odometry(502.0, 501.0))
+    await until(lambda: where.pose and where.pose.east_m > 1.0, "both are heard")
+    assert where.pose.east_m == pytest.approx(2.0, abs=1e-3)
+    assert where.pose.north_m == pytest.approx(1.0, abs=1e-3)
+    assert where.position.altitude_m == pytest.approx(ORIGIN[2], abs=1e-3)
+    assert where.troubles == ()
