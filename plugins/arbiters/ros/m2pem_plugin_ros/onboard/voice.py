@@ -1,0 +1,98 @@
+"""What an m2pem node says: `behavior_status` and `vehicle_status`."""
+
+import asyncio
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from m2pem_interfaces import msg as interfaces
+from rclpy.duration import Duration
+from rclpy.node import Node
+
+from m2pem.api import Clock
+from m2pem_plugin_ros.drivers.driver import Health
+from m2pem_plugin_ros.runtime import qos
+from m2pem_plugin_ros.stamps import stamp
+from m2pem_plugin_ros.statuses import Status, write_status
+
+STATUS_EVERY_S = 0.4
+FASTEST_S = 0.02
+"""Of real time: a clock may be so fast that telling would flood the network."""
+
+_READINESS = {
+    None: interfaces.VehicleStatus.NOT_KNOWN,
+    False: interfaces.VehicleStatus.NOT_READY,
+    True: interfaces.VehicleStatus.READY,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """How the vehicle is; `behavior`: the id of what it does, or ""."""
+
+    vehicle: str
+    behavior: str
+    held: bool
+    health: Health
+
+
+class Voice:
+    """Publishes; before `open` and after `close` nothing is said."""
+
+    def __init__(self, clock: Clock, look: Callable[[], About], wrap: Callable[[Any], Any]) -> None:
+        self._clock = clock
+        self._look = look
+        self._wrap = wrap
+        self._publisher: Any = None
+        self._behaviors: Any = None
+        self._vehicle: Any = None
+
+    def open(self, node: Node) -> None:
+        """Publish from this node."""
+        create = node.create_publisher
+        self._publisher = create(interfaces.BehaviorStatus, "behavior_status", qos.BEHAVIOR_STATUS)
+        self._behaviors = self._wrap(self._publisher)
+        self._vehicle = self._wrap(create(interfaces.VehicleStatus, "vehicle_status", qos.STATUS))
+
+    def close(self) -> None:
+        """Say nothing more."""
+        self._behaviors = self._vehicle = None
+
+    def behavior(self, status: Status) -> None:
+        """Say a status."""
+        if self._behaviors is not None:
+            message = interfaces.BehaviorStatus(stamp=stamp(self._clock.now_us()))
+            self._behaviors.publish(write_status(message, status))
+
+    def vehicle(self) -> None:
+        """Say how the vehicle is."""
+        if self._vehicle is None:
+            return
+        about = self._look()
+        battery = about.health.battery_fraction
+        self._vehicle.publish(
+            interfaces.VehicleStatus(
+                stamp=stamp(self._clock.now_us()),
+                vehicle=about.vehicle,
+                mode=about.health.mode,
+                behavior=about.behavior,
+                held=about.held,
+                readiness=_READINESS[about.health.ready],
+                not_ready_reasons=list(about.health.not_ready_reasons),
+                battery=math.nan if battery is None else battery,
+            )
+        )
+
+    async def keep_telling(self) -> None:
+        """Say how the vehicle is, at a steady rate."""
+        while True:
+            self.vehicle()
+            async with asyncio.TaskGroup() as both:
+                both.create_task(self._clock.sleep(STATUS_EVERY_S))
+                both.create_task(asyncio.sleep(FASTEST_S))
+
+    async def heard_out(self, within_s: float) -> None:
+        """Wait until all who listen have the statuses, or for so many real seconds."""
+        said = Duration(seconds=within_s)
+        await asyncio.to_thread(self._publisher.wait_for_all_acked, said)

@@ -1,0 +1,122 @@
+"""A NodeDriver with somebody to tell, for tests."""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any, cast
+from uuid import UUID, uuid4, uuid5
+
+from m2pem.api import ArbiterContext, BehaviorRequest, BehaviorState, Connection, ResourceId
+from m2pem.executive.clock import SystemClock
+from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
+from m2pem_plugin_ros.drivers.node import NodeDriver
+from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros.settings import Settings, Via
+
+AMPLE_S = 20.0
+LOOK_S = 0.005
+
+
+class Told:
+    """Implements `Told`: writes down what a driver tells."""
+
+    def __init__(self) -> None:
+        self.times_heard = 0
+        self.begun: list[UUID] = []
+        self.ends: list[tuple[UUID, Outcome]] = []
+
+    def heard(self) -> None:
+        self.times_heard += 1
+
+    def progress(self, goal: UUID) -> None:
+        if goal not in self.begun:
+            self.begun.append(goal)
+
+    def ended(self, goal: UUID, outcome: Outcome) -> None:
+        self.ends.append((goal, outcome))
+
+
+class Bench:
+    """The driver of one vehicle, and what it has told."""
+
+    def __init__(self, ros: RosRuntime, vehicle: str, via: Via, speed: float = 1.0) -> None:
+        self.told = Told()
+        self.ros = ros
+        self.clock = SystemClock(speed)
+        logger = logging.getLogger("m2pem.test")
+        context = ArbiterContext(self.clock, cast("Any", None), logger, (38.0, -77.0, 60.0))
+        self.vehicle = ResourceId(vehicle)
+        settings = Settings(f"/{vehicle}", via=via)
+        connection = Connection(self.vehicle, "ground")
+        seat = Seat(connection, settings, context, ros, cast("Any", None), self.told)
+        self.driver = NodeDriver(seat)
+
+    def order(self, behavior: str, *, preempts: tuple[UUID, ...] = (), **parameters: Any) -> Order:
+        """An order of a run of its own."""
+        return self.order_of(uuid4(), 1, behavior, preempts=preempts, **parameters)
+
+    def order_of(
+        self,
+        run: UUID,
+        epoch: int,
+        behavior: str,
+        *,
+        preempts: tuple[UUID, ...] = (),
+        **parameters: Any,
+    ) -> Order:
+        goal = uuid5(run, f"{uuid4()}")
+        request = BehaviorRequest(f"r1.{goal}", epoch, behavior, parameters, (self.vehicle,))
+        return Order(request, goal, run, preempts)
+
+    def begin(self, behavior: str, **parameters: Any) -> Order:
+        order = self.order(behavior, **parameters)
+        self.driver.begin(order)
+        return order
+
+    async def until(self, holds: Callable[[], object]) -> None:
+        """Wait for a condition."""
+        async with asyncio.timeout(AMPLE_S):
+            while not holds():  # noqa: ASYNC110  # what is waited for has no event
+                await asyncio.sleep(LOOK_S)
+
+    async def heard(self) -> None:
+        """Wait until the vehicle was heard."""
+        await self.until(lambda: self.told.times_heard)
+
+    async def running(self, order: Order) -> None:
+        """Wait until the vehicle does it."""
+        await self.until(lambda: order.goal in self.told.begun)
+
+    async def end_of(self, order: Order) -> Outcome:
+        """How it ended."""
+        await self.until(lambda: order.goal in [goal for goal, _ in self.told.ends])
+        return next(outcome for goal, outcome in self.told.ends if goal == order.goal)
+
+    @property
+    def begun(self) -> int:
+        """How often the vehicle has begun something, by its own count; 0 if it was not heard."""
+        return int(self.driver.health.mode.removeprefix("begun ") or 0)
+
+
+@asynccontextmanager
+async def bench(
+    domain: int, vehicle: str, via: Via = Via.TOPICS, speed: float = 1.0
+) -> AsyncIterator[Bench]:
+    """A driver that is open."""
+    async with RosRuntime("tested", domain_id=domain) as ros:
+        made = Bench(ros, vehicle, via, speed)
+        await made.driver.open()
+        try:
+            yield made
+        finally:
+            await made.driver.close()
+
+
+SUCCEEDED = BehaviorState.SUCCEEDED
+CANCELLED = BehaviorState.CANCELLED
+FAILED = BehaviorState.FAILED
+REJECTED = BehaviorState.REJECTED
+LOST = BehaviorState.LOST
+RUNNING = BehaviorState.RUNNING
+UNKNOWN = BehaviorState.UNKNOWN
