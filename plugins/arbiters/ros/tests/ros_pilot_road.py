@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from uuid import UUID
 
 from m2pem_plugin_ros.pilot import Ending, Pilot, Seen, Step, Target, Wishes, make_motion
@@ -138,7 +139,7 @@ class Road:
 def off_path(place: Place, places: Sequence[Place]) -> float:
     """How far a place is from a path."""
     nearest = math.inf
-    for (ae, an), (be, bn) in zip(places, places[1:], strict=False):
+    for (ae, an), (be, bn) in pairwise(places):
         length2 = (be - ae) ** 2 + (bn - an) ** 2
         along = ((place[0] - ae) * (be - ae) + (place[1] - an) * (bn - an)) / length2
         along = max(0.0, min(1.0, along))

@@ -1,6 +1,7 @@
 """Routes: how near the pilot keeps to them, how it ends them, and that it skips nothing."""
 
 import math
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -88,7 +89,7 @@ def test_who_has_a_turning_circle_keeps_within_two_circles_and_ends_where_it_sho
 def test_where_a_route_crosses_itself_nothing_is_skipped(bounds: Bounds) -> None:
     road = Road(bounds)
     driven = drive(road, FIGURE_EIGHT)
-    steps = [after - before for before, after in zip(driven, driven[1:], strict=False)]
+    steps = [after - before for before, after in pairwise(driven)]
     # A corner that is cut is shorter than the route, by less than a lookahead.
     assert max(steps) <= lookahead(bounds, bounds.speed_m_s)
     length = sum(

@@ -98,7 +98,7 @@ class Pilot:
 
     def fail(self, reason: str) -> None:
         """Stop, and let what it does fail."""
-        if self._goal is not None:
+        if self._goal is not None and self._ending is None:
             self._end_with(Ending(BehaviorState.FAILED, "", reason))
 
     def hold(self) -> None:
