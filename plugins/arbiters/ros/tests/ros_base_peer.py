@@ -1,14 +1,14 @@
 """A plain base in plain rclpy: it does what cmd_vel says and publishes odometry in the frame map.
 
-Lines on its input change it: "mute" and "speak" (odometry), "stick 0.5 0.2" (an operator's stick is
-held so) and "stick off", "intrude" (a second publisher of cmd_vel appears). Arguments: the topics'
-namespace, then "stamped" if commands are TwistStamped, then a factor for time.
+The topic "orders" changes it: "home" (it stands at the origin, and all is well), "mute" and "speak"
+(odometry), "stick 0.5 0.2" (an operator's stick is held so) and "stick off", "intrude" (a second
+publisher of cmd_vel appears), "block" (the wheels do not turn). What it is commanded goes to the
+topic "said". Arguments: the namespace, "plain" or "stamped" commands, and a factor for time.
 """
 
 import contextlib
 import math
 import sys
-import threading
 import time
 from typing import Any
 
@@ -33,14 +33,16 @@ class Base:
         self.forward = self.turning = 0.0
         self.wanted = (0.0, 0.0)
         self.wanted_at = 0.0
-        self.mute = False
+        self.mute = self.blocked = False
         self.stick: tuple[float, float] | None = None
+        self.intruder: Any = None
         self.kind = TwistStamped if stamped else Twist
         self.last = time.monotonic()
         self.odometry = self.node.create_publisher(Odometry, "odom", qos_profile_sensor_data)
         self.said = self.node.create_publisher(String, "said", 100)
         self.stick_topic = self.node.create_publisher(self.kind, "cmd_vel_teleop", 1)
         self.node.create_subscription(self.kind, "cmd_vel", self.hear, 10)
+        self.node.create_subscription(String, "orders", self.obey, 10)
         self.node.create_timer(PERIOD_S, self.move)
 
     def hear(self, message: Any) -> None:
@@ -53,7 +55,7 @@ class Base:
         now = time.monotonic()
         dt, self.last = (now - self.last) * self.speed, now
         heard = now - self.wanted_at < COMMAND_LASTS_S
-        wanted = self.wanted if heard else (0.0, 0.0)
+        wanted = self.wanted if heard and not self.blocked else (0.0, 0.0)
         part = 1.0 - math.exp(-dt / LAG_S)
         self.forward += part * (wanted[0] - self.forward)
         self.turning += part * (wanted[1] - self.turning)
@@ -79,22 +81,27 @@ class Base:
         message.twist.twist.angular.z = self.turning
         return message
 
-    def read(self) -> None:
-        for line in sys.stdin:
-            words = line.split()
-            if words[0] in ("mute", "speak"):
-                self.mute = words[0] == "mute"
-            elif words[0] == "stick":
-                self.stick = None if words[1] == "off" else (float(words[1]), float(words[2]))
-            elif words[0] == "intrude":
-                self.node.create_publisher(self.kind, "cmd_vel", 1)
+    def obey(self, order: String) -> None:
+        words = order.data.split()
+        if words[0] == "home":
+            self.east = self.north = self.yaw = self.forward = self.turning = 0.0
+            self.wanted, self.mute, self.blocked, self.stick = (0.0, 0.0), False, False, None
+            if self.intruder is not None:
+                self.node.destroy_publisher(self.intruder)
+        elif words[0] in ("mute", "speak"):
+            self.mute = words[0] == "mute"
+        elif words[0] == "stick":
+            self.stick = None if words[1] == "off" else (float(words[1]), float(words[2]))
+        elif words[0] == "intrude":
+            self.intruder = self.node.create_publisher(self.kind, "cmd_vel", 1)
+        elif words[0] == "block":
+            self.blocked = True
 
 
 def main() -> None:
     namespace, kind, speed = sys.argv[1:]
     rclpy.init()
     base = Base(namespace, kind == "stamped", float(speed))
-    threading.Thread(target=base.read, daemon=True).start()
     print("ready", flush=True)
     with contextlib.suppress(ExternalShutdownException):
         rclpy.spin(base.node)

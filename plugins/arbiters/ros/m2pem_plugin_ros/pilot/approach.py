@@ -32,6 +32,10 @@ class Approach:
         self._nearest_m = math.inf
         self._no_nearer_s = 0.0
 
+    def stop_here(self) -> None:
+        """It is there: nothing is to be gained by coming nearer."""
+        self._there = True
+
     def step(self, scene: Scene, point: Place, speed_m_s: float) -> Wish | Ending:
         """One step; an ending when it is there and stands, or comes no nearer."""
         distance = math.dist(place_of(scene.pose), point)

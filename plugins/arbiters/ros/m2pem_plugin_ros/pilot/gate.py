@@ -2,7 +2,7 @@
 
 import math
 
-from m2pem_plugin_ros.pilot.plane import finite_pose, place_of
+from m2pem_plugin_ros.pilot.plane import place_of, sane_pose
 from m2pem_plugin_ros.pose import Pose
 
 IGNORED = 3
@@ -25,12 +25,17 @@ class PoseGate:
         self._believed_s = -math.inf
         self._ignored = 0
 
+    @property
+    def doubts(self) -> bool:
+        """Whether the pose to go by is an old one, since the last cannot be."""
+        return self._ignored > 0
+
     def pose(self, pose: Pose | None, heard_s: float, *, strict: bool = True) -> Pose | None:
         """The pose to go by, given the one that was heard at `heard_s`; None: there is none.
 
         Not `strict`: nothing depends on it, and whatever is a pose is believed.
         """
-        pose = finite_pose(pose)
+        pose = sane_pose(pose)
         if pose is None:
             return None
         if heard_s - self._heard_s < SAME_S and self._believed is not None:

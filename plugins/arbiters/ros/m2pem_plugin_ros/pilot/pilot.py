@@ -11,7 +11,7 @@ from m2pem.api import BehaviorState
 from m2pem_plugin_ros.pilot.gate import MARGIN, PoseGate
 from m2pem_plugin_ros.pilot.governor import Governor
 from m2pem_plugin_ros.pilot.motions.motion import Motion
-from m2pem_plugin_ros.pilot.plane import finite_twist, place_of
+from m2pem_plugin_ros.pilot.plane import place_of, sane_twist
 from m2pem_plugin_ros.pilot.stuck import STUCK_S, StuckWatch
 from m2pem_plugin_ros.pilot.wishes import Wishes
 from m2pem_plugin_ros.pilot.words import STAND, Ending, Scene, Seen, Step, Wish
@@ -49,6 +49,7 @@ class Pilot:
         self._motion: Motion | None = None
         self._ending: Ending | None = None
         self._held = False
+        self._wished = STAND
         self._stopping_s = 0.0
         self._still_s = 0.0
         self._quiet_s = QUIET_S
@@ -88,6 +89,7 @@ class Pilot:
         """Do this in place of what it does, without a stop between."""
         self._goal, self._motion, self._ending = goal, motion, None
         self._held = False
+        self._wished = STAND
         self._driven_from = None
         self._speak()
 
@@ -134,7 +136,7 @@ class Pilot:
             pose = self._gate.pose(seen.pose, seen.now_s - seen.age_s, strict=not idle)
         if pose is None:
             return self._blind(dt_s)
-        twist = finite_twist(seen.twist)
+        twist = sane_twist(seen.twist)
         if not self.busy:
             self._governor.moved_by_others(twist.forward_m_s if twist is not None else 0.0)
             return Step(None)
@@ -154,6 +156,8 @@ class Pilot:
         motion = self._motion
         if motion is None or self._held or self._ending is not None:
             return STAND
+        if self._gate.doubts:  # nothing ends, nor begins, where it may not be
+            return self._wished
         self._find(motion, pose, dt_s)
         scene = Scene(
             dt_s=dt_s,
@@ -162,13 +166,14 @@ class Pilot:
             stands=stands,
             bounds=self._bounds,
             target=seen.target,
-            stick=finite_twist(seen.stick) if seen.stick_age_s <= STALE_S else None,
+            stick=sane_twist(seen.stick) if seen.stick_age_s <= STALE_S else None,
         )
         result = motion.step(scene)
-        if isinstance(result, Wish):
-            return result
-        self._end_with(result)
-        return STAND
+        if isinstance(result, Ending):
+            self._end_with(result)
+            result = STAND
+        self._wished = result
+        return result
 
     def _find(self, motion: Motion, pose: Pose, dt_s: float) -> None:
         """Tell the motion if it did not drive here itself."""

@@ -32,15 +32,24 @@ def yaw_towards(start: Place, end: Place) -> float:
     return math.atan2(end[1] - start[1], end[0] - start[0])
 
 
-def finite_pose(pose: Pose | None) -> Pose | None:
-    """The pose, unless something in it is no number."""
-    if pose is None or not math.isfinite(pose.east_m + pose.north_m + pose.yaw_rad):
+FARTHEST_M = 1e6
+FASTEST = 1e3
+"""What is farther from the origin, or faster in m/s or rad/s, is no pose or twist of a base."""
+
+
+def sane_pose(pose: Pose | None) -> Pose | None:
+    """The pose, unless something in it is no number, or none that can be."""
+    if pose is None or not math.isfinite(pose.yaw_rad):
         return None
-    return pose
+    return pose if _within(FARTHEST_M, pose.east_m, pose.north_m) else None
 
 
-def finite_twist(twist: Twist | None) -> Twist | None:
-    """The twist, unless something in it is no number."""
-    if twist is None or not math.isfinite(twist.forward_m_s + twist.yaw_rad_s):
+def sane_twist(twist: Twist | None) -> Twist | None:
+    """The twist, unless something in it is no number, or none that can be."""
+    if twist is None or not _within(FASTEST, twist.forward_m_s, twist.yaw_rad_s):
         return None
     return twist
+
+
+def _within(bound: float, *numbers: float) -> bool:
+    return all(-bound <= number <= bound for number in numbers)  # not if it is no number

@@ -9,9 +9,8 @@ from m2pem_plugin_ros.settings import Bounds
 
 LOOKAHEAD_M = 1.0
 LOOKAHEAD_S = 1.0
-LOOKAHEAD_RADII = 1.5
-"""How far ahead along a path one steers: this, more with speed, and no less than so many turning
-radii, since a base that cannot turn so soon would swing about the path."""
+"""How far ahead along a path one steers: this, and more with speed. It is never less than a turning
+radius, since a base that cannot turn so soon would swing about the path."""
 
 SPOT_RAD = math.radians(50.0)
 """A base that can turns on the spot towards what is farther to the side than this."""
@@ -31,7 +30,7 @@ NEAREST_M = 0.3
 
 def lookahead(bounds: Bounds, speed_m_s: float) -> float:
     """How far ahead along a path to steer, in metres."""
-    return max(LOOKAHEAD_M, LOOKAHEAD_RADII * bounds.turn_radius_m) + LOOKAHEAD_S * abs(speed_m_s)
+    return max(LOOKAHEAD_M, bounds.turn_radius_m) + LOOKAHEAD_S * abs(speed_m_s)
 
 
 def braking_speed(bounds: Bounds, distance_m: float, end_m_s: float = 0.0) -> float:

@@ -1,6 +1,7 @@
 """Staying with another vehicle."""
 
 import math
+from dataclasses import replace
 
 from m2pem.api import BehaviorState
 from m2pem_plugin_ros.pilot.approach import Approach
@@ -51,18 +52,30 @@ class Follow(Motion):
         if target is None or not target.age_s <= UNHEARD_S:
             reason = f"{self.target} has not been heard for {UNHEARD_S:g} s"
             return Ending(BehaviorState.FAILED, "", reason)
-        here = place_of(scene.pose)
         place = _now_at(target)
-        ahead = turned(scene.pose.yaw_rad, yaw_towards(here, place))
-        if math.dist(here, place) < CLEARANCE_M and abs(ahead) < math.pi / 2:
-            return STAND
         course_rad, speed = _motion(target)
+        wish = self._towards(scene, target, place, course_rad, speed)
+        return self._clear(scene, wish, place, speed)
+
+    def _towards(
+        self, scene: Scene, target: Target, place: Place, course_rad: float, speed: float
+    ) -> Wish:
         station = beyond(place, target.pose.yaw_rad - self._bearing_rad, self._offset_m)
         if speed < STANDING_M_S:
             return self._to_rest(scene, station)
         self._at_station = False
         self._approach = None
         return self._keep_up(scene, station, course_rad, speed)
+
+    def _clear(self, scene: Scene, wish: Wish, place: Place, speed: float) -> Wish:
+        """The same, but not into the target: as fast as it moves, and as one can still brake."""
+        here = place_of(scene.pose)
+        ahead = turned(scene.pose.yaw_rad, yaw_towards(here, place))
+        if abs(ahead) > math.pi / 2:
+            return wish
+        room = math.dist(here, place) - CLEARANCE_M
+        allowed = braking_speed(self.bounds, room, speed if room > 0 else 0.0)
+        return replace(wish, speed_m_s=min(wish.speed_m_s, allowed))
 
     def adjust(self, wishes: Wishes) -> None:
         """Speed and station."""

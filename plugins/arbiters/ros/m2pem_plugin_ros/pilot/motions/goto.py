@@ -20,8 +20,10 @@ CLEARANCE_M = 3.0
 
 TURNED_RAD = math.radians(3.0)
 TURNED_ENOUGH_RAD = math.radians(10.0)
-RUN_UP_RADII = 4.0
-"""What cannot turn on the spot comes from so far behind the place, to point as it should."""
+RUN_UP_RADII = 6.0
+RUN_UPS = 3
+"""What cannot turn on the spot comes from so far behind the place, to point as it should. If it
+misses the place, it tries again; after so many times it goes there as it can."""
 
 UNHEARD_S = 3.0
 """A vehicle that has not been heard for so long is no target any more."""
@@ -44,6 +46,7 @@ class Goto(Motion):
         self._approach = Approach(tolerance, moves=bool(self.target))
         self._arrived = False
         self._run_up: Tour | None = None
+        self._run_ups = 0
         if self.target and self._yaw_rad is not None and bounds.turn_radius_m > 0:
             raise RefusedError(
                 "parameter 'heading': what cannot turn on the spot cannot choose how it points "
@@ -58,8 +61,10 @@ class Goto(Motion):
             return Ending(BehaviorState.FAILED, "", reason)
         if self._arrived:
             return self._turn(scene)
-        if self._aims() and (wish := self._from_behind(scene, place)) is not None:
-            return wish
+        if self._aims():
+            wish = self._from_behind(scene, place)
+            if wish is not None:
+                return wish
         done = self._approach.step(scene, place, self.speed_m_s)
         if isinstance(done, Wish) or done.state is not BehaviorState.SUCCEEDED:
             return done
@@ -108,11 +113,20 @@ class Goto(Motion):
 
     def _from_behind(self, scene: Scene, place: Place) -> Wish | None:
         """To the place on a line in the direction of the heading; None at its end."""
-        if self._run_up is None:
+        if self._run_up is not None:
+            wish = self._run_up.step(scene, self.speed_m_s)
+            if wish is not None:
+                return wish
+            self._run_up = None
+        if math.dist(place_of(scene.pose), place) <= self.tolerance_m:
+            self._approach.stop_here()
+        elif self._run_ups < RUN_UPS:
+            self._run_ups += 1
             run_up_m = RUN_UP_RADII * self.bounds.turn_radius_m
             before = beyond(place, self._yaw_rad or 0.0, -run_up_m)
             self._run_up = Tour(Path((place_of(scene.pose), before, place)), self.bounds)
-        return self._run_up.step(scene, self.speed_m_s)
+            return self._run_up.step(scene, self.speed_m_s)
+        return None
 
     def _turn(self, scene: Scene) -> Wish | Ending:
         if self._yaw_rad is None or self.bounds.turn_radius_m > 0:

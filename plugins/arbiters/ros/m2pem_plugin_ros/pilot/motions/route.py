@@ -48,6 +48,8 @@ class SingleVehicleRouting(Motion):
             if wish is not None:
                 return wish
             self._ends = Approach(TOLERANCE_M)
+            if math.dist(place_of(scene.pose), self.places[-1]) <= TOLERANCE_M:
+                self._ends.stop_here()
         return self._ends.step(scene, self.places[-1], self.speed_m_s)
 
     def found_at(self, place: Place, moved_m: float) -> None:
