@@ -1,0 +1,92 @@
+"""The topics of a plain base: velocities out, those of an operator's stick in."""
+
+import asyncio
+import logging
+from typing import Any
+
+import geometry_msgs.msg
+from rclpy.duration import Duration
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+from m2pem_plugin_ros.pose import Twist
+from m2pem_plugin_ros.runtime import RosRuntime, qos
+from m2pem_plugin_ros.settings import Settings
+
+LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+"""An old command is worth nothing, so none waits for another."""
+
+ARRIVED_WITHIN_S = 0.5
+
+logger = logging.getLogger(__name__)
+
+
+class CommandTopic:
+    """Tells the base how to move."""
+
+    def __init__(self, ros: RosRuntime, settings: Settings) -> None:
+        self._node = ros.node
+        self._stamped = settings.stamped
+        name = full_name(settings, settings.topics.cmd_vel)
+        self._publisher = self._node.create_publisher(_message_type(settings), name, LATEST)
+
+    @property
+    def name(self) -> str:
+        """The topic's full name."""
+        return str(self._publisher.topic_name)
+
+    def send(self, twist: Twist) -> None:
+        """Publish a command."""
+        velocity = geometry_msgs.msg.Twist()
+        velocity.linear.x = twist.forward_m_s
+        velocity.angular.z = twist.yaw_rad_s
+        if not self._stamped:
+            self._publisher.publish(velocity)
+            return
+        message = geometry_msgs.msg.TwistStamped(twist=velocity)
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        message.header.frame_id = "base_link"
+        self._publisher.publish(message)
+
+    def others(self) -> int:
+        """How many others publish commands for the base."""
+        return max(0, int(self._node.count_publishers(self.name)) - 1)
+
+    async def stop(self) -> None:
+        """Tell it to stand, and wait a moment until it has heard that."""
+        self.send(Twist())
+        arrived = await asyncio.to_thread(
+            self._publisher.wait_for_all_acked, Duration(seconds=ARRIVED_WITHIN_S)
+        )
+        if not arrived:
+            logger.warning("%s: the last command, to stand, was not acknowledged", self.name)
+
+
+class StickTopic:
+    """What an operator's stick said last."""
+
+    def __init__(self, ros: RosRuntime, settings: Settings) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._stamped = settings.stamped
+        self._heard_s = -1e9
+        self.twist: Twist | None = None
+        name = full_name(settings, settings.topics.teleop)
+        ros.subscribe(_message_type(settings), name, self._hear, qos.TELEMETRY)
+
+    @property
+    def age_s(self) -> float:
+        """In real seconds: the operator is a real one."""
+        return self._loop.time() - self._heard_s
+
+    def _hear(self, message: Any) -> None:
+        twist = message.twist if self._stamped else message
+        self.twist = Twist(twist.linear.x, twist.angular.z)
+        self._heard_s = self._loop.time()
+
+
+def full_name(settings: Settings, name: str) -> str:
+    """A topic's name; what does not begin with "/" is in the vehicle's namespace."""
+    return name if name.startswith("/") else f"{settings.namespace.rstrip('/')}/{name}"
+
+
+def _message_type(settings: Settings) -> Any:
+    return geometry_msgs.msg.TwistStamped if settings.stamped else geometry_msgs.msg.Twist
