@@ -59,7 +59,9 @@ ROS_PYTHON := $(ROS)/bin/python
 ROS_PLUGINS := $(wildcard plugins/arbiters/ros plugins/ocu/mocu)
 ROS_PIP := PIP_CONSTRAINT=ros/constraints.txt PIP_BUILD_CONSTRAINT=ros/constraints.txt \
   $(ROS_PYTHON) -m pip --quiet --disable-pip-version-check
-ROS_INTERFACES := $(sort $(shell find ros/m2pem_interfaces -type f -not -name '*.pyc'))
+# Of Nav2, the tests have a double: its own interfaces are in no registry of wheels.
+ROS_PACKAGES := ros/m2pem_interfaces plugins/arbiters/ros/tests/nav2_testdouble
+ROS_INTERFACES := $(sort $(shell find $(ROS_PACKAGES) -type f -not -name '*.pyc'))
 ROS_CACHE := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/m2pem/ros
 ROS_IDENTITY := $(strip $(CURDIR) $(shell $(PYTHON) -V 2>&1))
 ifneq ($(shell $(ROS_PYTHON) -c '' 2>/dev/null && cat $(ROS)/created 2>/dev/null),$(ROS_IDENTITY))
@@ -76,9 +78,9 @@ $(ROS)/created: ros/constraints.txt
 $(ROS)/interfaces: $(ROS)/created $(ROS_INTERFACES)
 	@kept=$(ROS_CACHE)/$$({ $(ROS_PYTHON) -VV; sha256sum ros/constraints.txt $(ROS_INTERFACES); } | sha256sum | cut -c 1-16); \
 	if [ ! -d "$$kept" ]; then \
-	  echo "Building ros/m2pem_interfaces; this takes minutes, once"; \
+	  echo "Building interfaces of ROS; this takes minutes, once"; \
 	  mkdir -p "$(ROS_CACHE)"; building=$$(mktemp -d "$(ROS_CACHE)/building.XXXXXX"); trap 'rm -rf "$$building"' EXIT; \
-	  $(ROS_PIP) wheel --no-deps --wheel-dir "$$building" ./ros/m2pem_interfaces; \
+	  $(ROS_PIP) wheel --no-deps --wheel-dir "$$building" $(ROS_PACKAGES:%=./%); \
 	  mv -T "$$building" "$$kept" 2>/dev/null || [ -d "$$kept" ]; \
 	fi; \
 	$(ROS_PIP) install --no-deps --force-reinstall "$$kept"/*.whl

@@ -1,0 +1,175 @@
+"""A Nav2Driver in the test's process, told what the arbiter would tell it."""
+
+import asyncio
+import logging
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from uuid import UUID, uuid4
+
+from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
+from m2pem_plugin_ros.drivers.nav2 import Nav2Driver
+from m2pem_plugin_ros.frames import to_geodetic
+from m2pem_plugin_ros.localization import TopicLocalization
+from m2pem_plugin_ros.runtime import RosRuntime, qos
+from m2pem_plugin_ros.settings import DriverName, RouteAction, Settings
+from std_msgs.msg import String, UInt32
+
+from m2pem.api import (
+    ArbiterContext,
+    BehaviorRequest,
+    BehaviorState,
+    Connection,
+    PayloadState,
+    Point,
+    ResolvedValue,
+    ResourceId,
+    Route,
+    VehicleState,
+)
+
+PEER = Path(__file__).with_name("ros_nav2_peer.py")
+ORIGIN = (38.1075, -77.3192, 60.0)
+VEHICLE = ResourceId("ugv1")
+AMPLE_S = 15.0
+
+
+class WallClock:
+    """The clock of the wall."""
+
+    def now_us(self) -> int:
+        return time.time_ns() // 1000
+
+    async def sleep(self, seconds: float) -> None:
+        await asyncio.sleep(seconds)
+
+    async def sleep_until(self, time_us: int) -> None:
+        await asyncio.sleep((time_us - self.now_us()) / 1e6)
+
+
+@dataclass
+class Bus:
+    """What the other vehicles say."""
+
+    states: dict[ResourceId, VehicleState] = field(default_factory=dict)
+
+    def latest(self, resource: ResourceId) -> VehicleState | PayloadState | None:
+        return self.states.get(resource)
+
+    def publish(self, state: VehicleState | PayloadState) -> None:
+        assert isinstance(state, VehicleState)
+        self.states[state.resource] = state
+
+    def subscribe(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
+        raise NotImplementedError
+
+
+def at(east_m: float, north_m: float) -> Point:
+    """A target there."""
+    position = to_geodetic(east_m, north_m, 0.0, ORIGIN)
+    return Point((position.latitude_deg, position.longitude_deg, None))
+
+
+def along(*places: tuple[float, float]) -> Route:
+    """A route there."""
+    return Route(tuple(at(*place).position for place in places))
+
+
+class Diary:
+    """What the driver has told."""
+
+    def __init__(self) -> None:
+        self.outcomes: dict[UUID, Outcome] = {}
+        self.begun: list[UUID] = []
+        self.heards = 0
+
+    def heard(self) -> None:
+        self.heards += 1
+
+    def progress(self, goal: UUID) -> None:
+        self.begun.append(goal)
+
+    def ended(self, goal: UUID, outcome: Outcome) -> None:
+        self.outcomes[goal] = outcome
+
+
+class Bench:
+    """The driver, and what it has told."""
+
+    def __init__(self, ros: RosRuntime, route_action: RouteAction, name: ResourceId) -> None:
+        self.ros = ros
+        self.told = Diary()
+        self.bus = Bus()
+        self.motions = -1
+        settings = Settings(f"/{name}", driver=DriverName.NAV2, route_action=route_action)
+        context = ArbiterContext(WallClock(), self.bus, logging.getLogger("bench"), ORIGIN)
+        self.localization = TopicLocalization(ros, name, settings, context)
+        connection = Connection(name, "ground", sitl=True)
+        seat = Seat(connection, settings, context, ros, self.localization, self.told)
+        self.driver = Nav2Driver(seat)
+        self._words = ros.node.create_publisher(String, f"/{name}/words", qos.EVENTS)
+        ros.subscribe(UInt32, f"/{name}/motions", self._count, qos.STATUS)
+
+    async def ready(self) -> None:
+        await self.until(lambda: self.driver.health.ready and self.localization.pose is not None)
+        await self.until(lambda: self._words.get_subscription_count() and self.motions >= 0)
+
+    def order(self, behavior: str, goal: UUID | None = None, **wishes: ResolvedValue) -> Order:
+        request = BehaviorRequest("r1.b1", 1, behavior, wishes, (VEHICLE,))
+        return Order(request, goal or uuid4(), uuid4())
+
+    def begin(self, behavior: str, **wishes: ResolvedValue) -> UUID:
+        order = self.order(behavior, **wishes)
+        assert self.driver.refusal(order.request) == ""
+        self.driver.begin(order)
+        return order.goal
+
+    async def outcome(self, goal: UUID) -> Outcome:
+        await self.until(lambda: goal in self.told.outcomes)
+        return self.told.outcomes[goal]
+
+    async def state(self, goal: UUID) -> BehaviorState:
+        return (await self.outcome(goal)).state
+
+    async def until(self, holds: Callable[[], object], within_s: float = AMPLE_S) -> None:
+        async with asyncio.timeout(within_s):
+            while not holds():  # noqa: ASYNC110  # what is looked at has no event
+                await asyncio.sleep(0.01)
+
+    async def moving(self) -> None:
+        await self.until(lambda: self.speed_m_s > 0.5)
+
+    def say(self, words: str) -> None:
+        self._words.publish(String(data=words))
+
+    @property
+    def speed_m_s(self) -> float:
+        twist = self.localization.twist
+        return 0.0 if twist is None else abs(twist.forward_m_s)
+
+    @property
+    def place(self) -> tuple[float, float]:
+        pose = self.localization.pose
+        assert pose is not None
+        return pose.east_m, pose.north_m
+
+    def _count(self, message: Any) -> None:
+        self.motions = message.data
+
+
+@asynccontextmanager
+async def bench(
+    domain: int, route_action: RouteAction = RouteAction.THROUGH, name: ResourceId = VEHICLE
+) -> AsyncIterator[Bench]:
+    """A driver that is open and ready."""
+    async with RosRuntime("bench", domain_id=domain) as ros:
+        made = Bench(ros, route_action, name)
+        await made.driver.open()
+        try:
+            await made.ready()
+            yield made
+        finally:
+            await made.driver.close()
