@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     from m2pem.resources.behaviors import SHARED
     from m2pem.resources.fleet import Fleet
     from m2pem.resources.lawn_mower import lawn_mower, longest_edge_yaw
+    from m2pem.resources.units import Dimension, UnitError, quantity
 
 # Loaded when asked for: an arbiter's module need not pay for what an OCU imports.
 _MODULES = {
@@ -93,6 +94,7 @@ _MODULES = {
     "m2pem.resources.behaviors": "SHARED",
     "m2pem.resources.fleet": "Fleet",
     "m2pem.resources.lawn_mower": "lawn_mower longest_edge_yaw",
+    "m2pem.resources.units": "Dimension UnitError quantity",
 }
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 
@@ -112,6 +114,7 @@ __all__ = [
     "Connection",
     "Decision",
     "Detection",
+    "Dimension",
     "Finding",
     "Fleet",
     "FleetBus",
@@ -145,12 +148,14 @@ __all__ = [
     "Severity",
     "SimulationResult",
     "StampedRecord",
+    "UnitError",
     "Value",
     "VehiclePosition",
     "VehicleState",
     "lawn_mower",
     "longest_edge_yaw",
     "parse_mission",
+    "quantity",
 ]
 
 

@@ -98,6 +98,12 @@ class RosRuntime:
         self._nodes.append(node)
         return node
 
+    def drop_node(self, node: Node) -> None:
+        """Destroy a node of `make_node` with all that it has, before the end."""
+        self._nodes.remove(node)
+        self.executor.remove_node(node)
+        _destroy(node)
+
     def subscribe(
         self,
         message_type: Any,
@@ -256,10 +262,7 @@ class RosRuntime:
 
     def _let_go(self) -> None:
         for node in self._nodes:
-            for waitable in list(node.waitables):
-                if isinstance(waitable, ActionClient | ActionServer):  # nodes forget about these
-                    waitable.destroy()
-            node.destroy_node()
+            _destroy(node)
         self._nodes.clear()
         self.executor.shutdown(timeout_sec=0)
         rclpy.try_shutdown(context=self.context)
@@ -276,6 +279,13 @@ class RosRuntime:
             except Exception:  # one bad message must not deafen us to the others
                 if self._closing is None:
                     logger.exception("ROS brought what cannot be handled")
+
+
+def _destroy(node: Node) -> None:
+    for waitable in list(node.waitables):
+        if isinstance(waitable, ActionClient | ActionServer):  # nodes forget about these
+            waitable.destroy()
+    node.destroy_node()
 
 
 def _security() -> str:

@@ -1,0 +1,146 @@
+"""What faults do to a vehicle, and how they are written."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from m2pem_plugin_ros.settings import DriverName
+from m2pem_plugin_ros.sim.troubles import Troubles
+from m2pem_plugin_ros.sim.vehicle import Vehicle
+
+LOW = 0.12
+"""So full is a low battery."""
+
+REFUSAL = "it has been told to refuse"
+FLOOD_PER_S = 5000.0
+NUMBER = r"(\d+(?:\.\d+)?)"
+
+
+class Afflicted(Protocol):
+    """A vehicle as a fault sees it."""
+
+    vehicle: Vehicle
+    troubles: Troubles
+
+    def kill(self) -> None:
+        """End all its nodes."""
+        ...
+
+    def kill_node(self) -> None:
+        """End what steers it on board."""
+        ...
+
+    def start(self) -> None:
+        """Begin the nodes that are not there."""
+        ...
+
+
+Action = Callable[[Afflicted], None]
+Made = tuple[Action, Action | None]
+"""What begins a fault, and what ends it (None: nothing does)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of fault. `drivers`: to which vehicles it can happen; `detector`: only with one."""
+
+    pattern: str
+    make: Callable[[re.Match[str]], Made]
+    drivers: tuple[DriverName, ...] = tuple(DriverName)
+    detector: bool = False
+
+
+def _trouble(name: str, value: object, normal: object) -> Callable[[re.Match[str]], Made]:
+    def made(_: re.Match[str]) -> Made:
+        return (
+            lambda host: setattr(host.troubles, name, value),
+            lambda host: setattr(host.troubles, name, normal),
+        )
+
+    return made
+
+
+def _odometer(name: str) -> Callable[[re.Match[str]], Made]:
+    def made(_: re.Match[str]) -> Made:
+        return (
+            lambda host: setattr(host.vehicle.odometer, name, True),
+            lambda host: setattr(host.vehicle.odometer, name, False),
+        )
+
+    return made
+
+
+def _jump(match: re.Match[str]) -> Made:
+    distance_m = float(match[1])
+    return (lambda host: host.vehicle.odometer.jump(distance_m)), None
+
+
+def _stuck(_: re.Match[str]) -> Made:
+    return (
+        lambda host: setattr(host.vehicle.body, "stuck", True),
+        lambda host: setattr(host.vehicle.body, "stuck", False),
+    )
+
+
+def _refuse(match: re.Match[str]) -> Made:
+    return _trouble("refusal", match[1] or REFUSAL, None)(match)
+
+
+def _flood(match: re.Match[str]) -> Made:
+    per_s = FLOOD_PER_S if match[1] is None else float(match[1])
+    return _trouble("flood_per_s", per_s, 0.0)(match)
+
+
+def _battery(match: re.Match[str]) -> Made:
+    left = LOW if match[1] is None else float(match[1]) / 100
+    if left > 1:
+        raise ValueError("a battery has at most 100 %")
+    return (lambda host: setattr(host.vehicle.battery, "fraction", left)), None
+
+
+def _gps(_: re.Match[str]) -> Made:
+    return (
+        lambda host: setattr(host.vehicle, "gps_lost", True),
+        lambda host: setattr(host.vehicle, "gps_lost", False),
+    )
+
+
+def _detect(match: re.Match[str]) -> Made:
+    kind = match[1] or ""
+    return (lambda host: host.vehicle.detect(kind)), None
+
+
+def _kill(_: re.Match[str]) -> Made:
+    return (lambda host: host.kill()), (lambda host: host.start())
+
+
+def _kill_node(_: re.Match[str]) -> Made:
+    return (lambda host: host.kill_node()), (lambda host: host.start())
+
+
+def _start(_: re.Match[str]) -> Made:
+    return (lambda host: host.start()), None
+
+
+NODE_ONLY = (DriverName.NODE,)
+STEERED = (DriverName.NODE, DriverName.NAV2)
+KINDS: Mapping[str, Kind] = {
+    "silent": Kind(r"silent", _trouble("silent", True, False)),
+    "kill": Kind(r"kill", _kill),
+    "kill node": Kind(r"kill node", _kill_node),
+    "start": Kind(r"start", _start),
+    "stop odometry": Kind(r"stop odometry", _trouble("no_odometry", True, False)),
+    "freeze odometry": Kind(r"freeze odometry", _odometer("frozen")),
+    "odometry nan": Kind(r"odometry nan", _odometer("nonsense")),
+    "jump 20 m": Kind(rf"jump\s+{NUMBER}\s*m", _jump),
+    "wheels stuck": Kind(r"wheels stuck", _stuck),
+    "lose gps": Kind(r"lose gps", _gps),
+    "battery low, battery 12 %": Kind(rf"battery\s+(?:low|{NUMBER}\s*%)", _battery),
+    "detect, detect gpr": Kind(r"detect(?:\s+(\S+))?", _detect, detector=True),
+    'refuse, refuse "text"': Kind(r"refuse(?:\s+\"([^\"]+)\")?", _refuse, STEERED),
+    "never accept": Kind(r"never accept", _trouble("deaf", True, False), NODE_ONLY),
+    "lie": Kind(r"lie", _trouble("lies", True, False), NODE_ONLY),
+    "flood, flood 5000": Kind(rf"flood(?:\s+{NUMBER})?", _flood, NODE_ONLY),
+}
+"""How a fault is written, and what it is."""
