@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
@@ -15,6 +16,9 @@ from m2pem_plugin_ros.sim.vehicle import Vehicle
 
 TICK_S = 0.02
 """How often vehicles are moved on and publish, in seconds of the wall clock: at most 50 Hz."""
+
+COMMANDS_WITHIN_S = 0.1
+"""A base never stops for want of commands before so long, in seconds of the wall clock."""
 
 NODE = "m2pem_sim"
 
@@ -59,7 +63,8 @@ class Simulation:
     async def __aenter__(self) -> Self:
         try:
             for spec in self._specs:
-                host = Host(self._runtime(spec), Vehicle(spec, self._seed), self.clock)
+                vehicle = Vehicle(_patient(spec, self.clock.speed), self._seed)
+                host = Host(self._runtime(spec), vehicle, self.clock)
                 self._hosts[spec.name] = host
                 await host.open()
         except BaseException:
@@ -167,14 +172,21 @@ class Simulation:
         await asyncio.gather(*(ros.close() for ros in self._runtimes.values()))
 
 
+def _patient(spec: VehicleSpec, speed: float) -> VehicleSpec:
+    """At high speed, what is between two commands for a base is long in simulated time."""
+    timeout_s = max(spec.chassis.command_timeout_s, COMMANDS_WITHIN_S * speed)
+    return replace(spec, chassis=replace(spec.chassis, command_timeout_s=timeout_s))
+
+
 def _check(specs: Sequence[VehicleSpec]) -> None:
     if not specs:
         raise ValueError("there are no vehicles")
-    for what in ("name", "namespace"):
-        seen: dict[str, str] = {}
-        for spec in specs:
-            key = spec.name if what == "name" else spec.settings.namespace
-            if (other := seen.setdefault(key, spec.name)) != spec.name or (
-                what == "name" and sum(each.name == key for each in specs) > 1
-            ):
-                raise ValueError(f"{spec.name} and {other} have the same {what}: {key!r}")
+    for number, spec in enumerate(specs):
+        for other in specs[:number]:
+            if spec.name == other.name:
+                raise ValueError(f"two vehicles are called {spec.name}")
+            mine, theirs = spec.settings, other.settings
+            if (mine.namespace, mine.domain_id) == (theirs.namespace, theirs.domain_id):
+                raise ValueError(
+                    f"{other.name} and {spec.name} share the namespace {mine.namespace}"
+                )
