@@ -17,7 +17,7 @@ from m2pem_plugin_ros.sim.vehicle import Vehicle
 TICK_S = 0.02
 """How often vehicles are moved on and publish, in seconds of the wall clock: at most 50 Hz."""
 
-COMMANDS_WITHIN_S = 0.1
+COMMANDS_WITHIN_S = 0.25
 """A base never stops for want of commands before so long, in seconds of the wall clock."""
 
 NODE = "m2pem_sim"
