@@ -72,11 +72,18 @@ class Vehicle:
         for detector in self.detectors:
             self._found += [(detector, found) for found in detector.find(self.body.pose)]
 
-    def detect(self, kind: str = "") -> None:
-        """Find something here and now, with the first detector."""
+    def detect(self, what: str = "") -> None:
+        """Find something here and now: with the detector of that name, what it usually finds; else
+        such a thing with the first detector.
+
+        Raises:
+            ValueError: the vehicle carries no detector.
+        """
         if not self.detectors:
             raise ValueError(f"{self.spec.name} carries no detector")
-        detector, pose = self.detectors[0], self.body.pose
+        names = {each.spec.payload.rpartition("/")[2]: each for each in self.detectors}
+        detector, kind = names.get(what, self.detectors[0]), "" if what in names else what
+        pose = self.body.pose
         found = Found(kind or detector.spec.type, pose.east_m, pose.north_m)
         self._found.append((detector, found))
 

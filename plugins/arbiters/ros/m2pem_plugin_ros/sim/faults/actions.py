@@ -107,8 +107,8 @@ def _gps(_: re.Match[str]) -> Made:
 
 
 def _detect(match: re.Match[str]) -> Made:
-    kind = match[1] or ""
-    return (lambda host: host.vehicle.detect(kind)), None
+    what = match[1] or ""
+    return (lambda host: host.vehicle.detect(what)), None
 
 
 def _kill(_: re.Match[str]) -> Made:
