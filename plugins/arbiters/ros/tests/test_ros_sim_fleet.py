@@ -1,4 +1,4 @@
-"""What is simulated for a fleet file: the vehicles that an executive with the same file looks for."""
+"""What is simulated for a fleet file: what an executive with the same file looks for."""
 
 import math
 from pathlib import Path

@@ -1,6 +1,7 @@
 """What people say of simulated vehicles: settings and faults."""
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -101,12 +102,28 @@ def test_what_a_detector_cannot_find_is_refused(words: dict[str, Any], said: str
     assert said in str(caught.value)
 
 
+class Navigation:
+    """A Nav2 that notes what faults do to it."""
+
+    def __init__(self) -> None:
+        self.faults = SimpleNamespace(reject=False, hang=False, error_code=0)
+        self.state = "active"
+
+    def enter(self, state: str) -> None:
+        self.state = state
+
+
 class Patient:
     """A vehicle that notes what faults do to its nodes."""
 
     def __init__(self) -> None:
         self.vehicle, self.troubles = Vehicle(spec()), Troubles()
         self.nodes: list[str] = []
+        self.navigation: Any = Navigation()
+
+    @property
+    def nav2(self) -> Any:
+        return self.navigation
 
     def kill(self) -> None:
         self.nodes.append("kill")
@@ -122,7 +139,14 @@ class Patient:
         """All that faults switch on and off."""
         vehicle, odometer = self.vehicle, self.vehicle.odometer
         switches = (odometer.frozen, odometer.nonsense, vehicle.body.stuck, vehicle.gps_lost)
-        return (str(self.troubles), *switches, vehicle.battery.fraction, odometer.read(0).pose)
+        navigation = (str(self.nav2.faults), self.nav2.state)
+        return (
+            str(self.troubles),
+            *navigation,
+            *switches,
+            vehicle.battery.fraction,
+            odometer.read(0).pose,
+        )
 
 
 @pytest.mark.parametrize(
@@ -138,6 +162,10 @@ class Patient:
         "never accept",
         "lie",
         "flood",
+        "nav2 inactive",
+        "nav2 reject",
+        "nav2 hang",
+        "nav2 abort",
     ],
 )
 def test_what_a_fault_begins_it_ends(words: str) -> None:
@@ -168,6 +196,13 @@ def test_numbers_in_faults_count() -> None:
     assert patient.vehicle.battery.fraction == 0.3
     assert patient.vehicle.odometer.read(0).pose.north_m == pytest.approx(7.5)
     assert [found.type for _, found in patient.vehicle.detections()] == ["mine"]
+
+
+def test_a_nav2_that_is_dead_takes_no_harm() -> None:
+    patient = Patient()
+    patient.navigation = None
+    for words in ("nav2 inactive", "nav2 reject"):
+        parse(words).begin(patient)
 
 
 def test_every_fault_can_be_written_as_it_is_listed() -> None:

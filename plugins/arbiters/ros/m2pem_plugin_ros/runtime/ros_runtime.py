@@ -99,9 +99,9 @@ class RosRuntime:
         return node
 
     def drop_node(self, node: Node) -> None:
-        """Destroy a node of `make_node` with all that it has, before the end."""
-        self._nodes.remove(node)
+        """Let go of a node that `make_node` made, and of all that belongs to it."""
         self.executor.remove_node(node)
+        self._nodes.remove(node)
         _destroy(node)
 
     def subscribe(

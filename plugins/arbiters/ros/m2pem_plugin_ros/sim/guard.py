@@ -50,15 +50,15 @@ class GuardedNode:
     """A node whose topics go through a gate; everything else is as it was."""
 
     def __init__(self, node: Any, gate: Gate) -> None:
-        self._node = node
+        self.inner = node
         self._gate = gate
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._node, name)
+        return getattr(self.inner, name)
 
     def create_publisher(self, *arguments: Any, **options: Any) -> GuardedPublisher:
         """A publisher behind the gate."""
-        return GuardedPublisher(self._node.create_publisher(*arguments, **options), self._gate)
+        return GuardedPublisher(self.inner.create_publisher(*arguments, **options), self._gate)
 
     def create_subscription(
         self,
@@ -75,7 +75,7 @@ class GuardedNode:
             if gate.hears(name, message):
                 callback(message)
 
-        create = self._node.create_subscription
+        create = self.inner.create_subscription
         return create(message_type, topic, hear, *arguments, **options)
 
 
@@ -97,6 +97,12 @@ class GuardedRuntime:
         node = self._ros.make_node(name, namespace, **options)
         self._made.append(node)
         return GuardedNode(node, self.gate)
+
+    def drop_node(self, node: GuardedNode) -> None:
+        """End one of them; one that has ended is no more to be ended."""
+        if node.inner in self._made:
+            self._made.remove(node.inner)
+            self._ros.drop_node(node.inner)
 
     def subscribe(
         self,

@@ -46,6 +46,11 @@ class Host:
         """By what it is steered on board; BASE: by nothing."""
         return self.vehicle.spec.settings.driver
 
+    @property
+    def nav2(self) -> Any:
+        """The simulated Nav2; None: there is none, or it is dead."""
+        return self._way if self.driver is DriverName.NAV2 and self._steering else None
+
     async def open(self) -> None:
         """Begin its nodes."""
         await self._begin()
@@ -125,7 +130,9 @@ class Host:
             gate = NodeGate(self.troubles)
             name = f"{self.driver}_node"
             self._steering, self._gate = GuardedRuntime(self._ros, gate, name, namespace), gate
-            board = OnBoard(spec, self._steering, self._localization, self._clock, self.troubles)
+            board = OnBoard(
+                self.vehicle, self._steering, self._localization, self._clock, self.troubles
+            )
             self._way = make_way(board)
             await self._way.open()
 

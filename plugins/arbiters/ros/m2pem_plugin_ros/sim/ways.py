@@ -10,13 +10,13 @@ from m2pem.api import ArbiterContext, Connection, PayloadState, ResourceId, Vehi
 from m2pem_plugin_ros.drivers.driver import Driver, Seat, Told
 from m2pem_plugin_ros.localization import Localization
 from m2pem_plugin_ros.runtime import RosRuntime
-from m2pem_plugin_ros.settings import Bounds, DriverName
-from m2pem_plugin_ros.sim.body import Chassis
+from m2pem_plugin_ros.settings import Bounds, DriverName, Settings
 from m2pem_plugin_ros.sim.clock import SimulatedClock
 from m2pem_plugin_ros.sim.guard import GuardedRuntime
-from m2pem_plugin_ros.sim.refusing import RefusingDriver
+from m2pem_plugin_ros.sim.own_driver import OwnDriver
 from m2pem_plugin_ros.sim.specification import VehicleSpec
 from m2pem_plugin_ros.sim.troubles import Troubles
+from m2pem_plugin_ros.sim.vehicle import Vehicle
 
 logger = logging.getLogger(__name__)
 
@@ -33,36 +33,6 @@ class Way(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class OnBoard:
-    """All that a way is given."""
-
-    spec: VehicleSpec
-    ros: GuardedRuntime
-    localization: Localization
-    clock: SimulatedClock
-    troubles: Troubles
-
-    def make_driver(self, told: Told) -> Driver:
-        """What drives the base when the m2pem node, or Nav2, says so."""
-        driver: Driver = import_module("m2pem_plugin_ros.drivers.base").BaseDriver(self._seat(told))
-        return cast(Driver, RefusingDriver(driver, self.troubles))
-
-    def _seat(self, told: Told) -> Seat:
-        spec = self.spec
-        settings = replace(
-            spec.settings, driver=DriverName.BASE, bounds=bounds_of(spec.chassis, spec)
-        )
-        return Seat(
-            Connection(ResourceId(spec.name), spec.domain, sitl=True),
-            settings,
-            ArbiterContext(self.clock, _NoBus(), logger, spec.origin),
-            cast(RosRuntime, self.ros),
-            self.localization,
-            told,
-        )
-
-
 class NoWay:
     """A plain base: it is steered from elsewhere."""
 
@@ -73,24 +43,84 @@ class NoWay:
         """There is nothing to end."""
 
 
+@dataclass(frozen=True, slots=True)
+class OnBoard:
+    """All that a way is given."""
+
+    vehicle: Vehicle
+    ros: GuardedRuntime
+    localization: Localization
+    clock: SimulatedClock
+    troubles: Troubles
+
+    @property
+    def settings(self) -> Settings:
+        """Of the base, as who drives it on board has them."""
+        spec = self.vehicle.spec
+        return replace(spec.settings, driver=DriverName.BASE, bounds=_bounds(spec))
+
+    def make_driver(self, seat: Seat) -> Driver:
+        """What drives the base when the m2pem node, or Nav2, says so."""
+        driver: Driver = import_module("m2pem_plugin_ros.drivers.base").BaseDriver(seat)
+        return cast(Driver, OwnDriver(driver, self.vehicle.battery, self.troubles))
+
+    def make_told_driver(self, told: Told) -> Driver:
+        """The same, for who has no seat."""
+        spec = self.vehicle.spec
+        context = ArbiterContext(self.clock, _NoBus(), logger, spec.origin)
+        connection = Connection(ResourceId(spec.name), spec.domain, sitl=True)
+        ros = cast(RosRuntime, self.ros)
+        return self.make_driver(
+            Seat(connection, self.settings, context, ros, self.localization, told)
+        )
+
+
 def make_way(board: OnBoard) -> Way:
-    """What steers the vehicle, by its driver's name."""
-    namespace = board.spec.settings.namespace
-    made: Any
-    match board.spec.settings.driver:
+    """What steers the vehicle, by its driver's name.
+
+    Raises:
+        RosError: a package that it needs, such as nav2_msgs, is not there.
+    """
+    match board.vehicle.spec.settings.driver:
         case DriverName.NODE:
-            make = import_module("m2pem_plugin_ros.onboard").Onboard
-            made = make(board.ros, board.spec.name, namespace, board.make_driver, clock=board.clock)
+            return _node(board)
         case DriverName.NAV2:
-            make = import_module("m2pem_plugin_ros.sim.nav2").Nav2Server
-            made = make(board.ros, namespace, board.make_driver)
+            return _nav2(board)
         case _:
-            made = NoWay()
+            return NoWay()
+
+
+def _node(board: OnBoard) -> Way:
+    onboard: Any = import_module("m2pem_plugin_ros.onboard")
+    spec = board.vehicle.spec
+    aboard = onboard.Aboard(
+        vehicle=ResourceId(spec.name),
+        settings=board.settings,
+        clock=board.clock,
+        origin=spec.origin,
+        localization=board.localization,
+        domain=spec.domain,
+        logger=logger,
+    )
+    return cast(Way, onboard.Onboard(board.ros, aboard, board.make_driver))
+
+
+def _nav2(board: OnBoard) -> Way:
+    nav2: Any = import_module("m2pem_plugin_ros.sim.nav2")
+    spec = board.vehicle.spec
+    made = nav2.Nav2Server(
+        board.ros,
+        spec.settings.namespace,
+        board.make_told_driver,
+        board.localization,
+        spec.origin,
+    )
     return cast(Way, made)
 
 
-def bounds_of(chassis: Chassis, spec: VehicleSpec) -> Bounds:
+def _bounds(spec: VehicleSpec) -> Bounds:
     """What whoever steers on board knows of the base."""
+    chassis = spec.chassis
     return replace(
         spec.settings.bounds,
         speed_m_s=chassis.speed_m_s,

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from m2pem_plugin_ros.settings import DriverName
 from m2pem_plugin_ros.sim.troubles import Troubles
@@ -14,6 +14,9 @@ LOW = 0.12
 
 REFUSAL = "it has been told to refuse"
 FLOOD_PER_S = 5000.0
+BLOCKED_CODE = 208
+"""What Nav2's planner says when there is no path."""
+
 NUMBER = r"(\d+(?:\.\d+)?)"
 
 
@@ -22,6 +25,11 @@ class Afflicted(Protocol):
 
     vehicle: Vehicle
     troubles: Troubles
+
+    @property
+    def nav2(self) -> Any:
+        """Its simulated Nav2, if it has one that is alive."""
+        ...
 
     def kill(self) -> None:
         """End all its nodes."""
@@ -123,6 +131,32 @@ def _start(_: re.Match[str]) -> Made:
     return (lambda host: host.start()), None
 
 
+def _nav2(name: str, value: object, normal: object) -> Callable[[re.Match[str]], Made]:
+    def made(_: re.Match[str]) -> Made:
+        return (lambda host: _set(host, name, value)), (lambda host: _set(host, name, normal))
+
+    return made
+
+
+def _set(host: Afflicted, name: str, value: object) -> None:
+    if host.nav2 is not None:
+        setattr(host.nav2.faults, name, value)
+
+
+def _nav2_abort(match: re.Match[str]) -> Made:
+    return _nav2("error_code", int(match[1] or BLOCKED_CODE), 0)(match)
+
+
+def _nav2_inactive(_: re.Match[str]) -> Made:
+    return (lambda host: _enter(host, "inactive")), (lambda host: _enter(host, "active"))
+
+
+def _enter(host: Afflicted, state: str) -> None:
+    if host.nav2 is not None:
+        host.nav2.enter(state)
+
+
+NAV2_ONLY = (DriverName.NAV2,)
 NODE_ONLY = (DriverName.NODE,)
 STEERED = (DriverName.NODE, DriverName.NAV2)
 KINDS: Mapping[str, Kind] = {
@@ -142,5 +176,9 @@ KINDS: Mapping[str, Kind] = {
     "never accept": Kind(r"never accept", _trouble("deaf", True, False), NODE_ONLY),
     "lie": Kind(r"lie", _trouble("lies", True, False), NODE_ONLY),
     "flood, flood 5000": Kind(rf"flood(?:\s+{NUMBER})?", _flood, NODE_ONLY),
+    "nav2 inactive": Kind(r"nav2 inactive", _nav2_inactive, NAV2_ONLY),
+    "nav2 reject": Kind(r"nav2 reject", _nav2("reject", True, False), NAV2_ONLY),
+    "nav2 hang": Kind(r"nav2 hang", _nav2("hang", True, False), NAV2_ONLY),
+    "nav2 abort, nav2 abort 208": Kind(r"nav2 abort(?:\s+(\d+))?", _nav2_abort, NAV2_ONLY),
 }
 """How a fault is written, and what it is."""
