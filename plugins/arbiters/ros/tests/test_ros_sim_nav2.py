@@ -5,17 +5,16 @@ from typing import Any
 from uuid import uuid4
 
 import pytest
-
-nav2_actions = pytest.importorskip("nav2_msgs.action")
-pytest.importorskip("m2pem_plugin_ros.sim.nav2")
-pytest.importorskip("m2pem_plugin_ros.drivers.base")
-
 from action_msgs.msg import GoalStatus
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from nav_msgs.msg import Odometry
 from rclpy.action import ActionClient
 from ros_sim_watch import AMPLE_S, COMMAND, Heard, switch, until
+
+nav2_actions = pytest.importorskip("nav2_msgs.action")
+pytest.importorskip("m2pem_plugin_ros.sim.nav2")
+pytest.importorskip("m2pem_plugin_ros.drivers.base")
 
 WORDS = ["sim", "ros", "--driver", "nav2", "--ground", "1", "--speed", "5"]
 

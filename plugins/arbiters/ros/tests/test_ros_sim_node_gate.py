@@ -31,6 +31,7 @@ def gate(troubles: Troubles) -> NodeGate:
 @pytest.fixture
 def publisher(gate: NodeGate) -> Publisher:
     publisher = Publisher()
+    gate.made(publisher, "behavior_status")
     gate.send(publisher, "behavior_status", status(BehaviorStatus.RUNNING))
     return publisher
 
@@ -76,6 +77,13 @@ def test_a_flood_comes_at_its_rate(
         gate.step(0.0, 0.02)
     assert len(publisher.said) == pytest.approx(5001, abs=1)
     assert {"b1"} < {each.id for each in publisher.said}
+
+
+def test_a_flood_needs_nothing_that_was_said_before(gate: NodeGate, troubles: Troubles) -> None:
+    publisher, troubles.flood_per_s = Publisher(), 100.0
+    gate.made(publisher, "behavior_status")
+    gate.step(0.0, 0.1)
+    assert len(publisher.said) == 10
 
 
 def test_a_deaf_node_hears_of_nothing_new(gate: NodeGate, troubles: Troubles) -> None:

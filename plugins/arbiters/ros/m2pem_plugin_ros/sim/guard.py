@@ -29,6 +29,9 @@ class Gate:
         """Whether a message reaches who has subscribed."""
         return not self.closed
 
+    def made(self, publisher: Any, leaf: str) -> None:
+        """A publisher is there, and has published nothing yet."""
+
 
 class GuardedPublisher:
     """A publisher whose messages go through a gate."""
@@ -37,6 +40,7 @@ class GuardedPublisher:
         self._publisher = publisher
         self._gate = gate
         self._leaf = leaf(publisher.topic_name)
+        gate.made(publisher, self._leaf)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._publisher, name)

@@ -40,7 +40,6 @@ class NodeGate(Gate):
         super().send(publisher, leaf, message)
         if leaf != STATUS:
             return
-        self._publisher = publisher
         self._said.append(message)
         if self.troubles.lies and message.state in TERMINAL:
             super().send(publisher, leaf, _contradiction(message))
@@ -51,9 +50,10 @@ class NodeGate(Gate):
             return False
         return super().hears(leaf, message)
 
-    def attach(self, publisher: Any) -> None:
-        """With what to lie before the node has said anything."""
-        self._publisher = publisher
+    def made(self, publisher: Any, leaf: str) -> None:
+        """With this it can lie before the node has said anything."""
+        if leaf == STATUS:
+            self._publisher = publisher
 
     def step(self, now_s: float, wall_dt_s: float) -> None:
         """Say what is due by now."""
