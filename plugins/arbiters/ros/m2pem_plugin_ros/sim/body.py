@@ -1,0 +1,143 @@
+"""How a base on wheels or on water moves: what it is told, and what becomes of it."""
+
+import math
+from dataclasses import dataclass
+
+from m2pem_plugin_ros.pose import Pose, Twist
+
+STANDS_M_S = 1e-3
+"""Slower than this, in m/s and rad/s, it stands."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chassis:
+    """What a base can do, in SI units.
+
+    `turn_radius_m` 0: it turns on the spot. `lag_s`: how long its drives take to follow a command
+    (a first-order lag). `command_timeout_s`: without commands for so long, it stops.
+    """
+
+    speed_m_s: float = 2.0
+    reverse_m_s: float = 1.0
+    acceleration_m_s2: float = 1.0
+    yaw_rate_rad_s: float = 1.0
+    yaw_acceleration_rad_s2: float = 2.0
+    turn_radius_m: float = 0.0
+    lag_s: float = 0.1
+    command_timeout_s: float = 0.5
+
+
+class Body:
+    """A base in the plane. Times are seconds of simulated time.
+
+    `stuck`: its wheels turn in vain. `motions` counts how often it began to move because of
+    commands, after it had stood. `driven_m`: the length of its way.
+    """
+
+    def __init__(self, chassis: Chassis, pose: Pose) -> None:
+        self.chassis = chassis
+        self.pose = pose
+        self.stuck = False
+        self.motions = 0
+        self.driven_m = 0.0
+        self._twist = Twist()
+        self._command = Twist()
+        self._commanded_s = -math.inf
+        self._wanted = Twist()
+        self._stands = True
+
+    @property
+    def twist(self) -> Twist:
+        """How it moves, in its own frame."""
+        return self._twist
+
+    @property
+    def stands(self) -> bool:
+        """It does not move, and nothing has it move."""
+        return self._stands
+
+    def command(self, twist: Twist, now_s: float) -> None:
+        """What it is told; what is not finite is not heard."""
+        if math.isfinite(twist.forward_m_s) and math.isfinite(twist.yaw_rad_s):
+            self._command, self._commanded_s = twist, now_s
+
+    def step(self, now_s: float, dt_s: float) -> None:
+        """Let `dt_s` pass until `now_s`."""
+        told = self._told(now_s)
+        if self._stands:
+            if not _moves(told):
+                return
+            self._stands = False
+            self.motions += 1
+        self._follow(told, dt_s)
+        self._move(dt_s)
+        if not (_moves(told) or _moves(self._twist) or _moves(self._wanted)):
+            self._stands, self._twist, self._wanted = True, Twist(), Twist()
+
+    def _told(self, now_s: float) -> Twist:
+        """The command as far as it can be done; nothing if it is old or the wheels are stuck."""
+        chassis, command = self.chassis, self._command
+        if self.stuck or now_s - self._commanded_s > chassis.command_timeout_s:
+            return Twist()
+        forward = _within(-chassis.reverse_m_s, command.forward_m_s, chassis.speed_m_s)
+        yaw = _within(-chassis.yaw_rate_rad_s, command.yaw_rad_s, chassis.yaw_rate_rad_s)
+        if chassis.turn_radius_m > 0 and abs(forward) < STANDS_M_S:
+            yaw = 0.0  # steered wheels that stand turn nothing
+        return Twist(forward, yaw)
+
+    def _follow(self, told: Twist, dt_s: float) -> None:
+        chassis = self.chassis
+        share = 1.0 if chassis.lag_s <= 0 else 1.0 - math.exp(-dt_s / chassis.lag_s)
+        self._wanted = Twist(
+            _lagged(self._wanted.forward_m_s, told.forward_m_s, share),
+            _lagged(self._wanted.yaw_rad_s, told.yaw_rad_s, share),
+        )
+        forward = _towards(
+            self._twist.forward_m_s, self._wanted.forward_m_s, chassis.acceleration_m_s2 * dt_s
+        )
+        yaw = _towards(
+            self._twist.yaw_rad_s, self._wanted.yaw_rad_s, chassis.yaw_acceleration_rad_s2 * dt_s
+        )
+        if chassis.turn_radius_m > 0:
+            most = abs(forward) / chassis.turn_radius_m
+            yaw = _within(-most, yaw, most)
+        self._twist = Twist(forward, yaw)
+
+    def _move(self, dt_s: float) -> None:
+        self.pose = moved(self.pose, self._twist, dt_s)
+        self.driven_m += abs(self._twist.forward_m_s) * dt_s
+
+
+def moved(pose: Pose, twist: Twist, dt_s: float) -> Pose:
+    """Where a pose is after `dt_s`. The step is straight, in the mean direction."""
+    turn = twist.yaw_rad_s * dt_s
+    way = twist.forward_m_s * dt_s
+    middle = pose.yaw_rad + turn / 2
+    return Pose(
+        pose.east_m + way * math.cos(middle),
+        pose.north_m + way * math.sin(middle),
+        wrapped_rad(pose.yaw_rad + turn),
+        pose.up_m,
+    )
+
+
+def wrapped_rad(angle: float) -> float:
+    """The same direction, from -pi to pi."""
+    return math.remainder(angle, math.tau)
+
+
+def _moves(twist: Twist) -> bool:
+    return abs(twist.forward_m_s) > STANDS_M_S or abs(twist.yaw_rad_s) > STANDS_M_S
+
+
+def _within(least: float, value: float, most: float) -> float:
+    return max(least, min(most, value))
+
+
+def _towards(value: float, wanted: float, step: float) -> float:
+    return value + _within(-step, wanted - value, step)
+
+
+def _lagged(value: float, wanted: float, share: float) -> float:
+    after = value + (wanted - value) * share
+    return wanted if abs(wanted - after) < STANDS_M_S / 10 else after
