@@ -2,7 +2,7 @@
 
 The executive knows them by this only: it offers them to missions, and checks their parameters. The
 setting is `own_behaviors` of a connection, a map of names. A name alone is a behavior that all
-arbiters share (docs/missions.md); a new one says what it takes:
+arbiters share (docs/fleets.md); a new one says what it takes:
 
     own_behaviors:
       area_survey:
