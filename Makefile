@@ -94,6 +94,7 @@ $(ROS)/installed: $(ROS)/created pyproject.toml constraints.txt $(PLUGINS:%=%/py
 
 test-ros: ros ## check the plugins that need ROS, over DDS on 127.0.0.1
 	@$(ROS_PYTHON) -m pytest -n 2 -m "not long" $(ROS_PLUGINS:%=%/tests)
+	@$(ROS_PYTHON) -m bench --quick --only ros_command,ros_fleet,ros_discovery
 
 DEMO := $(BIN)/m2pem run missions/vignette1.bpmn --fleet fleet_configs/vignette1.yaml --simulate --speed 20
 ANSWERS := missions/answers/vignette1
@@ -152,7 +153,7 @@ PEERS := .conformance
 conformance: setup $(PEERS)/installed ## compare with other BPMN engines, and write the table into the docs
 	@$(BIN)/python -m tests.conformance --spiffworkflow $(PEERS)/bin/python
 
-bench: setup $(PEERS)/installed ## measure m2pem and other BPMN engines, and write bench/results (about half an hour)
+bench: setup ros $(PEERS)/installed ## measure m2pem and other BPMN engines, and write bench/results (about half an hour)
 	@$(BIN)/python -m bench
 
 bench-quick: setup ## see that what `make bench` runs does run, and rightly

@@ -1,6 +1,7 @@
 """`python -m bench`: measure everything, print the table, write bench/results/ and README.md."""
 
 import argparse
+import importlib.util
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -18,6 +19,7 @@ README = REPOSITORY / "README.md"
 RESULTS = REPOSITORY / "bench" / "results"
 SPIFFWORKFLOW = REPOSITORY / ".conformance" / "bin" / "python"
 MODULES = REPOSITORY / "tests" / "js" / "node_modules"
+ROS = REPOSITORY / ".venv-ros" / "bin" / "python"
 OWN_RUNS, PEER_RUNS = 5, 3
 STOCK_SIZES = 2
 """Enough to see where SpiffWorkflow gives up when its users do not lift the limit of recursion."""
@@ -45,15 +47,31 @@ def main(words: Sequence[str] | None = None) -> int:
     others = peers(SPIFFWORKFLOW, MODULES)
     names: Sequence[str] = asked.only or NAMES
     works = [work for work in WORK if work.name in names]
-    programs = [program for program in PROGRAMS if program.command[0] in names]
+    # A quick look must not depend on another environment, which may be out of date.
+    ros = ros_python(only_own=asked.quick)
+    wanted = [program for program in PROGRAMS if program.command[0] in names]
+    programs = [program for program in wanted if ros or not program.ros]
+    if len(programs) < len(wanted):
+        print("bench: ROS is not installed here, and its programs are left out")
     if asked.quick:
         return quick(others, works, programs)
-    found = machine(SPIFFWORKFLOW, MODULES)
+    found = machine(SPIFFWORKFLOW, MODULES, Path(ros))
     try:
         figures = kept(asked.results / FIGURES, found, names) if asked.only else Figures(found)
     except OtherError as error:
         parser.error(str(error))
     return measure_all(figures, others, works, programs, asked.up_to, asked.results)
+
+
+def ros_python(only_own: bool) -> str:
+    """The Python that runs what needs ROS: this one if it has ROS, or that of `make ros`; or ""."""
+    if importlib.util.find_spec("rclpy"):
+        return sys.executable
+    return str(ROS) if ROS.exists() and not only_own else ""
+
+
+def _python(program: Program) -> str:
+    return ros_python(only_own=False) if program.ros else sys.executable
 
 
 def _names(text: str) -> list[str]:
@@ -67,7 +85,7 @@ def _names(text: str) -> list[str]:
 def quick(others: Sequence[Engine], works: Sequence[Work], programs: Sequence[Program]) -> int:
     """Everything once, at its smallest; no time is looked at."""
     names = {each.name for each in others}
-    for name in {"SpiffWorkflow", "bpmn-elements", "bpmn-engine"} - names:
+    for name in {"SpiffWorkflow", "bpmn-elements", "bpmn-engine"} - names if works else ():
         print(f"bench: {name} is not installed, and left out")
 
     engines = [each for each in others if not each.name.endswith(STOCK)]
@@ -78,10 +96,10 @@ def quick(others: Sequence[Engine], works: Sequence[Work], programs: Sequence[Pr
         return f"{engine.name}, {work}, {size}", play(engine, work, size, 1, enough_s=0.0)
 
     jobs = [(engine, work.name, work.sizes[0]) for work in works for engine in engines]
-    commands = dict.fromkeys(program.quick for program in programs)
+    commands = {program.quick: _python(program) for program in programs}
     with ThreadPoolExecutor(2) as pool:
         done = [*pool.map(look, jobs)]
-        done += pool.map(lambda each: (" ".join(each), measure(each, 1)), commands)
+        done += pool.map(lambda each: (" ".join(each), measure(each, 1, commands[each])), commands)
     for name, figure in done:
         if figure.wrong:
             print(f"bench: {name}: {figure.wrong}", file=sys.stderr)
@@ -104,7 +122,7 @@ def measure_all(
         figures.add(work.name, played, installed)
         page = write(folder, figures, installed)
     for program in programs:
-        figures.programs[program.name] = measure(program.command, PEER_RUNS)
+        figures.programs[program.name] = measure(program.command, PEER_RUNS, _python(program))
         print(f"{program.name}: done", file=sys.stderr)
         page = write(folder, figures, installed)
     print(page)

@@ -90,12 +90,12 @@ def play(engine: Engine, work: str, size: int, runs: int, **more: float) -> Figu
     return Figure(medians(answers, ("cpu_s", "wall_s", "parse_s", "peak_kb")), len(answers))
 
 
-def measure(command: Sequence[str], runs: int) -> Figure:
-    """One of m2pem's own programs."""
+def measure(command: Sequence[str], runs: int, python: str = sys.executable) -> Figure:
+    """One of m2pem's own programs, by that Python."""
     answers = []
     try:
         for _ in range(runs):
-            program = [sys.executable, "-m", f"bench.programs.{command[0]}", *command[1:]]
+            program = [python, "-m", f"bench.programs.{command[0]}", *command[1:]]
             answers.append(ask(program, "", OWN_LIMIT_S))
     except FailedError as failure:
         return Figure(wrong=str(failure))

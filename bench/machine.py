@@ -9,7 +9,7 @@ from pathlib import Path
 import m2pem
 
 
-def machine(python: Path, modules: Path) -> dict[str, str]:
+def machine(python: Path, modules: Path, ros: Path) -> dict[str, str]:
     """The processor, the system and the versions."""
     found = {
         "processor": _processor(),
@@ -22,6 +22,8 @@ def machine(python: Path, modules: Path) -> dict[str, str]:
     }
     ask = "from importlib.metadata import version; print(version('SpiffWorkflow'))"
     found["SpiffWorkflow"] = _said(str(python), "-c", ask)
+    ask = "from importlib.metadata import version; print(version('ros-rclpy'))"
+    found["rclpy"] = _said(str(ros), "-c", ask)
     found["Node.js"] = _said("node", "--version")
     for name in ("bpmn-elements", "bpmn-engine"):
         package = modules / name / "package.json"

@@ -49,12 +49,16 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """A program of m2pem alone: the words of its command, and those of its quick look."""
+    """A program of m2pem alone: the words of its command, and those of its quick look.
+
+    `ros`: it runs where ROS is installed.
+    """
 
     size: str
     command: tuple[str, ...]
     quick: tuple[str, ...]
     goals: tuple[Goal, ...]
+    ros: bool = False
 
     @property
     def name(self) -> str:
@@ -98,6 +102,30 @@ def _mavlink_command(journal: str, bound_ms: float | None) -> Program:
     command = ("mavlink_command", journal, "100", "50", "500")
     quick = ("mavlink_command", "sqlite", "5", "200", "10")
     return Program("100 vehicles, 50 messages/s each", command, quick, goals)
+
+
+def _ros_command(journal: str, bound_ms: float | None) -> Program:
+    signal = f"signal to the ROS vehicle's callback, {journal} journal"
+    pause = f"pause to the ROS vehicle's callback, {journal} journal"
+    goals = (
+        Goal("p50_ms", f"{signal}, p50", "ms", bound_ms),
+        Goal("p95_ms", f"{signal}, p95", "ms"),
+        Goal("pause_p50_ms", f"{pause}, p50", "ms", bound_ms),
+        Goal("pause_p95_ms", f"{pause}, p95", "ms"),
+        Goal("cpu_percent", f"an executive with all that, ROS, {journal} journal, of a core", "%"),
+    )
+    command = ("ros_command", journal, "20", "500")
+    quick = ("ros_command", journal, "3", "10")
+    return Program("20 vehicles, 10 messages/s each", command, quick, goals, ros=True)
+
+
+def _ros_discovery(count: int) -> Program:
+    goals = (
+        Goal("all_s", "ROS, from connect until all are heard", "s"),
+        Goal("late_s", "ROS, from a vehicle's beginning to its first command", "s"),
+    )
+    command, quick = ("ros_discovery", str(count)), ("ros_discovery", "2")
+    return Program(f"{count} vehicle{'s' * (count > 1)}", command, quick, goals, ros=True)
 
 
 PROGRAMS = (
@@ -190,4 +218,28 @@ PROGRAMS = (
     ),
     _mavlink_command("memory", 5),
     _mavlink_command("sqlite", None),
+    _ros_command("memory", 3),
+    _ros_command("sqlite", None),
+    Program(
+        "100 vehicles, odometry and status at 10 Hz, 30 s",
+        ("ros_fleet", "100", "10", "30"),
+        ("ros_fleet", "5", "10", "1"),
+        (
+            Goal("states_per_s", "ROS, states that arrive on the fleet bus", "/s"),
+            Goal("longest_s", "ROS, longest time without a state of the same vehicle", "s", 1),
+            Goal("cpu_percent", "ROS, of a core", "%"),
+            Goal("peak_mb", "ROS, memory", "MB"),
+        ),
+        ros=True,
+    ),
+    _ros_discovery(1),
+    _ros_discovery(20),
+    _ros_discovery(100),
+    Program(
+        "with the wheels of ROS",
+        ("starting", "5", "help"),
+        ("starting", "1", "help"),
+        (Goal("help_s", "CPU of m2pem --help", "s"),),
+        ros=True,
+    ),
 )

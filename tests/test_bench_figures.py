@@ -1,6 +1,7 @@
 """`python -m bench --only` measures a part again, and keeps the rest."""
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         asked.append(f"{engine.name} {work} {size}")
         return NEW
 
-    def measure(command: tuple[str, ...], _: int) -> Figure:
+    def measure(command: tuple[str, ...], _: int, __: str) -> Figure:
         asked.append(" ".join(command))
         return NEW
 
@@ -34,6 +35,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setattr(bench, "measure", measure)
     monkeypatch.setattr(bench, "machine", lambda *_: HERE)
     monkeypatch.setattr(bench, "peers", lambda *_: [PEER])
+    monkeypatch.setattr(bench, "ros_python", lambda **_: "python-with-ros")
     return asked
 
 
@@ -141,3 +143,32 @@ def test_a_name_that_nothing_has_is_refused_with_those_that_there_are(
 def test_a_quick_look_does_nothing_twice(measured: list[str]) -> None:
     assert bench.main(["--quick", "--only", "reading,row"]) == 0
     assert sorted(measured) == ["bpmn-elements row 100", *["m2pem row 100"] * 3, "reading 200"]
+
+
+def test_programs_that_need_ros_are_run_by_a_python_that_has_it(
+    results: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pythons: dict[str, str] = {}
+
+    def measure(command: tuple[str, ...], _: int, python: str) -> Figure:
+        pythons[command[0]] = python
+        return NEW
+
+    monkeypatch.setattr(bench, "measure", measure)
+    bench.main(["--only", "idle,ros_fleet", "--results", str(results)])
+    assert pythons == {"idle": sys.executable, "ros_fleet": "python-with-ros"}
+
+
+@pytest.mark.parametrize("words", [["--quick"], ["--results", "."]])
+def test_without_ros_its_programs_are_left_out_and_that_is_said(
+    words: list[str],
+    results: Path,
+    measured: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(results)
+    monkeypatch.setattr(bench, "ros_python", lambda **_: "")
+    assert bench.main(["--only", "idle,ros_fleet", *words]) == 0
+    assert [each.split()[0] for each in measured] == ["idle"]
+    assert "ROS is not installed here" in capsys.readouterr().out

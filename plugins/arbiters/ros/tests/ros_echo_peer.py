@@ -1,7 +1,7 @@
 """The other side of the tests of the runtime, in plain rclpy.
 
-It echoes what comes on /ping to /pong, latches /greeting, answers /answer, and does behaviors:
-"goto" succeeds after one feedback, "wait" runs until it is cancelled.
+It echoes what comes on /ping to /pong, latches /greeting, answers /answer, accepts what comes on
+/command, and does behaviors: "goto" succeeds after one feedback, "wait" runs until it is cancelled.
 """
 
 import contextlib
@@ -10,7 +10,7 @@ from typing import Any
 
 import rclpy
 from m2pem_interfaces.action import ExecuteBehavior
-from m2pem_interfaces.msg import BehaviorStatus
+from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus
 from m2pem_interfaces.srv import AnswerPrompt
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -27,6 +27,15 @@ def main() -> None:
     pong = node.create_publisher(String, "pong", 1000)
     node.create_subscription(String, "ping", pong.publish, 1000)
     node.create_publisher(String, "greeting", LATCHED).publish(String(data="hello"))
+
+    accepted = node.create_publisher(BehaviorStatus, "behavior_status", 10)
+
+    def accept(command: Any) -> None:
+        said = " ".join(f"{each.key}={each.value}" for each in command.parameters)
+        state = BehaviorStatus.ACCEPTED
+        accepted.publish(BehaviorStatus(id=command.id, number=1, state=state, native_ref=said))
+
+    node.create_subscription(BehaviorCommand, "command", accept, 10)
 
     def answer(request: Any, response: Any) -> Any:
         response.success, response.message = True, f"{request.prompt}: {request.decision}"
