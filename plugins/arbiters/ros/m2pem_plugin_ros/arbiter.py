@@ -134,8 +134,12 @@ class RosArbiter:
                 connection, limits = self._connections[resource], self.limits(resource)
                 post = Post(connection, settings, self._context, self._ledger, limits)
                 self._vehicles[resource] = Vehicle(post, instruments[resource], self._make_driver)
-            for vehicle in self._vehicles.values():
-                await vehicle.open()
+            opened = await asyncio.gather(
+                *(vehicle.open() for vehicle in self._vehicles.values()), return_exceptions=True
+            )
+            for outcome in opened:
+                if isinstance(outcome, BaseException):
+                    raise outcome
         except BaseException:
             await self._disconnect()
             raise

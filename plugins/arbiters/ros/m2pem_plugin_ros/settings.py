@@ -117,7 +117,7 @@ _KEYS = (*(each.name for each in fields(Settings)), "sim")
 """`sim` is what a simulated vehicle is like; whoever simulates it reads that."""
 
 _DETECTOR_KEYS = ("namespace", "domain_id", "topic", "message", "type", "sim")
-_BOUNDS = {
+BOUNDS = {
     "speed": "speed_m_s",
     "reverse_speed": "reverse_m_s",
     "acceleration": "acceleration_m_s2",
@@ -125,6 +125,7 @@ _BOUNDS = {
     "turn_radius": "turn_radius_m",
     "lateral_acceleration": "lateral_m_s2",
 }
+"""What fleets call the fields of `Bounds`."""
 
 
 def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[ResourceId, Settings]:
@@ -197,7 +198,7 @@ def _topics(reader: ConnectionReader) -> Topics:
 
 
 def _bounds(reader: ConnectionReader) -> Bounds:
-    reader.refuse_others(_BOUNDS)
+    reader.refuse_others(BOUNDS)
     usual = Bounds()
     return Bounds(
         reader.number("speed", usual.speed_m_s, Dimension.SPEED),

@@ -19,6 +19,7 @@ from m2pem.api import (
     VehiclePosition,
     VehicleState,
 )
+from m2pem.errors import PluginError
 from m2pem_plugin_ros.drivers.driver import Driver, Health, Order, Outcome, Seat
 from m2pem_plugin_ros.goal_ids import goal_id, run_id
 from m2pem_plugin_ros.ignored import Ignored
@@ -67,6 +68,7 @@ class Vehicle:
         self._behaviors: dict[UUID, BehaviorId] = {}
         self._order: Order | None = None
         self._cancelled: BehaviorId = ""
+        self._broken = ""
         self._left: dict[UUID, None] = {}
         self._heard_us = post.context.clock.now_us()
         self._heard = 0
@@ -133,6 +135,8 @@ class Vehicle:
 
     def refusal(self, request: BehaviorRequest) -> str:
         """Why it cannot be done now; "" if it can."""
+        if self._broken:
+            return self._broken
         try:
             return self.driver.refusal(request)
         except Exception as error:
@@ -171,8 +175,18 @@ class Vehicle:
         self._left[order.goal] = None
 
     async def open(self) -> None:
-        """Have the driver listen."""
-        await self.driver.open()
+        """Have the driver listen. One that breaks refuses every request, and stops nobody else.
+
+        Raises:
+            PluginError: something that it needs is not installed.
+        """
+        try:
+            await self.driver.open()
+        except PluginError:
+            raise
+        except Exception as error:
+            self._context.logger.exception("%s: its driver does not open", self.resource)
+            self._broken = f"its driver did not open: {_bug(error)}"
 
     async def close(self) -> None:
         """Let go; the vehicle keeps doing what it does."""

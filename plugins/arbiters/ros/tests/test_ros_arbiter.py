@@ -281,6 +281,20 @@ def test_a_driver_that_breaks_in_everything_else_stops_nobody() -> None:
     play(main)
 
 
+def test_a_driver_that_does_not_open_refuses_and_stops_nobody() -> None:
+    async def main(world) -> None:
+        world.bodies[A].raises = {"open"}
+        async with world.connected() as bench:
+            await bench.start("r1.b1", "goto", A, target=NEAR)
+            end = await bench.ended("r1.b1", 5)
+            assert end.state is BehaviorState.REJECTED
+            assert "open is broken" in end.reason
+            await bench.start("r1.b2", "goto", B, target=NEAR)
+            await bench.running("r1.b2")
+
+    play(main)
+
+
 # --- telemetry ------------------------------------------------------------------------------------
 
 

@@ -1,0 +1,73 @@
+"""Holds the fleets of docs/ros.md to what the code does."""
+
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+from m2pem_plugin_ros.catalogue import DOMAINS, offered
+from m2pem_plugin_ros.settings import (
+    BOUNDS,
+    DetectorMessage,
+    DriverName,
+    OdomFrame,
+    RouteAction,
+    Settings,
+    Topics,
+    Via,
+    read_detectors,
+    read_settings,
+)
+
+import m2pem
+from m2pem.api import Connection, Fleet, ResourceId
+
+TEXT = (Path(__file__).parents[4] / "docs" / "ros.md").read_text(encoding="utf-8")
+FLEETS = [block for block in re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL) if "ros" in block]
+WHOLE = [block for block in FLEETS if block.startswith("version:")]
+
+
+def connections(fleet: Fleet) -> dict[ResourceId, Connection]:
+    vehicles = {
+        v.id: Connection(v.id, v.domain.value, v.settings)
+        for v in fleet.vehicles.values()
+        if v.arbiter == "ros"
+    }
+    payloads = {
+        p.id: Connection(
+            p.id, fleet.vehicles[p.vehicle].domain.value, p.settings, detector=p.detector
+        )
+        for p in fleet.payloads.values()
+        if p.arbiter == "ros"
+    }
+    return {**vehicles, **payloads}
+
+
+@pytest.mark.parametrize("block", WHOLE)
+def test_the_fleets_can_be_used(block: str, tmp_path: Path) -> None:
+    path = tmp_path / "fleet.yaml"
+    path.write_text(block, encoding="utf-8")
+    made = connections(m2pem.load_fleet(path))
+    assert len(read_settings(made)) + len(read_detectors(made)) == len(made) > 0
+
+
+def test_there_are_fleets() -> None:
+    assert len(WHOLE) >= 2
+
+
+def test_every_setting_is_explained() -> None:
+    keys = {each.name for each in fields(Settings)} | {each.name for each in fields(Topics)}
+    keys |= {"sim", "topic", "message", "type"}
+    enums = (DriverName, Via, RouteAction, OdomFrame, DetectorMessage)
+    words = {str(word) for enum in enums for word in enum}
+    assert {name for name in keys | words if f"`{name}`" not in TEXT} == set()
+
+
+def test_every_bound_is_explained_and_no_other() -> None:
+    table = TEXT.split("| `bounds` | usual")[1].split("\n\n")[0]
+    assert re.findall(r"^\| `(\w+)`", table, re.MULTILINE) == list(BOUNDS)
+
+
+def test_every_behavior_is_named() -> None:
+    names = {spec.name for driver in DriverName for d in DOMAINS for spec in offered(driver, d)}
+    assert {name for name in names if f"`{name}`" not in TEXT} == set()
