@@ -110,7 +110,7 @@ async def test_a_new_order_takes_over_and_the_old_one_is_not_told_of(base: Bench
 
 
 async def test_without_odometry_it_stands_and_goes_on_when_it_is_heard_again(base: Bench) -> None:
-    order = base.begin("goto", target=point(30, 0))
+    order = base.begin("goto", target=point(12, 0))
     await until(lambda: base.speed_m_s > 1.0)
     await base.tell_base("mute")
     await until(lambda: base.said[-1] == (0.0, 0.0))
@@ -223,7 +223,7 @@ async def test_stamped_commands_of_a_base_with_a_turning_circle(domain: int) -> 
         async with bench(
             domain, "/fleet/boat", SystemClock(SPEED), stamped=True, bounds=bounds
         ) as base:
-            order = base.begin("single_vehicle_routing", route=route((6, 0), (6, 6), (0, 6)))
+            order = base.begin("single_vehicle_routing", route=route((5, 0), (5, 5)))
             assert (await base.ending(order)).state is BehaviorState.SUCCEEDED
-            assert math.dist(base.place, (0, 6)) < 0.5
+            assert math.dist(base.place, (5, 5)) < 0.5
             assert all(abs(turning) * 1.5 <= abs(forward) + 1e-9 for forward, turning in base.said)
