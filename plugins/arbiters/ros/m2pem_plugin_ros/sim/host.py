@@ -137,8 +137,13 @@ class Host:
             board = OnBoard(
                 self.vehicle, self._steering, self._localization, self._clock, self.troubles
             )
-            self._way = make_way(board)
-            await self._way.open()
+            try:
+                self._way = make_way(board)
+                await self._way.open()
+            except BaseException:  # nothing half open stays, so that it can be begun again
+                self._steering.destroy()
+                self._way, self._steering, self._gate = NoWay(), None, None
+                raise
 
     async def _end_steering(self, end: Callable[[], Awaitable[None]]) -> None:
         steering = self._steering
