@@ -65,7 +65,7 @@ def test_without_commands_it_comes_to_a_stand(chassis: Chassis, forward: float, 
     body = Body(chassis, Pose(0, 0, 0))
     now_s = driven(body, Twist(forward, yaw), 2.0)
     slow_s = max(
-        chassis.speed_m_s / chassis.acceleration_m_s2,
+        max(chassis.speed_m_s, chassis.reverse_m_s) / chassis.acceleration_m_s2,
         chassis.yaw_rate_rad_s / chassis.yaw_acceleration_rad_s2,
     )
     for _ in range(round((chassis.command_timeout_s + slow_s + 20 * chassis.lag_s + 1) / STEP_S)):

@@ -105,9 +105,9 @@ async def test_a_target_is_detected_once_when_it_is_near(ros: RosRuntime) -> Non
     odometry = Heard(ros, Odometry, "/ugv1/odom")
     await until(lambda: ros.node.count_publishers("/ugv1/detections"))
     async with Joystick(ros, "/ugv1/cmd_vel", 2.0):
-        await odometry.next(lambda m: m.pose.pose.position.y > 8)
+        await odometry.next(lambda m: m.pose.pose.position.y > 2)
     async with Joystick(ros, "/ugv1/cmd_vel", -1.0):
-        await odometry.next(lambda m: m.pose.pose.position.y < 6)
+        await odometry.next(lambda m: m.pose.pose.position.y < 0.3)
     (detection,) = found.messages
     assert (detection.type, detection.position_kind) == ("gpr", Detection.GEOGRAPHIC)
     place = detection.position_geographic

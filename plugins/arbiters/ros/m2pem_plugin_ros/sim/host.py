@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from m2pem_plugin_ros.runtime import RosRuntime
@@ -61,7 +61,7 @@ class Host:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         try:
-            await self._end_steering()
+            await self._end_steering(self._way.close)
         finally:
             self._end_base()
 
@@ -111,9 +111,13 @@ class Host:
     async def _bury(self) -> None:
         """End the tasks of a node that is dead."""
         async with self._turn:
+            way = self._way
+            # An m2pem node can be ended without a word. Whatever else wants to say something at
+            # its end finds its entities gone.
+            end = getattr(way, "drop", way.close)
             try:
-                await self._end_steering()
-            except Exception as error:  # whatever it wanted to do with entities that are gone
+                await self._end_steering(end)
+            except Exception as error:
                 logger.debug("%s: its node is gone: %r", self.vehicle.spec.name, error)
 
     async def _start(self) -> None:
@@ -133,15 +137,20 @@ class Host:
             board = OnBoard(
                 self.vehicle, self._steering, self._localization, self._clock, self.troubles
             )
-            self._way = make_way(board)
-            await self._way.open()
+            try:
+                self._way = make_way(board)
+                await self._way.open()
+            except BaseException:  # nothing half open stays, so that it can be begun again
+                self._steering.destroy()
+                self._way, self._steering, self._gate = NoWay(), None, None
+                raise
 
-    async def _end_steering(self) -> None:
-        way, steering = self._way, self._steering
+    async def _end_steering(self, end: Callable[[], Awaitable[None]]) -> None:
+        steering = self._steering
         self._way, self._steering, self._gate = NoWay(), None, None
         try:
             async with asyncio.timeout(CLOSED_WITHIN_S):
-                await way.close()
+                await end()
         except TimeoutError:
             logger.error("%s: what steers it on board does not end", self.vehicle.spec.name)
         finally:

@@ -6,11 +6,18 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any, Protocol, cast
 
-from m2pem.api import ArbiterContext, Connection, PayloadState, ResourceId, VehicleState
+from m2pem.api import (
+    ArbiterContext,
+    Connection,
+    FleetBus,
+    PayloadState,
+    ResourceId,
+    VehicleState,
+)
 from m2pem_plugin_ros.drivers.driver import Driver, Seat, Told
 from m2pem_plugin_ros.localization import Localization
 from m2pem_plugin_ros.runtime import RosRuntime
-from m2pem_plugin_ros.settings import Bounds, DriverName, Settings
+from m2pem_plugin_ros.settings import Bounds, DriverName
 from m2pem_plugin_ros.sim.clock import SimulatedClock
 from m2pem_plugin_ros.sim.guard import GuardedRuntime
 from m2pem_plugin_ros.sim.own_driver import OwnDriver
@@ -53,26 +60,19 @@ class OnBoard:
     clock: SimulatedClock
     troubles: Troubles
 
-    @property
-    def settings(self) -> Settings:
-        """Of the base, as who drives it on board has them."""
-        spec = self.vehicle.spec
-        return replace(spec.settings, driver=DriverName.BASE, bounds=_bounds(spec))
-
-    def make_driver(self, seat: Seat) -> Driver:
+    def make_driver(self, told: Told, bus: FleetBus) -> Driver:
         """What drives the base when the m2pem node, or Nav2, says so."""
+        spec = self.vehicle.spec
+        seat = Seat(
+            Connection(ResourceId(spec.name), spec.domain, sitl=True),
+            replace(spec.settings, driver=DriverName.BASE, bounds=_bounds(spec)),
+            ArbiterContext(self.clock, bus, logger, spec.origin),
+            cast(RosRuntime, self.ros),
+            self.localization,
+            told,
+        )
         driver: Driver = import_module("m2pem_plugin_ros.drivers.base").BaseDriver(seat)
         return cast(Driver, OwnDriver(driver, self.vehicle.battery, self.troubles))
-
-    def make_told_driver(self, told: Told) -> Driver:
-        """The same, for who has no seat."""
-        spec = self.vehicle.spec
-        context = ArbiterContext(self.clock, _NoBus(), logger, spec.origin)
-        connection = Connection(ResourceId(spec.name), spec.domain, sitl=True)
-        ros = cast(RosRuntime, self.ros)
-        return self.make_driver(
-            Seat(connection, self.settings, context, ros, self.localization, told)
-        )
 
 
 def make_way(board: OnBoard) -> Way:
@@ -92,17 +92,18 @@ def make_way(board: OnBoard) -> Way:
 
 def _node(board: OnBoard) -> Way:
     onboard: Any = import_module("m2pem_plugin_ros.onboard")
+    bus: FleetBus = import_module("m2pem_plugin_ros.onboard.targets").Targets()
     spec = board.vehicle.spec
-    aboard = onboard.Aboard(
-        vehicle=ResourceId(spec.name),
-        settings=board.settings,
+    made = onboard.Onboard(
+        board.ros,
+        spec.name,
+        spec.settings.namespace,
+        lambda told: board.make_driver(told, bus),
         clock=board.clock,
-        origin=spec.origin,
-        localization=board.localization,
-        domain=spec.domain,
+        bus=bus,
         logger=logger,
     )
-    return cast(Way, onboard.Onboard(board.ros, aboard, board.make_driver))
+    return cast(Way, made)
 
 
 def _nav2(board: OnBoard) -> Way:
@@ -111,7 +112,7 @@ def _nav2(board: OnBoard) -> Way:
     made = nav2.Nav2Server(
         board.ros,
         spec.settings.namespace,
-        board.make_told_driver,
+        lambda told: board.make_driver(told, _NoBus()),
         board.localization,
         spec.origin,
     )
@@ -132,7 +133,7 @@ def _bounds(spec: VehicleSpec) -> Bounds:
 
 
 class _NoBus:
-    """On board, nothing is known of the fleet but what an m2pem node hears itself."""
+    """Nav2 knows nothing of the fleet."""
 
     def latest(self, resource: str) -> VehicleState | PayloadState | None:
         return None

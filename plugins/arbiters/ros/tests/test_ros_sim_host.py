@@ -1,0 +1,46 @@
+"""A simulated vehicle whose node cannot begin leaves nothing half open."""
+
+from typing import Any
+
+import pytest
+from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros.settings import Settings
+from m2pem_plugin_ros.sim import host as hosts
+from m2pem_plugin_ros.sim.clock import SimulatedClock
+from m2pem_plugin_ros.sim.specification import VehicleSpec
+from m2pem_plugin_ros.sim.vehicle import Vehicle
+from ros_sim_watch import until
+
+
+class Stillborn:
+    """It fails when it is opened for the first time."""
+
+    born = 0
+
+    async def open(self) -> None:
+        Stillborn.born += 1
+        if Stillborn.born == 1:
+            raise RuntimeError("not today")
+
+    async def close(self) -> None:
+        return None
+
+
+async def test_a_node_that_failed_to_begin_can_be_begun_again(
+    ros_domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def make(_: Any) -> Stillborn:
+        return Stillborn()
+
+    monkeypatch.setattr(hosts, "make_way", make)
+    async with RosRuntime("hosting", domain_id=ros_domain) as ros:
+        host = hosts.Host(ros, Vehicle(VehicleSpec("ugv1", Settings("/ugv1"))), SimulatedClock())
+        nodes = lambda: {name for name, _ in ros.node.get_node_names_and_namespaces()}  # noqa: E731
+        with pytest.raises(RuntimeError, match="not today"):
+            await host.open()
+        assert nodes() == {"hosting", "base"}
+        host.start()
+        await until(lambda: nodes() == {"hosting", "base", "m2pem_node"})
+        host.kill()
+        await until(lambda: nodes() == {"hosting"})
+        await host.close()
