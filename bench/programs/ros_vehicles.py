@@ -8,14 +8,12 @@ output, the line before "ready" says when the nodes began to be made (ns since t
 after it what a vehicle was commanded: its number, the verb, and when the callback was called.
 """
 
-import contextlib
 import sys
 import time
 
 import rclpy
 from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus, VehicleStatus
 from nav_msgs.msg import Odometry
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
@@ -63,14 +61,14 @@ class Vehicle:
                 return
             self._status.held = held
             self._states.publish(self._status)
-        if command.verb in TOLD:
-            print(self._number, command.verb, came_ns, flush=True)
         if command.verb == BehaviorCommand.START:
             self._say(command.id, BehaviorStatus.ACCEPTED, BehaviorStatus.RUNNING)
             if self._number != NEVER_ENDS:
                 self._say(command.id, BehaviorStatus.SUCCEEDED)
         elif command.verb == BehaviorCommand.CANCEL:
             self._say(command.id, BehaviorStatus.CANCELLED)
+        if command.verb in TOLD:
+            print(self._number, command.verb, came_ns, flush=True)
 
     def _say(self, behavior: str, *states: int) -> None:
         for state in states:
@@ -101,8 +99,11 @@ def main() -> None:
         vehicle.tell(node)
     node.create_timer(0.005, tell)
     print("ready", flush=True)
-    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+    try:
         rclpy.spin(node)
+    except (Exception, KeyboardInterrupt):  # at the end, whatever it did just then fails
+        if rclpy.ok():
+            raise
 
 
 if __name__ == "__main__":

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import rclpy
 from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus, VehicleStatus
 from nav_msgs.msg import Odometry
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import NavSatFix, NavSatStatus
@@ -394,8 +393,11 @@ def main() -> None:
     rclpy.init()
     sweeper = Sweeper()
     print("ready", flush=True)
-    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+    try:
         rclpy.spin(sweeper)
+    except (Exception, KeyboardInterrupt):  # at the end, whatever it did just then fails
+        if rclpy.ok():
+            raise
 
 
 if __name__ == "__main__":
