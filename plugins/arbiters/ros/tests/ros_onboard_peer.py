@@ -1,4 +1,4 @@
-"""Vehicles with an m2pem node each, in a process of their own: `ros_onboard_peer.py NAME...`.
+"""Vehicles with an m2pem node each, in a process of their own: `ros_onboard_peer.py SPEED NAME...`.
 
 What drives them is a script. SIGUSR1 makes their vehicles unheard; SIGTERM ends the nodes.
 """
@@ -16,10 +16,10 @@ from ros_scripted_driver import ScriptedDriver
 from m2pem.executive.clock import SystemClock
 
 
-async def main(names: list[str]) -> None:
+async def main(speed: float, names: list[str]) -> None:
     drivers: list[ScriptedDriver] = []
 
-    clock = SystemClock()
+    clock = SystemClock(speed)
     targets = Targets()
 
     def make_driver(told: Told) -> ScriptedDriver:
@@ -46,4 +46,4 @@ async def main(names: list[str]) -> None:
             await node.close()
 
 
-asyncio.run(main(sys.argv[1:]))
+asyncio.run(main(float(sys.argv[1]), sys.argv[2:]))

@@ -20,9 +20,9 @@ def via(request: pytest.FixtureRequest) -> Via:
     return Via(request.param)
 
 
-async def start_peer(domain: int) -> Peer:
+async def start_peer(domain: int, speed: int = 1) -> Peer:
     """A node that is there; the loop goes on while it starts."""
-    return await asyncio.to_thread(lambda: Peer(NODE, domain, ["evsg1"]).__enter__())
+    return await asyncio.to_thread(lambda: Peer(NODE, domain, [f"{speed}", "evsg1"]).__enter__())
 
 
 async def end_peer(peer: Peer) -> None:
@@ -78,8 +78,8 @@ async def test_both_sides_are_restarted_and_nothing_is_known(ros_domain: int, vi
         await end_peer(again)
 
 
-async def test_nobody_is_there_to_be_looked_at(ros_domain: int, via: Via) -> None:
-    async with bench(ros_domain, "evsg1", via) as one:
+async def test_nobody_is_there_to_be_looked_at(ros_domain: int) -> None:
+    async with bench(ros_domain, "evsg1", speed=5.0) as one:
         found = await one.driver.look(one.order("drive_stop"))
         assert (found.state, found.reason) == (
             UNKNOWN,
@@ -100,8 +100,8 @@ async def test_what_ended_while_nobody_listened_is_found(ros_domain: int, via: V
 
 
 async def test_a_node_that_hears_no_vehicle_any_more_says_it_is_lost(ros_domain: int) -> None:
-    peer = await start_peer(ros_domain)
-    async with bench(ros_domain, "evsg1") as one:
+    peer = await start_peer(ros_domain, speed=5)
+    async with bench(ros_domain, "evsg1", speed=5.0) as one:
         order = one.begin("single_vehicle_routing", route=ROUTE)
         await one.running(order)
         peer.process.send_signal(signal.SIGUSR1)
