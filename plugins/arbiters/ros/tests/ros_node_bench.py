@@ -7,12 +7,13 @@ from contextlib import asynccontextmanager
 from typing import Any, cast
 from uuid import UUID, uuid4, uuid5
 
-from m2pem.api import ArbiterContext, BehaviorRequest, BehaviorState, Connection, ResourceId
-from m2pem.executive.clock import SystemClock
 from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
 from m2pem_plugin_ros.drivers.node import NodeDriver
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.settings import Settings, Via
+
+from m2pem.api import ArbiterContext, BehaviorRequest, BehaviorState, Connection, ResourceId
+from m2pem.executive.clock import SystemClock
 
 AMPLE_S = 20.0
 LOOK_S = 0.005

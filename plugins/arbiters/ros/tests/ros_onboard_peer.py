@@ -1,4 +1,4 @@
-"""Vehicles with an m2pem node each, in a process of their own: `ros_onboard_peer.py NAME...`.
+"""Vehicles with an m2pem node each, in a process of their own: `ros_onboard_peer.py SPEED NAME...`.
 
 What drives them is a script. SIGUSR1 makes their vehicles unheard; SIGTERM ends the nodes.
 """
@@ -6,21 +6,24 @@ What drives them is a script. SIGUSR1 makes their vehicles unheard; SIGTERM ends
 import asyncio
 import signal
 import sys
-from typing import Any, cast
 
-from m2pem.api import ResourceId
-from m2pem.executive.clock import SystemClock
-from m2pem_plugin_ros.onboard import Aboard, Onboard
+from m2pem_plugin_ros.drivers.driver import Told
+from m2pem_plugin_ros.onboard import Onboard
+from m2pem_plugin_ros.onboard.targets import Targets
 from m2pem_plugin_ros.runtime import RosRuntime
-from m2pem_plugin_ros.settings import Settings
 from ros_scripted_driver import ScriptedDriver
 
+from m2pem.executive.clock import SystemClock
 
-async def main(names: list[str]) -> None:
+
+async def main(speed: float, names: list[str]) -> None:
     drivers: list[ScriptedDriver] = []
 
-    def make_driver(seat: Any) -> ScriptedDriver:
-        drivers.append(ScriptedDriver(seat))
+    clock = SystemClock(speed)
+    targets = Targets()
+
+    def make_driver(told: Told) -> ScriptedDriver:
+        drivers.append(ScriptedDriver(told, targets, clock))
         return drivers[-1]
 
     def deafen() -> None:
@@ -32,21 +35,15 @@ async def main(names: list[str]) -> None:
     loop.add_signal_handler(signal.SIGTERM, ended.set)
     loop.add_signal_handler(signal.SIGUSR1, deafen)
     async with RosRuntime("peer") as ros:
-        nodes = []
-        for name in names:
-            aboard = Aboard(
-                ResourceId(name),
-                Settings(f"/{name}"),
-                SystemClock(),
-                (38.0, -77.0, 60.0),
-                cast("Any", None),
-            )
-            nodes.append(Onboard(ros, aboard, make_driver))
-            await nodes[-1].open()
+        nodes = [
+            Onboard(ros, name, f"/{name}", make_driver, clock=clock, bus=targets) for name in names
+        ]
+        for node in nodes:
+            await node.open()
         print("ready", flush=True)
         await ended.wait()
         for node in nodes:
             await node.close()
 
 
-asyncio.run(main(sys.argv[1:]))
+asyncio.run(main(float(sys.argv[1]), sys.argv[2:]))

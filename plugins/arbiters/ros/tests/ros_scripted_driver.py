@@ -8,8 +8,17 @@ adjusted to a speed above 5 m/s. Its mode is how often it has begun something.
 import asyncio
 from collections.abc import Mapping
 
-from m2pem.api import BehaviorRequest, BehaviorState, Point, ResolvedValue, VehiclePosition
-from m2pem_plugin_ros.drivers.driver import Health, Order, Outcome, Seat
+from m2pem_plugin_ros.drivers.driver import Health, Order, Outcome, Told
+
+from m2pem.api import (
+    BehaviorRequest,
+    BehaviorState,
+    Clock,
+    FleetBus,
+    Point,
+    ResolvedValue,
+    VehiclePosition,
+)
 
 TICK_S = 0.01
 DONE = Outcome(BehaviorState.SUCCEEDED)
@@ -18,8 +27,10 @@ DONE = Outcome(BehaviorState.SUCCEEDED)
 class ScriptedDriver:
     """Implements `Driver`."""
 
-    def __init__(self, seat: Seat) -> None:
-        self.seat = seat
+    def __init__(self, told: Told, bus: FleetBus, clock: Clock) -> None:
+        self.told = told
+        self.bus = bus
+        self.clock = clock
         self.begun = 0
         self.held = False
         self.deaf = False
@@ -46,7 +57,7 @@ class ScriptedDriver:
         self.held = False
         self._order = order
         self._left_s = float(order.request.parameters.get("duration") or 0.0)  # type: ignore[arg-type]
-        self.seat.told.progress(order.goal)
+        self.told.progress(order.goal)
         if order.request.behavior == "drive_stop":
             self._over(DONE)
         elif order.request.behavior == "reverse":
@@ -81,7 +92,7 @@ class ScriptedDriver:
     async def _live(self) -> None:
         while True:
             if not self.deaf:
-                self.seat.told.heard()
+                self.told.heard()
             order = self._order
             if order is not None and order.request.behavior == "hold" and not self.held:
                 self._left_s -= TICK_S
@@ -89,12 +100,12 @@ class ScriptedDriver:
                     self._over(DONE)
             target = order.request.parameters.get("target") if order is not None else None
             if isinstance(target, VehiclePosition):
-                state = self.seat.context.bus.latest(target.vehicle)  # type: ignore[arg-type]
+                state = self.bus.latest(target.vehicle)  # type: ignore[arg-type]
                 if state is not None:
                     self._over(Outcome(BehaviorState.SUCCEEDED, reason=f"found {state.resource}"))
-            await self.seat.context.clock.sleep(TICK_S)
+            await self.clock.sleep(TICK_S)
 
     def _over(self, outcome: Outcome) -> None:
         order, self._order = self._order, None
         if order is not None:
-            self.seat.told.ended(order.goal, outcome)
+            self.told.ended(order.goal, outcome)

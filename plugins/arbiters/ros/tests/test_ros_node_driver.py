@@ -26,7 +26,7 @@ ROUTE = Route(((38.0, -77.0, None), (38.001, -77.0, None)))
 
 @pytest.fixture(scope="module")
 def domain() -> Iterator[int]:
-    with reserved_domain() as domain, Peer(NODE, domain, ["evsg1"]):
+    with reserved_domain() as domain, Peer(NODE, domain, ["1", "evsg1"]):
         yield domain
 
 

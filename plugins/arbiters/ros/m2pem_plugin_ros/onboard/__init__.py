@@ -3,10 +3,9 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from m2pem_plugin_ros.onboard.aboard import Aboard
     from m2pem_plugin_ros.onboard.onboard import Onboard
 
-__all__ = ["Aboard", "Onboard"]
+__all__ = ["Onboard"]
 
 
 def __getattr__(name: str) -> Any:

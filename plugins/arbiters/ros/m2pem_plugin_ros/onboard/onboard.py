@@ -1,17 +1,17 @@
 """An m2pem node for a vehicle: what it is asked for, a driver on board does."""
 
 import asyncio
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 from uuid import UUID, uuid5
 
 from m2pem_interfaces import msg as interfaces
 
-from m2pem.api import ArbiterContext, BehaviorRequest, BehaviorState, Connection, ResourceId
+from m2pem.api import BehaviorRequest, BehaviorSpec, BehaviorState, Clock, FleetBus
 from m2pem_plugin_ros.complaints import Complaints
-from m2pem_plugin_ros.drivers.driver import Driver, Order, Outcome, Seat
-from m2pem_plugin_ros.onboard.aboard import Aboard
+from m2pem_plugin_ros.drivers.driver import Driver, Order, Outcome, Told
 from m2pem_plugin_ros.onboard.asked import (
     Asked,
     Verb,
@@ -22,11 +22,14 @@ from m2pem_plugin_ros.onboard.asked import (
 )
 from m2pem_plugin_ros.onboard.book import Book
 from m2pem_plugin_ros.onboard.goals import Goals
+from m2pem_plugin_ros.onboard.offered import LEVEL
 from m2pem_plugin_ros.onboard.targets import Targets, read_target
 from m2pem_plugin_ros.onboard.voice import About, Voice
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.statuses import Status
 from m2pem_plugin_ros.wire import WireError
+
+LOGGER = logging.getLogger("m2pem.onboard")
 
 IDS = UUID("5f0c3c36-3a52-5e43-9d0a-6f1b0c1f7b61")
 """Ids of behaviors are any text; drivers know goals by UUIDs, which are made of them by this."""
@@ -41,17 +44,35 @@ SAID_WITHIN_S = 1.0
 
 class Onboard:
     """Serves `command`, `behavior_status`, `vehicle_status` and `execute_behavior` in the vehicle's
-    namespace (docs/ros.md, "A vehicle with an m2pem node"), and follows `target`."""
+    namespace (docs/ros.md, "A vehicle with an m2pem node").
+
+    `vehicle`: its name in the fleet. `make_driver`: of what is on board, and what it tells comes
+    here. `bus`: gets what is heard on `target`; it is to be the one that the driver's context has.
+    `catalogue`: what the driver can do.
+    """
 
     def __init__(
-        self, ros: RosRuntime, aboard: Aboard, make_driver: Callable[[Seat], Driver]
+        self,
+        ros: RosRuntime,
+        vehicle: str,
+        namespace: str,
+        make_driver: Callable[[Told], Driver],
+        *,
+        clock: Clock,
+        bus: FleetBus | None = None,
+        catalogue: Sequence[BehaviorSpec] = LEVEL,
+        logger: logging.Logger = LOGGER,
     ) -> None:
         self._ros = ros
-        self._aboard = aboard
-        self._clock = aboard.clock
-        self._complaints = Complaints(aboard.logger, aboard.clock.now_us)
+        self._name = vehicle
+        self._namespace = namespace
+        self._clock = clock
+        self._bus = Targets() if bus is None else bus
+        self._catalogue = catalogue
+        self._logger = logger
+        self._complaints = Complaints(logger, clock.now_us)
         self._book = Book(self._say)
-        self._targets = Targets()
+        self._voice = Voice(clock, self._about_vehicle)
         self._held = False
         self._ending = False
         self._heard_us: int | None = None
@@ -59,15 +80,9 @@ class Onboard:
         self._ids: dict[UUID, str] = {}
         self._over = asyncio.Event()
         self._tasks: list[asyncio.Task[None]] = []
-        context = ArbiterContext(aboard.clock, self._targets, aboard.logger, aboard.origin)
-        connection = Connection(aboard.vehicle, aboard.domain)
-        told = _Told(self)
-        self._driver = make_driver(
-            Seat(connection, aboard.settings, context, ros, aboard.localization, told)
-        )
         self._node: Any = None
         self._goals: Goals | None = None
-        self._voice = Voice(aboard.clock, self._about_vehicle, aboard.wrap)
+        self._driver = make_driver(_Told(self))
 
     # --- life -----------------------------------------------------------------------------------
 
@@ -76,7 +91,7 @@ class Onboard:
         await self._driver.open()
         node = self._node = self._ros.make_node(
             "m2pem_onboard",
-            self._aboard.settings.namespace,
+            self._namespace,
             start_parameter_services=False,
             enable_rosout=False,
         )
@@ -94,15 +109,17 @@ class Onboard:
     async def close(self) -> None:
         """Stop the vehicle, say so, and let go."""
         self._ending = True
-        if id_ := self._book.current:
-            self._over.clear()
-            self._driver.end(_goal(id_))
-            await self._within(self._over.wait(), STOP_WITHIN_S)
-            self._book.end(id_, BehaviorState.CANCELLED, reason=ENDED)
-        if self._goals is not None:
-            await self._goals.settled(SAID_WITHIN_S)
-            await self._voice.heard_out(SAID_WITHIN_S)
-        await self.drop()
+        try:
+            if id_ := self._book.current:
+                self._over.clear()
+                self._driver.end(_goal(id_))
+                await self._within(self._over.wait(), STOP_WITHIN_S)
+                self._book.end(id_, BehaviorState.CANCELLED, reason=ENDED)
+            if self._goals is not None:
+                await self._goals.settled(SAID_WITHIN_S)
+                await self._voice.heard_out(SAID_WITHIN_S)
+        finally:
+            await self.drop()
 
     async def drop(self) -> None:
         """Let go at once, without a word, as when the power fails."""
@@ -110,11 +127,14 @@ class Onboard:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._tasks = []
-        await self._driver.close()
         self._voice.close()
-        if self._node is not None:
-            self._ros.drop_node(self._node)
-            self._node = self._goals = None
+        self._goals = None
+        try:
+            await self._driver.close()
+        finally:
+            node, self._node = self._node, None
+            if node is not None:
+                self._ros.drop_node(node)
 
     # --- commands -------------------------------------------------------------------------------
 
@@ -156,7 +176,7 @@ class Onboard:
         except WireError as error:
             reason = str(error)
         except Exception as error:  # a driver's bug must not leave a START without an answer
-            self._aboard.logger.exception("%s: %s", self._name, message.behavior)
+            self._logger.exception("%s: %s", self._name, message.behavior)
             reason = f"the driver is wrong: {error!r}"
         if reason:
             self._book.reject(id_, "REJECTED", reason)
@@ -173,7 +193,7 @@ class Onboard:
     def _refusal(self, request: BehaviorRequest) -> str:
         if self._ending:
             return ENDED
-        catalogue, parameters = self._aboard.catalogue, request.parameters
+        catalogue, parameters = self._catalogue, request.parameters
         if reason := misfit(catalogue, self._name, request.behavior, parameters):
             return reason
         return self._silence() or self._driver.refusal(request)
@@ -190,7 +210,7 @@ class Onboard:
         try:
             self._driver.begin(order)
         except Exception as error:  # of the driver; it must not end the node
-            self._aboard.logger.exception("%s: %s", self._name, request.behavior)
+            self._logger.exception("%s: %s", self._name, request.behavior)
             reason = f"the driver is wrong: {error!r}"
             self._book.end(request.id, BehaviorState.FAILED, "FAILED", reason)
         self._voice.vehicle()
@@ -216,7 +236,7 @@ class Onboard:
             self._complaints.tell("adjust", f"{self._name}: {error}")
             return
         behavior, together = self._request.behavior, {**self._request.parameters, **parameters}
-        if reason := misfit(self._aboard.catalogue, self._name, behavior, together):
+        if reason := misfit(self._catalogue, self._name, behavior, together):
             self._complaints.tell("adjust", f"{self._name}: {reason}")
             return
         self._request = replace(self._request, parameters=together)
@@ -275,17 +295,13 @@ class Onboard:
 
     # --- inside ---------------------------------------------------------------------------------
 
-    @property
-    def _name(self) -> ResourceId:
-        return self._aboard.vehicle
-
     def _hear_target(self, message: Any) -> None:
         try:
-            target = read_target(message, self._clock.now_us(), self._aboard.origin[2])
+            target = read_target(message, self._clock.now_us())
         except WireError as error:
             self._complaints.tell("target", f"{self._name}: {error}")
         else:
-            self._targets.publish(target)
+            self._bus.publish(target)
 
     async def _within(self, happens: Any, seconds: float) -> None:
         """Wait for something, or so many seconds of the clock."""

@@ -43,9 +43,8 @@ class Targets:
             self._readers.remove(reader)
 
 
-def read_target(message: Any, now_us: int, ground_m: float) -> VehicleState:
-    """A vehicle's state of a TargetState. `ground_m`: its altitude above mean sea level, if the
-    message does not say.
+def read_target(message: Any, now_us: int) -> VehicleState:
+    """A vehicle's state of a TargetState; the altitude of its position is NaN if it is not said.
 
     Raises:
         WireError: it has no name, or is not on Earth.
@@ -57,7 +56,7 @@ def read_target(message: Any, now_us: int, ground_m: float) -> VehicleState:
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):  # nor is NaN
         raise WireError(f"the target {message.vehicle} is at {latitude}, {longitude}")
     velocity = (message.velocity.x, message.velocity.y, message.velocity.z)
-    altitude = altitude if math.isfinite(altitude) else ground_m
+    altitude = altitude if math.isfinite(altitude) else math.nan
     return VehicleState(
         ResourceId(message.vehicle),
         now_us,

@@ -40,20 +40,17 @@ class About:
 class Voice:
     """Publishes; before `open` and after `close` nothing is said."""
 
-    def __init__(self, clock: Clock, look: Callable[[], About], wrap: Callable[[Any], Any]) -> None:
+    def __init__(self, clock: Clock, look: Callable[[], About]) -> None:
         self._clock = clock
         self._look = look
-        self._wrap = wrap
-        self._publisher: Any = None
         self._behaviors: Any = None
         self._vehicle: Any = None
 
     def open(self, node: Node) -> None:
         """Publish from this node."""
         create = node.create_publisher
-        self._publisher = create(interfaces.BehaviorStatus, "behavior_status", qos.BEHAVIOR_STATUS)
-        self._behaviors = self._wrap(self._publisher)
-        self._vehicle = self._wrap(create(interfaces.VehicleStatus, "vehicle_status", qos.STATUS))
+        self._behaviors = create(interfaces.BehaviorStatus, "behavior_status", qos.BEHAVIOR_STATUS)
+        self._vehicle = create(interfaces.VehicleStatus, "vehicle_status", qos.STATUS)
 
     def close(self) -> None:
         """Say nothing more."""
@@ -95,4 +92,4 @@ class Voice:
     async def heard_out(self, within_s: float) -> None:
         """Wait until all who listen have the statuses, or for so many real seconds."""
         said = Duration(seconds=within_s)
-        await asyncio.to_thread(self._publisher.wait_for_all_acked, said)
+        await asyncio.to_thread(self._behaviors.wait_for_all_acked, said)

@@ -1,0 +1,156 @@
+"""`m2pem ros onboard`: the m2pem node of a vehicle, until Ctrl-C."""
+
+import asyncio
+import math
+import signal
+from typing import Any
+
+import click
+
+from m2pem.api import ArbiterContext, Connection, ResourceId
+from m2pem.errors import PluginError
+from m2pem_plugin_ros.loopback import keep_on_loopback
+from m2pem_plugin_ros.onboard.offered import LEVEL
+from m2pem_plugin_ros.settings import DriverName, Settings, read_settings
+
+_FLAGS = {"true": True, "false": False}
+
+
+class Origin(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """LAT,LON or LAT,LON,ALT."""
+
+    name = "lat,lon,alt"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float]:
+        """WGS-84 in degrees; metres above mean sea level."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            latitude, longitude, altitude = (*map(float, str(value).split(",")), 0.0)[:3]
+        except ValueError:
+            self.fail(f"{value!r} is not LAT,LON,ALT, such as 38.1,-77.3,60", param, ctx)
+        if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
+            self.fail(f"{value!r} is not on Earth", param, ctx)
+        return latitude, longitude, altitude
+
+
+class Setting(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """KEY=VALUE, where the key may be of an inner map."""
+
+    name = "key=value"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[tuple[str, ...], str | bool]:
+        """The keys on the way to the value, and the value."""
+        if isinstance(value, tuple):
+            return value
+        key, equals, said = (part.strip() for part in str(value).partition("="))
+        path = tuple(key.split("."))
+        if not (equals and said and all(path) and len(path) <= 2):
+            self.fail(f"{value!r} is not KEY=VALUE, such as bounds.speed=1.5 m/s", param, ctx)
+        return path, _FLAGS.get(said, said)
+
+
+@click.command()
+@click.option("--vehicle", required=True, help="Its name in the fleet.")
+@click.option("--namespace", help="Of its topics.  [default: / and its name]")
+@click.option(
+    "--driver",
+    type=click.Choice([DriverName.BASE.value, DriverName.NAV2.value]),
+    default=DriverName.BASE.value,
+    show_default=True,
+    help="What drives it: we, by velocities, or Nav2.",
+)
+@click.option(
+    "--domain", type=click.Choice(["ground", "surface"]), default="ground", show_default=True
+)
+@click.option(
+    "--origin",
+    type=Origin(),
+    required=True,
+    help="Of the frame map of its odometry: the fleet's origin.",
+)
+@click.option(
+    "--domain-id", type=click.IntRange(0, 232), help="The ROS domain.  [default: ROS_DOMAIN_ID]"
+)
+@click.option(
+    "--set",
+    "words",
+    type=Setting(),
+    multiple=True,
+    help="As the connection of a fleet has it, such as bounds.speed=1.5 m/s or odom_frame=odom. "
+    "May be given more than once.",
+)
+@click.option("--loopback", is_flag=True, help="Keep DDS on 127.0.0.1.")
+def onboard(
+    vehicle: str,
+    namespace: str | None,
+    driver: str,
+    domain: str,
+    origin: tuple[float, float, float],
+    domain_id: int | None,
+    words: tuple[tuple[tuple[str, ...], str | bool], ...],
+    loopback: bool,
+) -> None:
+    """Be the m2pem node of a vehicle, on board of it, until Ctrl-C. Then the vehicle stands.
+
+    Example: m2pem ros onboard --vehicle evsg1 --origin 38.1075,-77.3192,60
+    """
+    given: dict[str, Any] = {"namespace": namespace or f"/{vehicle}", "driver": driver}
+    if domain_id is not None:
+        given["domain_id"] = domain_id
+    for path, value in words:
+        _put(given, path, value)
+    connection = Connection(ResourceId(vehicle), domain, given)
+    try:
+        settings = read_settings({connection.resource: connection})[connection.resource]
+    except PluginError as error:
+        raise click.UsageError(str(error)) from error
+    if settings.driver is DriverName.NODE:
+        raise click.UsageError("this is the m2pem node; what it drives by is base or nav2")
+    if loopback:
+        keep_on_loopback()
+    asyncio.run(_serve(connection, settings, origin))
+
+
+def _put(given: dict[str, Any], path: tuple[str, ...], value: str | bool) -> None:
+    inner = given if len(path) == 1 else given.setdefault(path[0], {})
+    if not isinstance(inner, dict):
+        raise click.UsageError(f"--set {'.'.join(path)}: '{path[0]}' has a value of its own")
+    inner[path[-1]] = value
+
+
+async def _serve(
+    connection: Connection, settings: Settings, origin: tuple[float, float, float]
+) -> None:
+    from m2pem_plugin_ros.drivers.choice import make_driver  # noqa: PLC0415  # they need rclpy
+    from m2pem_plugin_ros.drivers.driver import Driver, Seat, Told  # noqa: PLC0415
+    from m2pem_plugin_ros.localization import TopicLocalization  # noqa: PLC0415
+    from m2pem_plugin_ros.onboard.onboard import LOGGER, Onboard  # noqa: PLC0415
+    from m2pem_plugin_ros.onboard.targets import Targets  # noqa: PLC0415
+    from m2pem_plugin_ros.onboard.wall_clock import WallClock  # noqa: PLC0415
+    from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415
+
+    ended = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    clock, targets = WallClock(), Targets()
+    context = ArbiterContext(clock, targets, LOGGER, origin)
+    name = connection.resource
+    async with RosRuntime(f"m2pem_{name}", domain_id=settings.domain_id) as ros:
+        localization = TopicLocalization(ros, name, settings, context)
+
+        def make(told: Told) -> Driver:
+            return make_driver(Seat(connection, settings, context, ros, localization, told))
+
+        namespace = settings.namespace
+        node = Onboard(ros, name, namespace, make, clock=clock, bus=targets, catalogue=LEVEL)
+        await node.open()
+        click.echo(f"{name}: {namespace or '/'}, an m2pem node that drives by {settings.driver}")
+        click.echo("ready")
+        await ended.wait()
+        await node.close()
