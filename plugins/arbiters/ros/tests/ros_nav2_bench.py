@@ -12,7 +12,7 @@ from uuid import UUID, uuid4
 
 from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
 from m2pem_plugin_ros.drivers.nav2 import Nav2Driver
-from m2pem_plugin_ros.frames import to_geodetic
+from m2pem_plugin_ros.frames import to_geodetic, to_local
 from m2pem_plugin_ros.localization import TopicLocalization
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.settings import DriverName, RouteAction, Settings
@@ -108,14 +108,19 @@ class Bench:
         context = ArbiterContext(WallClock(), self.bus, logging.getLogger("bench"), ORIGIN)
         self.localization = TopicLocalization(ros, name, settings, context)
         connection = Connection(name, "ground", sitl=True)
-        seat = Seat(connection, settings, context, ros, self.localization, self.told)
-        self.driver = Nav2Driver(seat)
+        self.seat = Seat(connection, settings, context, ros, self.localization, self.told)
+        self.driver = Nav2Driver(self.seat)
+        self._obeyed: list[str] = []
         self._words = ros.node.create_publisher(String, f"/{name}/words", qos.EVENTS)
+        self._obeyed_topic = f"/{name}/obeyed"
+        ros.subscribe(String, self._obeyed_topic, lambda m: self._obeyed.append(m.data), qos.EVENTS)
         ros.subscribe(UInt32, f"/{name}/motions", self._count, qos.STATUS)
 
     async def ready(self) -> None:
         await self.until(lambda: self.driver.health.ready and self.localization.pose is not None)
-        await self.until(lambda: self._words.get_subscription_count() and self.motions >= 0)
+        await self.until(self._words.get_subscription_count)
+        await self.until(lambda: self.ros.node.count_publishers(self._obeyed_topic))
+        await self.until(lambda: self.motions >= 0)
 
     def order(self, behavior: str, goal: UUID | None = None, **wishes: ResolvedValue) -> Order:
         request = BehaviorRequest("r1.b1", 1, behavior, wishes, (VEHICLE,))
@@ -124,6 +129,11 @@ class Bench:
     def begin(self, behavior: str, **wishes: ResolvedValue) -> UUID:
         order = self.order(behavior, **wishes)
         assert self.driver.refusal(order.request) == ""
+        self.driver.begin(order)
+        return order.goal
+
+    def begin_anyway(self, behavior: str, **wishes: ResolvedValue) -> UUID:
+        order = self.order(behavior, **wishes)
         self.driver.begin(order)
         return order.goal
 
@@ -139,11 +149,16 @@ class Bench:
             while not holds():  # noqa: ASYNC110  # what is looked at has no event
                 await asyncio.sleep(0.01)
 
-    async def moving(self) -> None:
+    async def moving(self, goal: UUID | None = None) -> None:
+        if goal is not None:
+            await self.until(lambda: goal in self.told.begun)
         await self.until(lambda: self.speed_m_s > 0.5)
 
-    def say(self, words: str) -> None:
+    async def say(self, words: str) -> None:
+        """Change the peer; returns when it has."""
+        self._obeyed.clear()
         self._words.publish(String(data=words))
+        await self.until(lambda: words in self._obeyed)
 
     @property
     def speed_m_s(self) -> float:
@@ -155,6 +170,12 @@ class Bench:
         pose = self.localization.pose
         assert pose is not None
         return pose.east_m, pose.north_m
+
+    def where(self, vehicle: str) -> tuple[float, float]:
+        state = self.bus.latest(ResourceId(vehicle))
+        assert isinstance(state, VehicleState)
+        assert state.position is not None
+        return to_local(state.position, ORIGIN)[:2]
 
     def _count(self, message: Any) -> None:
         self.motions = message.data

@@ -36,8 +36,8 @@ from m2pem.api import (  # noqa: E402
 
 ORIGIN = (38.1075, -77.3192, 60.0)
 STEP_S = 0.02
-SPEED_M_S = 4.0
-ACCELERATION_M_S2 = 8.0
+SPEED_M_S = 8.0
+ACCELERATION_M_S2 = 20.0
 
 
 class Base:
@@ -204,7 +204,13 @@ async def main(namespace: str, east_m: float, north_m: float) -> None:
     async with RosRuntime("nav2_peer") as ros:
         nav2 = Nav2Server(ros, namespace, base.make_driver, base, ORIGIN)
         await nav2.open()
-        ros.subscribe(String, f"{namespace}/words", lambda m: obey(nav2, m.data), qos.EVENTS)
+        obeyed = ros.node.create_publisher(String, f"{namespace}/obeyed", qos.EVENTS)
+
+        def hear(message: String) -> None:
+            obey(nav2, message.data)
+            obeyed.publish(message)
+
+        ros.subscribe(String, f"{namespace}/words", hear, qos.EVENTS)
         odom = ros.node.create_publisher(Odometry, f"{namespace}/odom", qos.TELEMETRY)
         motions = ros.node.create_publisher(UInt32, f"{namespace}/motions", qos.STATUS)
         told = -1

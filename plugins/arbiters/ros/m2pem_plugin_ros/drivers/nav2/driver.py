@@ -131,6 +131,8 @@ class Nav2Driver:
         drive = self._drive
         if drive is not None and drive.ending:
             return  # it is being stopped already
+        if drive is not None:
+            drive.errand.held()
         self._held = True
         self._replace(lambda: self._stand(drive))
 

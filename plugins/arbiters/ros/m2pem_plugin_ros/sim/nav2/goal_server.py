@@ -98,20 +98,20 @@ class GoalServer:
         return await self._carry_out(handle)
 
     def _result(self, handle: Any, work: "asyncio.Future[Any]") -> Any:
-        if not work.done():
-            if handle.is_cancel_requested:
-                handle.canceled()
-            else:
-                handle.abort()
-            return self.action.Result()
-        error = work.exception()
-        if error is None:
+        empty = self.action.Result()
+        error = work.exception() if work.done() else None
+        if work.done() and error is None:
             handle.succeed()
             return work.result()
+        if handle.is_cancel_requested:
+            handle.canceled()
+            return empty
         handle.abort()
+        if self._current is not handle:  # another goal has taken its place
+            return empty
         if not isinstance(error, AbortedError):
             logger.error("%s failed", self.name, exc_info=error)
-            return self.action.Result()
+            return empty
         result = self.action.Result(error_code=error.error_code)
         if hasattr(result, "error_msg"):
             result.error_msg = error.error_msg

@@ -59,6 +59,9 @@ class Errand(ABC):
             RosError: Nav2 does not answer.
         """
 
+    def held(self) -> None:  # noqa: B027  # most run as if nothing had been
+        """It is being interrupted; `run` comes once more."""
+
     def adjust(self, parameters: Mapping[str, ResolvedValue]) -> None:
         """Go on with these."""
         self.wishes.change(parameters)
@@ -104,6 +107,10 @@ class GoalErrand(Errand):
         self._current = numbered(self.job.order.goal, self._goals)
         self._goals += 1
         return await self.nav2.drive(self.client, self._current, goal, self.job.begun)
+
+    def held(self) -> None:
+        """What was found on the vehicle is cancelled, too."""
+        self._found = None
 
     def adjust(self, parameters: Mapping[str, ResolvedValue]) -> None:
         """Of most, the speed alone can change on the way."""
