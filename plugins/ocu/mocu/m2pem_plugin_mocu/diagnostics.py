@@ -23,7 +23,7 @@ LATE_S = 1.0
 class Health:
     """Of the executive, as this unit feels it.
 
-    `servers`: how many nodes offer our services. `journal_s`: how long it took to read from the
+    `listeners`: how many operators' clients hear all events. `servers`: how many nodes offer our services. `journal_s`: how long it took to read from the
     journal; `journal_error`: why it could not be.
     """
 
@@ -32,6 +32,7 @@ class Health:
     servers: int
     runs: int
     prompts: int
+    listeners: int
     refused: int
     left_out: int
     journal_s: float
@@ -116,6 +117,7 @@ def _executive(health: Health) -> Any:
     values = {
         "runs": health.runs,
         "prompts": health.prompts,
+        "listeners": health.listeners,
         "requests refused": health.refused,
         "events left out": health.left_out,
         "late_s": f"{health.late_s:.3f}",

@@ -5,7 +5,7 @@ import logging
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
-from m2pem_plugin_ros.runtime import RosRuntime, qos
+from m2pem_plugin_ros.runtime import RosRuntime
 
 from m2pem.api import MissionControl
 from m2pem.errors import M2pemError
@@ -39,7 +39,7 @@ class Examiner:
         self._topics = topics
         self._services = services
         self._vehicles = Vehicles(control.fleet())
-        self._publisher = ros.node.create_publisher(DiagnosticArray, "/diagnostics", qos.EVENTS)
+        self._publisher = ros.node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._warned = False
 
     async def listen(self) -> None:
@@ -78,6 +78,7 @@ class Examiner:
             servers=servers,
             runs=sum(not each.summary.status.ended for each in self._feed.pictures.values()),
             prompts=len(self._feed.prompts),
+            listeners=self._topics.listeners(),
             refused=sum(gate.refused for gate in self._services.gates.values()),
             left_out=self._topics.left_out,
             journal_s=time.monotonic() - began_s,
@@ -87,7 +88,10 @@ class Examiner:
     async def _journal_error(self) -> str:
         try:
             async with asyncio.timeout(JOURNAL_WITHIN_S):
-                await self._control.records("r1", BEYOND_ALL, 1)
+                if (run := next(iter(self._feed.pictures), self._feed.latest_run)) is None:
+                    await self._control.runs()
+                else:
+                    await self._control.records(run, BEYOND_ALL, 1)
         except TimeoutError:
             return f"it does not answer within {JOURNAL_WITHIN_S:g} s"
         except M2pemError as error:

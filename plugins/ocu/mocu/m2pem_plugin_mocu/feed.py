@@ -26,6 +26,9 @@ BACKLOG = 100_000
 REMEMBERED_RUNS = 100
 """Runs that have ended and are still told of; the journal has all."""
 
+REMEMBERED_PROMPTS = 1000
+"""Prompts that no longer stand: who answers one of them late is told who was first."""
+
 BREATH = 200
 """Notices that are taken before others may do something."""
 
@@ -73,6 +76,9 @@ class Feed:
     def __init__(self, control: MissionControl) -> None:
         self.pictures: dict[RunId, Picture] = {}
         self.prompts: dict[tuple[RunId, str], Asked] = {}
+        self.closed: dict[tuple[RunId, str], PromptClosed] = {}
+        self.latest_run: RunId | None = None
+        """The last that the journal had when this began."""
         self.taken = 0
         self._control = control
         self._notices: AsyncIterator[Notice] = control.subscribe(size=BACKLOG)
@@ -108,6 +114,7 @@ class Feed:
     async def _look_around(self) -> None:
         """Know the runs that have not ended, and where the tokens of those are that go on."""
         for summary in await self._control.runs():
+            self.latest_run = summary.run
             if summary.status is RunStatus.INTERRUPTED:
                 self.pictures[summary.run] = Picture(summary, None)
             elif not summary.status.ended:
@@ -183,10 +190,13 @@ class Feed:
         return picture
 
     def _apply(self, picture: Picture, stamped: StampedRecord, listener: Listener) -> None:
-        if not picture.apply(stamped):
+        is_new = picture.apply(stamped)
+        if stamped.seq > picture.told_seq:
+            picture.told_seq = stamped.seq
+            listener.recorded(picture, stamped)
+        if not is_new:
             return
         record = stamped.record
-        listener.recorded(picture, stamped)
         match record:
             case r.PromptAnswered(prompt=prompt, decision=decision, by=by):
                 self._close(PromptClosed(stamped.run, prompt, decision, by), listener)
@@ -201,8 +211,12 @@ class Feed:
             listener.tokens_changed()
 
     def _close(self, closed: PromptClosed, listener: Listener) -> None:
-        asked = self.prompts.pop((closed.run, closed.prompt), None)
+        key = (closed.run, closed.prompt)
+        asked = self.prompts.pop(key, None)
         if asked is not None:
+            self.closed[key] = closed
+            if len(self.closed) > REMEMBERED_PROMPTS:
+                del self.closed[next(iter(self.closed))]
             listener.closed(asked, closed)
 
     def _close_all_of(self, run: RunId, listener: Listener) -> None:

@@ -66,7 +66,7 @@ class MocuOcu:
 
         async with RosRuntime(NODE, namespace=self.namespace, domain_id=self._domain_id) as ros:
             topics = Topics(ros, self._control, self._feed)
-            services = Services(ros, self._control, topics)
+            services = Services(ros, self._control, self._feed, topics)
             examiner = Examiner(ros, self._control, self._feed, topics, services)
             following = asyncio.create_task(self._feed.follow(topics, now_us))
             speaking = [

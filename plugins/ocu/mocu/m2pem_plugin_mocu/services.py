@@ -7,8 +7,9 @@ from m2pem_interfaces import srv
 from m2pem_plugin_ros.runtime import RosRuntime
 
 from m2pem.api import MissionControl
-from m2pem.errors import M2pemError
+from m2pem.errors import M2pemError, OperatorError
 from m2pem_plugin_mocu import messages, requests
+from m2pem_plugin_mocu.feed import Feed
 from m2pem_plugin_mocu.gate import Gate
 from m2pem_plugin_mocu.starting import start_mission
 from m2pem_plugin_mocu.texts import sendable
@@ -30,9 +31,10 @@ STOPPING = 100
 class Services:
     """Offers them while the runtime is there."""
 
-    def __init__(self, ros: RosRuntime, control: MissionControl, topics: Topics) -> None:
+    def __init__(self, ros: RosRuntime, control: MissionControl, feed: Feed, topics: Topics) -> None:
         self._ros = ros
         self._control = control
+        self._feed = feed
         self._topics = topics
         self.gates: dict[str, Gate] = {}
         self._offer(srv.StartMission, "start_mission", start_mission, STARTING)
@@ -46,9 +48,9 @@ class Services:
             (srv.SetWaypoints, requests.set_waypoints),
             (srv.TakeVehicle, requests.take_vehicle),
             (srv.GiveBackVehicle, requests.give_back_vehicle),
-            (srv.AnswerPrompt, requests.answer_prompt),
+            (srv.AnswerPrompt, self._answer_prompt),
         ):
-            self._offer(service_type, handler.__name__, handler, SEVERAL)
+            self._offer(service_type, handler.__name__.lstrip("_"), handler, SEVERAL)
 
     def _offer(self, service_type: Any, name: str, handler: Handler, at_once: int) -> None:
         gate = self.gates[name] = Gate(at_once)
@@ -79,6 +81,18 @@ class Services:
         else:
             response.success = True
         return response
+
+    async def _answer_prompt(self, control: MissionControl, request: Any, response: Any) -> None:
+        try:
+            await requests.answer_prompt(control, request, response)
+        except OperatorError as refusal:
+            # A run that has ended since cannot say who was first.
+            closed = self._feed.closed.get((request.run, request.prompt))
+            if closed is None or not closed.decision or closed.by in str(refusal):
+                raise
+            raise OperatorError(
+                f"prompt {closed.prompt} was answered by {closed.by}: {closed.decision}; {refusal}"
+            ) from refusal
 
     async def _list_runs(self, control: MissionControl, request: Any, response: Any) -> None:
         for summary in await control.runs():

@@ -58,6 +58,11 @@ class Topics:
         self._paced_status = Paced(self._say_status)
         self._paced_active = Paced(self._say_active)
 
+    def listeners(self) -> int:
+        """How many clients hear events, and prompts as they come."""
+        heard = (self._events, self._prompt_events)
+        return min(publisher.get_subscription_count() for publisher in heard)
+
     async def run(self) -> None:
         """Speak until cancelled."""
         async with asyncio.TaskGroup() as group:

@@ -110,6 +110,12 @@ class Client:
                 pipe.close()
 
 
+def values(diagnostics: Message, name: str = "m2pem: executive") -> dict[str, str]:
+    """The values of a status, by their keys."""
+    (found,) = [each for each in diagnostics["status"] if each["name"] == name]
+    return {each["key"]: each["value"] for each in found["values"]}
+
+
 async def until(true: Callable[[], bool], otherwise: Callable[[], str] = lambda: "") -> None:
     """Wait for something that a process or DDS does."""
     try:
@@ -144,6 +150,10 @@ class World:
         unit = MocuOcu(self.faults, environment={NAMESPACE: namespace}, domain_id=self.domain)
         self._serving = asyncio.create_task(unit.serve())
         return unit
+
+    async def has_listeners(self, client: Client) -> None:
+        """Wait until the session's clients hear what is told once: events, and prompts as they open."""
+        await client.hears("diagnostics", lambda each: int(values(each)["listeners"]) >= 2)
 
     async def leave(self) -> None:
         """Cancel it, and see it end."""
