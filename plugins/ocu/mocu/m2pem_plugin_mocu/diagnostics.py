@@ -23,8 +23,9 @@ LATE_S = 1.0
 class Health:
     """Of the executive, as this unit feels it.
 
-    `listeners`: how many operators' clients hear all events. `servers`: how many nodes offer our services. `journal_s`: how long it took to read from the
-    journal; `journal_error`: why it could not be.
+    `listeners`: how many operators' clients hear all events. `servers`: how many nodes offer our
+    services. `journal_s`: how long it took to read from the journal; `journal_error`: why it could
+    not be.
     """
 
     name: str

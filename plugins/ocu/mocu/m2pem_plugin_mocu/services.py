@@ -31,7 +31,9 @@ STOPPING = 100
 class Services:
     """Offers them while the runtime is there."""
 
-    def __init__(self, ros: RosRuntime, control: MissionControl, feed: Feed, topics: Topics) -> None:
+    def __init__(
+        self, ros: RosRuntime, control: MissionControl, feed: Feed, topics: Topics
+    ) -> None:
         self._ros = ros
         self._control = control
         self._feed = feed

@@ -21,9 +21,10 @@ from m2pem_plugin_mocu.picture import Picture
 
 PROMPT_EVENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 
-EVENTS_AT_ONCE = 100
+EVENTS_AT_ONCE = 25
 EVENTS_EVERY_S = 0.025
-"""No more than a reader in Python can take: of what it has not read, a topic keeps 1000."""
+"""That is 1000 a second, and 1000 are what the topic keeps for a reader: one in Python takes several
+thousand a second, and may hesitate for one."""
 
 EVENTS_WAITING = 10_000
 """Beyond that the oldest are left out, which their readers see by `seq`."""
@@ -76,7 +77,7 @@ class Topics:
             async with asyncio.timeout(FLUSH_S):
                 while self._waiting:
                     self._send_some()
-                    await asyncio.sleep(EVENTS_EVERY_S)
+                    await asyncio.sleep(0)
                 for say in (self._say_prompts, self._say_status, self._say_active):
                     await say()
                 spoke = (

@@ -152,7 +152,7 @@ class World:
         return unit
 
     async def has_listeners(self, client: Client) -> None:
-        """Wait until the session's clients hear what is told once: events, and prompts as they open."""
+        """Wait until the session's clients hear what is told once, such as events."""
         await client.hears("diagnostics", lambda each: int(values(each)["listeners"]) >= 2)
 
     async def leave(self) -> None:

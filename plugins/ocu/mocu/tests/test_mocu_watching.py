@@ -19,10 +19,12 @@ LOOPS = b"""<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" tar
 <process id="P" isExecutable="true"><startEvent id="S"/>
 <exclusiveGateway id="Again" default="out"/><scriptTask id="Count"><script>n = n + 1</script>
 </scriptTask><endEvent id="E"/><exclusiveGateway id="In"/>
-<sequenceFlow id="a" sourceRef="S" targetRef="In"/><sequenceFlow id="b" sourceRef="In" targetRef="Count"/>
+<sequenceFlow id="a" sourceRef="S" targetRef="In"/>
+<sequenceFlow id="b" sourceRef="In" targetRef="Count"/>
 <sequenceFlow id="c" sourceRef="Count" targetRef="Again"/>
-<sequenceFlow id="again" sourceRef="Again" targetRef="In"><conditionExpression>n &lt; 60</conditionExpression>
-</sequenceFlow><sequenceFlow id="out" sourceRef="Again" targetRef="E"/></process></definitions>"""
+<sequenceFlow id="again" sourceRef="Again" targetRef="In">
+<conditionExpression>n &lt; 30</conditionExpression></sequenceFlow>
+<sequenceFlow id="out" sourceRef="Again" targetRef="E"/></process></definitions>"""
 
 
 def stands(prompts: Message, text: str) -> bool:
@@ -136,16 +138,16 @@ async def test_many_changes_are_few_messages(world: World, client: Client) -> No
     await world.has_listeners(client)
     since = len(client.said)
     begun = asyncio.get_running_loop().time()
-    runs = [await world.control.start(LOOPS, data={"n": 0}) for _ in range(5)]
+    runs = [await world.control.start(LOOPS, data={"n": 0}) for _ in range(3)]
     for run in runs:
         await world.control.wait(run)
-    await client.hears("status", lambda each: statuses(each) == [COMPLETED] * 5)
+    await client.hears("status", lambda each: statuses(each) == [COMPLETED] * 3)
     count = sum([len(await world.control.records(run, limit=100_000)) for run in runs])
     await until(lambda: len(client.heard("events")) >= count)
     most = 2 + (asyncio.get_running_loop().time() - begun) / LEAST_S
     for topic in ("active_elements", "status"):
         assert len(client.heard(topic, since=since)) <= most
-    assert count > 1000
+    assert 500 < count < 1000  # the topic keeps so many, however slow its reader is
     for run in runs:
         seqs = [each["seq"] for each in client.heard("events") if each["run"] == run]
         assert all(after == before + 1 for before, after in pairwise(seqs))
