@@ -140,11 +140,11 @@ class Feed:
             self._close(PromptClosed(*key), listener)
 
     async def _records(self, picture: Picture) -> AsyncIterator[StampedRecord]:
-        seq = picture.seq
-        while page := await self._control.records(picture.summary.run, seq):
+        """From where a page ended: a journal cannot be read from anywhere else. Some are known."""
+        while page := await self._control.records(picture.summary.run, picture.page_seq):
             for stamped in page:
                 yield stamped
-            seq = page[-1].seq
+            picture.page_seq = page[-1].seq
 
     async def _begin(self, summary: RunSummary) -> Picture:
         try:
@@ -156,7 +156,10 @@ class Feed:
             summary = RunSummary(
                 summary.run, mission.file, summary.process, summary.status, summary.started_us
             )
-        picture = self.pictures[summary.run] = Picture(summary, mission)
+        picture = Picture(summary, mission)
+        if (known := self.pictures.get(summary.run)) is not None:
+            picture.told_seq = known.told_seq
+        self.pictures[summary.run] = picture
         return picture
 
     # --- what happens ---------------------------------------------------------------------------

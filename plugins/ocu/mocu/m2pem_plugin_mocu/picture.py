@@ -53,6 +53,8 @@ class Picture:
         self.summary = summary
         self.mission = mission
         self.seq = 0
+        self.page_seq = 0
+        """Up to here, the journal was read."""
         self.told_seq = 0
         """Up to here, operators were told."""
         self._tokens: dict[int, Token] = {}

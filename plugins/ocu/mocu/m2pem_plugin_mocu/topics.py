@@ -23,8 +23,8 @@ PROMPT_EVENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 
 EVENTS_AT_ONCE = 25
 EVENTS_EVERY_S = 0.025
-"""That is 1000 a second, and 1000 are what the topic keeps for a reader: one in Python takes several
-thousand a second, and may hesitate for one."""
+"""That is 1000 a second, and 1000 are what the topic keeps for a reader: one in Python takes
+several thousand a second, and may hesitate for one."""
 
 EVENTS_WAITING = 10_000
 """Beyond that the oldest are left out, which their readers see by `seq`."""
@@ -62,7 +62,7 @@ class Topics:
     def listeners(self) -> int:
         """How many clients hear events, and prompts as they come."""
         heard = (self._events, self._prompt_events)
-        return min(publisher.get_subscription_count() for publisher in heard)
+        return min(int(publisher.get_subscription_count()) for publisher in heard)
 
     async def run(self) -> None:
         """Speak until cancelled."""
