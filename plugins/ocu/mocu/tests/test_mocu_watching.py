@@ -171,6 +171,18 @@ async def test_a_reader_that_is_frozen_holds_nobody_up(world: World, client: Cli
         frozen.close()
 
 
+async def test_a_flood_of_calls_starves_no_prompt(
+    world: World, client: Client, clients: list[Client]
+) -> None:
+    await client.hears("prompts", lambda each: True)
+    flood = clients[1].send("list_runs", times=2000)
+    await clients[1].responses(flood, 1)
+    _, prompt = await world.asks("Meanwhile?")
+    await client.hears("prompts", lambda each: stands(each, "Meanwhile?"))
+    answer = {"run": "r1", "prompt": prompt, "decision": "continue"}
+    assert (await client.call("answer_prompt", **answer))["success"]
+
+
 async def test_what_happens_last_is_still_told(world: World, client: Client) -> None:
     await world.has_listeners(client)
     run, prompt = await world.asks()
