@@ -26,7 +26,7 @@ from m2pem.testing.stage import stage
 
 PEER = Path(__file__).with_name("mocu_client_peer.py")
 ONE, OTHER = "/m2pem", "/team_b/m2pem"
-WITHIN_S = 15.0
+WITHIN_S = 30.0
 LOOK_EVERY_S = 0.005
 
 Message = dict[str, Any]

@@ -128,6 +128,7 @@ async def test_bad_data_changes_nothing(world: World, client: Client) -> None:
 async def test_of_two_operators_the_second_is_told_who_was_first(
     world: World, client: Client, clients: list[Client]
 ) -> None:
+    await world.has_listeners(client)
     run, prompt = await world.asks()
     answer = {"run": run, "prompt": prompt, "decision": "continue"}
     assert (await clients[1].call("answer_prompt", by="bob@mocu2", **answer))["success"]
