@@ -1,6 +1,6 @@
 """MissionControl: the one face of the executive to operators, scripts and OCU plugins."""
 
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -212,8 +212,17 @@ class MissionControl(Protocol):
         """What every resource can do."""
         ...
 
-    def check(self, mission: Path | str | bytes) -> Sequence[Finding]:
-        """All findings of `m2pem check` for a mission and the fleet in use."""
+    def simulated(self) -> bool:
+        """Whether nothing real moves: all vehicles are simulated, or software in the loop."""
+        ...
+
+    def check(
+        self, mission: Path | str | bytes, *, process: str | None = None, data: Iterable[str] = ()
+    ) -> Sequence[Finding]:
+        """All findings of `m2pem check` for a mission and the fleet in use.
+
+        `data`: names that are given at start.
+        """
         ...
 
     async def simulate(self, mission: Path | str | bytes, **options: Any) -> "SimulationResult":

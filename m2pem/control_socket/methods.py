@@ -93,6 +93,10 @@ async def _catalogue(control: MissionControl, _: Nothing) -> Any:
     return control.catalogue()
 
 
+async def _simulated(control: MissionControl, _: Nothing) -> Any:
+    return control.simulated()
+
+
 async def _mission(control: MissionControl, p: OfRun) -> Any:
     mission = await control.mission(p.run)
     return {"file": mission.file, "source": mission.source, "library": mission.library}
@@ -117,6 +121,7 @@ METHODS: dict[str, Method] = {
     "wait": (OfRun, lambda c, p: c.wait(p.run)),
     "fleet": (Nothing, _fleet),
     "catalogue": (Nothing, _catalogue),
+    "simulated": (Nothing, _simulated),
 }
 """Calls, answered once."""
 

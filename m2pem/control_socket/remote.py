@@ -3,7 +3,7 @@
 import asyncio
 import itertools
 from base64 import b64decode
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -55,6 +55,7 @@ class RemoteControl:
         self._fleet = restore(b64decode(await self._ask("fleet")))
         catalogue = await self._ask("catalogue")
         self._catalogue = msgspec.convert(catalogue, dict[ResourceId, tuple[BehaviorSpec, ...]])
+        self._simulated = bool(await self._ask("simulated"))
         self._listening = asyncio.create_task(self._follow_prompts())
         return self
 
@@ -226,7 +227,13 @@ class RemoteControl:
         """What every resource can do."""
         return self._catalogue
 
-    def check(self, mission: Path | str | bytes) -> Sequence[Finding]:
+    def simulated(self) -> bool:
+        """Whether nothing real moves."""
+        return self._simulated
+
+    def check(
+        self, mission: Path | str | bytes, *, process: str | None = None, data: Iterable[str] = ()
+    ) -> Sequence[Finding]:
         """Refused."""
         raise OperatorError("missions are checked where the executive runs: m2pem check")
 

@@ -71,6 +71,11 @@ class FleetArbiters:
                 fence=fence,
                 sitl=owner.sitl,
             )
+        self.nothing_is_real = all(
+            name == SIMULATED or connection.sitl
+            for name, group in connections.items()
+            for connection in group.values()
+        )
         self.by_name: dict[str, Arbiter] = {
             name: plugins.arbiter(name)(group, context) for name, group in connections.items()
         }

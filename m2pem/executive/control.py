@@ -1,7 +1,7 @@
 """`MissionControl` over an executive: what OCUs, scripts and the command line call."""
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -218,7 +218,13 @@ class Control:
         """What every resource can do."""
         return self._executive.arbiters.catalogue()
 
-    def check(self, mission: Path | str | bytes) -> Sequence[Finding]:
+    def simulated(self) -> bool:
+        """Whether nothing real moves."""
+        return self._executive.arbiters.nothing_is_real
+
+    def check(
+        self, mission: Path | str | bytes, *, process: str | None = None, data: Iterable[str] = ()
+    ) -> Sequence[Finding]:
         """All findings of `m2pem check` for a mission and the fleet in use."""
         executive = self._executive
         try:
@@ -226,7 +232,12 @@ class Control:
         except MissionError as error:
             return error.findings
         return findings_for(
-            loaded, executive.arbiters, executive.plugins, simulated=executive.simulated
+            loaded,
+            executive.arbiters,
+            executive.plugins,
+            data,
+            process,
+            simulated=executive.simulated,
         )
 
     async def simulate(self, mission: Path | str | bytes, **options: Any) -> SimulationResult:

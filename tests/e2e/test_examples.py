@@ -408,6 +408,15 @@ EXPECTED = {
             never={"at InspectBridge"},
         ),
     ],
+    "t22": [
+        Course(
+            [
+                *("at SendRoute", "SendRoute: continue by answers file"),
+                *("DriveRoute: rover single_vehicle_routing", "at End", "completed"),
+            ],
+            never={"at Aborted"},
+        )
+    ],
 }
 """By example, a course for each rehearsal of its README. The others are all Python, whose output is
 compared."""

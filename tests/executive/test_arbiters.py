@@ -49,3 +49,25 @@ def test_an_arbiter_is_told_the_failsafe_and_the_fence(fence: str, lent: Area | 
     for resource in (UAV1, CAMERA):
         connection = plugins.connections[resource]
         assert (connection.failsafe, connection.fence) == ("return_to_launch", lent)
+
+
+@pytest.mark.parametrize(
+    ("arbiter", "sitl", "simulated", "nothing_is_real"),
+    [
+        ("sim", False, False, True),
+        ("ros", True, False, True),
+        ("ros", False, True, True),
+        ("ros", False, False, False),
+    ],
+)
+def test_it_is_known_whether_anything_real_moves(
+    arbiter: str, sitl: bool, simulated: bool, nothing_is_real: bool
+) -> None:
+    vehicles = {UAV1: Vehicle(UAV1, Domain.AIR, arbiter, {}, sitl=sitl)}
+    arbiters = FleetArbiters(
+        Fleet("fleet", "fleet.yaml", vehicles),
+        cast("ArbiterPlugins", Plugins()),
+        cast("ArbiterContext", object()),
+        simulated=simulated,
+    )
+    assert arbiters.nothing_is_real is nothing_is_real

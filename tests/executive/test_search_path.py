@@ -53,6 +53,21 @@ def test_a_mission_that_calls_what_is_nowhere_says_where_it_was_looked_for(
     assert str(tmp_path) in finding.message
 
 
+def test_a_check_knows_what_is_given_at_start(play) -> None:
+    routed = '<scriptTask id="T"><script>done = mission.pace</script></scriptTask>'
+
+    async def story(world: World):
+        check = world.executive.control.check
+        source = mission(sequence(("T", routed)))
+        given = check(source, data=["mission.pace"])
+        return check(source), given, check(source, process="Q", data=["mission.pace"])
+
+    unknown, given, elsewhere = play(story)
+    assert ["mission.pace" in each.message for each in unknown] == [True]
+    assert given == []
+    assert [each.rule for each in elsewhere] == ["unknown-process"]
+
+
 def test_a_rehearsal_beside_missions_has_the_path_too(play, tmp_path: Path) -> None:
     (tmp_path / "search.bpmn").write_bytes(mission(SEARCH))
     given = []

@@ -1,0 +1,153 @@
+"""What /diagnostics says of the executive, its journal and its vehicles (diagnostic_msgs)."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from m2pem.api import Fleet, LinkState, PayloadState, ResourceId, VehicleState
+from m2pem_plugin_mocu import messages
+from m2pem_plugin_mocu.texts import one_line
+
+SILENT_AFTER_S = 5.0
+"""For a vehicle of a fleet that does not say `lost_after`."""
+
+LOW_BATTERY = 0.2
+LATE_S = 1.0
+"""When the executive's event loop comes so much too late, operators notice."""
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """Of the executive, as this unit feels it.
+
+    `listeners`: how many operators' clients hear all events. `servers`: how many nodes offer our
+    services. `journal_s`: how long it took to read from the journal; `journal_error`: why it could
+    not be.
+    """
+
+    name: str
+    late_s: float
+    servers: int
+    runs: int
+    prompts: int
+    listeners: int
+    refused: int
+    left_out: int
+    journal_s: float
+    journal_error: str = ""
+
+
+class Vehicles:
+    """The last that each vehicle and payload has said, and when that was heard."""
+
+    def __init__(self, fleet: Fleet, now_s: Callable[[], float] = time.monotonic) -> None:
+        self._fleet = fleet
+        self._now_s = now_s
+        self._last: dict[ResourceId, tuple[VehicleState | PayloadState, float]] = {}
+
+    def hear(self, state: VehicleState | PayloadState) -> None:
+        """A vehicle or payload says how it is."""
+        self._last[state.resource] = (state, self._now_s())
+
+    def statuses(self) -> list[Any]:
+        """One for each vehicle, and for each payload that has said something."""
+        mounted = [each for each in self._fleet.payloads if each in self._last]
+        return [self._status(resource) for resource in [*self._fleet.vehicles, *mounted]]
+
+    def _status(self, resource: ResourceId) -> Any:
+        name = f"m2pem: link {resource}"
+        if resource not in self._last:
+            return _status(name, resource, DiagnosticStatus.STALE, "nothing heard yet", {})
+        state, heard_s = self._last[resource]
+        silent_s = self._now_s() - heard_s
+        values = {"link": state.link.value, "behavior": state.behavior}
+        problems: list[str] = []
+        if isinstance(state, VehicleState):
+            values |= _of_vehicle(state)
+            problems = _problems(state)
+        level = DiagnosticStatus.WARN if problems else DiagnosticStatus.OK
+        if state.link is LinkState.DEGRADED:
+            level, problems = DiagnosticStatus.WARN, ["link degraded", *problems]
+        if state.link is LinkState.LOST:
+            level, problems = DiagnosticStatus.ERROR, ["link lost", *problems]
+        elif silent_s > self._silent_after_s(resource):
+            level, problems = DiagnosticStatus.STALE, [f"silent for {silent_s:.0f} s", *problems]
+        return _status(name, resource, level, "; ".join(problems) or "heard", values)
+
+    def _silent_after_s(self, resource: ResourceId) -> float:
+        vehicle = self._fleet.vehicles[ResourceId(resource.partition("/")[0])]
+        return vehicle.lost_after_s or SILENT_AFTER_S
+
+
+def _of_vehicle(state: VehicleState) -> dict[str, str]:
+    said: dict[str, object] = {"mode": state.mode, "armed": state.armed, "ready": state.ready}
+    if state.battery_fraction is not None:
+        said["battery"] = f"{state.battery_fraction:.2f}"
+    if state.position is not None:
+        said["latitude_deg"] = f"{state.position.latitude_deg:.7f}"
+        said["longitude_deg"] = f"{state.position.longitude_deg:.7f}"
+        said["altitude_m"] = f"{state.position.altitude_m:.1f}"
+    return {key: str(value) for key, value in said.items() if value is not None and value != ""}
+
+
+def _problems(state: VehicleState) -> list[str]:
+    problems: list[str] = []
+    if state.battery_fraction is not None and state.battery_fraction < LOW_BATTERY:
+        problems.append(f"battery at {state.battery_fraction:.0%}")
+    if state.ready is False:
+        problems.append(f"not ready: {', '.join(state.not_ready_reasons) or 'it does not say why'}")
+    return problems
+
+
+def _executive(health: Health) -> Any:
+    level, problems = DiagnosticStatus.OK, list[str]()
+    if health.late_s > LATE_S or health.left_out:
+        level = DiagnosticStatus.WARN
+    if health.late_s > LATE_S:
+        problems.append(f"busy: {health.late_s:.1f} s late")
+    if health.left_out:
+        problems.append(f"{health.left_out} events were left out, as there were too many")
+    if health.servers > 1:
+        level = DiagnosticStatus.ERROR
+        problems.append(
+            f"{health.servers} executives serve this namespace: each does what is asked"
+        )
+    values = {
+        "runs": health.runs,
+        "prompts": health.prompts,
+        "listeners": health.listeners,
+        "requests refused": health.refused,
+        "events left out": health.left_out,
+        "late_s": f"{health.late_s:.3f}",
+    }
+    return _status("m2pem: executive", health.name, level, "; ".join(problems) or "serves", values)
+
+
+def _journal(health: Health) -> Any:
+    if health.journal_error:
+        level, text = DiagnosticStatus.ERROR, health.journal_error
+    else:
+        level, text = DiagnosticStatus.OK, "readable"
+    values = {"read_s": f"{health.journal_s:.3f}"}
+    return _status("m2pem: journal", health.name, level, text, values)
+
+
+def diagnostics(health: Health, vehicles: Vehicles, now_us: int) -> Any:
+    """All of it, as one message."""
+    statuses: Sequence[Any] = [_executive(health), _journal(health), *vehicles.statuses()]
+    message = DiagnosticArray(status=list(statuses))
+    message.header.stamp = messages.time_of(now_us)
+    return message
+
+
+def _status(name: str, hardware: str, level: bytes, text: str, values: dict[str, Any]) -> Any:
+    return DiagnosticStatus(
+        name=name,
+        hardware_id=one_line(hardware),
+        level=level,
+        message=one_line(text),
+        values=[KeyValue(key=key, value=one_line(str(value))) for key, value in values.items()],
+    )

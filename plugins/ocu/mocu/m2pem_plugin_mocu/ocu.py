@@ -1,0 +1,111 @@
+"""Serves operator control units over ROS 2, as an OCU of the executive."""
+
+import asyncio
+import logging
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from m2pem_plugin_ros.installation import require_interfaces
+from m2pem_plugin_ros.loopback import keep_on_loopback
+
+from m2pem.errors import M2pemError
+from m2pem_plugin_mocu import settings
+from m2pem_plugin_mocu.feed import Feed
+
+if TYPE_CHECKING:
+    from m2pem.api import MissionControl
+    from m2pem_plugin_mocu.topics import Topics
+
+NODE = "executive"
+
+SETTLE_TURNS = 5
+"""Turns of the event loop without a notice, after which all that was committed is known."""
+
+SETTLE_S = 0.5
+
+log = logging.getLogger("m2pem.ocu.mocu")
+
+
+class MocuOcu:
+    """All its operators see the same and may do the same, wherever in the ROS domain they are.
+
+    `environment`: the variables of `settings`. `domain_id`: None takes ROS_DOMAIN_ID.
+
+    Raises:
+        PluginError: ROS 2, or m2pem_interfaces, is not there or not usable, or a variable has a
+            value that it may not have.
+    """
+
+    def __init__(
+        self,
+        control: "MissionControl",
+        *,
+        environment: Mapping[str, str] = os.environ,
+        domain_id: int | None = None,
+    ) -> None:
+        self.namespace = settings.namespace(environment)
+        self._control = control
+        self._domain_id = domain_id
+        if settings.stays_on_loopback(environment, simulated=control.simulated()):
+            keep_on_loopback()
+        require_interfaces("m2pem_interfaces")
+        self._feed = Feed(control)
+
+    async def serve(self) -> None:
+        """Tell operators what happens, and do what they ask, until cancelled.
+
+        Ends when the executive does.
+        """
+        from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415  # rclpy
+
+        from m2pem_plugin_mocu.examiner import Examiner  # noqa: PLC0415
+        from m2pem_plugin_mocu.services import Services  # noqa: PLC0415
+        from m2pem_plugin_mocu.topics import Topics, now_us  # noqa: PLC0415
+
+        async with RosRuntime(NODE, namespace=self.namespace, domain_id=self._domain_id) as ros:
+            topics = Topics(ros, self._control, self._feed)
+            services = Services(ros, self._control, self._feed, topics)
+            examiner = Examiner(ros, self._control, self._feed, topics, services)
+            following = asyncio.create_task(self._feed.follow(topics, now_us))
+            speaking = [
+                asyncio.create_task(topics.run()),
+                asyncio.create_task(examiner.run()),
+                asyncio.create_task(examiner.listen()),
+            ]
+            log.info("operators are served over ROS in %s", self.namespace)
+            try:
+                await asyncio.wait([following])
+                self._say_why(following)
+            finally:
+                await asyncio.shield(asyncio.create_task(self._end(topics, following, speaking)))
+
+    def _say_why(self, following: "asyncio.Task[None]") -> None:
+        try:
+            following.result()
+        except M2pemError as error:
+            log.warning("operators over ROS are served no more: %s", error)
+
+    async def _end(
+        self,
+        topics: "Topics",
+        following: "asyncio.Task[None]",
+        speaking: "list[asyncio.Task[None]]",
+    ) -> None:
+        """Tell how it ended: the last records may have come just before."""
+        await self._settle(following)
+        for task in [following, *speaking]:
+            task.cancel()
+        await asyncio.gather(following, *speaking, return_exceptions=True)
+        await topics.flush()
+
+    async def _settle(self, following: "asyncio.Task[None]") -> None:
+        """Wait until what was committed is known here, unless it never ends."""
+        taken, turns = self._feed.taken, 0
+        with suppress(TimeoutError):
+            async with asyncio.timeout(SETTLE_S):
+                while turns < SETTLE_TURNS and not following.done():
+                    await asyncio.sleep(0)
+                    turns = turns + 1 if self._feed.taken == taken else 0
+                    taken = self._feed.taken

@@ -1,0 +1,104 @@
+"""What operators may ask for: the services of docs/ros.md, "Operators over ROS"."""
+
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from m2pem_interfaces import srv
+from m2pem_plugin_ros.runtime import RosRuntime
+
+from m2pem.api import MissionControl
+from m2pem.errors import M2pemError, OperatorError
+from m2pem_plugin_mocu import messages, requests
+from m2pem_plugin_mocu.feed import Feed
+from m2pem_plugin_mocu.gate import Gate
+from m2pem_plugin_mocu.starting import start_mission
+from m2pem_plugin_mocu.texts import sendable
+from m2pem_plugin_mocu.topics import Topics
+
+Handler = Callable[[MissionControl, Any, Any], Awaitable[None]]
+
+SEVERAL = 20
+"""Requests of a service at once."""
+
+STARTING = 2
+"""Missions that are read at once: each takes a thread, of those that the journal needs, too."""
+
+LISTING = 4
+STOPPING = 100
+"""STOP has places of its own: it waits for nothing."""
+
+
+class Services:
+    """Offers them while the runtime is there."""
+
+    def __init__(
+        self, ros: RosRuntime, control: MissionControl, feed: Feed, topics: Topics
+    ) -> None:
+        self._ros = ros
+        self._control = control
+        self._feed = feed
+        self._topics = topics
+        self.gates: dict[str, Gate] = {}
+        self._offer(srv.StartMission, "start_mission", start_mission, STARTING)
+        self._offer(srv.ListRuns, "list_runs", self._list_runs, LISTING)
+        self._offer_control()
+        for service_type, handler in (
+            (srv.SendSignal, requests.send_signal),
+            (srv.SendMessage, requests.send_message),
+            (srv.SetRoute, requests.set_route),
+            (srv.SetArea, requests.set_area),
+            (srv.SetWaypoints, requests.set_waypoints),
+            (srv.TakeVehicle, requests.take_vehicle),
+            (srv.GiveBackVehicle, requests.give_back_vehicle),
+            (srv.AnswerPrompt, self._answer_prompt),
+        ):
+            self._offer(service_type, handler.__name__.lstrip("_"), handler, SEVERAL)
+
+    def _offer(self, service_type: Any, name: str, handler: Handler, at_once: int) -> None:
+        gate = self.gates[name] = Gate(at_once)
+
+        async def serve(request: Any, response: Any) -> Any:
+            return await self._handle(gate, handler, request, response)
+
+        self._ros.serve(service_type, name, serve)
+
+    def _offer_control(self) -> None:
+        gate = self.gates["control_run"] = Gate(SEVERAL)
+        stop = self.gates["stop"] = Gate(STOPPING)
+
+        async def serve(request: Any, response: Any) -> Any:
+            if request.verb == srv.ControlRun.Request.STOP:
+                return await self._handle(stop, requests.stop_run, request, response)
+            return await self._handle(gate, requests.control_run, request, response)
+
+        self._ros.serve(srv.ControlRun, "control_run", serve)
+
+    async def _handle(self, gate: Gate, handler: Handler, request: Any, response: Any) -> Any:
+        try:
+            with gate.passed():
+                await handler(self._control, request, response)
+        except M2pemError as refusal:
+            response.success = False
+            response.message = sendable(str(refusal))
+        else:
+            response.success = True
+        return response
+
+    async def _answer_prompt(self, control: MissionControl, request: Any, response: Any) -> None:
+        try:
+            await requests.answer_prompt(control, request, response)
+        except OperatorError as refusal:
+            # A run that has ended since cannot say who was first.
+            closed = self._feed.closed.get((request.run, request.prompt))
+            if closed is None or not closed.decision or closed.by in str(refusal):
+                raise
+            raise OperatorError(
+                f"prompt {closed.prompt} was answered by {closed.by}: {closed.decision}; {refusal}"
+            ) from refusal
+
+    async def _list_runs(self, control: MissionControl, request: Any, response: Any) -> None:
+        for summary in await control.runs():
+            if summary.status.ended and request.open_only:
+                continue
+            time_s = await self._topics.mission_time_s(summary)
+            response.runs.append(messages.run_status(summary, time_s))

@@ -1,0 +1,170 @@
+"""What operators hear: the topics of docs/ros.md, "Operators over ROS"."""
+
+import asyncio
+import logging
+import math
+import time
+from collections import deque
+from typing import Any
+
+from m2pem_interfaces import msg
+from m2pem_plugin_ros.runtime import RosRuntime, qos
+from rclpy.duration import Duration
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+from m2pem.api import MissionControl, PromptClosed, RunStatus, RunSummary, StampedRecord
+from m2pem.errors import M2pemError
+from m2pem_plugin_mocu import messages
+from m2pem_plugin_mocu.feed import Asked, Feed
+from m2pem_plugin_mocu.pacing import Paced
+from m2pem_plugin_mocu.picture import Picture
+
+PROMPT_EVENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+
+EVENTS_AT_ONCE = 25
+EVENTS_EVERY_S = 0.025
+"""That is 1000 a second, and 1000 are what the topic keeps for a reader: one in Python takes
+several thousand a second, and may hesitate for one."""
+
+EVENTS_WAITING = 10_000
+"""Beyond that the oldest are left out, which their readers see by `seq`."""
+
+FLUSH_S = 1.0
+"""At the end, so long may take what has not been sent, or not been confirmed by its readers."""
+
+log = logging.getLogger("m2pem.ocu.mocu")
+
+
+def now_us() -> int:
+    """The time of this machine, in microseconds since the Unix epoch."""
+    return time.time_ns() // 1000
+
+
+class Topics:
+    """A `Listener` of the feed."""
+
+    def __init__(self, ros: RosRuntime, control: MissionControl, feed: Feed) -> None:
+        publisher = ros.node.create_publisher
+        self._control = control
+        self._feed = feed
+        self._prompts = publisher(msg.OpenPrompts, "prompts", qos.STATUS)
+        self._prompt_events = publisher(msg.Prompt, "prompt_events", PROMPT_EVENTS)
+        self._status = publisher(msg.MissionStatus, "status", qos.STATUS)
+        self._active = publisher(msg.ActiveElements, "active_elements", qos.STATUS)
+        self._events = publisher(msg.MissionEvent, "events", qos.EVENTS)
+        self._waiting: deque[tuple[Picture, StampedRecord, int]] = deque()
+        self._some_wait = asyncio.Event()
+        self.left_out = 0
+        self._paced_prompts = Paced(self._say_prompts)
+        self._paced_status = Paced(self._say_status)
+        self._paced_active = Paced(self._say_active)
+
+    def listeners(self) -> int:
+        """How many clients hear events, and prompts as they come."""
+        heard = (self._events, self._prompt_events)
+        return min(int(publisher.get_subscription_count()) for publisher in heard)
+
+    async def run(self) -> None:
+        """Speak until cancelled."""
+        async with asyncio.TaskGroup() as group:
+            for paced in (self._paced_prompts, self._paced_status, self._paced_active):
+                group.create_task(paced.run())
+            group.create_task(self._send_events())
+
+    async def flush(self) -> None:
+        """Say how things stand at the end, and give readers the time to hear it."""
+        try:
+            async with asyncio.timeout(FLUSH_S):
+                while self._waiting:
+                    self._send_some()
+                    await asyncio.sleep(0)
+                for say in (self._say_prompts, self._say_status, self._say_active):
+                    await say()
+                spoke = (
+                    self._prompts,
+                    self._prompt_events,
+                    self._status,
+                    self._active,
+                    self._events,
+                )
+                for publisher in spoke:
+                    wait = Duration(seconds=FLUSH_S / len(spoke))
+                    await asyncio.to_thread(publisher.wait_for_all_acked, wait)
+        except TimeoutError:
+            log.warning("some operators may not have heard how it ended")
+
+    # --- what the feed tells --------------------------------------------------------------------
+
+    def recorded(self, picture: Picture, stamped: StampedRecord) -> None:
+        """To be sent in its turn."""
+        if len(self._waiting) >= EVENTS_WAITING:
+            self._waiting.popleft()
+            self.left_out += 1
+        self._waiting.append((picture, stamped, picture.at_us(stamped.t_s)))
+        self._some_wait.set()
+
+    def runs_changed(self) -> None:
+        """To be said soon."""
+        self._paced_status.change()
+
+    def tokens_changed(self) -> None:
+        """To be said soon."""
+        self._paced_active.change()
+
+    def asked(self, asked: Asked) -> None:
+        """Said at once, as an event, and soon among all that stand."""
+        self._prompt_events.publish(messages.open_prompt(asked.prompt, asked.since_us))
+        self._paced_prompts.change()
+
+    def closed(self, asked: Asked, closed: PromptClosed) -> None:
+        """Said at once, as an event, and soon by its absence."""
+        self._prompt_events.publish(
+            messages.closed_prompt(asked.prompt, closed.decision, closed.by, now_us())
+        )
+        self._paced_prompts.change()
+
+    # --- speaking -------------------------------------------------------------------------------
+
+    async def _say_prompts(self) -> None:
+        standing = [
+            messages.open_prompt(asked.prompt, asked.since_us)
+            for asked in self._feed.prompts.values()
+        ]
+        self._prompts.publish(msg.OpenPrompts(stamp=messages.time_of(now_us()), prompts=standing))
+
+    async def _say_active(self) -> None:
+        self._active.publish(messages.active_elements(self._feed.pictures.values(), now_us()))
+
+    async def _say_status(self) -> None:
+        runs: list[Any] = []
+        for picture in list(self._feed.pictures.values()):
+            summary = picture.summary
+            runs.append(messages.run_status(summary, await self.mission_time_s(summary)))
+        self._status.publish(msg.MissionStatus(stamp=messages.time_of(now_us()), runs=runs))
+
+    async def mission_time_s(self, summary: RunSummary) -> float:
+        """Of a run that goes on; NaN of others."""
+        if summary.status.ended or summary.status is RunStatus.INTERRUPTED:
+            return math.nan
+        try:
+            return await self._control.mission_time_s(summary.run)
+        except M2pemError:  # no executive here drives it, or it has ended just now
+            return math.nan
+
+    async def _send_events(self) -> None:
+        while True:
+            self._some_wait.clear()
+            if not self._waiting:
+                await self._some_wait.wait()
+            self._send_some()
+            await asyncio.sleep(EVENTS_EVERY_S)
+
+    def _send_some(self) -> None:
+        if not self._events.get_subscription_count():
+            self._waiting.clear()  # what nobody hears is not kept: the journal has it
+        for _ in range(min(EVENTS_AT_ONCE, len(self._waiting))):
+            picture, stamped, at_us = self._waiting.popleft()
+            try:
+                self._events.publish(messages.event(picture, stamped, at_us))
+            except Exception:  # one that no message can carry must not silence the others
+                log.exception("%s: record %d cannot be sent", stamped.run, stamped.seq)

@@ -1,0 +1,237 @@
+"""The parts that need no DDS: pace, settings, what diagnostics say, and catching up."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from m2pem_plugin_mocu import feed as feeds
+from m2pem_plugin_mocu.diagnostics import SILENT_AFTER_S, Health, Vehicles, diagnostics
+from m2pem_plugin_mocu.feed import Asked, Feed
+from m2pem_plugin_mocu.pacing import LEAST_S, MOST_S, Paced
+from m2pem_plugin_mocu.picture import Picture
+from m2pem_plugin_mocu.settings import SettingError, namespace, stays_on_loopback
+from m2pem_plugin_mocu.texts import one_line, sendable
+from mocu_world import fleet, until
+
+from m2pem.api import (
+    LinkState,
+    PromptClosed,
+    ResourceId,
+    RunStatus,
+    RunSummary,
+    StampedRecord,
+    VehicleState,
+)
+from m2pem.api import records as r
+from m2pem.testing import scenarios
+from m2pem.testing.stage import stage
+
+OK, WARN, ERROR, STALE = b"\0", b"\1", b"\2", b"\3"
+UGV1 = ResourceId("ugv1")
+
+Virtual = Callable[[Callable[[Any], Awaitable[list[int]]]], list[int]]
+
+
+# --- pace -----------------------------------------------------------------------------------------
+
+
+def said_while(virtual: Virtual, changes: int, every_s: float) -> list[int]:
+    """What is said of a number that is changed so often."""
+
+    async def main(clock: Any) -> list[int]:
+        number = 0
+        said: list[int] = []
+
+        async def say() -> None:
+            said.append(number)
+            if number == 3:
+                raise ValueError("cannot be said")
+
+        paced = Paced(say)
+        running = asyncio.create_task(paced.run())
+        for _ in range(changes):
+            await clock.sleep(every_s)
+            number += 1
+            paced.change()
+        await clock.sleep(MOST_S)
+        running.cancel()
+        return said
+
+    return virtual(main)
+
+
+def test_a_thousand_changes_a_second_are_said_ten_times_a_second(virtual: Virtual) -> None:
+    said = said_while(virtual, 10_000, 0.001)
+    assert len(said) <= 11 / LEAST_S
+    assert said[-1] == 10_000
+    assert said == sorted(said)
+
+
+def test_what_does_not_change_is_said_once_a_second(virtual: Virtual) -> None:
+    said = said_while(virtual, 1, 10.0)
+    assert 10 <= len(said) <= 13
+
+
+def test_what_cannot_be_said_does_not_silence_what_comes_after(virtual: Virtual) -> None:
+    assert said_while(virtual, 5, 2.0)[-1] == 5
+
+
+# --- settings and texts ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("said", "meant"), [("", "/m2pem"), ("team_a/m2pem", "/team_a/m2pem"), ("/x/", "/x")]
+)
+def test_the_namespace_may_be_said(said: str, meant: str) -> None:
+    assert namespace({"M2PEM_ROS_NAMESPACE": said}) == meant
+
+
+@pytest.mark.parametrize("said", ["a b", "9", "a//b", "a__b", "ä"])
+def test_what_is_no_namespace_is_refused(said: str) -> None:
+    with pytest.raises(SettingError, match="M2PEM_ROS_NAMESPACE"):
+        namespace({"M2PEM_ROS_NAMESPACE": said})
+
+
+@pytest.mark.parametrize(
+    ("said", "simulated", "stays"),
+    [("", True, True), ("", False, False), ("1", False, True), ("0", True, False)],
+)
+def test_dds_stays_where_nothing_real_moves(said: str, simulated: bool, stays: bool) -> None:
+    assert stays_on_loopback({"M2PEM_ROS_LOOPBACK": said}, simulated=simulated) is stays
+
+
+def test_texts_are_made_fit_for_messages() -> None:
+    assert sendable("a\0b\ud800") == "a\N{REPLACEMENT CHARACTER}b?"
+    assert one_line(" two\n lines \x1b[31m") == "two lines ?[31m"
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+
+def picture(*records: tuple[float, r.Record]) -> Picture:
+    made = Picture(RunSummary("r1", "", "", RunStatus.RUNNING, 0), None)
+    for seq, (t_s, record) in enumerate(records, 1):
+        assert made.apply(StampedRecord("r1", seq, t_s, record))
+    return made
+
+
+def test_pauses_are_counted_into_times_of_the_clock() -> None:
+    second = 1_000_000
+    made = picture(
+        (0.0, r.RunStarted("P", 100 * second)),
+        (10.0, r.RunPaused(110 * second)),
+        (10.0, r.RunResumed(140 * second)),
+        (15.0, r.TokenEntered(1, "P", "Task", 0)),
+        (20.0, r.RunEnded(r.RunOutcome.STOPPED, "enough")),
+    )
+    assert made.summary.ended_us == 150 * second
+    assert (made.summary.status, made.summary.detail) == (RunStatus.STOPPED, "enough")
+    assert made.active() == []
+
+
+def test_instances_are_counted_and_the_activity_itself_is_not() -> None:
+    entered = [r.TokenEntered(1, "P", "Task", 0)]
+    entered += [r.TokenEntered(2 + n, "P", "Task", 1, instance=n) for n in range(3)]
+    made = picture(*((float(n), record) for n, record in enumerate(entered)))
+    (active,) = made.active()
+    assert (active.element, active.tokens, active.since_us) == ("Task", 3, 0)
+
+
+def test_a_record_that_is_known_changes_nothing() -> None:
+    made = picture((0.0, r.RunStarted("P", 1)))
+    assert not made.apply(StampedRecord("r1", 1, 0.0, r.TokenEntered(1, "P", "Task", 0)))
+    assert made.active() == []
+
+
+class Heard:
+    """A listener that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.records: list[tuple[str, int]] = []
+        self.opened: list[str] = []
+        self.answered: list[str] = []
+
+    def recorded(self, _: Picture, stamped: StampedRecord) -> None:
+        self.records.append((stamped.run, stamped.seq))
+
+    def runs_changed(self) -> None: ...
+
+    def tokens_changed(self) -> None: ...
+
+    def asked(self, asked: Asked) -> None:
+        self.opened.append(asked.prompt.text)
+
+    def closed(self, _: Asked, closed: PromptClosed) -> None:
+        self.answered.append(closed.by)
+
+
+async def test_a_unit_that_fell_behind_reads_what_it_has_missed(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(feeds, "BACKLOG", 5)
+    monkeypatch.setattr(feeds, "AGAIN_S", 0.0)
+    heard = Heard()
+    async with stage(fleet()) as control:
+        feed = Feed(control)
+        following = asyncio.create_task(feed.follow(heard, lambda: 0))
+        await control.start(scenarios.question("Road?"))
+        await until(lambda: heard.opened == ["Road?"])
+        (prompt,) = control.prompts()
+        await control.answer("r1", prompt.prompt, "continue", by="anna")
+        await control.wait("r1")
+        last = (await control.records("r1"))[-1].seq
+        await until(lambda: len(heard.records) >= last)
+    await following
+    assert heard.records == [("r1", seq) for seq in range(1, last + 1)]
+    assert heard.answered == ["anna"]
+    assert "fell 5 notices behind" in caplog.text
+
+
+# --- diagnostics ----------------------------------------------------------------------------------
+
+
+class Watch:
+    """A clock that the test turns."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@pytest.mark.parametrize(
+    ("state", "silent_s", "level", "says"),
+    [
+        (VehicleState(UGV1, 0, battery_fraction=0.9), 0.0, OK, "heard"),
+        (VehicleState(UGV1, 0, battery_fraction=0.1), 0.0, WARN, "battery at 10%"),
+        (
+            VehicleState(UGV1, 0, ready=False, not_ready_reasons=("no GPS",)),
+            0.0,
+            WARN,
+            "not ready: no GPS",
+        ),
+        (VehicleState(UGV1, 0, link=LinkState.DEGRADED), 0.0, WARN, "link degraded"),
+        (VehicleState(UGV1, 0, link=LinkState.LOST), 60.0, ERROR, "link lost"),
+        (VehicleState(UGV1, 0), SILENT_AFTER_S + 1, STALE, "silent for 6 s"),
+    ],
+)
+def test_a_vehicle_is_told_as_it_is(
+    state: VehicleState, silent_s: float, level: bytes, says: str
+) -> None:
+    now_s = Watch()
+    vehicles = Vehicles(fleet(), now_s)
+    vehicles.hear(state)
+    now_s.now_s += silent_s
+    first, second = vehicles.statuses()
+    assert (first.level, first.message) == (level, says)
+    assert (second.level, second.message) == (STALE, "nothing heard yet")
+
+
+def test_two_executives_in_one_namespace_are_an_error() -> None:
+    health = Health("fleet", 0.0, 2, 0, 0, 0, 0, 0, 0.0)
+    executive, journal = diagnostics(health, Vehicles(fleet()), 0).status[:2]
+    assert executive.level == ERROR
+    assert "2 executives serve this namespace" in executive.message
+    assert journal.level == OK
