@@ -1,0 +1,143 @@
+"""Keeps the members of a march in their places, by nothing but how fast each may go.
+
+The lead goes at the speed of the march and waits when somebody falls back too far; the others go as
+fast as brings them to their places, and stop before they come too near to the one ahead of them in
+their lane. Pure: it is told what is seen, and knows no clock.
+"""
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from m2pem.model.catalogue import ResourceId
+from m2pem.teams.columns import GAP_SHARE, lane_mates
+from m2pem.teams.plan import March, Marcher, Stand
+
+_SLACK_S = 1.5
+_LOOK_AHEAD_M = 50.0
+_CRAWL_SHARE = 0.1
+_START_SHARE = 0.2
+"""Of the speed of the march: what is slower stands; what stands goes on at the second."""
+
+_RESTART_SHARE = 0.1
+"""Of the spacing: how much wider than needed a gap is when one who can but stop and go goes on."""
+
+
+@dataclass(slots=True)
+class _Track:
+    """What is known of a member: how far it is, along its own path and the team's route."""
+
+    marcher: Marcher
+    back_m: float
+    along_m: float | None = None
+    mark_m: float = -math.inf
+    stands: bool = False
+    arrived: bool = False
+
+
+class Marshal:
+    """`steady`: members that can go or stop, but not slower; all others take any speed."""
+
+    def __init__(self, march: March, steady: Collection[ResourceId] = ()) -> None:
+        self._march = march
+        self._steady = frozenset(steady)
+        self._tracks = {
+            marcher.member: _Track(marcher, marcher.back_m) for marcher in march.marchers
+        }
+        self._slack_m = max(march.spacing_m / 2, _SLACK_S * march.speed_m_s)
+
+    @property
+    def floor_m(self) -> float:
+        """The least way along the route between two in one lane."""
+        return GAP_SHARE * self._march.spacing_m
+
+    def mark_m(self, member: ResourceId) -> float:
+        """How far along the route a member was seen last; -inf before it was."""
+        return self._tracks[member].mark_m
+
+    def drop(self, member: ResourceId) -> None:
+        """Go on without a member; in a column, who is behind it moves up."""
+        self._tracks.pop(member, None)
+        if self._march.closes:
+            for rank, track in enumerate(self._tracks.values()):
+                track.back_m = rank * self._march.spacing_m
+
+    def step(
+        self, seen: Mapping[ResourceId, Stand], arrived: Collection[ResourceId] = ()
+    ) -> dict[ResourceId, float]:
+        """How fast each member may go now, in m/s; 0: it must stand.
+
+        `seen`: where those are of whom it is known. Who was never seen is left alone. `arrived`:
+        who is at the end of its way; they are told nothing.
+        """
+        for member, track in self._tracks.items():
+            self._look(track, seen.get(member), member in arrived)
+        known = [track for track in self._tracks.values() if track.mark_m > -math.inf]
+        if not known:
+            return {}
+        lead = known[0]
+        origin_m = lead.mark_m + lead.back_m
+        # Nobody waits for what lies beyond a place: a short way ends before its place does.
+        lags = {
+            track.marcher.member: min(origin_m - track.back_m, track.marcher.path.end_mark_m)
+            - track.mark_m
+            for track in known
+        }
+        wanted: dict[ResourceId, float] = {}
+        for index, track in enumerate(known):
+            member = track.marcher.member
+            if track.arrived:
+                continue
+            if track is lead:
+                worst = max(
+                    (lags[other.marcher.member] for other in known[1:] if not other.arrived),
+                    default=0.0,
+                )
+                speed = self._lead_speed(track, worst)
+            else:
+                speed = self._follower_speed(track, known[:index], lags[member])
+            track.stands = speed == 0.0
+            wanted[member] = speed
+        return wanted
+
+    def _look(self, track: _Track, stand: Stand | None, arrived: bool) -> None:
+        path = track.marcher.path
+        if arrived:
+            track.arrived, track.mark_m = True, path.end_mark_m
+        elif stand is not None:
+            found_m = path.find(stand.place, track.along_m, _LOOK_AHEAD_M, stand.yaw_rad)
+            track.along_m, track.mark_m = found_m, path.mark_m(found_m)
+
+    def _lead_speed(self, track: _Track, worst_lag_m: float) -> float:
+        march_m_s, slack = self._march.speed_m_s, self._slack_m
+        if track.marcher.member in self._steady:
+            bound = slack if track.stands else 2 * slack
+            return 0.0 if worst_lag_m > bound else march_m_s
+        return self._graded(track, march_m_s * (2 - worst_lag_m / slack))
+
+    def _follower_speed(self, track: _Track, before: list[_Track], lag_m: float) -> float:
+        march_m_s, slack = self._march.speed_m_s, self._slack_m
+        free_m = self._free_m(track, before)
+        motion = track.marcher.motion
+        if track.marcher.member not in self._steady:
+            speed = min(march_m_s * (1 + lag_m / slack), motion.safe_m_s(free_m))
+            return self._graded(track, speed)
+        needed_m = motion.stopping_m(march_m_s)
+        if track.stands:
+            wide = free_m >= needed_m + _RESTART_SHARE * self._march.spacing_m
+            return march_m_s if wide and lag_m >= -slack / 2 else 0.0
+        return march_m_s if free_m > needed_m and lag_m > -slack else 0.0
+
+    def _free_m(self, track: _Track, before: list[_Track]) -> float:
+        """The way that it may go before it is too near to one of its lane, were that to stop."""
+        gaps = [
+            other.mark_m - track.mark_m
+            for other in before
+            if lane_mates(other.marcher, track.marcher, self._march.spacing_m)
+        ]
+        return min(gaps, default=math.inf) - self.floor_m
+
+    def _graded(self, track: _Track, speed_m_s: float) -> float:
+        share = _START_SHARE if track.stands else _CRAWL_SHARE
+        speed = min(speed_m_s, self._march.speed_m_s)
+        return 0.0 if speed < share * self._march.speed_m_s else speed
