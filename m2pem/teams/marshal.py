@@ -1,8 +1,8 @@
 """Keeps the members of a march in their places, by nothing but how fast each may go.
 
-The lead goes at the speed of the march and waits when somebody falls back too far; the others go as
-fast as brings them to their places, and stop before they come too near to the one ahead of them in
-their lane. Pure: it is told what is seen, and knows no clock.
+Whoever is ahead of its place waits, so does everybody when somebody falls back too far, and nobody
+comes too near to the one ahead in its lane, even if that one stops dead.
+Pure: it is told what is seen, and knows no clock.
 """
 
 import math
@@ -75,29 +75,14 @@ class Marshal:
         known = [track for track in self._tracks.values() if track.mark_m > -math.inf]
         if not known:
             return {}
-        lead = known[0]
-        origin_m = lead.mark_m + lead.back_m
-        # Nobody waits for what lies beyond a place: a short way ends before its place does.
-        lags = {
-            track.marcher.member: min(origin_m - track.back_m, track.marcher.path.end_mark_m)
-            - track.mark_m
-            for track in known
-        }
         wanted: dict[ResourceId, float] = {}
         for index, track in enumerate(known):
-            member = track.marcher.member
-            if track.arrived:
-                continue
-            if track is lead:
-                worst = max(
-                    (lags[other.marcher.member] for other in known[1:] if not other.arrived),
-                    default=0.0,
-                )
-                speed = self._lead_speed(track, worst)
-            else:
-                speed = self._follower_speed(track, known[:index], lags[member])
-            track.stands = speed == 0.0
-            wanted[member] = speed
+            if not track.arrived:
+                others = [each for each in known if each is not track and not each.arrived]
+                waits_m = max((_lag_m(other, track) for other in others), default=0.0)
+                speed = self._speed(track, known[:index], waits_m)
+                track.stands = speed == 0.0
+                wanted[track.marcher.member] = speed
         return wanted
 
     def _look(self, track: _Track, stand: Stand | None, arrived: bool) -> None:
@@ -108,25 +93,22 @@ class Marshal:
             found_m = path.find(stand.place, track.along_m, _LOOK_AHEAD_M, stand.yaw_rad)
             track.along_m, track.mark_m = found_m, path.mark_m(found_m)
 
-    def _lead_speed(self, track: _Track, worst_lag_m: float) -> float:
+    def _speed(self, track: _Track, before: list[_Track], waits_m: float) -> float:
+        """`waits_m`: how far the last of the others has fallen back behind this one."""
         march_m_s, slack = self._march.speed_m_s, self._slack_m
-        if track.marcher.member in self._steady:
-            bound = slack if track.stands else 2 * slack
-            return 0.0 if worst_lag_m > bound else march_m_s
-        return self._graded(track, march_m_s * (2 - worst_lag_m / slack))
-
-    def _follower_speed(self, track: _Track, before: list[_Track], lag_m: float) -> float:
-        march_m_s, slack = self._march.speed_m_s, self._slack_m
+        lag_m = _lag_m(track, before[0]) if before else 0.0
         free_m = self._free_m(track, before)
         motion = track.marcher.motion
         if track.marcher.member not in self._steady:
-            speed = min(march_m_s * (1 + lag_m / slack), motion.safe_m_s(free_m))
-            return self._graded(track, speed)
+            speed = min(march_m_s * (1 + lag_m / slack), march_m_s * (2 - waits_m / slack))
+            return self._graded(track, min(speed, motion.safe_m_s(free_m)))
         needed_m = motion.stopping_m(march_m_s)
         if track.stands:
             wide = free_m >= needed_m + _RESTART_SHARE * self._march.spacing_m
-            return march_m_s if wide and lag_m >= -slack / 2 else 0.0
-        return march_m_s if free_m > needed_m and lag_m > -slack else 0.0
+            goes = wide and lag_m >= -slack / 2 and waits_m <= slack
+        else:
+            goes = free_m > needed_m and lag_m > -slack and waits_m <= 2 * slack
+        return march_m_s if goes else 0.0
 
     def _free_m(self, track: _Track, before: list[_Track]) -> float:
         """The way that it may go before it is too near to one of its lane, were that to stop."""
@@ -141,3 +123,12 @@ class Marshal:
         share = _START_SHARE if track.stands else _CRAWL_SHARE
         speed = min(speed_m_s, self._march.speed_m_s)
         return 0.0 if speed < share * self._march.speed_m_s else speed
+
+
+def _lag_m(track: _Track, other: _Track) -> float:
+    """How far one is behind the place that is its own beside the other; less than 0: ahead of it.
+
+    Nobody waits for what lies beyond the end of a way.
+    """
+    place_m = other.mark_m + other.back_m - track.back_m
+    return min(place_m, track.marcher.path.end_mark_m) - track.mark_m
