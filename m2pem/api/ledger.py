@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from m2pem.api import refusal as parameters
 from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
@@ -36,7 +36,7 @@ class Ledger:
     `catalogue` is the arbiter's own. No arbiter must use it.
 
     The number of a report follows from its state (ACCEPTED 1, RUNNING 2, an end 3; a rejection is
-    1), so that it rises even for an arbiter that forgot everything in a restart.
+    1; `refer` makes more), so that it rises even for an arbiter that has forgotten everything.
     """
 
     def __init__(
@@ -114,6 +114,19 @@ class Ledger:
         if entry is not None and entry.last.state is BehaviorState.ACCEPTED:
             self._report(entry, BehaviorState.RUNNING)
 
+    def refer(self, behavior: BehaviorId, native_ref: str) -> None:
+        """It is to be found again by this from now on.
+
+        What is RUNNING is reported so once more, for the journal must have it.
+        """
+        entry = self._entries.get(behavior)
+        if entry is None or entry.last.state.terminal:
+            return
+        entry.last = replace(entry.last, native_ref=native_ref)
+        if entry.last.state is BehaviorState.RUNNING:
+            entry.last = replace(entry.last, number=entry.last.number + 1)
+            self._reports.put(entry.last)
+
     def end(
         self,
         behavior: BehaviorId | None,
@@ -140,11 +153,18 @@ class Ledger:
         self.end(self.holder(resource), BehaviorState.LOST, reason=reason)
 
     def adopt(
-        self, behavior: BehaviorId, resources: Sequence[ResourceId], native_ref: str | None
+        self,
+        behavior: BehaviorId,
+        resources: Sequence[ResourceId],
+        native_ref: str | None,
+        number: int = 2,
     ) -> None:
-        """After a restart: the vehicle was found doing it. It is RUNNING; that is not reported."""
+        """After a restart: the vehicle was found doing it. It is RUNNING; that is not reported.
+
+        `number`: of the report that said so, where `refer` had it said more than once.
+        """
         if behavior not in self._entries:
-            report = BehaviorReport(behavior, 2, BehaviorState.RUNNING, native_ref=native_ref)
+            report = BehaviorReport(behavior, number, BehaviorState.RUNNING, native_ref=native_ref)
             self._entries[behavior] = _Entry(tuple(resources), 0, report)
             self._holders.update(dict.fromkeys(resources, behavior))
 
@@ -206,7 +226,7 @@ class Ledger:
         outputs: Mapping[str, Value] | None = None,
     ) -> None:
         last = entry.last
-        number = 3 if state.terminal else 2
+        number = max(3, last.number + 1) if state.terminal else 2
         entry.last = BehaviorReport(
             last.id, number, state, code, reason, last.native_ref, outputs or {}
         )

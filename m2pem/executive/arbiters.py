@@ -1,13 +1,19 @@
 """The arbiters of a fleet: which one serves which resource, and what it offers."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
 
 from m2pem.api.arbiter import Arbiter, ArbiterContext, Connection
+from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
 from m2pem.model.geometry import Area
 from m2pem.resources.fleet import Fleet
 from m2pem.resources.graph import ResourceGraph
+from m2pem.teams.offers import Offers
+
+if TYPE_CHECKING:
+    from m2pem.teams.arbiter import Teams
 
 SIMULATED = "sim"
 """The arbiter that serves everything in a simulated fleet."""
@@ -84,15 +90,53 @@ class FleetArbiters:
             for name, group in connections.items()
             for resource in group
         }
+        self._context = context
+        self._offers = Offers(fleet, self.of)
         self.graph = ResourceGraph(fleet, self.offered)
+
+    @cached_property
+    def teams(self) -> "Teams":
+        """The arbiter of team behaviors that are made of behaviors of the members."""
+        from m2pem.teams.arbiter import Teams  # noqa: PLC0415  # a check asks for offers alone
+
+        return Teams(self.fleet, self.of, self._context, self._offers)
+
+    @property
+    def all(self) -> Mapping[str, Arbiter]:
+        """Those of the fleet, and the one of teams whose members they serve."""
+        return {"teams": self.teams, **self.by_name} if self.fleet.teams else self.by_name
+
+    def serving(
+        self, resources: Sequence[ResourceId], behavior: str, type_: BehaviorType
+    ) -> Arbiter | None:
+        """Who does a behavior on resources; None: they have different arbiters.
+
+        A team behavior goes to the members' arbiter, if there is one that offers it for them all;
+        else it is made of behaviors of the members.
+        """
+        arbiters = dict.fromkeys(self.of(resource) for resource in resources)
+        only = next(iter(arbiters)) if len(arbiters) == 1 else None
+        if type_ is not BehaviorType.TEAM:
+            return only
+        offers = only is not None and all(
+            _has(only.catalogue(resource), behavior) for resource in resources
+        )
+        return only if offers else self.teams
+
+    def holding(self, resource: ResourceId) -> Arbiter:
+        """Who holds a resource, and lets it go on: its team while it is in one, else its own."""
+        return self.teams if self.teams.marshals(resource) else self.of(resource)
 
     def of(self, resource: ResourceId) -> Arbiter:
         """The arbiter that serves a resource."""
         return self._of[resource]
 
     def offered(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """What the arbiter offers on a resource, before the fleet's `behaviors` list."""
-        return self._of[resource].catalogue(resource)
+        """What can be had of a resource, before the fleet's `behaviors` list: what its arbiter
+        offers, and what teams can make of that."""
+        own = tuple(self._of[resource].catalogue(resource))
+        made = self._offers.together(resource)
+        return (*own, *(spec for spec in made if not _has(own, spec.name)))
 
     def catalogue(self) -> Mapping[ResourceId, Sequence[BehaviorSpec]]:
         """What every resource can do in this fleet."""
@@ -102,3 +146,7 @@ class FleetArbiters:
     def resources(self) -> Sequence[ResourceId]:
         """Every vehicle and payload."""
         return tuple(self._of)
+
+
+def _has(specs: Sequence[BehaviorSpec], team_behavior: str) -> bool:
+    return any(spec.name == team_behavior and spec.type is BehaviorType.TEAM for spec in specs)

@@ -74,18 +74,11 @@ class Dispatcher:
 
     def hold(self, resource: str) -> None:
         """Bring a resource to its safe state."""
-        arbiter = self._arbiters.of(ResourceId(resource))
-        self._enqueue(
-            (resource,), lambda: self._call(f"hold {resource}", arbiter.hold(ResourceId(resource)))
-        )
+        self._enqueue((resource,), lambda: self._turn("hold", ResourceId(resource)))
 
     def resume(self, resource: str) -> None:
         """Let a resource go on after `hold`."""
-        arbiter = self._arbiters.of(ResourceId(resource))
-        self._enqueue(
-            (resource,),
-            lambda: self._call(f"resume {resource}", arbiter.resume(ResourceId(resource))),
-        )
+        self._enqueue((resource,), lambda: self._turn("resume", ResourceId(resource)))
 
     def hold_all(self, run: str) -> None:
         """Bring everything that a run commands to its safe state, whatever its state says."""
@@ -97,7 +90,10 @@ class Dispatcher:
     # --- what is known of behaviors -------------------------------------------------------------
 
     def reported(self, report: BehaviorReport) -> None:
-        """An arbiter's report passes through here, so that numbers go on rising."""
+        """An arbiter's report passes through here, so that numbers go on rising; that of a team's
+        part goes to its team."""
+        if self._arbiters.teams.heard(report):
+            return
         active = self._active.get(report.id)
         if active is not None:
             active.last_number = max(active.last_number, report.number)
@@ -110,10 +106,10 @@ class Dispatcher:
             active.deadline.cancel()
         self._availability.release(behavior)
 
-    def adopt(self, behavior: str, resources: Iterable[str], number: int) -> None:
+    def adopt(self, behavior: str, resources: Iterable[str], number: int, arbiter: Arbiter) -> None:
         """After a restart: the arbiter has it already."""
         ids = [ResourceId(resource) for resource in resources]
-        self._active[behavior] = _Active(self._arbiters.of(ids[0]), tuple(ids), number)
+        self._active[behavior] = _Active(arbiter, tuple(ids), number)
         self._availability.acquire(ids, behavior)
 
     async def close(self) -> None:
@@ -165,14 +161,14 @@ class Dispatcher:
     async def _start(self, command: StartBehavior) -> None:
         ids = tuple(ResourceId(resource) for resource in command.resources)
         kind = BehaviorType(command.type)
-        arbiters = dict.fromkeys(self._arbiters.of(resource) for resource in ids)
-        arbiter = next(iter(arbiters))
+        serving = self._arbiters.serving(ids, command.name, kind)
+        arbiter = serving or self._arbiters.of(ids[0])
         self._active[command.behavior] = active = _Active(arbiter, ids)
-        if len(arbiters) > 1:
+        if serving is None:
             reason = f"{', '.join(ids)} are served by different arbiters"
             self._refuse(command.behavior, "REJECTED", reason)
             return
-        spec = self._spec(ids, command.name, kind)
+        spec = self.spec(ids, command.name, kind)
         if spec is None:
             reason = f"{', '.join(ids)}: no {kind.value} behavior {command.name} is offered"
             self._refuse(command.behavior, "REJECTED", reason)
@@ -181,33 +177,48 @@ class Dispatcher:
         if refusal is not None:
             self._refuse(command.behavior, "RESOURCE_UNAVAILABLE", refusal)
             return
-        run = command.behavior.partition(".")[0]
         try:
-            parameters = resolve(
-                spec,
-                command.parameters,
-                lambda name: self._geometries(run, name),
-                self._arbiters.fleet.vehicles,
-                self._arbiters.fleet.origin,
-            )
+            request = self.request(command, spec)
         except ParameterError as error:
             self._refuse(command.behavior, "REJECTED", str(error))
             return
         self._apply_script(command, arbiter)
-        request = BehaviorRequest(
+        wrong = await self._call(f"start {command.behavior}", arbiter.start(request))
+        if wrong and self._active.get(command.behavior) is active:
+            self._refuse(command.behavior, "REJECTED", wrong)
+
+    def request(self, command: StartBehavior, spec: BehaviorSpec) -> BehaviorRequest:
+        """What an arbiter is asked for.
+
+        Raises:
+            ParameterError: a parameter makes no sense.
+        """
+        run = command.behavior.partition(".")[0]
+        ids = tuple(ResourceId(resource) for resource in command.resources)
+        parameters = resolve(
+            spec,
+            command.parameters,
+            lambda name: self._geometries(run, name),
+            self._arbiters.fleet.vehicles,
+            self._arbiters.fleet.origin,
+        )
+        return BehaviorRequest(
             command.behavior,
             command.epoch,
             command.name,
             parameters,
             ids,
             _resource_ids(command.roles),
-            command.preempts,
+            self._arbiters.teams.parts_of(command.preempts, ids),
         )
-        wrong = await self._call(f"start {command.behavior}", arbiter.start(request))
-        if wrong and self._active.get(command.behavior) is active:
-            self._refuse(command.behavior, "REJECTED", wrong)
 
-    def _spec(
+    async def _turn(self, what: str, resource: ResourceId) -> None:
+        """Hold or resume; asked in its turn, as a team may have taken the resource meanwhile."""
+        arbiter = self._arbiters.holding(resource)
+        call = arbiter.hold(resource) if what == "hold" else arbiter.resume(resource)
+        await self._call(f"{what} {resource}", call)
+
+    def spec(
         self, resources: tuple[ResourceId, ...], name: str, kind: BehaviorType
     ) -> BehaviorSpec | None:
         """How it is taken: by every member of a team, else by the first that offers it."""

@@ -139,7 +139,7 @@ class Executive:
         """
         await self._connect()
         self._group = await self._stack.enter_async_context(asyncio.TaskGroup())
-        for name, arbiter in self.arbiters.by_name.items():
+        for name, arbiter in self.arbiters.all.items():
             self._listen(f"reports of {name}", partial(self._read_reports, arbiter))
             self._listen(f"telemetry of {name}", partial(self._read_telemetry, arbiter))
         if self._watch_links:
@@ -159,7 +159,7 @@ class Executive:
 
     async def _connect(self) -> None:
         connected: list[Arbiter] = []
-        for name, arbiter in self.arbiters.by_name.items():
+        for name, arbiter in self.arbiters.all.items():
             try:
                 await arbiter.connect()
             except Exception as error:
@@ -177,7 +177,7 @@ class Executive:
         finally:
             for listener in self._listeners:
                 listener.cancel()
-            for arbiter in self.arbiters.by_name.values():
+            for arbiter in self.arbiters.all.values():
                 await arbiter.close()
             self.bus.close()
             self.notices.end()
@@ -347,8 +347,9 @@ class Executive:
         if not fault.reachable and not self.availability.reason(resource):
             self._lost.add(resource)
             self.availability.withdraw(resource, f"lost: {fault.reason}")
+        with_team = self.arbiters.teams.fault(resource, fault.code, fault.reason)
         for runner in self.runners.values():
-            if fault.resource in runner.run.state.held:
+            if not with_team and fault.resource in runner.run.state.held:
                 runner.post(fault)
 
     def set_geometry(

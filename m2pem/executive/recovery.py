@@ -7,7 +7,7 @@ running is asked for at its arbiter. Nothing is sent again that may have been do
 import asyncio
 import logging
 
-from m2pem.api.arbiter import BehaviorReport
+from m2pem.api.arbiter import Arbiter, BehaviorReport
 from m2pem.engine import commands as c
 from m2pem.engine.inputs import BehaviorMissing, ClaimRun, Input, ResourceFault
 from m2pem.engine.run import MissionRun
@@ -19,6 +19,7 @@ from m2pem.executive.runner import Runner
 from m2pem.executive.script import Script
 from m2pem.journal.base import Journal
 from m2pem.model.catalogue import BehaviorState, ResourceId, ResumePolicy
+from m2pem.resources.parameters import ParameterError
 
 log = logging.getLogger("m2pem.resume")
 
@@ -50,6 +51,7 @@ async def take_over(
     max_outage_s = arbiters.fleet.max_outage_s
     too_long = max_outage_s is not None and outage_s > max_outage_s
     known = list(state.behaviors.values())
+    _recall(runner, arbiters, dispatcher)
     reports = await asyncio.gather(*(_query(arbiters, behavior) for behavior in known))
     resend: set[str] = set()
     for behavior, report in zip(known, reports, strict=True):
@@ -58,7 +60,8 @@ async def take_over(
         if report is not None and report.state is BehaviorState.UNKNOWN and unseen:
             resend.add(behavior.id)
             continue
-        dispatcher.adopt(behavior.id, behavior.resources, number)
+        arbiter = _arbiter(arbiters, behavior)
+        dispatcher.adopt(behavior.id, behavior.resources, number, arbiter)
         item = _what_to_post(arbiters, behavior, report)
         if item is None and too_long and behavior.phase is BehaviorPhase.ACTIVE:
             reason = f"nobody drove the mission for {outage_s:.0f} s"
@@ -74,9 +77,39 @@ async def take_over(
     )
 
 
+def _recall(runner: Runner, arbiters: FleetArbiters, dispatcher: Dispatcher) -> None:
+    """Tell the arbiter of teams what it had to do: of that, no vehicle's arbiter knows."""
+    for behavior in runner.run.state.behaviors.values():
+        if _arbiter(arbiters, behavior) is not arbiters.teams:
+            continue
+        ids = tuple(ResourceId(name) for name in behavior.resources)
+        spec = dispatcher.spec(ids, behavior.name, BehaviorType(behavior.type))
+        command = c.StartBehavior(
+            behavior.id,
+            behavior.element,
+            runner.epoch,
+            behavior.type,
+            behavior.name,
+            behavior.resources,
+            behavior.roles,
+            behavior.parameters,
+        )
+        try:
+            if spec is not None:
+                arbiters.teams.recall(dispatcher.request(command, spec))
+        except ParameterError as error:
+            log.warning("%s: it cannot be taken up again: %s", behavior.id, error)
+
+
+def _arbiter(arbiters: FleetArbiters, behavior: Behavior) -> Arbiter:
+    ids = [ResourceId(name) for name in behavior.resources]
+    serving = arbiters.serving(ids, behavior.name, BehaviorType(behavior.type))
+    return serving or arbiters.of(ids[0])
+
+
 async def _query(arbiters: FleetArbiters, behavior: Behavior) -> BehaviorReport | None:
     """What the arbiter sees; None: it cannot say."""
-    arbiter = arbiters.of(ResourceId(behavior.resources[0]))
+    arbiter = _arbiter(arbiters, behavior)
     try:
         async with asyncio.timeout(QUERY_TIMEOUT_S):
             return await arbiter.query(behavior.id, behavior.native_ref)

@@ -20,6 +20,7 @@ from m2pem.resources.fleet import Fleet
 from m2pem.resources.graph import Catalogue, ResourceGraph
 from m2pem.resources.nearmiss import did_you_mean
 from m2pem.resources.parameters import ParameterProblem, examine
+from m2pem.resources.team_needs import lacking
 from m2pem.resources.units import article
 
 DETECTOR_SERVICE = "Detector"
@@ -53,6 +54,16 @@ def _returned(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
                 f"m2pem:returned='{signal.returned}': {fleet.file} has no such vehicle or payload",
                 did_you_mean(signal.returned, known),
             )
+
+
+def _member_lacks(name: str, offered: Sequence[BehaviorSpec], allowed: Sequence[str] | None) -> str:
+    """What keeps a vehicle out of a team behavior that is made of behaviors of each member."""
+    alone = [spec.name for spec in offered if spec.type is BehaviorType.VEHICLE]
+    if needed := lacking(name, alone):
+        return f"a member needs {' and '.join(needed)}, which it does not offer either"
+    if needed := lacking(name, alone if allowed is None else allowed):
+        return f"a member needs {' and '.join(needed)}, which the fleet does not let it do"
+    return ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +172,10 @@ class _Check:
             return message, f'set type="{other}" and name a {other}', "wrong-type"
         arbiter = "the simulated arbiter" if self.simulated else f"arbiter '{holder.arbiter}'"
         message = f"{arbiter} of {place(self.fleet, resource)} offers no {wanted} behavior '{name}'"
+        if wanted is BehaviorType.TEAM and (
+            remedy := _member_lacks(name, offered, holder.behaviors)
+        ):
+            return message, remedy, "unknown-behavior"
         return message, self._near_behavior(behavior, offered), "unknown-behavior"
 
     def _near_behavior(self, behavior: Behavior, offered: Iterable[BehaviorSpec]) -> str:

@@ -7,7 +7,6 @@ them has arrived. They don't watch each other.
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
 
 from m2pem.sim.course import Course, Craft
 from m2pem.sim.manoeuvres import (
@@ -21,30 +20,7 @@ from m2pem.sim.manoeuvres import (
 )
 from m2pem.sim.phases import Vector
 from m2pem.sim.wishes import Wishes
-
-SPACING_M = 15.0
-
-
-def slot(shape: str, index: int) -> tuple[float, float]:
-    """Where member `index` (0 leads) stands: behind the lead and to its left, in spacings."""
-    rank, side = (index + 1) // 2, 1 if index % 2 else -1
-    match shape:
-        case "line":
-            return 0.0, float(rank * side)
-        case "wedge":
-            return float(rank), float(rank * side)
-        case "vee":
-            return -float(rank), float(rank * side)
-        case "echelon_left":
-            return float(index), float(index)
-        case "echelon_right":
-            return float(index), -float(index)
-        case "diamond":
-            rows, place = divmod(index, 4)
-            back, left = ((0, 0), (1, 1), (1, -1), (2, 0))[place]
-            return float(back + 3 * rows), float(left)
-        case _:
-            return float(index), 0.0
+from m2pem.teams.shapes import SPACING_M, beside, shifted, slot, trimmed
 
 
 def _formation(default_shape: str) -> Callable[[Sequence[Craft], Wishes], list[Manoeuvre]]:
@@ -85,7 +61,7 @@ def _march(crafts: Sequence[Craft], wishes: Wishes, default_shape: str) -> list[
         back, left = (part * spacing for part in slot(shape, index))
         up = flying_height(craft, wishes)
         if route is not None:
-            places = _trimmed(_shifted(wishes.places(craft, route, up), left), back)
+            places = trimmed(shifted(wishes.places(craft, route, up), left), back)
         elif index:
             places = [_beside(crafts[0], back, left, up)]
         else:
@@ -96,44 +72,8 @@ def _march(crafts: Sequence[Craft], wishes: Wishes, default_shape: str) -> list[
 
 def _beside(lead: Craft, back: float, left: float, up: float) -> Vector:
     stopped = Course(lead)
-    cos, sin = math.cos(stopped.yaw), math.sin(stopped.yaw)
-    east, north, _ = stopped.place
-    return (east - back * cos - left * sin, north - back * sin + left * cos, up)
-
-
-def _shifted(places: list[Vector], left_m: float) -> list[Vector]:
-    """The route moved sideways; at corners by as much as keeps the legs apart."""
-    if not left_m or len(places) < 2:
-        return places
-    yaws = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(places)]
-    shifted = []
-    for index, (east, north, up) in enumerate(places):
-        before, after = yaws[max(0, index - 1)], yaws[min(index, len(yaws) - 1)]
-        half = math.remainder(after - before, math.tau) / 2
-        aside = before + half + math.pi / 2
-        reach = left_m / max(0.5, math.cos(half))
-        shifted.append((east + reach * math.cos(aside), north + reach * math.sin(aside), up))
-    return shifted
-
-
-def _trimmed(places: list[Vector], back_m: float) -> list[Vector]:
-    """The route without its last `back_m`, or (less than 0) that much longer."""
-    if not back_m or len(places) < 2:
-        return places
-    kept = list(places)
-    while back_m > 0 and len(kept) > 2 and math.dist(kept[-1], kept[-2]) <= back_m:
-        back_m -= math.dist(kept[-1], kept[-2])
-        kept.pop()
-    length = math.dist(kept[-1], kept[-2])
-    if length > 0:
-        part = 1 - back_m / length
-        a, b = kept[-2], kept[-1]
-        kept[-1] = (
-            a[0] + (b[0] - a[0]) * part,
-            a[1] + (b[1] - a[1]) * part,
-            a[2] + (b[2] - a[2]) * part,
-        )
-    return kept
+    east, north, _ = beside(stopped.place[:2], stopped.yaw, back, left)
+    return (east, north, up)
 
 
 def _one_by_one(crafts: Sequence[Craft], wishes: Wishes) -> list[Manoeuvre]:

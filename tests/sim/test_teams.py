@@ -9,7 +9,8 @@ from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.model.geometry import Point, VehiclePosition
 from m2pem.resources.behaviors import SHARED
 from m2pem.sim.arbiters import SimArbiter
-from m2pem.sim.teams import TEAM_MANOEUVRES, slot
+from m2pem.sim.teams import TEAM_MANOEUVRES
+from m2pem.teams.shapes import slot
 from m2pem.testing.contracts.bench import ArbiterBench
 
 S = 1_000_000

@@ -1,0 +1,272 @@
+"""The arbiter of teams: makes a team behavior of behaviors of the members, whoever serves them."""
+
+import logging
+from collections.abc import AsyncIterator, Callable, Sequence
+from dataclasses import replace
+
+from m2pem.api.arbiter import (
+    Arbiter,
+    ArbiterContext,
+    BehaviorId,
+    BehaviorReport,
+    BehaviorRequest,
+    Limits,
+)
+from m2pem.api.ledger import Ledger
+from m2pem.api.mailbox import Mailbox
+from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.resources.allocation import spelled_out
+from m2pem.resources.fleet import Fleet, LostMemberPolicy
+from m2pem.teams.behavior import TeamBehavior
+from m2pem.teams.member import Member
+from m2pem.teams.offers import Offers
+from m2pem.teams.plan import TeamRefusedError
+from m2pem.teams.reference import read_reference
+from m2pem.teams.restart import look_for_parts
+from m2pem.teams.scene import Scene, Scheme
+
+REMEMBERED = 1_000
+CANCEL_MARGIN_S = 1.0
+"""So that a team can say which member did not end in time, before it is itself given up."""
+
+_log = logging.getLogger("m2pem.teams")
+
+
+class Teams:
+    """Implements `m2pem.api.Arbiter` for team behaviors of any members.
+
+    `arbiter_of`: the arbiter of a vehicle. Parts of a behavior are named after it and their member:
+    "r1.b3.evsg1" is what evsg1 does of r1.b3; who reads the arbiters' reports hands those of parts
+    to `heard`, and faults of members to `fault`.
+    """
+
+    def __init__(
+        self,
+        fleet: Fleet,
+        arbiter_of: Callable[[ResourceId], Arbiter],
+        context: ArbiterContext,
+        offers: Offers,
+    ) -> None:
+        self._fleet = fleet
+        self._arbiter_of = arbiter_of
+        self._context = context
+        self._offers = offers
+        self._scene = Scene(fleet, offers, context.bus)
+        self._ledger = Ledger(self.catalogue, _log)
+        self._behaviors: dict[BehaviorId, TeamBehavior] = {}
+        self._requests: dict[BehaviorId, BehaviorRequest] = {}
+        self._scripts: dict[BehaviorId, tuple[float, str, str]] = {}
+        self._states: Mailbox[VehicleState | PayloadState] = Mailbox()
+
+    # --- what can be done -----------------------------------------------------------------------
+
+    def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+        """The team behaviors in which a vehicle can take part by what it can do alone."""
+        return self._offers.together(resource)
+
+    def limits(self, resource: ResourceId) -> Limits:
+        """A member's own, and some time to say what became of it."""
+        own = self._arbiter_of(resource).limits(resource)
+        return replace(own, cancel_timeout_s=own.cancel_timeout_s + CANCEL_MARGIN_S)
+
+    def marshals(self, resource: ResourceId) -> bool:
+        """Whether a vehicle is a member of a team behavior that goes on: a hold must come here."""
+        return self._behavior_of(resource) is not None
+
+    def parts_of(
+        self, behaviors: Sequence[BehaviorId], resources: Sequence[ResourceId]
+    ) -> tuple[BehaviorId, ...]:
+        """Behaviors to preempt, with those parts of team behaviors that resources are busy with."""
+        parts = []
+        for name in behaviors:
+            behavior = self._behaviors.get(name)
+            if behavior is not None:
+                parts += [
+                    member.part
+                    for member in behavior.members.values()
+                    if member.id in resources and member.active
+                ]
+        return (*behaviors, *parts)
+
+    # --- the protocol ---------------------------------------------------------------------------
+
+    async def connect(self) -> None:
+        """Nothing to reach: the members have arbiters of their own."""
+
+    async def start(self, request: BehaviorRequest) -> None:
+        """Start a team behavior."""
+        await self._scene.until_seen(request.resources, self._context.clock)
+        made: list[Scheme] = []
+
+        def refusal(wished: BehaviorRequest) -> str:
+            try:
+                made.append(self._scene.scheme(wished, begun=False))
+            except TeamRefusedError as error:
+                return str(error)
+            return ""
+
+        if not self._ledger.admit(request, refusal=refusal):
+            return
+        parts = self.parts_of(request.preempts, request.resources)
+        for name in request.preempts:
+            if name in self._behaviors:
+                self._behaviors[name].leave(request.resources)
+        behavior = self._make(replace(request, preempts=parts), made[0])
+        self._script_parts(request)
+        behavior.start()
+
+    async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
+        """End a team behavior."""
+        if self._ledger.may_cancel(behavior, epoch) and behavior in self._behaviors:
+            self._behaviors[behavior].cancel(epoch)
+
+    async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
+        """What became of a team behavior; after a restart, what became of its parts.
+
+        It goes on if all of them do or have ended well; else what is left of it is ended, and it is
+        UNKNOWN.
+        """
+        request = self._requests.pop(behavior, None)
+        known = self._ledger.last(behavior)
+        if known.state is not BehaviorState.UNKNOWN or request is None:
+            return known
+        await self._scene.until_seen(request.resources, self._context.clock)
+        try:
+            scheme = self._scene.scheme(request, begun=True)
+        except TeamRefusedError as error:
+            return replace(known, reason=f"it cannot be gone on with: {error}")
+        kept = read_reference(native_ref)
+        found = await look_for_parts(request, scheme.plan, kept, self._arbiter_of)
+        if found.gap:
+            for part in found.running:
+                member = ResourceId(part.partition("/")[0])
+                await self._arbiter_of(member).cancel(f"{behavior}.{part}", request.epoch)
+            return replace(known, reason=found.gap)
+        self._ledger.adopt(behavior, request.resources, native_ref, 1 + max(1, kept.version))
+        adopted = self._make(request, scheme)
+        adopted.found(found.reports, kept)
+        adopted.start()
+        return self._ledger.last(behavior)
+
+    async def hold(self, resource: ResourceId) -> None:
+        """A run holds a member: the team waits as one."""
+        behavior = self._behavior_of(resource)
+        if behavior is None:
+            await self._arbiter_of(resource).hold(resource)
+        else:
+            await behavior.hold(resource)
+
+    async def resume(self, resource: ResourceId) -> None:
+        """A run lets a member go on; the team goes on when all may."""
+        behavior = self._behavior_of(resource)
+        if behavior is None:
+            await self._arbiter_of(resource).resume(resource)
+        else:
+            await behavior.resume(resource)
+
+    def reports(self) -> AsyncIterator[BehaviorReport]:
+        """Of team behaviors, each as one."""
+        return self._ledger.reports()
+
+    def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
+        """Nothing: the members have arbiters of their own."""
+        return self._states.read()
+
+    async def close(self) -> None:
+        """Marshal nobody any more. Vehicles keep doing what they do."""
+        for behavior in self._behaviors.values():
+            behavior.close()
+        self._states.close()
+        self._ledger.close()
+
+    # --- what the executive tells ---------------------------------------------------------------
+
+    def heard(self, report: BehaviorReport) -> bool:
+        """Take a report if it is of a part; False: it is a behavior's of its own."""
+        name, _, part = report.id.partition(".")
+        name, part = f"{name}.{part.partition('.')[0]}", part.partition(".")[2]
+        if not part:
+            return False
+        behavior = self._behaviors.get(name)
+        if behavior is None:
+            _log.info("a report for %s, of a team behavior that is not known here", report.id)
+        else:
+            behavior.heard(report)
+        return True
+
+    def fault(self, resource: ResourceId, code: str, reason: str) -> bool:
+        """Take a fault of a member, for its team; False: it is in no team at work."""
+        behavior = self._behavior_of(resource)
+        if behavior is None:
+            return False
+        behavior.lose(resource, code, reason)
+        return True
+
+    def recall(self, request: BehaviorRequest) -> None:
+        """After a restart: what a behavior was that `query` will ask for."""
+        self._requests[request.id] = request
+
+    def script(self, behavior: BehaviorId, after_s: float, end: str, error: str = "") -> None:
+        """For rehearsals: say, before it starts, how every part of a behavior ends."""
+        self._scripts[behavior] = (after_s, end, error)
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _behavior_of(self, resource: ResourceId) -> TeamBehavior | None:
+        for behavior in reversed(self._behaviors.values()):
+            if not behavior.over and resource in behavior.members:
+                return behavior
+        return None
+
+    def _make(self, request: BehaviorRequest, scheme: Scheme) -> TeamBehavior:
+        def failed(member: ResourceId, reason: str) -> None:
+            behavior.failed_to_start(member, reason)
+
+        def tell(state: BehaviorState, code: str, reason: str) -> None:
+            if state.terminal:
+                self._ledger.end(request.id, state, code, reason)
+            else:
+                self._ledger.progress(request.id)
+
+        members = {each: Member(each, self._arbiter_of(each), failed) for each in request.resources}
+        behavior = TeamBehavior(
+            request,
+            scheme.plan,
+            members,
+            self._context.clock,
+            lambda member: self._scene.look(member, scheme.plane),
+            tell,
+            lambda reference: self._ledger.refer(request.id, reference.text()),
+            goes_on=self._goes_on(request),
+        )
+        self._behaviors.pop(request.id, None)
+        self._behaviors[request.id] = behavior
+        self._forget()
+        return behavior
+
+    def _goes_on(self, request: BehaviorRequest) -> bool:
+        """Whether all teams of a request go on without a lost member."""
+        crews = [members for members in request.roles.values() if members] or [request.resources]
+        policies: dict[tuple[ResourceId, ...], set[LostMemberPolicy]] = {}
+        for team in self._fleet.teams.values():
+            policies.setdefault(spelled_out(team), set()).add(team.on_lost_member)
+        return all(policies.get(tuple(crew)) == {LostMemberPolicy.CONTINUE} for crew in crews)
+
+    def _script_parts(self, request: BehaviorRequest) -> None:
+        scripted = self._scripts.pop(request.id, None)
+        if scripted is None:
+            return
+        for member in request.resources:
+            script = getattr(self._arbiter_of(member), "script", None)
+            if script is not None:
+                script(f"{request.id}.{member}", *scripted)
+            else:
+                _log.warning("%s: answers do not act on %s", request.id, member)
+
+    def _forget(self) -> None:
+        """Let go of the oldest that is over."""
+        if len(self._behaviors) > REMEMBERED:
+            over = (name for name, each in self._behaviors.items() if each.over)
+            if (oldest := next(over, None)) is not None:
+                del self._behaviors[oldest]

@@ -1,0 +1,390 @@
+"""One team behavior while it goes on: parts begin, are marshalled, end, and are lost."""
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
+from m2pem.api.clock import Clock
+from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.teams.marshal import Marshal
+from m2pem.teams.member import Member
+from m2pem.teams.plan import Leg, Plan, Stand
+from m2pem.teams.reference import Reference
+
+PERIOD_S = 0.25
+"""How often a march is looked at."""
+
+IDLE_PERIOD_S = 1.0
+ACCEPT_WITHIN_S = 15.0
+"""A member that has said nothing of its part by then has not understood it."""
+
+US_PER_S = 1_000_000
+
+_log = logging.getLogger("m2pem.teams")
+
+Tell = Callable[[BehaviorState, str, str], None]
+"""(state, code, reason): RUNNING, or the end."""
+
+
+@dataclass(slots=True)
+class _Share:
+    """What one member was to do. `by`: who does it now; None: nobody yet."""
+
+    leg: Leg
+    by: ResourceId | None = None
+    part: str = ""
+    done: bool = False
+    given_up: bool = False
+
+    @property
+    def over(self) -> bool:
+        return self.done or self.given_up
+
+
+class TeamBehavior:
+    """`look`: where a member is seen now; None: nobody knows. `tell` is told RUNNING and the end;
+    `refer` the reference to keep before each word of RUNNING. `goes_on`: without a lost member.
+
+    All is synchronous, for reports must be taken in their order; what arbiters are asked for waits
+    in the members.
+    """
+
+    def __init__(
+        self,
+        request: BehaviorRequest,
+        plan: Plan,
+        members: Mapping[ResourceId, Member],
+        clock: Clock,
+        look: Callable[[ResourceId], Stand | None],
+        tell: Tell,
+        refer: Callable[[Reference], None],
+        *,
+        goes_on: bool,
+    ) -> None:
+        self.id: BehaviorId = request.id
+        self.epoch = request.epoch
+        self.members = dict(members)
+        self._request = request
+        self._plan = plan
+        self._clock = clock
+        self._look = look
+        self._tell = tell
+        self._refer = refer
+        self._goes_on = goes_on
+        self._shares = {leg.member: _Share(leg) for leg in plan.legs}
+        steady = [each.id for each in members.values() if not each.adjustable]
+        self._marshal = Marshal(plan.march, steady) if plan.march else None
+        self._reference = Reference()
+        self._told_running = False
+        self._ending: tuple[BehaviorState, str, str] | None = None
+        self._ending_due_us = 0
+        self._stayed_s = 0.0
+        self._over = False
+        self._wake = asyncio.Event()
+        self._ticking: asyncio.Task[None] | None = None
+
+    # --- what the team is asked for -------------------------------------------------------------
+
+    def start(self) -> None:
+        """Begin, or go on after a restart."""
+        self._ticking = asyncio.get_running_loop().create_task(self._tick())
+        self._review()
+
+    def cancel(self, epoch: int) -> None:
+        """End all parts; CANCELLED when the last of them has ended."""
+        self.epoch = max(epoch, self.epoch)
+        self._end_all(BehaviorState.CANCELLED, "", "")
+
+    def leave(self, keep: tuple[ResourceId, ...]) -> None:
+        """Another behavior has taken the team over, and `keep` of its members: stop the others."""
+        self._over = True
+        self._wake.set()
+        for member in self.members.values():
+            if member.id not in keep:
+                member.cancel(self.epoch)
+
+    def close(self) -> None:
+        """Command nothing more; the vehicles go on with what they do."""
+        self._over = True
+        if self._ticking is not None:
+            self._ticking.cancel()
+        for member in self.members.values():
+            member.close()
+
+    @property
+    def over(self) -> bool:
+        """Whether its end was told, or is nobody's concern any more."""
+        return self._over
+
+    async def hold(self, member: ResourceId) -> None:
+        """A run holds a member."""
+        await self.members[member].hold()
+
+    async def resume(self, member: ResourceId) -> None:
+        """A run lets a member go on."""
+        await self.members[member].resume()
+        self._review()
+
+    @property
+    def paused(self) -> bool:
+        """Whether a run holds one of them: then nobody is let go, slowed or sent off."""
+        return any(member.paused for member in self.members.values() if not member.lost)
+
+    # --- what happens to members ----------------------------------------------------------------
+
+    def heard(self, report: BehaviorReport) -> None:
+        """A member's arbiter has reported of its part."""
+        member = next((each for each in self.members.values() if each.part == report.id), None)
+        if member is None or not member.active:
+            return
+        member.state = report.state
+        member.native_ref = report.native_ref or member.native_ref
+        if report.state.terminal:
+            self._part_ended(member, report)
+        self._review()
+
+    def lose(self, member: ResourceId, code: str, reason: str) -> None:
+        """A member is not heard any more, or can go on no longer."""
+        lost = self.members[member]
+        if not lost.lost and not self._over:
+            lost.cancel(self.epoch)
+            if code == "LINK_LOST":
+                lost.state = BehaviorState.LOST  # its end may never be heard: nobody waits for it
+            self._miss(lost, code, reason)
+            self._review()
+
+    def failed_to_start(self, member: ResourceId, reason: str) -> None:
+        """A member's arbiter did not take its part."""
+        failed = self.members[member]
+        if failed.active:
+            failed.state = BehaviorState.REJECTED
+            self._end_all(BehaviorState.FAILED, "REJECTED", f"{member}: {reason}")
+            self._review()
+
+    def found(self, reports: Mapping[str, BehaviorReport], kept: Reference) -> None:
+        """After a restart, before `start`: what the arbiters know of the parts."""
+        self._told_running = True
+        self._reference = kept
+        for name, why in kept.lost.items():
+            if name in self.members:
+                self.members[name].lost = why
+                self._drop(self.members[name])
+        for part, report in reports.items():
+            doer, _, origin = part.partition("/")
+            share = self._shares.get(ResourceId(origin or doer))
+            if share is None or ResourceId(doer) not in self.members:
+                continue
+            member = self.members[ResourceId(doer)]
+            share.by, share.part = member.id, part
+            share.done = report.state is BehaviorState.SUCCEEDED
+            if not member.active:
+                member.adopt(f"{self.id}.{part}", report, kept.begun.get(part))
+
+    def _part_ended(self, member: Member, report: BehaviorReport) -> None:
+        part = member.part.removeprefix(f"{self.id}.")
+        share = next((each for each in self._shares.values() if each.part == part), None)
+        if report.state is BehaviorState.SUCCEEDED:
+            if share is not None:
+                share.done = True
+            return
+        if self._ending is not None or member.lost:
+            return
+        code = report.code or ("LINK_LOST" if report.state is BehaviorState.LOST else "FAILED")
+        reason = report.reason or f"its part ended {report.state.value}"
+        if report.state is BehaviorState.REJECTED or code == "TAKEN_OVER":
+            self._end_all(BehaviorState.FAILED, code, f"{member.id}: {reason}")
+        else:
+            self._miss(member, code, reason)
+
+    def _miss(self, member: Member, code: str, reason: str) -> None:
+        """By the team's policy: end, or go on without it."""
+        member.lost = f"{code}: {reason}"
+        if self._ending is not None:
+            return
+        left = [each for each in self.members.values() if not each.lost]
+        if not self._goes_on or not left:
+            self._end_all(BehaviorState.FAILED, code, f"{member.id}: {reason}")
+            return
+        _log.warning("%s goes on without %s: %s", self.id, member.id, member.lost)
+        self._drop(member)
+        self._note()
+
+    def _drop(self, member: Member) -> None:
+        if self._marshal is not None:
+            self._marshal.drop(member.id)
+        for share in self._shares.values():
+            doer = share.by or share.leg.member
+            if doer == member.id and not share.over:
+                if self._plan.shared:
+                    share.by, share.part = None, ""
+                else:
+                    share.given_up = True
+
+    # --- what is to be done now -----------------------------------------------------------------
+
+    def _review(self) -> None:
+        if self._over:
+            return
+        self._wake.set()
+        if self._ending is not None:
+            if not any(member.active for member in self.members.values()):
+                self._finish(*self._ending)
+            return
+        if not self.paused:
+            self._send_off()
+        active = [member for member in self.members.values() if member.active]
+        if any(member.state is None for member in active):
+            return
+        if not self._told_running:
+            self._told_running = True
+            self._note()
+        elif self._unnoted():
+            self._note()
+        if not active and not self._plan.stays and self._all_over():
+            self._end_well()
+
+    def _send_off(self) -> None:
+        for origin, share in self._shares.items():
+            if share.over or share.by is not None:
+                continue
+            taker = self._taker(origin, share)
+            if taker is None:
+                continue
+            suffix = taker.id if taker.id == origin else f"{taker.id}/{origin}"
+            leg = share.leg if taker.id == origin else replace(share.leg, member=taker.id)
+            share.by, share.part = taker.id, suffix
+            preempts = self._request.preempts if taker.id == origin else ()
+            taker.begin(f"{self.id}.{suffix}", leg, self.epoch, preempts, self._clock.now_us())
+
+    def _taker(self, origin: ResourceId, share: _Share) -> Member | None:
+        """Who begins a share now; None: nobody yet."""
+        before = self._shares.get(share.leg.after) if share.leg.after is not None else None
+        if before is not None and not before.over:
+            return None
+        member = self.members[origin]
+        if not member.lost:
+            return member
+        free = (
+            each
+            for each in self.members.values()
+            if not each.lost and not each.active and self._has_done_its_own(each.id)
+        )
+        return next(free, None)
+
+    def _has_done_its_own(self, member: ResourceId) -> bool:
+        own = self._shares.get(member)
+        return own is None or own.over
+
+    def _parts(self) -> dict[str, str | None]:
+        """The parts that have begun, with their references."""
+        begun = dict(self._reference.begun)
+        for member in self.members.values():
+            if member.part and member.state is not None:
+                begun[member.part.removeprefix(f"{self.id}.")] = member.native_ref
+        return begun
+
+    def _unnoted(self) -> bool:
+        return self._parts() != self._reference.begun
+
+    def _note(self) -> None:
+        """Say RUNNING, with what the journal should know."""
+        if not self._told_running or self._ending is not None:
+            return
+        done = tuple(share.part for share in self._shares.values() if share.done and share.part)
+        lost = {member.id: member.lost for member in self.members.values() if member.lost}
+        self._reference = Reference(self._parts(), done, lost, self._reference.version + 1)
+        self._refer(self._reference)
+        self._tell(BehaviorState.RUNNING, "", "")
+
+    def _end_all(self, state: BehaviorState, code: str, reason: str) -> None:
+        if self._over or self._ending is not None:
+            return
+        self._ending = (state, code, reason)
+        bound_s = max(member.limits.cancel_timeout_s for member in self.members.values())
+        self._ending_due_us = self._clock.now_us() + round(bound_s * US_PER_S)
+        for member in self.members.values():
+            member.cancel(self.epoch)
+        self._review()
+
+    def _end_well(self) -> None:
+        lost = [f"{each.id} ({each.lost})" for each in self.members.values() if each.lost]
+        reason = f"without {', '.join(lost)}" if lost else ""
+        self._finish(BehaviorState.SUCCEEDED, "", reason)
+
+    def _all_over(self) -> bool:
+        return all(share.over for share in self._shares.values())
+
+    def _give_up(self, late: str) -> None:
+        state, code, reason = self._ending or (BehaviorState.CANCELLED, "", "")
+        if state is BehaviorState.CANCELLED:
+            self._finish(BehaviorState.LOST, "TIMEOUT", late)
+        else:
+            self._finish(state, code, f"{reason}; {late}")
+
+    def _finish(self, state: BehaviorState, code: str, reason: str) -> None:
+        self._over = True
+        self._wake.set()
+        self._tell(state, code, reason)
+
+    # --- time -----------------------------------------------------------------------------------
+
+    async def _tick(self) -> None:
+        while not self._over:
+            period_s = self._period_s()
+            if period_s is None:
+                self._wake.clear()
+                await self._wake.wait()
+                continue
+            await self._clock.sleep(period_s)
+            if not self._over:
+                try:
+                    self._pass(period_s)
+                except Exception:  # the vehicles of a team must not go on unwatched
+                    _log.exception("%s: held because of a bug in m2pem", self.id)
+                    self._end_all(BehaviorState.FAILED, "FAILED", "a bug in m2pem: see its log")
+
+    def _period_s(self) -> float | None:
+        """Until the next look; None: nothing that takes time is under way."""
+        if self._ending is not None:
+            return PERIOD_S
+        if self._marshal is not None and any(member.goes for member in self.members.values()):
+            return PERIOD_S
+        if any(member.active and member.state is None for member in self.members.values()):
+            return IDLE_PERIOD_S
+        if self._plan.duration_s is not None and self._all_over():
+            return min(IDLE_PERIOD_S, max(0.001, self._plan.duration_s - self._stayed_s))
+        return None
+
+    def _pass(self, seconds: float) -> None:
+        now_us = self._clock.now_us()
+        if self._ending is not None:
+            if now_us >= self._ending_due_us:
+                late = [member.id for member in self.members.values() if member.active]
+                self._give_up(f"{', '.join(late)} did not end in time when cancelled")
+            return
+        for member in self.members.values():
+            silent_us = now_us - member.begun_us
+            if member.active and member.state is None and silent_us > ACCEPT_WITHIN_S * US_PER_S:
+                reason = f"its arbiter said nothing for {ACCEPT_WITHIN_S:g} s"
+                self.failed_to_start(member.id, reason)
+                return
+        if self.paused:
+            return
+        if self._marshal is not None:
+            self._march(self._marshal)
+        if self._plan.duration_s is not None and self._all_over():
+            self._stayed_s += seconds
+            if self._stayed_s >= self._plan.duration_s:
+                self._end_well()
+
+    def _march(self, marshal: Marshal) -> None:
+        seen = {}
+        for member in self.members.values():
+            stand = self._look(member.id) if member.told_of and not member.lost else None
+            if stand is not None:
+                seen[member.id] = stand
+        arrived = [origin for origin, share in self._shares.items() if share.done]
+        for name, speed_m_s in marshal.step(seen, arrived).items():
+            self.members[name].go(speed_m_s, self.epoch)

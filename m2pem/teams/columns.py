@@ -1,0 +1,149 @@
+"""Plans of teams that move along a route in a shape, all at once or one after the other."""
+
+import math
+from collections.abc import Sequence
+from itertools import accumulate, pairwise
+
+from m2pem.model.catalogue import ResourceId
+from m2pem.model.geometry import Route
+from m2pem.teams.path import Path
+from m2pem.teams.plan import Leg, March, Marcher, Plan, Setting, TeamRefusedError
+from m2pem.teams.shapes import SPACING_M, Vector, beside, shifted, slot, trimmed
+
+GAP_SHARE = 0.5
+"""Of the spacing: what members in one lane keep at least, along the route."""
+
+HEADROOM_SHARE = 0.4
+"""Of the spacing: what a member may need to stop, so that it need not always brake and start."""
+
+_SAME_PLACE_M = 0.01
+
+
+def march(setting: Setting, default_shape: str) -> Plan:
+    """All move together and keep their places; without a route they form up on the lead."""
+    shape, spacing = _shape(setting, default_shape)
+    route = setting.route()
+    if route is None:
+        return Plan(_forming_up(setting, shape, spacing, chained=False))
+    ways = _ways(setting, route, shape, spacing)
+    marchers = tuple(
+        Marcher(way.member, way.path, way.back_m, way.left_m, setting.motion(way.member))
+        for way in ways
+    )
+    speed = _march_speed(setting, marchers, spacing)
+    legs = tuple(way.leg(setting, speed, None) for way in ways)
+    return Plan(legs, March(marchers, spacing, speed, closes=shape == "column"))
+
+
+def one_by_one(setting: Setting) -> Plan:
+    """Each sets off when the one before it has arrived, and stops behind it."""
+    shape, spacing = _shape(setting, "column")
+    route = setting.route()
+    if route is None:
+        return Plan(_forming_up(setting, shape, spacing, chained=True))
+    ways = _ways(setting, route, shape, spacing)
+    befores: list[ResourceId | None] = [None, *(way.member for way in ways)]
+    wished = setting.number("speed")
+    return Plan(
+        tuple(way.leg(setting, wished, after) for way, after in zip(ways, befores, strict=False))
+    )
+
+
+def lane_mates(a: Marcher, b: Marcher, spacing_m: float) -> bool:
+    """Whether one drives in the other's track."""
+    return abs(a.left_m - b.left_m) < spacing_m / 2
+
+
+class _Way:
+    """A member's own way: the route moved to its side, and cut short by what it stays behind."""
+
+    def __init__(
+        self,
+        setting: Setting,
+        member: ResourceId,
+        route: Sequence[Vector],
+        place: tuple[float, float],
+    ) -> None:
+        self.member = member
+        self.back_m, self.left_m = place
+        steps = (math.dist(a[:2], b[:2]) for a, b in pairwise(route))
+        marks = list(accumulate(steps, initial=0.0))
+        moved = shifted(route, self.left_m)
+        kept = trimmed(moved, self.back_m)
+        end_mark = marks[-1] - self.back_m
+        if end_mark < 0:  # its place is before the route: it need not see the route's start
+            kept = kept[-1:]
+        self.places = kept
+        marks = [*marks[: len(kept) - 1], end_mark]
+        begin = setting.stands[member].place
+        if not setting.begun:
+            first = math.dist(begin, kept[0][:2])
+            kept, marks = [(*begin, 0.0), *kept], [marks[0] - first, *marks]
+        elif len(kept) == 1:
+            kept, marks = [*kept, *kept], [*marks, *marks]
+        self.path = Path(kept, marks)
+
+    def leg(self, setting: Setting, speed_m_s: float | None, after: ResourceId | None) -> Leg:
+        route = setting.route()
+        if len(self.places) < 2 or route is None:
+            return setting.to_place(self.member, self.places[0], after=after)
+        ups = [waypoint[2] for waypoint in _apart(setting, route)]
+        waypoints = tuple(
+            setting.coordinate(place, None if up is None else place[2])
+            for place, up in zip(self.places, ups, strict=False)
+        )
+        wished = {"route": Route(waypoints, route.altitude_frame), "speed": speed_m_s}
+        return setting.leg(self.member, "single_vehicle_routing", wished, after)
+
+
+def _shape(setting: Setting, default: str) -> tuple[str, float]:
+    return setting.text("shape", default), setting.number("spacing") or SPACING_M
+
+
+def _ways(setting: Setting, route: Route, shape: str, spacing_m: float) -> list[_Way]:
+    places = [(*setting.level(each), each[2] or 0.0) for each in _apart(setting, route)]
+    ways = []
+    for index, member in enumerate(setting.members):
+        back, left = (part * spacing_m for part in slot(shape, index))
+        ways.append(_Way(setting, member, places, (back, left)))
+    return ways
+
+
+def _apart(setting: Setting, route: Route) -> list[tuple[float, float, float | None]]:
+    """The waypoints that differ; a route of one begins where the lead stands."""
+    kept = [route.waypoints[0]]
+    for waypoint in route.waypoints[1:]:
+        if math.dist(setting.level(waypoint), setting.level(kept[-1])) > _SAME_PLACE_M:
+            kept.append(waypoint)
+    if len(kept) == 1:
+        lead = setting.members[0]
+        here = setting.stands[lead].place
+        if math.dist(here, setting.level(kept[0])) <= 1.0:
+            raise TeamRefusedError("parameter 'route': it is one place, and the lead is there")
+        kept.insert(0, setting.coordinate(here, kept[0][2]))
+    return kept
+
+
+def _march_speed(setting: Setting, marchers: Sequence[Marcher], spacing_m: float) -> float:
+    """As wished, but so that each can stop before it comes too near to the one in its lane."""
+    speed = setting.speed()
+    for index, marcher in enumerate(marchers):
+        if any(lane_mates(marcher, other, spacing_m) for other in marchers[:index]):
+            speed = min(speed, marcher.motion.safe_m_s(HEADROOM_SHARE * spacing_m))
+    return speed
+
+
+def _forming_up(
+    setting: Setting, shape: str, spacing_m: float, *, chained: bool
+) -> tuple[Leg, ...]:
+    lead, *others = setting.members
+    stand = setting.stands[lead]
+    if stand.yaw_rad is None:
+        raise TeamRefusedError(f"the heading of {lead} is not known, on which the others form up")
+    legs: list[Leg] = []
+    for index, member in enumerate(others, 1):
+        back, left = (part * spacing_m for part in slot(shape, index))
+        place = beside(stand.place, stand.yaw_rad, back, left)
+        after = others[index - 2] if chained and index > 1 else None
+        legs.append(setting.to_place(member, place, after=after))
+    return tuple(legs)

@@ -1,0 +1,184 @@
+"""One member of a team behavior: the part that it does, and the calls to its arbiter."""
+
+import asyncio
+import logging
+import math
+from collections.abc import Awaitable, Callable
+
+from m2pem.api.arbiter import AdjustingArbiter, Arbiter, BehaviorReport, BehaviorRequest
+from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.teams.plan import Leg
+
+CALL_TIMEOUT_S = 10.0
+"""As the dispatcher's: an arbiter only hands over, and one that hangs is a fault."""
+
+SPEED_STEP_SHARE = 0.05
+"""Of the speed that was said last: smaller changes are not worth a command."""
+
+_log = logging.getLogger("m2pem.teams")
+
+
+class Member:
+    """Commands go out one after the other; a hold by the run, which must not wait, at once.
+
+    `part`: the id of its part, "" before and between them. `state`: where that is; None: no word of
+    it yet. `paused`: a run holds it. `halted`: the marshal does. `lost`: why the team goes on
+    without it. `failed`: is told what an arbiter's `start` raised.
+    """
+
+    def __init__(
+        self,
+        member: ResourceId,
+        arbiter: Arbiter,
+        failed: Callable[[ResourceId, str], None],
+    ) -> None:
+        self.id = member
+        self.limits = arbiter.limits(member)
+        self.part = ""
+        self.state: BehaviorState | None = None
+        self.native_ref: str | None = None
+        self.begun_us = 0
+        self.paused = False
+        self.halted = False
+        self.lost = ""
+        self._arbiter = arbiter
+        self._failed = failed
+        self._speed_m_s: float | None = None
+        self._tail: asyncio.Task[None] | None = None
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    @property
+    def adjustable(self) -> bool:
+        """Whether it can be told to go slower while it goes on."""
+        return isinstance(self._arbiter, AdjustingArbiter)
+
+    @property
+    def told_of(self) -> bool:
+        """Whether it tells where it is all the time, so that it can be marshalled."""
+        return math.isfinite(self.limits.lost_after_s)
+
+    @property
+    def active(self) -> bool:
+        """Whether its part goes on, or may."""
+        return bool(self.part) and (self.state is None or not self.state.terminal)
+
+    @property
+    def goes(self) -> bool:
+        """Whether its part is known to go on."""
+        return self.active and self.state is BehaviorState.RUNNING
+
+    def begin(
+        self, part: str, leg: Leg, epoch: int, preempts: tuple[str, ...], now_us: int
+    ) -> None:
+        """Have it start a part."""
+        self.part, self.state, self.native_ref, self.begun_us = part, None, None, now_us
+        self.halted = False
+        speed = leg.parameters.get("speed")
+        self._speed_m_s = float(speed) if isinstance(speed, int | float) else None
+        request = BehaviorRequest(
+            part,
+            epoch,
+            leg.behavior,
+            leg.parameters,
+            (self.id,),
+            {"member": (self.id,)},
+            preempts,
+        )
+
+        async def start() -> None:
+            try:
+                async with asyncio.timeout(CALL_TIMEOUT_S):
+                    await self._arbiter.start(request)
+            except TimeoutError:
+                self._failed(self.id, f"its arbiter did not return within {CALL_TIMEOUT_S:g} s")
+            except Exception as error:  # an arbiter's fault is the member's, not the team's
+                _log.exception("start %s: the arbiter raised", part)
+                self._failed(self.id, f"its arbiter raised {type(error).__name__}: {error}")
+
+        self._enqueue(start)
+
+    def adopt(self, part: str, report: BehaviorReport, native_ref: str | None) -> None:
+        """After a restart: it was found doing a part, or at its end."""
+        self.part, self.state = part, report.state
+        self.native_ref = report.native_ref or native_ref
+
+    def cancel(self, epoch: int) -> None:
+        """Have it end its part."""
+        part = self.part
+        if self.active:
+            self._enqueue(lambda: self._call(f"cancel {part}", self._arbiter.cancel(part, epoch)))
+
+    def go(self, speed_m_s: float, epoch: int) -> None:
+        """Let it go at a speed, or (0) not at all; nothing while an earlier word is on its way."""
+        if self.paused or not self.goes or (self._tail is not None and not self._tail.done()):
+            return
+        if speed_m_s == 0.0:
+            if not self.halted:
+                self.halted = True
+                self._enqueue(lambda: self._call(f"halt {self.id}", self._arbiter.hold(self.id)))
+            return
+        if self.adjustable and self._worth(speed_m_s):
+            self._enqueue(lambda: self._adjust(speed_m_s, epoch))
+        if self.halted:
+            self.halted = False
+            self._enqueue(self._go_on)
+
+    async def hold(self) -> None:
+        """A run holds it."""
+        self.paused = True
+        await self._arbiter.hold(self.id)
+
+    async def resume(self) -> None:
+        """The run lets it go; it stands on if the marshal wants it to."""
+        self.paused = False
+        if not self.halted:
+            await self._arbiter.resume(self.id)
+
+    async def query(self, part: str, native_ref: str | None) -> BehaviorReport:
+        """What its arbiter knows of a part."""
+        return await self._arbiter.query(part, native_ref)
+
+    def close(self) -> None:
+        """Command nothing more."""
+        for task in self._tasks:
+            task.cancel()
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _worth(self, speed_m_s: float) -> bool:
+        last = self._speed_m_s
+        return last is None or abs(speed_m_s - last) > SPEED_STEP_SHARE * last
+
+    async def _adjust(self, speed_m_s: float, epoch: int) -> None:
+        if isinstance(self._arbiter, AdjustingArbiter) and self.active and not self.paused:
+            self._speed_m_s = speed_m_s
+            wished = self._arbiter.adjust(self.part, epoch, {"speed": speed_m_s})
+            await self._call(f"adjust {self.part}", wished)
+
+    async def _go_on(self) -> None:
+        if self.paused:
+            return
+        await self._call(f"go on {self.id}", self._arbiter.resume(self.id))
+        if self.paused:  # a run has held it meanwhile, and the last word is the run's
+            await self._call(f"hold {self.id}", self._arbiter.hold(self.id))
+
+    def _enqueue(self, job: Callable[[], Awaitable[None]]) -> None:
+        before = self._tail
+
+        async def in_turn() -> None:
+            if before is not None:
+                await asyncio.wait([before])
+            await job()
+
+        self._tail = task = asyncio.get_running_loop().create_task(in_turn())
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _call(self, what: str, call: Awaitable[None]) -> None:
+        try:
+            async with asyncio.timeout(CALL_TIMEOUT_S):
+                await call
+        except TimeoutError:
+            _log.error("%s: the arbiter did not return within %g s", what, CALL_TIMEOUT_S)
+        except Exception:  # an arbiter's fault must not end the team
+            _log.exception("%s: the arbiter raised", what)

@@ -1,0 +1,198 @@
+"""What each member of a team does, and what the team keeps to meanwhile: the words of planning."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from m2pem.api.arbiter import ResolvedValue
+from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.model.geometry import Area, Coordinate, Point, Route, VehiclePosition
+from m2pem.teams.motion import MOTIONS, Motion
+from m2pem.teams.path import Path
+from m2pem.teams.plane import MAX_RANGE_M, Plane
+from m2pem.teams.shapes import Vector
+
+_FLYING_OR_DIVING = ("air", "subsurface")
+
+
+class TeamRefusedError(Exception):
+    """The team cannot do it; the text says why, naming the member or the parameter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """What one member does. `after`: it begins when that member has ended its own."""
+
+    member: ResourceId
+    behavior: str
+    parameters: Mapping[str, ResolvedValue]
+    after: ResourceId | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Marcher:
+    """A member on the march: `back_m` behind the lead along the route, `left_m` beside it."""
+
+    member: ResourceId
+    path: Path
+    back_m: float
+    left_m: float
+    motion: Motion
+
+
+@dataclass(frozen=True, slots=True)
+class March:
+    """Members that move along one route and keep their places to each other, the lead first.
+
+    `closes`: who comes behind a lost member moves up to its place.
+    """
+
+    marchers: tuple[Marcher, ...]
+    spacing_m: float
+    speed_m_s: float
+    closes: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """`legs`: at most one a member. `stays`: it goes on when all have ended, for `duration_s` if
+    that is given. `shared`: what a lost member has not done is done by another one."""
+
+    legs: tuple[Leg, ...]
+    march: March | None = None
+    stays: bool = False
+    duration_s: float | None = None
+    shared: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Stand:
+    """Where a vehicle is on the plane; `yaw_rad` from east, counter-clockwise; None: not known."""
+
+    place: tuple[float, float]
+    yaw_rad: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What a plan is made from. `offered`: each member's own vehicle behaviors, by name.
+
+    `stands`: where each member is. `target`: where the vehicle is that `target` names. `begun`: the
+    members are under way already (after a restart), not on their way to the route's start.
+    """
+
+    members: tuple[ResourceId, ...]
+    domains: Mapping[ResourceId, str]
+    offered: Mapping[ResourceId, Mapping[str, BehaviorSpec]]
+    parameters: Mapping[str, ResolvedValue]
+    plane: Plane
+    stands: Mapping[ResourceId, Stand] = field(default_factory=dict)
+    target: Stand | None = None
+    begun: bool = False
+
+    def number(self, name: str) -> float | None:
+        """A parameter in SI; None if it is not given."""
+        value = self.parameters.get(name)
+        return float(value) if isinstance(value, int | float) else None
+
+    def text(self, name: str, default: str) -> str:
+        """A parameter that is a text."""
+        value = self.parameters.get(name)
+        return value if isinstance(value, str) else default
+
+    def route(self) -> Route | None:
+        """The parameter `route`."""
+        value = self.parameters.get("route")
+        return value if isinstance(value, Route) else None
+
+    def area(self) -> Area | None:
+        """The parameter `area`."""
+        value = self.parameters.get("area")
+        return value if isinstance(value, Area) else None
+
+    def target_place(self) -> tuple[float, float]:
+        """Where `target` is now.
+
+        Raises:
+            TeamRefusedError: nobody knows.
+        """
+        value = self.parameters.get("target")
+        if isinstance(value, Point):
+            return self.level(value.position)
+        if self.target is not None:
+            return self.target.place
+        what = value.vehicle if isinstance(value, VehiclePosition) else "the target"
+        raise TeamRefusedError(f"parameter 'target': the position of {what} is not known")
+
+    def level(self, place: Coordinate) -> tuple[float, float]:
+        """A coordinate on the plane.
+
+        Raises:
+            TeamRefusedError: it is too far away.
+        """
+        east, north = self.plane.level(place[0], place[1])
+        if max(abs(east), abs(north)) > MAX_RANGE_M:
+            raise TeamRefusedError(
+                f"[{place[0]}, {place[1]}] is more than {MAX_RANGE_M / 1000:.0f} km away"
+            )
+        return east, north
+
+    def coordinate(self, place: Vector | tuple[float, float], up_m: float | None) -> Coordinate:
+        """A place of the plane as a coordinate, with that altitude."""
+        return (*self.plane.geo(place[0], place[1]), up_m)
+
+    def motion(self, member: ResourceId) -> Motion:
+        """How a member moves."""
+        return MOTIONS.get(self.domains[member], MOTIONS["ground"])
+
+    def speed(self) -> float:
+        """The speed of all together: as wished, else what the slowest is taken to go.
+
+        Not above what the arbiter of a member allows.
+        """
+        wished = self.number("speed")
+        bounds = [self.motion(member).nominal_m_s for member in self.members]
+        speed = min(bounds) if wished is None else wished
+        for member in self.members:
+            spec = self.offered[member].get("single_vehicle_routing")
+            limit = spec.by_name["speed"].maximum if spec and "speed" in spec.by_name else None
+            speed = speed if limit is None else min(speed, limit)
+        return speed
+
+    def leg(
+        self,
+        member: ResourceId,
+        behavior: str,
+        wished: Mapping[str, ResolvedValue],
+        after: ResourceId | None = None,
+    ) -> Leg:
+        """A member's part: the wished parameters that it takes, at the team's altitude if any."""
+        spec = self.offered[member].get(behavior)
+        if spec is None:
+            raise TeamRefusedError(f"{member} has no behavior '{behavior}'")
+        given = dict(wished)
+        if self.domains[member] in _FLYING_OR_DIVING:
+            for name in ("altitude", "altitude_frame"):
+                given.setdefault(name, self.parameters.get(name))
+        taken = {
+            name: value
+            for name, value in given.items()
+            if value is not None and name in spec.by_name
+        }
+        return Leg(member, behavior, taken, after)
+
+    def to_place(
+        self,
+        member: ResourceId,
+        place: Vector | tuple[float, float],
+        heading_rad: float | None = None,
+        after: ResourceId | None = None,
+    ) -> Leg:
+        """A member's way to a place: `goto`, or a route of two points where it has none."""
+        there = self.coordinate(place, None)
+        speed = self.number("speed")
+        if "goto" in self.offered[member]:
+            wished = {"target": Point(there), "speed": speed, "heading": heading_rad}
+            return self.leg(member, "goto", wished, after)
+        here = self.coordinate(self.stands[member].place, None)
+        wished_route = {"route": Route((here, there)), "speed": speed}
+        return self.leg(member, "single_vehicle_routing", wished_route, after)

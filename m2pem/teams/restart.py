@@ -1,0 +1,88 @@
+"""After a restart: what has become of the parts of a team behavior."""
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
+from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.teams.plan import Plan
+from m2pem.teams.reference import Reference
+
+QUERY_TIMEOUT_S = 8.0
+"""Less than a team itself is given to answer."""
+
+_GOOD = (BehaviorState.ACCEPTED, BehaviorState.RUNNING, BehaviorState.SUCCEEDED)
+
+_log = logging.getLogger("m2pem.teams")
+
+
+@dataclass(frozen=True, slots=True)
+class FoundParts:
+    """`reports`: of the parts that had begun, by part. `gap`: why the team cannot go on; "" if it
+    can."""
+
+    reports: Mapping[str, BehaviorReport]
+    gap: str = ""
+
+    @property
+    def running(self) -> tuple[str, ...]:
+        """The parts that go on."""
+        return tuple(part for part, each in self.reports.items() if not each.state.terminal)
+
+
+async def look_for_parts(
+    request: BehaviorRequest,
+    plan: Plan,
+    kept: Reference,
+    arbiter_of: Callable[[ResourceId], Arbiter],
+) -> FoundParts:
+    """Ask the arbiters for every part that has begun, or may have.
+
+    A part that the journal does not know may have begun just before the crash; if its arbiter does
+    not know it either, it has not.
+    """
+    planned = dict.fromkeys(leg.member for leg in plan.legs if leg.member not in kept.lost)
+    parts = dict.fromkeys([*kept.begun, *planned])
+    asked = [part for part in parts if _doer(part) not in kept.lost and part not in kept.done]
+    answers = await asyncio.gather(
+        *(_ask(request.id, part, kept.begun.get(part), arbiter_of) for part in asked)
+    )
+    reports: dict[str, BehaviorReport] = {
+        part: BehaviorReport(f"{request.id}.{part}", 3, BehaviorState.SUCCEEDED)
+        for part in kept.done
+    }
+    gaps: list[str] = []
+    for part, answer in zip(asked, answers, strict=True):
+        if answer.state is BehaviorState.UNKNOWN and part not in kept.begun:
+            continue
+        reports[part] = answer
+        if answer.state not in _GOOD:
+            why = answer.reason or answer.code or "no reason given"
+            gaps.append(f"the part of {_doer(part)} is {answer.state.value}: {why}")
+    if not reports and plan.legs:
+        gaps.append("no member knows of it")
+    return FoundParts(reports, "; ".join(gaps))
+
+
+def _doer(part: str) -> ResourceId:
+    return ResourceId(part.partition("/")[0])
+
+
+async def _ask(
+    behavior: str,
+    part: str,
+    native_ref: str | None,
+    arbiter_of: Callable[[ResourceId], Arbiter],
+) -> BehaviorReport:
+    name = f"{behavior}.{part}"
+    try:
+        async with asyncio.timeout(QUERY_TIMEOUT_S):
+            return await arbiter_of(_doer(part)).query(name, native_ref)
+    except TimeoutError:
+        reason = f"its arbiter did not answer within {QUERY_TIMEOUT_S:g} s"
+    except Exception as error:  # an arbiter's fault is a part that is not known
+        _log.exception("%s: its arbiter raised on query", name)
+        reason = f"its arbiter raised {type(error).__name__}: {error}"
+    return BehaviorReport(name, 0, BehaviorState.UNKNOWN, reason=reason)

@@ -1,0 +1,93 @@
+"""What a team can see: where its members are, what each can do alone, and so what each is to do."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from m2pem.api.arbiter import BehaviorRequest
+from m2pem.api.bus import FleetBus
+from m2pem.api.clock import Clock
+from m2pem.api.telemetry import VehicleState
+from m2pem.model.catalogue import ResourceId
+from m2pem.model.geometry import VehiclePosition
+from m2pem.resources.fleet import Fleet
+from m2pem.teams.offers import Offers
+from m2pem.teams.plan import Plan, Setting, Stand, TeamRefusedError
+from m2pem.teams.plane import Plane
+from m2pem.teams.planning import PLANS
+
+SEEN_WITHIN_S = 1.5
+LOOK_EVERY_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Scheme:
+    """A plan, and the plane that its places are in."""
+
+    plan: Plan
+    plane: Plane
+
+
+class Scene:
+    """Looks through the fleet's bus."""
+
+    def __init__(self, fleet: Fleet, offers: Offers, bus: FleetBus) -> None:
+        self._fleet = fleet
+        self._offers = offers
+        self._bus = bus
+
+    def scheme(self, request: BehaviorRequest, *, begun: bool) -> Scheme:
+        """What each member of a request does.
+
+        Raises:
+            TeamRefusedError: it cannot be done; the text says why.
+        """
+        if not request.resources:
+            raise TeamRefusedError(f"{request.behavior} has no members")
+        states = {member: self._state(member) for member in request.resources}
+        for member, state in states.items():
+            if state is None:
+                raise TeamRefusedError(f"the position of {member} is not known")
+        first = states[request.resources[0]]
+        if first is None or first.position is None:
+            raise TeamRefusedError(f"the position of {request.resources[0]} is not known")
+        plane = Plane(first.position.latitude_deg, first.position.longitude_deg)
+        target = request.parameters.get("target")
+        seen = None
+        if isinstance(target, VehiclePosition):
+            seen = self.look(ResourceId(target.vehicle), plane)
+        setting = Setting(
+            request.resources,
+            {each: self._fleet.vehicles[each].domain.value for each in request.resources},
+            {each: self._offers.alone(each) for each in request.resources},
+            request.parameters,
+            plane,
+            {each: stand_of(plane, state) for each, state in states.items() if state is not None},
+            seen,
+            begun,
+        )
+        return Scheme(PLANS[request.behavior](setting), plane)
+
+    async def until_seen(self, vehicles: Sequence[ResourceId], clock: Clock) -> None:
+        """Wait a moment for those that have not been heard since the start of the executive."""
+        waited_s = 0.0
+        while waited_s < SEEN_WITHIN_S and not all(self._state(each) for each in vehicles):
+            await clock.sleep(LOOK_EVERY_S)
+            waited_s += LOOK_EVERY_S
+
+    def look(self, vehicle: ResourceId, plane: Plane) -> Stand | None:
+        """Where a vehicle is; None: nobody knows."""
+        state = self._state(vehicle)
+        return None if state is None else stand_of(plane, state)
+
+    def _state(self, vehicle: ResourceId) -> VehicleState | None:
+        state = self._bus.latest(vehicle)
+        known = isinstance(state, VehicleState) and state.position is not None
+        return state if known and isinstance(state, VehicleState) else None
+
+
+def stand_of(plane: Plane, state: VehicleState) -> Stand:
+    """A vehicle on the plane; its position must be known."""
+    if state.position is None:
+        raise ValueError(f"the position of {state.resource} is not known")
+    place = plane.level(state.position.latitude_deg, state.position.longitude_deg)
+    return Stand(place, state.yaw_rad)
