@@ -18,6 +18,7 @@ from m2pem.executive.reporting import reported, spec_of
 from m2pem.executive.runner import Runner
 from m2pem.executive.script import Script
 from m2pem.journal.base import Journal
+from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import BehaviorState, ResourceId, ResumePolicy
 from m2pem.resources.parameters import ParameterError
 

@@ -92,7 +92,10 @@ class RosArbiter:
         """What a vehicle can do, by its driver and domain; payloads are carried, no more."""
         if resource not in self._settings:
             return ()
-        return offered(self._settings[resource].driver, self._connections[resource].domain)
+        settings = self._settings[resource]
+        usual = offered(settings.driver, self._connections[resource].domain)
+        known = {spec.name for spec in usual}
+        return (*usual, *(spec for spec in settings.own_behaviors if spec.name not in known))
 
     def _taken(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """A payload may be held by what its vehicle does."""

@@ -13,7 +13,7 @@ arbiters share (docs/fleets.md); a new one says what it takes:
           passes: {kind: count, minimum: 1, maximum: 5, default: 1}
           speed: speed
 
-Bounds and defaults are SI numbers: s, m, m/s, rad.
+Bounds and defaults carry units, as everywhere in a fleet.
 """
 
 import difflib
@@ -26,27 +26,27 @@ from m2pem.api import (
     SHARED,
     BehaviorSpec,
     BehaviorType,
+    Dimension,
     ParameterKind,
     ParameterSpec,
     ResourceId,
     ResumePolicy,
+    UnitError,
+    quantity,
 )
 from m2pem.errors import PluginError
 
 _BEHAVIOR_KEYS = ("parameters", "required_one_of", "resume", "ends", "doc")
 _PARAMETER_KEYS = ("kind", "required", "minimum", "maximum", "choices", "default", "doc")
-_NUMBERS = frozenset(
-    {
-        ParameterKind.DURATION,
-        ParameterKind.DISTANCE,
-        ParameterKind.ALTITUDE,
-        ParameterKind.SPEED,
-        ParameterKind.ANGLE,
-        ParameterKind.ANGULAR_SPEED,
-        ParameterKind.NUMBER,
-        ParameterKind.COUNT,
-    }
-)
+_PLAIN = frozenset({ParameterKind.NUMBER, ParameterKind.COUNT})
+_DIMENSIONS: Mapping[ParameterKind, Dimension] = {
+    ParameterKind.DURATION: Dimension.DURATION,
+    ParameterKind.DISTANCE: Dimension.DISTANCE,
+    ParameterKind.ALTITUDE: Dimension.DISTANCE,
+    ParameterKind.SPEED: Dimension.SPEED,
+    ParameterKind.ANGLE: Dimension.ANGLE,
+    ParameterKind.ANGULAR_SPEED: Dimension.ANGULAR_SPEED,
+}
 
 
 def read_declared_behaviors(resource: ResourceId, value: Any) -> tuple[BehaviorSpec, ...]:
@@ -156,10 +156,15 @@ def _choices(place: str, value: Any, kind: ParameterKind) -> tuple[str, ...]:
 def _number(place: str, value: Any, kind: ParameterKind) -> float | None:
     if value is None:
         return None
-    if kind not in _NUMBERS:
+    if kind in _DIMENSIONS:
+        try:
+            return quantity(value, _DIMENSIONS[kind])
+        except UnitError as error:
+            raise _error(place, str(error)) from None
+    if kind not in _PLAIN:
         raise _error(place, f"{_article(kind)} is not a number")
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise _error(place, f"{value!r} is not a number; write it in SI, without a unit")
+        raise _error(place, f"{value!r} is not a number")
     if kind is ParameterKind.COUNT and (value != int(value) or value < 0):
         raise _error(place, f"{value!r} is not a whole number, 0 or more")
     return float(value)

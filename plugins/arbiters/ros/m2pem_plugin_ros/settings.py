@@ -5,9 +5,10 @@ from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from typing import Any
 
-from m2pem.api import Connection, Dimension, ResourceId
+from m2pem.api import BehaviorSpec, Connection, Dimension, ResourceId
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.connection_reader import ConnectionReader
+from m2pem_plugin_ros.declared_behaviors import read_declared_behaviors
 
 DOMAINS = ("ground", "surface")
 """Of the vehicles that this arbiter commands."""
@@ -90,6 +91,7 @@ class Settings:
     bounds: Bounds = field(default_factory=Bounds)
     hardware_id: str = ""
     route_action: RouteAction = RouteAction.THROUGH
+    own_behaviors: tuple[BehaviorSpec, ...] = ()
 
     def topic(self, name: str) -> str:
         """The full name of a topic, action or service of the vehicle."""
@@ -174,7 +176,12 @@ def _read_vehicle(connection: Connection) -> Settings:
     reader.refuse_others(_KEYS)
     reader.inner("sim", "{heading: 60 deg}")
     driver = reader.choice("driver", DriverName, DriverName.NODE)
-    for key, of in (("via", DriverName.NODE), ("route_action", DriverName.NAV2)):
+    only = {
+        "via": DriverName.NODE,
+        "own_behaviors": DriverName.NODE,
+        "route_action": DriverName.NAV2,
+    }
+    for key, of in only.items():
         if key in connection.settings and driver is not of:
             raise reader.error(key, f"it is for the driver {of} only, and this one is {driver}")
     return Settings(
@@ -188,6 +195,7 @@ def _read_vehicle(connection: Connection) -> Settings:
         _bounds(reader.inner("bounds", "{speed: 2 m/s}")),
         reader.text("hardware_id", resource),
         reader.choice("route_action", RouteAction, RouteAction.THROUGH),
+        read_declared_behaviors(resource, connection.settings.get("own_behaviors")),
     )
 
 

@@ -67,6 +67,13 @@ def test_a_new_behavior_says_all_that_it_takes() -> None:
     )
 
 
+def test_bounds_and_defaults_carry_units() -> None:
+    brush = {"kind": "speed", "minimum": "3.6 km/h", "maximum": 2, "default": "1.5 m/s"}
+    (spec,) = read({"sweep": {"parameters": {"speed": brush}}})
+    (bounded,) = spec.parameters
+    assert (bounded.minimum, bounded.maximum, bounded.default) == (1.0, 2.0, 1.5)
+
+
 def test_of_several_ways_to_say_where_one_is_enough() -> None:
     declared = {
         "water": {
@@ -98,9 +105,12 @@ REFUSED = [
     ({"sweep": {"required_one_of": [["route"]]}}, r"\.required_one_of: 'route' is none of"),
     (parameter(required=True), r"\.p\.kind: it is missing: one of duration, "),
     (parameter(kind="speed", max=3), r"\.p\.max: there is no such key; did you mean 'maximum'\?"),
-    (parameter(kind="speed", minimum="2 m/s"), r"\.p\.minimum: '2 m/s' is not a number; .* SI"),
-    (parameter(kind="speed", minimum=float("nan")), r"\.p\.minimum: nan is not a number"),
-    (parameter(kind="speed", minimum=True), r"\.p\.minimum: True is not a number"),
+    (parameter(kind="speed", minimum="2 kg"), r"\.p\.minimum: .*'kg'"),
+    (parameter(kind="angle", minimum=1.5), r"\.p\.minimum: .* '1\.5 deg' or '1\.5 rad'"),
+    (parameter(kind="speed", minimum=float("nan")), r"\.p\.minimum: nan is not "),
+    (parameter(kind="number", minimum=float("nan")), r"\.p\.minimum: nan is not a number"),
+    (parameter(kind="number", minimum="2 m/s"), r"\.p\.minimum: '2 m/s' is not a number"),
+    (parameter(kind="speed", minimum=True), r"\.p\.minimum: True is not a speed"),
     (parameter(kind="speed", minimum=3, maximum=2), r"\.p\.minimum: 3 is above the maximum, 2"),
     (parameter(kind="count", minimum=1.5), r"\.p\.minimum: 1\.5 is not a whole number"),
     (parameter(kind="route", minimum=1), r"\.p\.minimum: a route is not a number"),
