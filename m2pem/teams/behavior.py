@@ -78,6 +78,7 @@ class TeamBehavior:
         self._marshal = Marshal(plan.march, steady) if plan.march else None
         self._reference = Reference()
         self._told_running = False
+        self._again = False
         self._ending: tuple[BehaviorState, str, str] | None = None
         self._ending_due_us = 0
         self._stayed_s = 0.0
@@ -173,7 +174,7 @@ class TeamBehavior:
                 self._drop(self.members[name])
         for part, report in reports.items():
             doer, _, origin = part.partition("/")
-            share = self._shares.get(ResourceId(origin or doer))
+            share = self._shares.get(ResourceId(origin.partition("/")[0] or doer))
             if share is None or ResourceId(doer) not in self.members:
                 continue
             member = self.members[ResourceId(doer)]
@@ -181,6 +182,14 @@ class TeamBehavior:
             share.done = report.state is BehaviorState.SUCCEEDED
             if not member.active:
                 member.adopt(f"{self.id}.{part}", report, kept.begun.get(part))
+
+    def take_up(self, reports: Mapping[str, BehaviorReport], kept: Reference) -> None:
+        """As `found`, but some parts are missing: they are begun anew, and the others let go."""
+        self.found(reports, kept)
+        self._told_running = False
+        self._again = True
+        for member in self.members.values():
+            member.let_go()
 
     def _part_ended(self, member: Member, report: BehaviorReport) -> None:
         part = member.part.removeprefix(f"{self.id}.")
@@ -253,6 +262,8 @@ class TeamBehavior:
             if taker is None:
                 continue
             suffix = taker.id if taker.id == origin else f"{taker.id}/{origin}"
+            if self._again:  # its arbiter may know the first one, and that it has ended
+                suffix = f"{taker.id}/{origin}/{self.epoch}"
             leg = share.leg if taker.id == origin else replace(share.leg, member=taker.id)
             share.by, share.part = taker.id, suffix
             preempts = self._request.preempts if taker.id == origin else ()

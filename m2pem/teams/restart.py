@@ -27,9 +27,9 @@ class FoundParts:
     gap: str = ""
 
     @property
-    def running(self) -> tuple[str, ...]:
-        """The parts that go on."""
-        return tuple(part for part, each in self.reports.items() if not each.state.terminal)
+    def good(self) -> Mapping[str, BehaviorReport]:
+        """The parts that go on or have ended well."""
+        return {part: each for part, each in self.reports.items() if each.state in _GOOD}
 
 
 async def look_for_parts(
