@@ -143,8 +143,8 @@ class Teams:
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """What became of a team behavior; after a restart, what became of its parts.
 
-        It goes on if all of them do or have ended well. Else it is UNKNOWN; what goes on of it is kept
-        in mind for a `start` under the same id, which takes it up, or a `cancel`, which ends it.
+        It goes on if all of them do or have ended well. Else it is UNKNOWN; what goes on of it is
+        kept in mind for a `start` under the same id, which takes it up, or a `cancel`.
         """
         request = self._requests.pop(behavior, None)
         known = self._ledger.last(behavior)
@@ -158,7 +158,7 @@ class Teams:
         kept = read_reference(native_ref)
         found = await look_for_parts(request, scheme.plan, kept, self._arbiter_of)
         if found.gap:
-            self._remains[behavior] = _Remains(request, scheme, found, kept)
+            self._remains[behavior] = _Remains(request, scheme, found, found.trimmed(kept))
             return replace(known, reason=found.gap)
         self._ledger.adopt(behavior, request.resources, native_ref, 1 + max(1, kept.version))
         adopted = self._make(request, scheme)
