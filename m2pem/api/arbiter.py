@@ -114,7 +114,11 @@ class BehaviorReport:
 
 
 class Arbiter(Protocol):
-    """Constructed as `Arbiter(connections: Mapping[ResourceId, Connection], context)`."""
+    """Constructed as `Arbiter(connections: Mapping[ResourceId, Connection], context)`.
+
+    A class attribute `takes_one_vehicle = True` says that no request may be for several vehicles:
+    where a mission has several do the same, each of them is asked for its own then.
+    """
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """What the resource can do. Needs no connection and no transport library."""

@@ -104,7 +104,9 @@ class FleetArbiters:
     @property
     def all(self) -> Mapping[str, Arbiter]:
         """Those of the fleet, and the one of teams whose members they serve."""
-        return {"teams": self.teams, **self.by_name} if self.fleet.teams else self.by_name
+        apart = len(self.by_name) > 1 or any(map(_takes_one_vehicle, self.by_name.values()))
+        together = self.fleet.teams or (apart and len(self.fleet.vehicles) > 1)
+        return {"teams": self.teams, **self.by_name} if together else self.by_name
 
     def serving(
         self, resources: Sequence[ResourceId], behavior: str, type_: BehaviorType
@@ -112,12 +114,15 @@ class FleetArbiters:
         """Who does a behavior on resources; None: they have different arbiters.
 
         A team behavior goes to the members' arbiter, if there is one that offers it for them all;
-        else it is made of behaviors of the members.
+        else it is made of behaviors of the members. So is a behavior of vehicles that several are
+        to do, where their arbiters take one vehicle each.
         """
         arbiters = dict.fromkeys(self.of(resource) for resource in resources)
         only = next(iter(arbiters)) if len(arbiters) == 1 else None
         if type_ is not BehaviorType.TEAM:
-            return only
+            together = len(resources) > 1 and all(each in self.fleet.vehicles for each in resources)
+            apart = only is None or _takes_one_vehicle(only)
+            return self.teams if together and apart else only
         offers = only is not None and all(
             _has(only.catalogue(resource), behavior) for resource in resources
         )
@@ -150,3 +155,7 @@ class FleetArbiters:
 
 def _has(specs: Sequence[BehaviorSpec], team_behavior: str) -> bool:
     return any(spec.name == team_behavior and spec.type is BehaviorType.TEAM for spec in specs)
+
+
+def _takes_one_vehicle(arbiter: Arbiter) -> bool:
+    return bool(getattr(arbiter, "takes_one_vehicle", False))

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import AsyncIterator, Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from m2pem.api.arbiter import (
     Arbiter,
@@ -22,8 +22,8 @@ from m2pem.teams.behavior import TeamBehavior
 from m2pem.teams.member import Member
 from m2pem.teams.offers import Offers
 from m2pem.teams.plan import TeamRefusedError
-from m2pem.teams.reference import read_reference
-from m2pem.teams.restart import look_for_parts
+from m2pem.teams.reference import Reference, read_reference
+from m2pem.teams.restart import FoundParts, look_for_parts
 from m2pem.teams.scene import Scene, Scheme
 
 REMEMBERED = 1_000
@@ -31,6 +31,16 @@ CANCEL_MARGIN_S = 1.0
 """So that a team can say which member did not end in time, before it is itself given up."""
 
 _log = logging.getLogger("m2pem.teams")
+
+
+@dataclass(frozen=True, slots=True)
+class _Remains:
+    """What was found after a restart of a team behavior that is not whole any more."""
+
+    request: BehaviorRequest
+    scheme: Scheme
+    found: FoundParts
+    kept: Reference
 
 
 class Teams:
@@ -56,14 +66,19 @@ class Teams:
         self._ledger = Ledger(self.catalogue, _log)
         self._behaviors: dict[BehaviorId, TeamBehavior] = {}
         self._requests: dict[BehaviorId, BehaviorRequest] = {}
+        self._remains: dict[BehaviorId, _Remains] = {}
         self._scripts: dict[BehaviorId, tuple[float, str, str]] = {}
         self._states: Mailbox[VehicleState | PayloadState] = Mailbox()
 
     # --- what can be done -----------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """The team behaviors in which a vehicle can take part by what it can do alone."""
-        return self._offers.together(resource)
+        """What a vehicle can do beside others: what it can do alone, and the team behaviors in
+        which it can take part by that."""
+        alone = self._offers.alone(resource)
+        together = self._offers.together(resource)
+        names = {spec.name for spec in together}
+        return (*together, *(spec for spec in alone.values() if spec.name not in names))
 
     def limits(self, resource: ResourceId) -> Limits:
         """A member's own, and some time to say what became of it."""
@@ -96,7 +111,7 @@ class Teams:
 
     async def start(self, request: BehaviorRequest) -> None:
         """Start a team behavior."""
-        await self._scene.until_seen(request.resources, self._context.clock)
+        await self._scene.until_seen(request, self._context.clock)
         made: list[Scheme] = []
 
         def refusal(wished: BehaviorRequest) -> str:
@@ -114,24 +129,32 @@ class Teams:
                 self._behaviors[name].leave(request.resources)
         behavior = self._make(replace(request, preempts=parts), made[0])
         self._script_parts(request)
+        remains = self._remains.pop(request.id, None)
+        if remains is not None:
+            behavior.take_up(remains.found.good, remains.kept)
         behavior.start()
 
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
         """End a team behavior."""
+        remains = self._remains.pop(behavior, None)
+        if remains is not None:
+            self._ledger.adopt(behavior, remains.request.resources, remains.kept.text())
+            left = self._make(remains.request, remains.scheme)
+            left.found(remains.found.good, remains.kept)
         if self._ledger.may_cancel(behavior, epoch) and behavior in self._behaviors:
             self._behaviors[behavior].cancel(epoch)
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """What became of a team behavior; after a restart, what became of its parts.
 
-        It goes on if all of them do or have ended well; else what is left of it is ended, and it is
-        UNKNOWN.
+        It goes on if all of them do or have ended well. Else it is UNKNOWN; what goes on of it is
+        kept in mind for a `start` under the same id, which takes it up, or a `cancel`.
         """
         request = self._requests.pop(behavior, None)
         known = self._ledger.last(behavior)
         if known.state is not BehaviorState.UNKNOWN or request is None:
             return known
-        await self._scene.until_seen(request.resources, self._context.clock)
+        await self._scene.until_seen(request, self._context.clock)
         try:
             scheme = self._scene.scheme(request, begun=True)
         except TeamRefusedError as error:
@@ -139,9 +162,7 @@ class Teams:
         kept = read_reference(native_ref)
         found = await look_for_parts(request, scheme.plan, kept, self._arbiter_of)
         if found.gap:
-            for part in found.running:
-                member = ResourceId(part.partition("/")[0])
-                await self._arbiter_of(member).cancel(f"{behavior}.{part}", request.epoch)
+            self._remains[behavior] = _Remains(request, scheme, found, found.trimmed(kept))
             return replace(known, reason=found.gap)
         self._ledger.adopt(behavior, request.resources, native_ref, 1 + max(1, kept.version))
         adopted = self._make(request, scheme)

@@ -39,7 +39,11 @@ def survey(setting: Setting) -> Plan:
             route = Route(tuple(setting.coordinate(place, None) for each in band for place in each))
             parameters = {"route": route, "speed": wished}
             legs.append(setting.leg(member, "single_vehicle_routing", parameters))
-    return Plan(tuple(legs), shared=True)
+    takes = {
+        member: frozenset(setting.offered[member]["single_vehicle_routing"].by_name)
+        for member in setting.members
+    }
+    return Plan(tuple(legs), shared=True, takes=takes)
 
 
 def _bands(

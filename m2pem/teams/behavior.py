@@ -3,15 +3,15 @@
 import asyncio
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
 
 from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
 from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.teams.marshal import Marshal
 from m2pem.teams.member import Member
-from m2pem.teams.plan import Leg, Plan, Stand
+from m2pem.teams.plan import Plan, Stand
 from m2pem.teams.reference import Reference
+from m2pem.teams.shares import Shares
 
 PERIOD_S = 0.25
 """How often a march is looked at."""
@@ -26,21 +26,6 @@ _log = logging.getLogger("m2pem.teams")
 
 Tell = Callable[[BehaviorState, str, str], None]
 """(state, code, reason): RUNNING, or the end."""
-
-
-@dataclass(slots=True)
-class _Share:
-    """What one member was to do. `by`: who does it now; None: nobody yet."""
-
-    leg: Leg
-    by: ResourceId | None = None
-    part: str = ""
-    done: bool = False
-    given_up: bool = False
-
-    @property
-    def over(self) -> bool:
-        return self.done or self.given_up
 
 
 class TeamBehavior:
@@ -73,7 +58,7 @@ class TeamBehavior:
         self._tell = tell
         self._refer = refer
         self._goes_on = goes_on
-        self._shares = {leg.member: _Share(leg) for leg in plan.legs}
+        self._shares = Shares(plan)
         steady = [each.id for each in members.values() if not each.adjustable]
         self._marshal = Marshal(plan.march, steady) if plan.march else None
         self._reference = Reference()
@@ -172,22 +157,22 @@ class TeamBehavior:
                 self.members[name].lost = why
                 self._drop(self.members[name])
         for part, report in reports.items():
-            doer, _, origin = part.partition("/")
-            share = self._shares.get(ResourceId(origin or doer))
-            if share is None or ResourceId(doer) not in self.members:
-                continue
-            member = self.members[ResourceId(doer)]
-            share.by, share.part = member.id, part
-            share.done = report.state is BehaviorState.SUCCEEDED
-            if not member.active:
+            done = report.state is BehaviorState.SUCCEEDED
+            member = self.members.get(self._shares.place(part, done=done))
+            if member is not None and not member.active:
                 member.adopt(f"{self.id}.{part}", report, kept.begun.get(part))
 
+    def take_up(self, reports: Mapping[str, BehaviorReport], kept: Reference) -> None:
+        """As `found`, but some parts are missing: they are begun anew, and the others let go."""
+        self.found(reports, kept)
+        self._told_running = False
+        self._shares.again = True
+        for member in self.members.values():
+            member.let_go()
+
     def _part_ended(self, member: Member, report: BehaviorReport) -> None:
-        part = member.part.removeprefix(f"{self.id}.")
-        share = next((each for each in self._shares.values() if each.part == part), None)
         if report.state is BehaviorState.SUCCEEDED:
-            if share is not None:
-                share.done = True
+            self._shares.finish(member.part.removeprefix(f"{self.id}."))
             return
         if self._ending is not None or member.lost:
             return
@@ -205,7 +190,9 @@ class TeamBehavior:
             return
         left = [each for each in self.members.values() if not each.lost]
         if not self._goes_on or not left:
-            self._end_all(BehaviorState.FAILED, code, f"{member.id}: {reason}")
+            nobody = code == "LINK_LOST" and not left
+            state = BehaviorState.LOST if nobody else BehaviorState.FAILED
+            self._end_all(state, code, f"{member.id}: {reason}")
             return
         _log.warning("%s goes on without %s: %s", self.id, member.id, member.lost)
         self._drop(member)
@@ -214,13 +201,7 @@ class TeamBehavior:
     def _drop(self, member: Member) -> None:
         if self._marshal is not None:
             self._marshal.drop(member.id)
-        for share in self._shares.values():
-            doer = share.by or share.leg.member
-            if doer == member.id and not share.over:
-                if self._plan.shared:
-                    share.by, share.part = None, ""
-                else:
-                    share.given_up = True
+        self._shares.drop(member.id)
 
     # --- what is to be done now -----------------------------------------------------------------
 
@@ -242,40 +223,14 @@ class TeamBehavior:
             self._note()
         elif self._unnoted():
             self._note()
-        if not active and not self._plan.stays and self._all_over():
+        if not active and not self._plan.stays and self._shares.all_over:
             self._end_well()
 
     def _send_off(self) -> None:
-        for origin, share in self._shares.items():
-            if share.over or share.by is not None:
-                continue
-            taker = self._taker(origin, share)
-            if taker is None:
-                continue
-            suffix = taker.id if taker.id == origin else f"{taker.id}/{origin}"
-            leg = share.leg if taker.id == origin else replace(share.leg, member=taker.id)
-            share.by, share.part = taker.id, suffix
-            preempts = self._request.preempts if taker.id == origin else ()
-            taker.begin(f"{self.id}.{suffix}", leg, self.epoch, preempts, self._clock.now_us())
-
-    def _taker(self, origin: ResourceId, share: _Share) -> Member | None:
-        """Who begins a share now; None: nobody yet."""
-        before = self._shares.get(share.leg.after) if share.leg.after is not None else None
-        if before is not None and not before.over:
-            return None
-        member = self.members[origin]
-        if not member.lost:
-            return member
-        free = (
-            each
-            for each in self.members.values()
-            if not each.lost and not each.active and self._has_done_its_own(each.id)
-        )
-        return next(free, None)
-
-    def _has_done_its_own(self, member: ResourceId) -> bool:
-        own = self._shares.get(member)
-        return own is None or own.over
+        for errand in self._shares.errands(self.members, self.epoch):
+            part = f"{self.id}.{errand.part}"
+            preempts = self._request.preempts if errand.own else ()
+            errand.member.begin(part, errand.leg, self.epoch, preempts, self._clock.now_us())
 
     def _parts(self) -> dict[str, str | None]:
         """The parts that have begun, with their references."""
@@ -292,9 +247,10 @@ class TeamBehavior:
         """Say RUNNING, with what the journal should know."""
         if not self._told_running or self._ending is not None:
             return
-        done = tuple(share.part for share in self._shares.values() if share.done and share.part)
         lost = {member.id: member.lost for member in self.members.values() if member.lost}
-        self._reference = Reference(self._parts(), done, lost, self._reference.version + 1)
+        self._reference = Reference(
+            self._parts(), self._shares.done, lost, self._reference.version + 1
+        )
         self._refer(self._reference)
         self._tell(BehaviorState.RUNNING, "", "")
 
@@ -312,9 +268,6 @@ class TeamBehavior:
         lost = [f"{each.id} ({each.lost})" for each in self.members.values() if each.lost]
         reason = f"without {', '.join(lost)}" if lost else ""
         self._finish(BehaviorState.SUCCEEDED, "", reason)
-
-    def _all_over(self) -> bool:
-        return all(share.over for share in self._shares.values())
 
     def _give_up(self, late: str) -> None:
         state, code, reason = self._ending or (BehaviorState.CANCELLED, "", "")
@@ -353,7 +306,7 @@ class TeamBehavior:
             return PERIOD_S
         if any(member.active and member.state is None for member in self.members.values()):
             return IDLE_PERIOD_S
-        if self._plan.duration_s is not None and self._all_over():
+        if self._plan.duration_s is not None and self._shares.all_over:
             return min(IDLE_PERIOD_S, max(0.001, self._plan.duration_s - self._stayed_s))
         return None
 
@@ -374,7 +327,7 @@ class TeamBehavior:
             return
         if self._marshal is not None:
             self._march(self._marshal)
-        if self._plan.duration_s is not None and self._all_over():
+        if self._plan.duration_s is not None and self._shares.all_over:
             self._stayed_s += seconds
             if self._stayed_s >= self._plan.duration_s:
                 self._end_well()
@@ -385,6 +338,5 @@ class TeamBehavior:
             stand = self._look(member.id) if member.told_of and not member.lost else None
             if stand is not None:
                 seen[member.id] = stand
-        arrived = [origin for origin, share in self._shares.items() if share.done]
-        for name, speed_m_s in marshal.step(seen, arrived).items():
+        for name, speed_m_s in marshal.step(seen, self._shares.arrived).items():
             self.members[name].go(speed_m_s, self.epoch)

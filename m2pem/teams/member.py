@@ -102,6 +102,11 @@ class Member:
         self.part, self.state = part, report.state
         self.native_ref = report.native_ref or native_ref
 
+    def let_go(self) -> None:
+        """After a restart: what was held until somebody said how to go on."""
+        if self.active:
+            self._enqueue(self._go_on)
+
     def cancel(self, epoch: int) -> None:
         """Have it end its part."""
         part = self.part

@@ -55,13 +55,15 @@ class March:
 @dataclass(frozen=True, slots=True)
 class Plan:
     """`legs`: at most one a member. `stays`: it goes on when all have ended, for `duration_s` if
-    that is given. `shared`: what a lost member has not done is done by another one."""
+    that is given. `shared`: what a lost member has not done is done by another one; `takes`: the
+    parameters that each takes then."""
 
     legs: tuple[Leg, ...]
     march: March | None = None
     stays: bool = False
     duration_s: float | None = None
     shared: bool = False
+    takes: Mapping[ResourceId, frozenset[str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

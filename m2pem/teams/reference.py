@@ -1,7 +1,8 @@
 """What the journal keeps of a team behavior, so that its members are found again after a restart.
 
 It is the team behavior's `native_ref`: a text, in which each part is named as its behavior
-is behind the team's id ("r1.b3.evsg1" is the part evsg1 of r1.b3).
+is behind the team's id: "r1.b3.evsg1" is the part evsg1 of r1.b3. "evsg2/evsg1" is what evsg2 does
+in the place of evsg1, and "evsg1/evsg1/2" what evsg1 began anew when the run had its second epoch.
 """
 
 import json

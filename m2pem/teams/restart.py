@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
 from m2pem.model.catalogue import BehaviorState, ResourceId
@@ -27,9 +27,13 @@ class FoundParts:
     gap: str = ""
 
     @property
-    def running(self) -> tuple[str, ...]:
-        """The parts that go on."""
-        return tuple(part for part, each in self.reports.items() if not each.state.terminal)
+    def good(self) -> Mapping[str, BehaviorReport]:
+        """The parts that go on or have ended well."""
+        return {part: each for part, each in self.reports.items() if each.state in _GOOD}
+
+    def trimmed(self, kept: Reference) -> Reference:
+        """What was kept, without the parts that cannot go on: they are not asked for again."""
+        return replace(kept, begun={p: ref for p, ref in kept.begun.items() if p in self.good})
 
 
 async def look_for_parts(

@@ -13,7 +13,7 @@ from m2pem.resources.fleet import Fleet
 from m2pem.teams.offers import Offers
 from m2pem.teams.plan import Plan, Setting, Stand, TeamRefusedError
 from m2pem.teams.plane import Plane
-from m2pem.teams.planning import PLANS
+from m2pem.teams.planning import PLANS, alike
 
 SEEN_WITHIN_S = 1.5
 LOOK_EVERY_S = 0.1
@@ -43,6 +43,8 @@ class Scene:
         """
         if not request.resources:
             raise TeamRefusedError(f"{request.behavior} has no members")
+        if request.behavior not in PLANS:
+            return Scheme(alike(request), Plane(0.0, 0.0))
         states = {member: self._state(member) for member in request.resources}
         for member, state in states.items():
             if state is None:
@@ -67,8 +69,9 @@ class Scene:
         )
         return Scheme(PLANS[request.behavior](setting), plane)
 
-    async def until_seen(self, vehicles: Sequence[ResourceId], clock: Clock) -> None:
-        """Wait a moment for those that have not been heard since the start of the executive."""
+    async def until_seen(self, request: BehaviorRequest, clock: Clock) -> None:
+        """Wait a moment for members that have not been heard since the start of the executive."""
+        vehicles = request.resources if request.behavior in PLANS else ()
         waited_s = 0.0
         while waited_s < SEEN_WITHIN_S and not all(self._state(each) for each in vehicles):
             await clock.sleep(LOOK_EVERY_S)

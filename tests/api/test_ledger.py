@@ -104,3 +104,20 @@ def test_what_goes_on_may_be_adjusted_by_its_own_executive_only(caplog) -> None:
     assert "adjustment of r1.b1 ignored: epoch 1 is past" in caplog.text
     book.end("r1.b1", BehaviorState.SUCCEEDED)
     assert not book.may_adjust("r1.b1", 2)
+
+
+def test_a_reference_that_is_known_late_is_in_what_is_reported_then(virtual) -> None:
+    book = ledger()
+    assert book.admit(request("r1.b1"))
+    book.refer("r1.b1", "one")
+    book.progress("r1.b1")
+    book.refer("r1.b1", "two")
+    book.end("r1.b1", BehaviorState.SUCCEEDED)
+    book.refer("r1.b1", "too late")
+    book.refer("r1.b2", "of nobody")
+    assert [(each.number, each.state, each.native_ref) for each in reported(book, virtual)] == [
+        (1, BehaviorState.ACCEPTED, None),
+        (2, BehaviorState.RUNNING, "one"),
+        (3, BehaviorState.RUNNING, "two"),
+        (4, BehaviorState.SUCCEEDED, "two"),
+    ]

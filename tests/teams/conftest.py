@@ -138,11 +138,18 @@ def fleet_of(
     geometries: Mapping[str, Geometry],
     policy: LostMemberPolicy,
     others: tuple[str, ...],
+    *,
+    sooner: bool,
 ) -> Fleet:
     """Vehicles by name with their arbiters, and the team of all but `others`."""
     vehicles = {
         ResourceId(name): Vehicle(
-            ResourceId(name), domains.get(name, Domain.GROUND), arbiter, {"battery": 1.0}
+            ResourceId(name),
+            domains.get(name, Domain.GROUND),
+            arbiter,
+            {},
+            # Sooner than carts' own arbiter says so, which is then too late.
+            lost_after_s=1.0 if sooner else None,
         )
         for name, arbiter in names.items()
     }
@@ -171,7 +178,7 @@ def play() -> Play:
         names = {
             name: arbiter if isinstance(arbiter, str) else arbiter[name] for name in yard.driven
         }
-        fleet = fleet_of(names, domains or {}, geometries or {}, policy, others)
+        fleet = fleet_of(names, domains or {}, geometries or {}, policy, others, sooner=watch_links)
 
         async def main(clock: VirtualClock) -> Any:
             seen: list[Record] = []

@@ -100,6 +100,8 @@ class MavlinkArbiter:
         PluginError: a connection cannot be used; the text names the resource and the key.
     """
 
+    takes_one_vehicle = True
+
     def __init__(
         self,
         connections: Mapping[ResourceId, Connection],

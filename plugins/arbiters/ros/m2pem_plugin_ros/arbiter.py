@@ -66,6 +66,8 @@ class RosArbiter:
         PluginError: a connection cannot be used; the text names the resource and the key.
     """
 
+    takes_one_vehicle = True
+
     def __init__(
         self,
         connections: Mapping[ResourceId, Connection],

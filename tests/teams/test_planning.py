@@ -1,0 +1,176 @@
+"""Plans of teams, without anything that moves."""
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from m2pem.model.behavior import BehaviorType
+from m2pem.model.catalogue import ResourceId
+from m2pem.model.geometry import Point, Route, VehiclePosition
+from m2pem.resources.behaviors import SHARED
+from m2pem.resources.team_needs import TEAM_NEEDS
+from m2pem.teams.path import Path
+from m2pem.teams.plan import Plan, Setting, Stand, TeamRefusedError
+from m2pem.teams.plane import Plane
+from m2pem.teams.planning import PLANS
+from m2pem.teams.reference import Reference, read_reference
+
+from .carts import PLANE
+from .conftest import area, route
+
+OFFERED = ("single_vehicle_routing", "goto", "follow")
+FIELD = area((0, 0), (120, 0), (120, 60), (0, 60))
+
+
+def setting(
+    *domains: str, offered: tuple[str, ...] = OFFERED, yaw: float | None = 0.0, **parameters: Any
+) -> Setting:
+    names = [ResourceId(f"v{index}") for index in range(len(domains))]
+    specs = {name: SHARED[name, BehaviorType.VEHICLE] for name in offered}
+    return Setting(
+        tuple(names),
+        dict(zip(names, domains, strict=True)),
+        {name: specs for name in names},  # noqa: C420
+        parameters,
+        PLANE,
+        {name: Stand((-20.0 * index, 0.0), yaw) for index, name in enumerate(names)},
+    )
+
+
+def waypoints(plan: Plan, member: str) -> list[tuple[float, float, float | None]]:
+    leg = next(leg for leg in plan.legs if leg.member == member)
+    found = leg.parameters["route"]
+    assert isinstance(found, Route)
+    return [(*PLANE.level(each[0], each[1]), each[2]) for each in found.waypoints]
+
+
+def test_every_shared_team_behavior_has_a_plan_and_says_what_it_needs() -> None:
+    shared = {name for name, type_ in SHARED if type_ is BehaviorType.TEAM}
+    assert set(PLANS) == shared
+    assert set(TEAM_NEEDS) == shared
+
+
+def test_members_in_one_lane_go_no_faster_than_their_spacing_lets_them_stop() -> None:
+    road = route((50, 0), (500, 0))
+    near = PLANS["road_following_formation"](
+        setting("ground", "ground", route=road, spacing=5.0, speed=20.0)
+    )
+    abreast = PLANS["road_sweep"](setting("ground", "ground", route=road, spacing=5.0, speed=20.0))
+    assert near.march
+    assert abreast.march
+    assert near.march.speed_m_s < 2.0
+    assert abreast.march.speed_m_s == 20.0
+
+
+def test_the_slowest_domain_sets_the_speed_when_nobody_does() -> None:
+    plan = PLANS["road_sweep"](setting("air", "surface", route=route((50, 0), (500, 0))))
+    assert plan.march
+    assert plan.march.speed_m_s == 4.0
+    assert {leg.parameters["speed"] for leg in plan.legs} == {4.0}
+
+
+def test_altitudes_of_a_route_are_kept() -> None:
+    high = Route(tuple((*PLANE.geo(east, 0.0), 30.0 + east / 10) for east in (50.0, 150.0)), "amsl")
+    plan = PLANS["road_following_formation"](setting("air", "air", route=high, spacing=50.0))
+    assert waypoints(plan, "v0")[-1][2] == 45.0
+    assert waypoints(plan, "v1")[-1][2] == pytest.approx(40.0, abs=0.1)
+    assert [leg.parameters["route"].altitude_frame for leg in plan.legs] == ["amsl"] * 2  # type: ignore[union-attr]
+    flat = PLANS["road_following_formation"](
+        setting("air", "air", route=route((50, 0), (150, 0)), spacing=50.0)
+    )
+    assert {each[2] for name in ("v0", "v1") for each in waypoints(flat, name)} == {None}
+
+
+def test_a_place_behind_the_beginning_of_a_route_is_gone_to_at_once() -> None:
+    plan = PLANS["bridge_crossing"](
+        setting("ground", "ground", "ground", route=route((50, 0), (80, 0)), spacing=40.0)
+    )
+    assert [leg.behavior for leg in plan.legs] == ["single_vehicle_routing", "goto", "goto"]
+    target = plan.legs[2].parameters["target"]
+    assert isinstance(target, Point)
+    assert PLANE.level(*target.position[:2]) == pytest.approx((0, 0), abs=0.01)
+
+
+def test_who_has_no_goto_takes_a_route_of_two_places() -> None:
+    plan = PLANS["formation"](
+        setting("ground", "ground", offered=OFFERED[:1], shape="line", spacing=10.0)
+    )
+    assert [at[:2] for at in waypoints(plan, "v1")] == [
+        pytest.approx((-20, 0), abs=0.01),
+        pytest.approx((0, 10), abs=0.01),
+    ]
+
+
+def test_the_faster_survey_more() -> None:
+    plan = PLANS["area_survey"](setting("ground", "air", area=FIELD, spacing=5.0))
+    assert len(waypoints(plan, "v1")) == 2 * len(waypoints(plan, "v0"))
+    even = PLANS["area_survey"](setting("ground", "air", area=FIELD, spacing=5.0, speed=3.0))
+    assert len(waypoints(even, "v1")) == len(waypoints(even, "v0"))
+
+
+def test_only_aircraft_are_told_an_altitude() -> None:
+    plan = PLANS["area_survey"](setting("ground", "air", area=FIELD, altitude=40.0))
+    assert [leg.parameters.get("altitude") for leg in plan.legs] == [None, 40.0]
+
+
+@pytest.mark.parametrize(
+    ("behavior", "wished", "why"),
+    [
+        ("formation", setting("ground", "ground", yaw=None), "the heading of v0"),
+        ("escort", setting("ground", target=VehiclePosition("v0")), "v0 cannot escort itself"),
+        ("area_observe", setting("ground", target=VehiclePosition("vip")), "position of vip"),
+        ("area_survey", setting("ground", area=FIELD, spacing=0.001), "spacing"),
+        ("road_sweep", setting("ground", route=route((0, 0), (0, 0))), "the lead is there"),
+        ("road_sweep", setting("ground", route=route((0, 0), (0, 200_000))), "100 km away"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_by_name(behavior: str, wished: Setting, why: str) -> None:
+    with pytest.raises(TeamRefusedError, match=why):
+        PLANS[behavior](wished)
+
+
+@given(
+    st.floats(-80, 80), st.floats(-180, 180), st.floats(-50_000, 50_000), st.floats(-50_000, 50_000)
+)
+def test_the_plane_and_back(latitude: float, longitude: float, east: float, north: float) -> None:
+    plane = Plane(latitude, longitude)
+    assert plane.level(*plane.geo(east, north)) == pytest.approx((east, north), abs=1e-3)
+
+
+def test_the_plane_agrees_with_the_ellipsoid() -> None:
+    import pymap3d
+
+    plane = Plane(38.1, -77.3)
+    for east, north in ((1000.0, 0.0), (0.0, 1000.0), (-3000.0, 2000.0)):
+        latitude, longitude, _ = pymap3d.enu2geodetic(east, north, 0.0, 38.1, -77.3, 0.0)
+        assert plane.level(float(latitude), float(longitude)) == pytest.approx(
+            (east, north), rel=2e-3, abs=2.0
+        )
+
+
+def test_the_way_back_is_told_from_the_way_there() -> None:
+    path = Path([(0, 0, 0), (100, 0, 0), (100, 4, 0), (0, 4, 0)], [0, 100, 104, 204])
+    assert path.find((40, 2.5), None, 0, yaw_rad=0.0) == pytest.approx(40)
+    assert path.find((40, 1.5), None, 0, yaw_rad=math.pi) == pytest.approx(164)
+    assert path.find((40, 2.5), 35.0, 20.0) == pytest.approx(40), "not the nearer leg, but the next"
+    assert path.find((0, 60), 10.0, 20.0) == pytest.approx(204), "one who has strayed is looked for"
+
+
+def test_marks_of_two_paths_are_the_same_abreast() -> None:
+    inner = Path([(0, 0, 0), (90, 0, 0), (90, 90, 0)], [0, 100, 200])
+    assert inner.mark_m(45) == pytest.approx(50)
+    assert inner.mark_m(1000) == 200
+    assert inner.mark_m(-5) == 0
+
+
+@pytest.mark.parametrize("text", [None, "", "a goal of somebody", "[]", "{", '{"begun": 3}'])
+def test_a_reference_that_cannot_be_read_is_an_empty_one(text: str | None) -> None:
+    assert read_reference(text) == Reference()
+
+
+def test_a_reference_is_read_as_it_was_written() -> None:
+    written = Reference({"a": "x", "a/b": None}, ("a",), {ResourceId("b"): "FAILED: why"}, 3)
+    assert read_reference(written.text()) == written
