@@ -1,6 +1,5 @@
 """What a team can see: where its members are, what each can do alone, and so what each is to do."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from m2pem.api.arbiter import BehaviorRequest

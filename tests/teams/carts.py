@@ -100,6 +100,7 @@ class Yard:
 class CartArbiter(GoalArbiter):
     """Commands carts of a yard; they can go and stop."""
 
+    takes_one_vehicle = True
     names: ClassVar[tuple[str, ...]] = ("single_vehicle_routing", "goto", "follow", "drive_stop")
     behaviors: ClassVar[tuple[BehaviorSpec, ...]] = tuple(
         SHARED[name, BehaviorType.VEHICLE] for name in names

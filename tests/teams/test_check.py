@@ -110,9 +110,15 @@ def test_an_arbiter_that_offers_it_for_all_members_keeps_it(
     assert serving is (known.of(ids[0]) if native else known.teams)
 
 
-def test_a_vehicle_behavior_on_two_arbiters_is_nobodys() -> None:
+def test_a_behavior_of_vehicles_on_two_arbiters_is_done_by_each() -> None:
     known = arbiters(ROUTING, f"{ROUTING}+goto")
-    assert known.serving(list(known.fleet.vehicles), ROUTING, VEHICLE) is None
+    assert known.serving(list(known.fleet.vehicles), ROUTING, VEHICLE) is known.teams
+
+
+def test_a_behavior_of_vehicles_goes_to_their_arbiter_where_that_takes_several() -> None:
+    known = arbiters(ROUTING, ROUTING)
+    ids = list(known.fleet.vehicles)
+    assert known.serving(ids, ROUTING, VEHICLE) is known.of(ids[0])
 
 
 def test_who_is_in_no_team_is_offered_none() -> None:
