@@ -44,6 +44,7 @@ class Member:
         self._arbiter = arbiter
         self._failed = failed
         self._speed_m_s: float | None = None
+        self._cancelled = ""
         self._tail: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -108,9 +109,10 @@ class Member:
             self._enqueue(self._go_on)
 
     def cancel(self, epoch: int) -> None:
-        """Have it end its part."""
+        """Have it end its part, once."""
         part = self.part
-        if self.active:
+        if self.active and self._cancelled != part:
+            self._cancelled = part
             self._enqueue(lambda: self._call(f"cancel {part}", self._arbiter.cancel(part, epoch)))
 
     def go(self, speed_m_s: float, epoch: int) -> None:

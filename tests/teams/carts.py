@@ -78,6 +78,7 @@ class Driven:
     offset_m: float = 0.0
     bearing_rad: float = 0.0
     mute: bool = False
+    battery: float | None = None
     refuses: str = ""
     ending: str = ""
 
@@ -130,6 +131,7 @@ class CartArbiter(GoalArbiter):
                         0.0,
                     ),
                     yaw_rad=cart.yaw_rad,
+                    battery_fraction=driven.battery,
                 )
                 self.heard(state, driven.goal, driven.became, driven.code)
             await self.context.clock.sleep(STEP_S)

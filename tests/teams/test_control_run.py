@@ -5,12 +5,15 @@ from typing import Any
 
 import pytest
 
+from m2pem.api.arbiter import Limits
 from m2pem.api.control import RunStatus
 from m2pem.engine.records import BehaviorEnded, BehaviorProgressed
-from m2pem.model.catalogue import BehaviorState
-from m2pem.resources.fleet import LostMemberPolicy
+from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.plugins import PluginManager
+from m2pem.resources.fleet import Domain, Fleet, LostMemberPolicy, Team, Vehicle
+from m2pem.sim.rehearsal import rehearse
 
-from .carts import Yard
+from .carts import ORIGIN, CartArbiter, Yard
 from .conftest import Play, World, area, one_task, route
 
 ROAD = {"road": route((50, 0), (450, 0)), "field": area((0, 0), (200, 0), (200, 90), (0, 90))}
@@ -243,3 +246,51 @@ def test_one_who_is_slow_is_waited_for(play: Play) -> None:
     assert ended.state is BehaviorState.SUCCEEDED
     assert max(gaps) < 20 + 2 * 10 + 15
     assert min(gaps) >= 10
+
+
+@pytest.mark.parametrize("policy", list(LostMemberPolicy))
+def test_a_low_battery_is_dealt_with_by_the_policy(play: Play, policy: LostMemberPolicy) -> None:
+    async def story(world: World) -> Any:
+        run = await under_way(world)
+        world.yard.driven["b"].battery = 0.1
+        return await until_over(world, run)
+
+    yard = column()
+    _, ended = play(story, yard, geometries=ROAD, policy=policy, watch_links=True)
+    assert yard.count("cancel", "b") == 1
+    assert yard["b"].stands
+    assert yard["b"].place[0] < 400
+    if policy is GO_ON:
+        assert ended.state is BehaviorState.SUCCEEDED
+        assert ended.reason.startswith("without b (BATTERY_LOW")
+    else:
+        assert (ended.state, ended.code) == (BehaviorState.FAILED, "BATTERY_LOW")
+
+
+def test_a_member_that_does_not_stop_is_named(play: Play) -> None:
+    async def story(world: World) -> Any:
+        run = await under_way(world)
+        world.yard.driven["b"].mute = True
+        await world.executive.control.stop(run)
+        return await until_over(world, run)
+
+    # Its arbiter does not say that it is lost before it is given up.
+    CartArbiter.bounds = Limits(lost_after_s=100.0, cancel_timeout_s=8.0)
+    try:
+        _, ended = play(story, column(), geometries=ROAD)
+    finally:
+        CartArbiter.bounds = Limits()
+    assert (ended.state, ended.code) == (BehaviorState.LOST, "TIMEOUT")
+    assert ended.reason == "b did not end in time when cancelled"
+
+
+def test_a_rehearsal_in_which_nobody_tells_where_it_is_comes_to_its_end() -> None:
+    vehicles = {
+        ResourceId(name): Vehicle(ResourceId(name), domain, "sim", {})
+        for name, domain in (("ugv", Domain.GROUND), ("uav", Domain.AIR))
+    }
+    crew = Team("crew", tuple(vehicles), ResourceId("ugv"))
+    fleet = Fleet("f", "f.yaml", vehicles, {}, {"crew": crew}, ROAD, ORIGIN)
+    # The simulated arbiter itself keeps aircraft off roads.
+    result = rehearse(MARCH, fleet, plugins=PluginManager(block=("all",)))
+    assert result.summary.status is RunStatus.COMPLETED, result.records[-5:]
