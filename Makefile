@@ -19,7 +19,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages demo demo-air test test-long test-ros fuzz lint format docs pictures
+.PHONY: help setup python-packages npm-packages demo demo-air demo-ros test test-long test-ros fuzz lint format docs pictures
 .PHONY: bench bench-quick conformance clean ros
 
 help: ## list the targets
@@ -116,6 +116,31 @@ demo-air: python-packages ## survey a field with simulated MAVLink vehicles, one
 	@echo "Two copters and a rover over MAVLink, ten times as fast as real ones. uav1 will fall silent."
 	@$(AUTOPILOTS) --fault "$(LINK_LOST)" & autopilots=$$!; trap 'kill $$autopilots' EXIT; \
 	$(BIN)/m2pem run missions/survey_pair.bpmn --fleet fleet_configs/survey_pair.yaml --speed 10
+
+# A ROS domain of its own, so that nobody else on this machine is met.
+DEMO_DOMAIN := 96
+DEMO_SPEED := 10
+OPERATOR := $(ROS_PYTHON) examples/t22_operator_over_ros/ros_operator.py --by demo
+
+# Three processes: vehicles, the executive, and an operator who speaks ROS alone.
+# 1: the fleet; 2: the mission; 3: what the operator brings and answers
+define over_ros
+@eval "$$($(ROS_PYTHON) -m m2pem_plugin_ros.loopback $(DEMO_DOMAIN))"; \
+$(ROS)/bin/m2pem sim ros --fleet $(1) --speed $(DEMO_SPEED) & vehicles=$$!; \
+$(ROS)/bin/m2pem serve --fleet $(1) --ocu mocu --speed $(DEMO_SPEED) --journal memory: >/dev/null & executive=$$!; \
+trap 'kill $$vehicles $$executive 2>/dev/null; wait' EXIT; \
+$(OPERATOR) --mission $(2) $(3)
+endef
+
+demo-ros: ros ## run two missions over ROS: vehicles reached in three ways, an operator who speaks ROS
+	@echo "The paper's mission over ROS. The radar finds a mine: the vehicle stops and reverses, and the operator aborts."
+	$(call over_ros,fleet_configs/vignette1_ros.yaml,missions/vignette1.bpmn,--answer UserSendRoute=continue --answer UserSendRoute=abort)
+	@echo; echo "The operator sends another route: nothing is found there, and it is driven to its end."
+	$(call over_ros,fleet_configs/vignette1_ros.yaml,missions/vignette1.bpmn,--answer UserSendRoute=continue \
+	  --set-route route_alpha=fleet_configs/routes/bravo.geojson)
+	@echo; echo "The first field test: a section of three vehicles, each of which is reached in another way."
+	$(call over_ros,fleet_configs/mehds_ros.yaml,missions/mehds_vignette_1.bpmn,--answer UserSendRoute=sweep \
+	  --answer UserConfirmHazard=hazard --answer UserSwitchRoute=continue --answer UserConfirmBridge=cross)
 
 lint: setup ## check style, types and layers
 	@$(BIN)/ruff check .
