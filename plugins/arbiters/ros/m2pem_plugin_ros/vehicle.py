@@ -21,6 +21,7 @@ from m2pem.api import (
 )
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.complaints import Complaints
+from m2pem_plugin_ros.confines import Confines
 from m2pem_plugin_ros.drivers.driver import Driver, Health, Order, Outcome, Seat
 from m2pem_plugin_ros.goal_ids import goal_id, run_id
 from m2pem_plugin_ros.instruments import Instruments
@@ -64,6 +65,8 @@ class Vehicle:
         self._ledger = post.ledger
         self._limits = post.limits
         self._instruments = instruments
+        fence = post.connection.fence
+        self._confines = None if fence is None else Confines(fence, post.context.bus)
         self._complaints = Complaints(post.context.logger, self.resource)
         self._behaviors: dict[UUID, BehaviorId] = {}
         self._order: Order | None = None
@@ -138,7 +141,7 @@ class Vehicle:
         if self._broken:
             return self._broken
         try:
-            return self.driver.refusal(request)
+            return self.driver.refusal(request) or self._breach(request)
         except Exception as error:
             self._context.logger.exception("%s: refusal", self.resource)
             return _bug(error)
@@ -309,6 +312,14 @@ class Vehicle:
             self._context.logger.exception("%s: %s", self.resource, what)
             return _bug(error)
         return ""
+
+    def _breach(self, request: BehaviorRequest) -> str:
+        """Where it would leave the fleet's fence."""
+        if self._confines is None:
+            return ""
+        where = self._instruments.senses.localization
+        yaw_rad = None if where.pose is None else where.pose.yaw_rad
+        return self._confines.refusal(request, where.position, yaw_rad)
 
     def _health(self) -> Health:
         try:
