@@ -44,7 +44,7 @@ SAID_WITHIN_S = 1.0
 
 class Onboard:
     """Serves `command`, `behavior_status`, `vehicle_status` and `execute_behavior` in the vehicle's
-    namespace (docs/ros.md, "A vehicle with an m2pem node").
+    namespace (docs/ros.md, "Write your own node").
 
     `vehicle`: its name in the fleet. `make_driver`: of what is on board, and what it tells comes
     here. `bus`: gets what is heard on `target`; it is to be the one that the driver's context has.
