@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from m2pem.model.mission import Mission
     from m2pem.model.values import Value
     from m2pem.resources.behaviors import SHARED
+    from m2pem.resources.fence import Fence
     from m2pem.resources.fleet import Fleet
     from m2pem.resources.lawn_mower import lawn_mower, longest_edge_yaw
     from m2pem.resources.units import Dimension, UnitError, quantity
@@ -92,6 +93,7 @@ _MODULES = {
     "m2pem.model.geometry": "Area Point Route VehiclePosition",
     "m2pem.model.values": "Value",
     "m2pem.resources.behaviors": "SHARED",
+    "m2pem.resources.fence": "Fence",
     "m2pem.resources.fleet": "Fleet",
     "m2pem.resources.lawn_mower": "lawn_mower longest_edge_yaw",
     "m2pem.resources.units": "Dimension UnitError quantity",
@@ -115,6 +117,7 @@ __all__ = [
     "Decision",
     "Detection",
     "Dimension",
+    "Fence",
     "Finding",
     "Fleet",
     "FleetBus",

@@ -13,6 +13,7 @@ from m2pem.api import (
     BehaviorSpec,
     BehaviorState,
     Connection,
+    Fence,
     Ledger,
     Limits,
     LinkState,
@@ -27,7 +28,6 @@ from m2pem_plugin_mavlink.settings import Settings, read_settings
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.behaviors.behavior import Behavior
-    from m2pem_plugin_mavlink.fence import Fence
     from m2pem_plugin_mavlink.foreign import TakeoverWatch
     from m2pem_plugin_mavlink.helm import Helm
     from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
@@ -143,7 +143,6 @@ class MavlinkArbiter:
 
     async def connect(self) -> None:
         """Listen to all vehicles; returns when all were heard, or soon."""
-        from m2pem_plugin_mavlink.fence import Fence  # noqa: PLC0415  # it needs pymap3d
         from m2pem_plugin_mavlink.helm import Helm  # noqa: PLC0415  # it needs pymavlink
 
         lost_after_s = {resource: self.limits(resource).lost_after_s for resource in self._settings}

@@ -22,10 +22,10 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
-from m2pem_plugin_ros.catalogue import offered
+from m2pem_plugin_ros.catalogue import LEVEL
+from m2pem_plugin_ros.complaints import Complaints
 from m2pem_plugin_ros.drivers.choice import make_driver as driver_of_the_fleet
 from m2pem_plugin_ros.drivers.driver import Driver, Seat
-from m2pem_plugin_ros.ignored import Ignored
 from m2pem_plugin_ros.instruments import Installation, Station
 from m2pem_plugin_ros.native_ref import Kept, native_ref, read_native_ref
 from m2pem_plugin_ros.settings import DriverName, read_detectors, read_settings
@@ -91,13 +91,12 @@ class RosArbiter:
     # --- what is offered ------------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """What a vehicle can do, by its driver and domain; payloads are carried, no more."""
+        """What a vehicle can do; payloads are carried, no more."""
         if resource not in self._settings:
             return ()
         settings = self._settings[resource]
-        usual = offered(settings.driver, self._connections[resource].domain)
-        known = {spec.name for spec in usual}
-        return (*usual, *(spec for spec in settings.own_behaviors if spec.name not in known))
+        known = {spec.name for spec in LEVEL}
+        return (*LEVEL, *(spec for spec in settings.own_behaviors if spec.name not in known))
 
     def _taken(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """A payload may be held by what its vehicle does."""
@@ -311,7 +310,7 @@ class RosArbiter:
     async def _attend(self) -> None:
         """Look after all vehicles, again and again."""
         clock = self._context.clock
-        ignored = Ignored(self._context.logger, "the arbiter of ROS vehicles")
+        complaints = Complaints(self._context.logger, "the arbiter of ROS vehicles")
         looked_us, was_late, turn = clock.now_us(), False, 0
         while True:
             now_us = clock.now_us()
@@ -322,7 +321,7 @@ class RosArbiter:
                 try:
                     state = vehicle.attend(may_lose=not late)
                 except Exception as error:  # one vehicle's bug must not stop the others
-                    ignored.add(f"{vehicle.resource} cannot be attended to", repr(error))
+                    complaints.add(f"{vehicle.resource} cannot be attended to", repr(error))
                 else:
                     if state is not None:
                         self._states.put(state)

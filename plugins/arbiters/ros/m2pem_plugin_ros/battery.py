@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from m2pem.api import ArbiterContext, ResourceId
-from m2pem_plugin_ros.ignored import Ignored
+from m2pem_plugin_ros.complaints import Complaints
 from m2pem_plugin_ros.settings import Settings
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ class Battery:
         from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415
 
         self.fraction: float | None = None
-        self._ignored = Ignored(context.logger, resource)
+        self._complaints = Complaints(context.logger, resource)
         topic = settings.topic(settings.topics.battery)
         ros.subscribe(BatteryState, topic, self._hear, qos.TELEMETRY)
 
@@ -32,4 +32,4 @@ class Battery:
             self.fraction = share
         elif not math.isnan(share):  # NaN: the battery does not measure it
             hint = "; BatteryState.percentage is from 0 to 1" if 1.0 < share <= 100.0 else ""
-            self._ignored.add("a charge that cannot be", f"{share:g}{hint}")
+            self._complaints.add("a charge that cannot be", f"{share:g}{hint}")

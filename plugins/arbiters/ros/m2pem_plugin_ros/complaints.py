@@ -1,33 +1,26 @@
-"""Complaints about what comes over a network, at a bounded rate: a fault may come a thousand times
-a second, and must not fill the log."""
+"""Complaints about what others say, at a bounded rate: a fault may come a thousand times a second,
+and must not fill the log."""
 
 import logging
-from collections.abc import Callable
-
-EVERY_S = 10.0
-MOST_KINDS = 100
+from collections import Counter
 
 
 class Complaints:
-    """Logs the first of each kind at once, and those that follow once in a while, counted."""
+    """Counts them by their cause; logs the 1st, the 10th, the 100th of each, and so on.
 
-    def __init__(
-        self, logger: logging.Logger, now_us: Callable[[], int], every_s: float = EVERY_S
-    ) -> None:
+    Whatever a vehicle floods us with, the log stays readable, and says how much it was.
+    """
+
+    def __init__(self, logger: logging.Logger, who: str) -> None:
+        self.counts: Counter[str] = Counter()
         self._logger = logger
-        self._now_us = now_us
-        self._every_us = round(every_s * 1_000_000)
-        self._told: dict[str, tuple[int, int]] = {}
+        self._who = who
 
-    def tell(self, kind: str, text: str, level: int = logging.WARNING) -> None:
-        """Complain. Those of one kind are counted together, and the last text is logged."""
-        now_us = self._now_us()
-        last_us, unsaid = self._told.get(kind, (now_us - self._every_us, 0))
-        if now_us - last_us < self._every_us:
-            self._told[kind] = (last_us, unsaid + 1)
-            return
-        if kind not in self._told and len(self._told) >= MOST_KINDS:
-            del self._told[next(iter(self._told))]
-        self._told[kind] = (now_us, 0)
-        more = f" ({unsaid} more like this)" if unsaid else ""
-        self._logger.log(level, "%s%s", text, more)
+    def add(self, cause: str, detail: str = "", level: int = logging.WARNING) -> None:
+        """One more. `cause`: one of few; `detail`: of this one."""
+        self.counts[cause] += 1
+        count = self.counts[cause]
+        if count == 10 ** (len(str(count)) - 1):
+            so_far = f" ({count} so far)" if count > 1 else ""
+            what = f"{cause}: {detail}" if detail else cause
+            self._logger.log(level, "%s: %s%s", self._who, what, so_far)

@@ -13,8 +13,8 @@ from m2pem.api import (
     PayloadState,
     ResourceId,
 )
+from m2pem_plugin_ros.complaints import Complaints
 from m2pem_plugin_ros.frames import to_geodetic
-from m2pem_plugin_ros.ignored import Ignored
 from m2pem_plugin_ros.settings import DetectorMessage, DetectorSettings
 from m2pem_plugin_ros.whereabouts import FARTHEST_M
 
@@ -65,7 +65,7 @@ class DetectorTopic:
         self._context = context
         self._whereabouts = whereabouts
         self._hear = hear
-        self._ignored = Ignored(context.logger, resource)
+        self._complaints = Complaints(context.logger, resource)
         self._waiting: deque[_Found] = deque(maxlen=WAITING)
         if settings.message is DetectorMessage.STRING:
             from std_msgs.msg import String  # noqa: PLC0415  # it is loaded where ROS is only
@@ -102,31 +102,31 @@ class DetectorTopic:
             if -90.0 <= geo.latitude_deg <= 90.0 and -180.0 <= geo.longitude_deg <= 180.0:
                 return GeoPosition(geo.latitude_deg, geo.longitude_deg, geo.altitude_m)
             cause = "the position of a detection, which cannot be"
-            self._ignored.add(cause, f"({geo.latitude_deg:g}, {geo.longitude_deg:g})")
+            self._complaints.add(cause, f"({geo.latitude_deg:g}, {geo.longitude_deg:g})")
         elif message.position_kind == _LOCAL:
             place, frame = message.position_local, message.header.frame_id
             if frame.removeprefix("/") != _MAP:
                 cause = "the position of a detection in a frame other than map"
-                self._ignored.add(cause, f"'{frame}'")
+                self._complaints.add(cause, f"'{frame}'")
             elif all(abs(number) <= FARTHEST_M for number in (place.x, place.y, place.z)):
                 return to_geodetic(place.x, place.y, place.z, self._context.origin)
             else:
                 cause = "the position of a detection, which cannot be"
-                self._ignored.add(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
+                self._complaints.add(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
         return None
 
     def _take(self, type_: str, time_us: int, position: GeoPosition | None) -> None:
         type_ = type_.strip() or self._settings.type
         if not type_:
-            self._ignored.add("a detection without a type")
+            self._complaints.add("a detection without a type")
             return
         if len(type_) > LONGEST_TYPE:
-            self._ignored.add("a detection whose type is too long", f"{len(type_)} characters")
+            self._complaints.add("a detection whose type is too long", f"{len(type_)} characters")
             return
         found = _Found(type_, time_us, position)
         if self._waiting or not self._tell(found):
             if len(self._waiting) == WAITING:
-                self._ignored.add("detections, as the vehicle's position is not known")
+                self._complaints.add("detections, as the vehicle's position is not known")
             self._waiting.append(found)
 
     def _tell(self, found: _Found) -> bool:

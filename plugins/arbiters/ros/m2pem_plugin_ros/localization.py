@@ -4,8 +4,8 @@ import math
 from typing import TYPE_CHECKING, Any, Protocol
 
 from m2pem.api import ArbiterContext, GeoPosition, ResourceId
+from m2pem_plugin_ros.complaints import Complaints
 from m2pem_plugin_ros.frames import yaw_of_quaternion
-from m2pem_plugin_ros.ignored import Ignored
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.settings import OdomFrame, Settings
 from m2pem_plugin_ros.whereabouts import FARTHEST_M, Whereabouts
@@ -65,7 +65,7 @@ class TopicLocalization:
         from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415
 
         self.changes = 0
-        self.ignored = Ignored(context.logger, resource)
+        self.complaints = Complaints(context.logger, resource)
         self._clock = context.clock
         self._frame = settings.odom_frame
         self._where = Whereabouts(settings.odom_frame, context.origin)
@@ -114,23 +114,24 @@ class TopicLocalization:
     def _hear_odometry(self, message: Any) -> None:
         stamp = (message.header.stamp.sec, message.header.stamp.nanosec)
         if stamp == self._stamp and stamp != (0, 0):
-            self.ignored.add("odometry that was there already", f"stamp {stamp[0]}.{stamp[1]:09}")
+            detail = f"stamp {stamp[0]}.{stamp[1]:09}"
+            self.complaints.add("odometry that was there already", detail)
             return
         place, turn = message.pose.pose.position, message.pose.pose.orientation
         linear, angular = message.twist.twist.linear, message.twist.twist.angular
         if not _within(FARTHEST_M, place.x, place.y, place.z):
             cause = "odometry with a place that cannot be"
-            self.ignored.add(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
+            self.complaints.add(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
             return
         speeds_are_sane = _within(FASTEST_M_S, linear.x, linear.y)
         if not speeds_are_sane or not _within(FASTEST_RAD_S, angular.z):
             cause = "odometry with a speed that cannot be"
-            self.ignored.add(cause, f"({linear.x:g}, {linear.y:g}) m/s, {angular.z:g} rad/s")
+            self.complaints.add(cause, f"({linear.x:g}, {linear.y:g}) m/s, {angular.z:g} rad/s")
             return
         try:
             yaw_rad = yaw_of_quaternion(turn)
         except ValueError as error:
-            self.ignored.add("odometry with an orientation that cannot be", str(error))
+            self.complaints.add("odometry with an orientation that cannot be", str(error))
             return
         self._stamp = stamp
         self._posed_us = self._clock.now_us()
@@ -146,7 +147,7 @@ class TopicLocalization:
         latitude, longitude = message.latitude, message.longitude
         is_unset = status == _STATUS_NOT_SET and latitude == longitude == 0.0
         if is_unset or not (_within(90.0, latitude) and _within(180.0, longitude)):
-            self.ignored.add("a fix that cannot be", f"({latitude:g}, {longitude:g})")
+            self.complaints.add("a fix that cannot be", f"({latitude:g}, {longitude:g})")
             return
         altitude = message.altitude if _within(FARTHEST_M, message.altitude) else math.nan
         self._fixed_us = self._clock.now_us()

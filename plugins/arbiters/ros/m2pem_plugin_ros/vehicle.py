@@ -20,9 +20,10 @@ from m2pem.api import (
     VehicleState,
 )
 from m2pem.errors import PluginError
+from m2pem_plugin_ros.complaints import Complaints
+from m2pem_plugin_ros.confines import Confines
 from m2pem_plugin_ros.drivers.driver import Driver, Health, Order, Outcome, Seat
 from m2pem_plugin_ros.goal_ids import goal_id, run_id
-from m2pem_plugin_ros.ignored import Ignored
 from m2pem_plugin_ros.instruments import Instruments
 from m2pem_plugin_ros.settings import DriverName, Settings
 from m2pem_plugin_ros.telemetry import SILENT_SHARE, link_state, vehicle_state
@@ -64,7 +65,9 @@ class Vehicle:
         self._ledger = post.ledger
         self._limits = post.limits
         self._instruments = instruments
-        self._ignored = Ignored(post.context.logger, self.resource)
+        fence = post.connection.fence
+        self._confines = None if fence is None else Confines(fence, post.context.bus)
+        self._complaints = Complaints(post.context.logger, self.resource)
         self._behaviors: dict[UUID, BehaviorId] = {}
         self._order: Order | None = None
         self._cancelled: BehaviorId = ""
@@ -138,7 +141,7 @@ class Vehicle:
         if self._broken:
             return self._broken
         try:
-            return self.driver.refusal(request)
+            return self.driver.refusal(request) or self._breach(request)
         except Exception as error:
             self._context.logger.exception("%s: refusal", self.resource)
             return _bug(error)
@@ -220,7 +223,7 @@ class Vehicle:
         if behavior is None:
             return
         if not outcome.is_end:
-            self._ignored.add("an end that is none", f"{behavior} is {outcome.state}")
+            self._complaints.add("an end that is none", f"{behavior} is {outcome.state}")
             return
         if self._order is not None and self._order.goal == goal:
             self._order = None
@@ -298,7 +301,7 @@ class Vehicle:
     def _behavior(self, goal: UUID) -> BehaviorId | None:
         behavior = self._behaviors.get(goal)
         if behavior is None:
-            self._ignored.add("what it says of a goal that it was not given", str(goal))
+            self._complaints.add("what it says of a goal that it was not given", str(goal))
         return behavior
 
     def _ask(self, what: str, call: Callable[[], None]) -> str:
@@ -310,11 +313,19 @@ class Vehicle:
             return _bug(error)
         return ""
 
+    def _breach(self, request: BehaviorRequest) -> str:
+        """Where it would leave the fleet's fence."""
+        if self._confines is None:
+            return ""
+        where = self._instruments.senses.localization
+        yaw_rad = None if where.pose is None else where.pose.yaw_rad
+        return self._confines.refusal(request, where.position, yaw_rad)
+
     def _health(self) -> Health:
         try:
             return self.driver.health
         except Exception as error:
-            self._ignored.add("what its driver says of its health", repr(error))
+            self._complaints.add("what its driver says of its health", repr(error))
             return Health()
 
     def _show_targets(self, order: Order) -> None:

@@ -65,6 +65,7 @@ class Bench:
     """Implements `Told`, and gives orders. `said`: the commands that the base has got."""
 
     def __init__(self, ros: RosRuntime, namespace: str, clock: Clock, **options: Any) -> None:
+        fence = options.pop("fence", None)
         self.clock = clock
         self.bus = Bus()
         self.heard_count = 0
@@ -76,7 +77,7 @@ class Bench:
         ros.subscribe(String, f"{namespace}/said", self._say, qos.EVENTS)
         settings = Settings(namespace, **{"bounds": Bounds(acceleration_m_s2=2.0), **options})
         context = ArbiterContext(clock, self.bus, logging.getLogger("m2pem.testing"), ORIGIN)
-        connection = Connection(ResourceId("ugv1"), "ground", sitl=True)
+        connection = Connection(ResourceId("ugv1"), "ground", sitl=True, fence=fence)
         self.driver = BaseDriver(Seat(connection, settings, context, ros, self.where, self))
 
     def heard(self) -> None:

@@ -18,6 +18,7 @@ from m2pem_plugin_ros.pose import Pose, Twist
 
 from m2pem.api import (
     ArbiterContext,
+    Area,
     BehaviorRequest,
     BehaviorState,
     Connection,
@@ -236,9 +237,13 @@ class DoubleStation:
         self.is_open = False
 
 
-def connections(bodies: Mapping[ResourceId, Body], **settings: object) -> dict:
+def connections(
+    bodies: Mapping[ResourceId, Body], fence: Area | None = None, **settings: object
+) -> dict:
     return {
-        resource: Connection(resource, "ground", {"namespace": f"/{resource}", **settings})
+        resource: Connection(
+            resource, "ground", {"namespace": f"/{resource}", **settings}, fence=fence
+        )
         for resource in bodies
     }
 

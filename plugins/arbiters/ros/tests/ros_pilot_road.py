@@ -57,10 +57,15 @@ class Body:
 class Road:
     """A pilot that drives a body. Every command is checked against the bounds."""
 
-    def __init__(self, bounds: Bounds = TURNS_ON_THE_SPOT, body: Body | None = None) -> None:
+    def __init__(
+        self,
+        bounds: Bounds = TURNS_ON_THE_SPOT,
+        body: Body | None = None,
+        outside_m: Callable[[Place], float] | None = None,
+    ) -> None:
         self.bounds = bounds
         self.body = body or Body()
-        self.pilot = Pilot(bounds)
+        self.pilot = Pilot(bounds, outside_m)
         self.now_s = 100.0
         self.commands: list[Twist] = []
         self.driven: list[Pose] = [self.body.pose]

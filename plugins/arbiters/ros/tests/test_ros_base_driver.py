@@ -11,7 +11,7 @@ from m2pem_plugin_ros.settings import Bounds
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from ros_base_bench import BASE, Bench, bench, geo, point, route, until
 
-from m2pem.api import BehaviorState, GeoPosition, ResourceId, VehiclePosition, VehicleState
+from m2pem.api import Area, BehaviorState, GeoPosition, ResourceId, VehiclePosition, VehicleState
 from m2pem.executive.clock import SystemClock
 
 SPEED = 4.0
@@ -53,6 +53,18 @@ async def test_goto_ends_within_the_tolerance_and_points_as_asked(base: Bench) -
     assert base.where.pose is not None
     assert abs(base.where.pose.yaw_rad) < math.radians(10)
     assert base.driver.health.mode == "standby"
+
+
+async def test_a_base_that_is_dragged_out_of_the_fence_is_stopped(domain: int, peer: Peer) -> None:
+    corners = ((-5, -5), (5, -5), (5, 5), (-5, 5), (-5, -5))
+    fence = Area((tuple(geo(*corner) for corner in corners),))
+    async with bench(domain, "/ugv1", SystemClock(SPEED), fence=fence) as base:
+        order = base.begin("goto", target=point(40, 0))  # the arbiter would refuse it
+        outcome = await base.ending(order)
+        assert outcome.state is BehaviorState.FAILED
+        assert outcome.reason.endswith("m outside the fleet's fence")
+        assert 6.0 < base.place[0] < 12.0
+        assert base.said[-1] == (0.0, 0.0)
 
 
 async def test_reverse_goes_straight_back(base: Bench) -> None:

@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
-from m2pem_plugin_ros.catalogue import DOMAINS, offered
+from m2pem_plugin_ros.catalogue import LEVEL
 from m2pem_plugin_ros.settings import (
     BOUNDS,
     DetectorMessage,
@@ -69,5 +69,4 @@ def test_every_bound_is_explained_and_no_other() -> None:
 
 
 def test_every_behavior_is_named() -> None:
-    names = {spec.name for driver in DriverName for d in DOMAINS for spec in offered(driver, d)}
-    assert {name for name in names if f"`{name}`" not in TEXT} == set()
+    assert {spec.name for spec in LEVEL if f"`{spec.name}`" not in TEXT} == set()

@@ -5,7 +5,7 @@ import math
 from collections.abc import AsyncIterator, Iterator
 
 import pytest
-from m2pem_plugin_ros.ignored import Ignored
+from m2pem_plugin_ros.complaints import Complaints
 from m2pem_plugin_ros.localization import TopicLocalization
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.runtime import RosRuntime
@@ -77,21 +77,21 @@ async def test_what_cannot_be_is_ignored_and_logged_once_with_a_count(
     for cause, messages in wrong.items():
         await teller.say(*messages)
         counted = len(messages)
-        await until(lambda c=cause, n=counted: where.ignored.counts[c] == n, cause)
+        await until(lambda c=cause, n=counted: where.complaints.counts[c] == n, cause)
     assert where.pose == Pose(1.0, 2.0, 0.0)
-    lines = [record.message for record in caplog.records if "ignored" in record.message]
+    lines = [record.message for record in caplog.records if record.levelname == "WARNING"]
     assert len(lines) == len(wrong), lines
-    assert "evsg1: ignored: odometry with a place that cannot be: (nan, 0, 0)" in lines
+    assert "evsg1: odometry with a place that cannot be: (nan, 0, 0)" in lines
 
 
 def test_what_goes_on_being_wrong_is_counted_in_few_lines(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    ignored = Ignored(logging.getLogger("m2pem.testing"), "evsg1")
+    complaints = Complaints(logging.getLogger("m2pem.testing"), "evsg1")
     for _ in range(2500):
-        ignored.add("a fix that cannot be", "(91, 0)")
+        complaints.add("a fix that cannot be", "(91, 0)")
     assert [record.message for record in caplog.records] == [
-        "evsg1: ignored: a fix that cannot be: (91, 0)" + so_far
+        "evsg1: a fix that cannot be: (91, 0)" + so_far
         for so_far in ("", " (10 so far)", " (100 so far)", " (1000 so far)")
     ]
 
@@ -100,7 +100,7 @@ async def test_odometry_that_repeats_a_stamp_is_not_news(ros: RosRuntime, teller
     where = localization(ros)
     frozen = [odometry(5.0, 5.0, stamp=7)] * 3
     await teller.say(odometry(1.0, 1.0, stamp=7), *frozen)
-    await until(lambda: where.ignored.counts["odometry that was there already"] == 3)
+    await until(lambda: where.complaints.counts["odometry that was there already"] == 3)
     assert where.pose.east_m == 1.0
     await teller.say(odometry(2.0, 2.0, stamp=3))
     await until(lambda: where.pose.east_m == 2.0, "a robot that was restarted is believed")
@@ -114,7 +114,7 @@ async def test_odometry_that_begins_anywhere_needs_a_fix(ros: RosRuntime, teller
         odometry(500.0, 500.0),
     )
     await until(lambda: where.twist, "odometry is heard")
-    await until(lambda: where.ignored.counts["a fix that cannot be"] == 1)
+    await until(lambda: where.complaints.counts["a fix that cannot be"] == 1)
     assert (where.pose, where.age_s) == (None, INF)
     assert where.troubles == ("no satellite fix was heard yet",)
     await teller.say(fix(*ORIGIN[:2], altitude=NAN, status=-2))

@@ -4,7 +4,6 @@ import sys
 
 import pytest
 from m2pem_plugin_ros.arbiter import RosArbiter
-from m2pem_plugin_ros.catalogue import offered
 from m2pem_plugin_ros.settings import (
     DOMAINS,
     Bounds,
@@ -180,7 +179,9 @@ def test_a_detectors_settings_are_read_strictly(own, said) -> None:
 @pytest.mark.parametrize("driver", DriverName)
 @pytest.mark.parametrize("domain", DOMAINS)
 def test_every_vehicle_is_offered_what_moves_in_the_plane(driver, domain) -> None:
-    assert {spec.name for spec in offered(driver, domain)} == {
+    connections = {V: Connection(V, domain, {**LEAST, "driver": driver.value})}
+    arbiter = RosArbiter(connections, context(None))
+    assert {spec.name for spec in arbiter.catalogue(V)} == {
         *("single_vehicle_routing", "goto", "hold", "drive_stop", "reverse", "follow", "teleop"),
     }
 

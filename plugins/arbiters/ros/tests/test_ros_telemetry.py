@@ -73,7 +73,7 @@ async def test_a_pose_that_is_no_number_never_reaches_the_fleet(domain: int) -> 
             odometry(1.0, 1.0), *[odometry(NAN, NAN, forward=NAN)] * 3, fix(NAN, NAN), battery(0.5)
         )
         await until(lambda: bench.latest(V).battery_fraction == 0.5, "the last was heard")
-        heard = bench.arbiter._vehicles[V]._instruments.senses.localization.ignored.counts
+        heard = bench.arbiter._vehicles[V]._instruments.senses.localization.complaints.counts
         await until(lambda: heard.total() == 4, "all were heard")
         told = len(bench.states)
         await until(lambda: len(bench.states) > told + 2, "states go on")

@@ -5,8 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, TypeAlias
 
-from m2pem.api import BehaviorState, FleetBus, ResolvedValue
-from m2pem_plugin_mavlink.fence import Fence
+from m2pem.api import BehaviorState, Fence, FleetBus, ResolvedValue
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 

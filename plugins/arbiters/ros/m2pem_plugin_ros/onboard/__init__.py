@@ -1,4 +1,4 @@
-"""The arbiter node that runs on a vehicle (docs/ros.md, "A vehicle with an m2pem node")."""
+"""The arbiter node that runs on a vehicle (docs/ros.md, "Write your own node")."""
 
 from typing import TYPE_CHECKING, Any
 

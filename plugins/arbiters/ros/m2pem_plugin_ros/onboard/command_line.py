@@ -1,39 +1,18 @@
 """`m2pem ros onboard`: the m2pem node of a vehicle, until Ctrl-C."""
 
 import asyncio
-import math
 import signal
 from typing import Any
 
 import click
 
-from m2pem.api import ArbiterContext, Connection, ResourceId
+from m2pem.api import ArbiterContext, Connection, GeoPosition, ResourceId
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.loopback import keep_on_loopback
-from m2pem_plugin_ros.onboard.offered import LEVEL
+from m2pem_plugin_ros.place_option import Place
 from m2pem_plugin_ros.settings import DriverName, Settings, read_settings
 
 _FLAGS = {"true": True, "false": False}
-
-
-class Origin(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """LAT,LON or LAT,LON,ALT."""
-
-    name = "lat,lon,alt"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float, float]:
-        """WGS-84 in degrees; metres above mean sea level."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            latitude, longitude, altitude = (*map(float, str(value).split(",")), 0.0)[:3]
-        except ValueError:
-            self.fail(f"{value!r} is not LAT,LON,ALT, such as 38.1,-77.3,60", param, ctx)
-        if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
-            self.fail(f"{value!r} is not on Earth", param, ctx)
-        return latitude, longitude, altitude
 
 
 class Setting(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
@@ -69,7 +48,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg]  # older clicks have i
 )
 @click.option(
     "--origin",
-    type=Origin(),
+    type=Place(),
     required=True,
     help="Of the frame map of its odometry: the fleet's origin.",
 )
@@ -90,7 +69,7 @@ def onboard(
     namespace: str | None,
     driver: str,
     domain: str,
-    origin: tuple[float, float, float],
+    origin: GeoPosition,
     domain_id: int | None,
     words: tuple[tuple[tuple[str, ...], str | bool], ...],
     loopback: bool,
@@ -113,7 +92,8 @@ def onboard(
         raise click.UsageError("this is the m2pem node; what it drives by is base or nav2")
     if loopback:
         keep_on_loopback()
-    asyncio.run(_serve(connection, settings, origin))
+    at = (origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
+    asyncio.run(_serve(connection, settings, at))
 
 
 def _put(given: dict[str, Any], path: tuple[str, ...], value: str | bool) -> None:
@@ -148,7 +128,7 @@ async def _serve(
             return make_driver(Seat(connection, settings, context, ros, localization, told))
 
         namespace = settings.namespace
-        node = Onboard(ros, name, namespace, make, clock=clock, bus=targets, catalogue=LEVEL)
+        node = Onboard(ros, name, namespace, make, clock=clock, bus=targets)
         await node.open()
         click.echo(f"{name}: {namespace or '/'}, an m2pem node that drives by {settings.driver}")
         click.echo("ready")

@@ -10,6 +10,7 @@ from uuid import UUID, uuid5
 from m2pem_interfaces import msg as interfaces
 
 from m2pem.api import BehaviorRequest, BehaviorSpec, BehaviorState, Clock, FleetBus
+from m2pem_plugin_ros.catalogue import LEVEL
 from m2pem_plugin_ros.complaints import Complaints
 from m2pem_plugin_ros.drivers.driver import Driver, Order, Outcome, Told
 from m2pem_plugin_ros.onboard.asked import (
@@ -22,7 +23,6 @@ from m2pem_plugin_ros.onboard.asked import (
 )
 from m2pem_plugin_ros.onboard.book import Book
 from m2pem_plugin_ros.onboard.goals import Goals
-from m2pem_plugin_ros.onboard.offered import LEVEL
 from m2pem_plugin_ros.onboard.targets import Targets, read_target
 from m2pem_plugin_ros.onboard.voice import About, Voice
 from m2pem_plugin_ros.runtime import RosRuntime, qos
@@ -44,7 +44,7 @@ SAID_WITHIN_S = 1.0
 
 class Onboard:
     """Serves `command`, `behavior_status`, `vehicle_status` and `execute_behavior` in the vehicle's
-    namespace (docs/ros.md, "A vehicle with an m2pem node").
+    namespace (docs/ros.md, "Write your own node").
 
     `vehicle`: its name in the fleet. `make_driver`: of what is on board, and what it tells comes
     here. `bus`: gets what is heard on `target`; it is to be the one that the driver's context has.
@@ -70,7 +70,7 @@ class Onboard:
         self._bus = Targets() if bus is None else bus
         self._catalogue = catalogue
         self._logger = logger
-        self._complaints = Complaints(logger, clock.now_us)
+        self._complaints = Complaints(logger, vehicle)
         self._book = Book(self._say)
         self._voice = Voice(clock, self._about_vehicle)
         self._held = False
@@ -143,7 +143,7 @@ class Onboard:
         try:
             asked = read_command(message)
         except WireError as error:
-            self._complaints.tell("command", f"{self._name}: {error}")
+            self._complaints.add("a command that cannot be", str(error))
             return
         if asked.verb is Verb.START:
             self.start(message)
@@ -155,7 +155,7 @@ class Onboard:
             self._resume()
         elif self._book.is_past(asked.run, asked.epoch):
             text = f"{asked.verb.name} of {asked.id}: {_past(asked.epoch)}"
-            self._complaints.tell("epoch", f"{self._name}: {text}")
+            self._complaints.add("a command of the past", text)
         elif asked.verb is Verb.CANCEL:
             self.cancel(asked.id)
         else:
@@ -233,11 +233,11 @@ class Onboard:
         try:
             parameters = read_parameters(message)
         except WireError as error:
-            self._complaints.tell("adjust", f"{self._name}: {error}")
+            self._complaints.add("a change that cannot be", str(error))
             return
         behavior, together = self._request.behavior, {**self._request.parameters, **parameters}
         if reason := misfit(self._catalogue, self._name, behavior, together):
-            self._complaints.tell("adjust", f"{self._name}: {reason}")
+            self._complaints.add("a change that cannot be", reason)
             return
         self._request = replace(self._request, parameters=together)
         self._driver.adjust(_goal(asked.id), parameters)
@@ -299,7 +299,7 @@ class Onboard:
         try:
             target = read_target(message, self._clock.now_us())
         except WireError as error:
-            self._complaints.tell("target", f"{self._name}: {error}")
+            self._complaints.add("a target that cannot be", str(error))
         else:
             self._bus.publish(target)
 

@@ -5,13 +5,15 @@ is not known is not driven on: without a pose that is fresh the command is zero.
 """
 
 import math
+from collections.abc import Callable
 from uuid import UUID
 
 from m2pem.api import BehaviorState
+from m2pem_plugin_ros.pilot.fence_watch import FenceWatch
 from m2pem_plugin_ros.pilot.gate import MARGIN, PoseGate
 from m2pem_plugin_ros.pilot.governor import Governor
 from m2pem_plugin_ros.pilot.motions.motion import Motion
-from m2pem_plugin_ros.pilot.plane import place_of, sane_twist
+from m2pem_plugin_ros.pilot.plane import Place, place_of, sane_twist
 from m2pem_plugin_ros.pilot.stuck import STUCK_S, StuckWatch
 from m2pem_plugin_ros.pilot.wishes import Wishes
 from m2pem_plugin_ros.pilot.words import STAND, Ending, Scene, Seen, Step, Wish
@@ -38,13 +40,17 @@ FOUND_M = 1.0
 
 
 class Pilot:
-    """One base. `step` it about 20 times a second, more rarely while it is not `busy`."""
+    """One base. `step` it about 20 times a second, more rarely while it is not `busy`.
 
-    def __init__(self, bounds: Bounds) -> None:
+    `outside_m`: how far a place is outside of where the base may be, 0 inside; everywhere if None.
+    """
+
+    def __init__(self, bounds: Bounds, outside_m: Callable[[Place], float] | None = None) -> None:
         self._bounds = bounds
         self._governor = Governor(bounds)
         self._gate = PoseGate(max(bounds.speed_m_s, bounds.reverse_m_s))
         self._stuck = StuckWatch()
+        self._fence = FenceWatch(outside_m or (lambda _: 0.0))
         self._goal: UUID | None = None
         self._motion: Motion | None = None
         self._ending: Ending | None = None
@@ -91,6 +97,7 @@ class Pilot:
         self._held = False
         self._wished = STAND
         self._driven_from = None
+        self._fence.forget()
         self._speak()
 
     def end(self, goal: UUID) -> None:
@@ -158,6 +165,10 @@ class Pilot:
             return STAND
         if self._gate.doubts:  # nothing ends, nor begins, where it may not be
             return self._wished
+        if (left_by_m := self._fence.left_by_m(place_of(pose))) > 0:
+            reason = f"it is {left_by_m:.1f} m outside the fleet's fence"
+            self._end_with(Ending(BehaviorState.FAILED, "", reason))
+            return STAND
         self._find(motion, pose, dt_s)
         scene = Scene(
             dt_s=dt_s,

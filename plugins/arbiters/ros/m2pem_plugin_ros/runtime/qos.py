@@ -1,4 +1,4 @@
-"""The qualities of service of all topics and services (docs/ros.md, "Topics and services")."""
+"""The qualities of service of all topics and services (docs/ros.md)."""
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 

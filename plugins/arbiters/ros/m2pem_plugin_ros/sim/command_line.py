@@ -1,7 +1,6 @@
 """`m2pem sim ros`: simulated vehicles, until Ctrl-C."""
 
 import asyncio
-import math
 import signal
 from collections.abc import Iterable
 from contextlib import suppress
@@ -14,6 +13,7 @@ from m2pem.api import GeoPosition
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.frames import Origin, to_local
 from m2pem_plugin_ros.loopback import keep_on_loopback
+from m2pem_plugin_ros.place_option import Place
 from m2pem_plugin_ros.settings import DriverName
 from m2pem_plugin_ros.sim.crew import make_crew
 from m2pem_plugin_ros.sim.detector import Target
@@ -24,26 +24,6 @@ from m2pem_plugin_ros.sim.words import WordError
 
 MOST = 100
 """Vehicles in one process; 20 are moderate, see docs/ros.md."""
-
-
-class Place(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """LAT,LON or LAT,LON,ALT."""
-
-    name = "lat,lon,alt"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> GeoPosition:
-        """WGS-84 in degrees; metres above mean sea level."""
-        if isinstance(value, GeoPosition):
-            return value
-        try:
-            latitude, longitude, altitude = (*map(float, str(value).split(",")), 0.0)[:3]
-        except ValueError:
-            self.fail(f"{value!r} is not LAT,LON,ALT, such as 38.1,-77.3,60", param, ctx)
-        if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
-            self.fail(f"{value!r} is not on Earth", param, ctx)
-        return GeoPosition(latitude, longitude, altitude)
 
 
 class Word(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare

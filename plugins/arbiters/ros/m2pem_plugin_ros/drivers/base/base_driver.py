@@ -52,8 +52,8 @@ class BaseDriver:
         self._pace = Pace(seat.context.clock)
         self._name = seat.connection.resource
         self._bounds = seat.settings.bounds
-        self._pilot = Pilot(self._bounds)
-        self._surroundings = Surroundings(seat.context)
+        self._surroundings = Surroundings(seat.context, seat.connection.fence)
+        self._pilot = Pilot(self._bounds, self._surroundings.outside_m)
         self._ended = EndedGoals()
         self._progress_told: UUID | None = None
         self._warned: UUID | None = None

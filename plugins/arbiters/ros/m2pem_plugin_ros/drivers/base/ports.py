@@ -26,7 +26,7 @@ class CommandTopic:
     def __init__(self, ros: RosRuntime, settings: Settings) -> None:
         self._node = ros.node
         self._stamped = settings.stamped
-        name = full_name(settings, settings.topics.cmd_vel)
+        name = settings.topic(settings.topics.cmd_vel)
         self._publisher = self._node.create_publisher(_message_type(settings), name, LATEST)
 
     @property
@@ -69,7 +69,7 @@ class StickTopic:
         self._stamped = settings.stamped
         self._heard_s = -1e9
         self.twist: Twist | None = None
-        name = full_name(settings, settings.topics.teleop)
+        name = settings.topic(settings.topics.teleop)
         ros.subscribe(_message_type(settings), name, self._hear, qos.TELEMETRY)
 
     @property
@@ -81,11 +81,6 @@ class StickTopic:
         twist = message.twist if self._stamped else message
         self.twist = Twist(twist.linear.x, twist.angular.z)
         self._heard_s = self._loop.time()
-
-
-def full_name(settings: Settings, name: str) -> str:
-    """A topic's name; what does not begin with "/" is in the vehicle's namespace."""
-    return name if name.startswith("/") else f"{settings.namespace.rstrip('/')}/{name}"
 
 
 def _message_type(settings: Settings) -> Any:

@@ -4,24 +4,33 @@ import math
 
 from m2pem.api import (
     ArbiterContext,
+    Area,
+    Fence,
     GeoPosition,
     LinkState,
     ResourceId,
     VehicleState,
 )
-from m2pem_plugin_ros.frames import to_local
+from m2pem_plugin_ros.bow import bow_rad
+from m2pem_plugin_ros.frames import to_geodetic, to_local
 from m2pem_plugin_ros.pilot import Target
+from m2pem_plugin_ros.pilot.plane import Place
 from m2pem_plugin_ros.pose import Pose
-
-COURSE_ABOVE_M_S = 0.3
-"""Of who does not say where its bow points, it is known from its course, at such a speed."""
 
 
 class Surroundings:
-    """As the fleet's bus and origin say."""
+    """As the fleet's bus, origin and fence say."""
 
-    def __init__(self, context: ArbiterContext) -> None:
+    def __init__(self, context: ArbiterContext, fence: Area | None = None) -> None:
         self._context = context
+        self._fence = None if fence is None else Fence(fence)
+
+    def outside_m(self, place: Place) -> float:
+        """How far a place is outside the fence; 0 inside, or if there is none."""
+        if self._fence is None:
+            return 0.0
+        position = to_geodetic(*place, 0.0, self._context.origin)
+        return self._fence.outside_m((position.latitude_deg, position.longitude_deg))
 
     def level(self, latitude_deg: float, longitude_deg: float) -> tuple[float, float]:
         """East and north of the origin, in metres."""
@@ -38,10 +47,7 @@ class Surroundings:
             return None
         east, north = self.level(state.position.latitude_deg, state.position.longitude_deg)
         east_m_s, north_m_s, _ = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
-        yaw = state.yaw_rad
-        if yaw is None:
-            moves = math.hypot(east_m_s, north_m_s) > COURSE_ABOVE_M_S
-            yaw = math.atan2(north_m_s, east_m_s) if moves else 0.0
+        yaw = bow_rad(state)
         age_s = max(0.0, (self._context.clock.now_us() - state.time_us) / 1e6)
         if not math.isfinite(east + north + east_m_s + north_m_s + yaw):
             return None

@@ -58,7 +58,7 @@ class Nav2Driver:
         self._held = False
         self._ended: OrderedDict[UUID, Outcome] = OrderedDict()
         self._work: set[asyncio.Task[None]] = set()
-        self._looking: asyncio.Task[None] | None = None
+        self._looking: list[asyncio.Task[None]] = []
 
     async def open(self) -> None:
         """Listen to Nav2, and to whether it is active.
@@ -68,7 +68,11 @@ class Nav2Driver:
         """
         settings = self._seat.settings
         self._nav2 = Nav2(self._seat.ros, settings.namespace, self._told.heard, self._logger)
-        self._looking = asyncio.get_running_loop().create_task(self._look_on(self._nav2))
+        loop = asyncio.get_running_loop()
+        self._looking = [
+            loop.create_task(self._look_on(self._nav2)),
+            loop.create_task(self._listen_on(self._nav2)),
+        ]
 
     @property
     def health(self) -> Health:
@@ -172,7 +176,7 @@ class Nav2Driver:
 
     async def close(self) -> None:
         """Leave the vehicle as it is."""
-        tasks = [*self._work, *([self._looking] if self._looking is not None else [])]
+        tasks = [*self._work, *self._looking]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -291,16 +295,23 @@ class Nav2Driver:
         while True:
             try:
                 await nav2.look()
-                if self._seat.localization.age_s <= FRESH_S:
-                    self._told.heard()
                 await self._look_after(nav2)
             except RosError as error:
                 self._logger.warning("%s: %s", self._name, error)
             except Exception:  # a vehicle must not go deaf because of one bad answer
                 self._logger.exception("%s: Nav2 cannot be looked at", self._name)
-            await asyncio.gather(
-                self._seat.context.clock.sleep(LOOK_EVERY_S), asyncio.sleep(LOOK_AT_MOST_EVERY_S)
-            )
+            await self._pause()
+
+    async def _listen_on(self, nav2: Nav2) -> None:
+        """A vehicle that says where it is is heard, however long Nav2 takes to answer."""
+        while True:
+            if nav2.looked_at and self._seat.localization.age_s <= FRESH_S:
+                self._told.heard()
+            await self._pause()
+
+    async def _pause(self) -> None:
+        clock = self._seat.context.clock
+        await asyncio.gather(clock.sleep(LOOK_EVERY_S), asyncio.sleep(LOOK_AT_MOST_EVERY_S))
 
     async def _look_after(self, nav2: Nav2) -> None:
         """What it does for nobody any more is ended; what it can do no more has failed."""

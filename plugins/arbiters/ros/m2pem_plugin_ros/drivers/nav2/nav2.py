@@ -19,6 +19,9 @@ from m2pem_plugin_ros.runtime import RosRuntime, RosTimeoutError, qos
 STATE_S = 1.0
 """Real seconds in which bt_navigator says what state it is in."""
 
+LOOKS = 2
+"""So often it may leave that unanswered before it counts as not there."""
+
 RIVAL_S = 0.5
 """Real seconds in which the goal that took the place of ours is heard of, on another topic."""
 
@@ -26,7 +29,8 @@ LOOK_S = 0.05
 
 
 class Nav2:
-    """`namespace`: of the vehicle. `heard` is called whenever Nav2 says something.
+    """`namespace`: of the vehicle. `heard` is called whenever Nav2 says something, once it was
+    `looked_at`.
 
     Raises:
         RosError: nav2_msgs is not installed.
@@ -44,6 +48,7 @@ class Nav2:
         self._ours: set[UUID] = set()
         self._limit_m_s: float | None = None
         self.state = ""
+        self._looks = 0
         actions = self.messages.action
         self.to_pose = self._client(actions.NavigateToPose, "navigate_to_pose")
         self.through_poses = self._client(actions.NavigateThroughPoses, "navigate_through_poses")
@@ -60,6 +65,12 @@ class Nav2:
     def is_active(self) -> bool:
         """Whether it takes goals."""
         return not self.trouble
+
+    @property
+    def looked_at(self) -> bool:
+        """Whether it has answered by now, or had the time to: who is told of it may give it an
+        order at once. An answer may get lost while DDS finds who is there."""
+        return bool(self.state) or self._looks >= LOOKS
 
     @property
     def trouble(self) -> str:
@@ -95,6 +106,8 @@ class Nav2:
             state = answer.current_state
             active = state.id == State.PRIMARY_STATE_ACTIVE
             self.state = "active" if active else state.label or f"state {state.id}"
+        self._looks += 1
+        if self.state:
             self._heard()
         for client in self._clients():
             client.look_for_server()
@@ -245,7 +258,8 @@ class Nav2:
 
     def _heard(self) -> None:
         self._heard_at_s = self._now_s()
-        self._told()
+        if self.looked_at:
+            self._told()
 
     @staticmethod
     def _now_s() -> float:

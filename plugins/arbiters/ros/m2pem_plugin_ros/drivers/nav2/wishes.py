@@ -16,6 +16,7 @@ from m2pem.api import (
     VehiclePosition,
     VehicleState,
 )
+from m2pem_plugin_ros.bow import bow_rad
 from m2pem_plugin_ros.drivers.nav2.verdicts import NavigationError
 from m2pem_plugin_ros.frames import to_local
 from m2pem_plugin_ros.pose import Pose
@@ -79,7 +80,7 @@ class Wishes:
             raise NavigationError(f"{vehicle} has not been heard for {STALE_S:g} s")
         position = state.position
         place = self._at(position.latitude_deg, position.longitude_deg)
-        return replace(place, yaw_rad=_course_rad(state))
+        return replace(place, yaw_rad=bow_rad(state))
 
     def way(self) -> list[Pose]:
         """`route`, each pose in the direction of the next."""
@@ -114,10 +115,3 @@ def apart_m(a: Pose, b: Pose) -> float:
 def towards_rad(a: Pose, b: Pose) -> float:
     """The yaw from one place to the other."""
     return math.atan2(b.north_m - a.north_m, b.east_m - a.east_m)
-
-
-def _course_rad(state: VehicleState) -> float:
-    if state.yaw_rad is not None:
-        return state.yaw_rad
-    east, north, _ = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
-    return math.atan2(north, east)

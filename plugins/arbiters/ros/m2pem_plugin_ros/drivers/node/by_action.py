@@ -178,7 +178,7 @@ class ByAction:
         try:
             status = read_status(message)
         except WireError as error:
-            self._complaints.tell("feedback", f"{self._name}: {error}")
+            self._complaints.add("feedback that cannot be", str(error))
             return
         if status.id != str(goal) or status.number <= pursued.number:
             return
@@ -298,7 +298,7 @@ class ByAction:
             wrong = f"the result of {goal} is a status of {status.id} that is {status.state}"
         except WireError as error:
             wrong = str(error)
-        self._complaints.tell("result", f"{self._name}: {wrong}")
+        self._complaints.add("a result that cannot be", wrong)
         return Outcome(_ENDS.get(number, BehaviorState.FAILED), reason=wrong)
 
     def _run(self, work: Coroutine[Any, Any, None]) -> None:
@@ -309,4 +309,4 @@ class ByAction:
     def _done(self, task: asyncio.Task[None]) -> None:
         self._tasks.discard(task)
         if not task.cancelled() and (error := task.exception()) is not None:
-            self._complaints.tell("task", f"{self._name}: {error!r}")
+            self._complaints.add("m2pem is wrong", repr(error))

@@ -166,8 +166,8 @@ class ByTopics:
         if pursued is None:
             if status.id not in self._ended and status.id not in self._looks:
                 # Another executive's, perhaps, or of before ours was started.
-                text = f"{self._name}: a status of {status.id}, which we have not given it"
-                self._complaints.tell("id", text, logging.INFO)
+                cause = "a status of what we have not given it"
+                self._complaints.add(cause, status.id, logging.INFO)
         elif status.state is BehaviorState.UNKNOWN:
             self._unknown(pursued)
         elif status.number > pursued.number:

@@ -32,7 +32,7 @@ class NodeDriver:
     def __init__(self, seat: Seat) -> None:
         self._seat = seat
         self._clock = seat.context.clock
-        self._complaints = Complaints(seat.context.logger, self._clock.now_us)
+        self._complaints = Complaints(seat.context.logger, seat.connection.resource)
         self._holding = Insisting(self._clock)
         self._said: VehicleStatus | None = None
         self._publisher: Any = None
@@ -102,7 +102,7 @@ class NodeDriver:
         try:
             self._send(messages.adjust(order, parameters, self._clock.now_us()))
         except WireError as error:
-            self._complaints.tell("adjust", f"{self._resource}: {error}")
+            self._complaints.add("a change that cannot be told", str(error))
 
     def hold(self) -> None:
         """Tell the node, until it says that the vehicle is held."""
@@ -127,8 +127,7 @@ class NodeDriver:
         self._seat.told.heard()
         self._said = said = read_vehicle_status(message)
         if said.vehicle != self._resource:
-            text = f"{self._resource}: the node in {self._name('')} says it is '{said.vehicle}'"
-            self._complaints.tell("name", text)
+            self._complaints.add(f"the node in {self._name('')} is another one's", said.vehicle)
         self._opened.vehicle_does(said.behavior)
 
     def _hear_status(self, link: ByTopics, message: Any) -> None:
@@ -136,7 +135,7 @@ class NodeDriver:
         try:
             link.status(read_status(message))
         except WireError as error:
-            self._complaints.tell("status", f"{self._resource}: {error}")
+            self._complaints.add("a status that cannot be", str(error))
 
     # --- inside ---------------------------------------------------------------------------------
 
@@ -150,7 +149,7 @@ class NodeDriver:
         return self._link
 
     def _name(self, leaf: str) -> str:
-        return f"{self._seat.settings.namespace.rstrip('/')}/{leaf}"
+        return self._seat.settings.topic(leaf)
 
     def _send(self, message: object) -> None:
         self._publisher.publish(message)

@@ -12,10 +12,7 @@ from m2pem_plugin_ros.pilot.steering import Steering, braking_speed, lookahead
 from m2pem_plugin_ros.pilot.wishes import Wishes
 from m2pem_plugin_ros.pilot.words import STAND, Ending, RefusedError, Scene, Target, Wish
 from m2pem_plugin_ros.settings import Bounds
-
-OFFSET_M = 15.0
-BEHIND_RAD = math.pi
-"""Where to be, if nobody says."""
+from m2pem_plugin_ros.usual import BEHIND_RAD, OFFSET_M
 
 STATION_M = 1.0
 LEFT_STATION_M = 2.0

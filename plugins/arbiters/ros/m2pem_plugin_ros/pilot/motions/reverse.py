@@ -16,8 +16,8 @@ from m2pem_plugin_ros.pilot.wishes import Wishes
 from m2pem_plugin_ros.pilot.words import STAND, Ending, Scene, Wish
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.settings import Bounds
+from m2pem_plugin_ros.usual import REVERSE_M
 
-DISTANCE_M = 5.0
 ENDED_M = 0.05
 BACK_AGAIN_M = 0.3
 
@@ -30,7 +30,7 @@ class Reverse(Motion):
     def __init__(self, wishes: Wishes, bounds: Bounds) -> None:
         super().__init__(wishes, bounds)
         distance = wishes.number("distance")
-        self._distance_m = DISTANCE_M if distance is None else distance
+        self._distance_m = REVERSE_M if distance is None else distance
         self._line: Leg | None = None
         self._over = False
 

@@ -8,8 +8,8 @@ from geometry_msgs.msg import Point
 
 from m2pem_plugin_ros.drivers.nav2.errands.errand import GoalErrand, Job
 from m2pem_plugin_ros.drivers.nav2.goal_client import GoalClient
+from m2pem_plugin_ros.usual import REVERSE_M
 
-DISTANCE_M = 5.0
 SPEED_M_S = 0.5
 NOTHING_M = 0.01
 ALLOWED = 3.0
@@ -22,7 +22,7 @@ class Reverse(GoalErrand):
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
-        distance_m = self.wishes.number("distance", DISTANCE_M) or 0.0
+        distance_m = self.wishes.number("distance", REVERSE_M) or 0.0
         self._left_m = self._goal_m = distance_m
 
     @property

@@ -15,13 +15,12 @@ from m2pem_plugin_ros.drivers.nav2.goal_client import GoalClient
 from m2pem_plugin_ros.drivers.nav2.verdicts import NavigationError, taken_over
 from m2pem_plugin_ros.drivers.nav2.wishes import apart_m, towards_rad
 from m2pem_plugin_ros.pose import Pose
+from m2pem_plugin_ros.usual import BEHIND_RAD, OFFSET_M
 
 MOVED_M = 1.0
 """A target that has moved by so much is told to Nav2 again, which must plan each time."""
 
 AGAIN_S = 1.0
-OFFSET_M = 15.0
-BEHIND_RAD = math.pi
 
 
 class Pursuit(GoalErrand):
