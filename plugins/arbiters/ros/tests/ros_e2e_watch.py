@@ -31,13 +31,13 @@ class Sample(NamedTuple):
 class Track:
     """One vehicle. All of it is in the order in which it was heard.
 
-    `motions`: how often it has begun to move. `starts`: goals that its node was told to START, as
+    `begun_m`: how far north it was whenever it began to move. `starts`: goals that its node was told to START, as
     often as it was told. `statuses`: (goal, number, state). `goals`: how goals of actions stood.
     """
 
     def __init__(self) -> None:
         self.odometry: list[Sample] = []
-        self.motions = 0
+        self.begun_m: list[float] = []
         self.starts: list[str] = []
         self.statuses: list[tuple[str, int, int]] = []
         self.goals: dict[str, list[int]] = defaultdict(list)
@@ -57,6 +57,10 @@ class Track:
     def north_m(self) -> float:
         """Where it is."""
         return self.odometry[-1].north_m
+
+    def begun_before(self, north_m: float) -> int:
+        """How often it has begun to move before it came there."""
+        return sum(begun_m < north_m for begun_m in self.begun_m)
 
     def stood_on_the_way(self, from_m: float, to_m: float) -> list[Sample]:
         """Where it was not moving between two places on its way north."""
@@ -122,7 +126,8 @@ class Watch:
             track.odometry.append(Sample(message.twist.twist.linear.x, place.x, place.y))
 
         def motions(message: Any) -> None:
-            track.motions = message.data
+            if message.data:
+                track.begun_m.append(track.north_m if track.odometry else 0.0)
 
         def command(message: Any) -> None:
             if message.verb == BehaviorCommand.START:
