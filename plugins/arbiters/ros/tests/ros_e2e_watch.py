@@ -31,8 +31,9 @@ class Sample(NamedTuple):
 class Track:
     """One vehicle. All of it is in the order in which it was heard.
 
-    `begun_m`: how far north it was whenever it began to move. `starts`: goals that its node was told to START, as
-    often as it was told. `statuses`: (goal, number, state). `goals`: how goals of actions stood.
+    `begun_m`: how far north it was whenever it began to move. `starts`: goals that its node was
+    told to START, as often as it was told. `statuses`: (goal, number, state). `goals`: how goals of
+    actions stood.
     """
 
     def __init__(self) -> None:

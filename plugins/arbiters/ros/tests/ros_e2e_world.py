@@ -82,38 +82,36 @@ def fleet_file(
     return file
 
 
-def convoy(folder: Path, vehicles: Iterable[str], *, again: str = "") -> Path:
+def convoy(folder: Path, vehicles: Iterable[str], *, again: str = "", name: str = "convoy") -> Path:
     """A mission in which all drive their routes at the same time: `Drive_NAME` of each.
 
     `again`: an ISO 8601 duration; whose link is lost waits for so long (`Wait_NAME`), and then
     drives its route once more (`Again_NAME`).
     """
     parts, flows = "", [("Start", "Fork"), ("Join", "End")]
-    for name in vehicles:
-        parts += _drive(f"Drive_{name}", name)
-        flows += [("Fork", f"Drive_{name}"), (f"Drive_{name}", f"Merge_{name}")]
-        flows += [(f"Merge_{name}", "Join")]
-        parts += f'<exclusiveGateway id="Merge_{name}"/>'
+    for each in vehicles:
+        parts += _drive(f"Drive_{each}", each) + f'<exclusiveGateway id="Merge_{each}"/>'
+        flows += [("Fork", f"Drive_{each}"), (f"Drive_{each}", f"Merge_{each}")]
+        flows += [(f"Merge_{each}", "Join")]
         if again:
             parts += (
-                f'<boundaryEvent id="Lost_{name}" attachedToRef="Drive_{name}">'
+                f'<boundaryEvent id="Lost_{each}" attachedToRef="Drive_{each}">'
                 '<errorEventDefinition errorRef="LinkLost"/></boundaryEvent>'
-                f'<intermediateCatchEvent id="Wait_{name}"><timerEventDefinition><timeDuration>'
+                f'<intermediateCatchEvent id="Wait_{each}"><timerEventDefinition><timeDuration>'
                 f"{again}</timeDuration></timerEventDefinition></intermediateCatchEvent>"
             )
-            parts += _drive(f"Again_{name}", name)
-            flows += [(f"Lost_{name}", f"Wait_{name}"), (f"Wait_{name}", f"Again_{name}")]
-            flows += [(f"Again_{name}", f"Merge_{name}")]
+            parts += _drive(f"Again_{each}", each)
+            flows += [(f"Lost_{each}", f"Wait_{each}"), (f"Wait_{each}", f"Again_{each}")]
+            flows += [(f"Again_{each}", f"Merge_{each}")]
     lines = "".join(
         f'<sequenceFlow id="{source}_{target}" sourceRef="{source}" targetRef="{target}"/>'
         for source, target in flows
     )
-    file = folder / "convoy.bpmn"
+    file = folder / f"{name}.bpmn"
     file.write_text(
         '<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"'
         ' xmlns:m2pem="https://m2pem.org/schema/1" targetNamespace="https://m2pem.org/scenarios">'
         '<error id="LinkLost" errorCode="LINK_LOST"/>'
-        '<signal id="5a1e0c55-0000-4000-8000-000000000001" name="Nothing"/>'
         '<process id="CONVOY" isExecutable="true"><startEvent id="Start"/>'
         f'<parallelGateway id="Fork"/>{parts}<parallelGateway id="Join"/><endEvent id="End"/>'
         f"{lines}</process></definitions>"
