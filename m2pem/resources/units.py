@@ -21,6 +21,7 @@ class Dimension(StrEnum):
     DURATION = "duration"
     DISTANCE = "distance"
     SPEED = "speed"
+    ACCELERATION = "acceleration"
     ANGLE = "angle"
     ANGULAR_SPEED = "angular speed"
 
@@ -42,6 +43,7 @@ UNITS: Mapping[Dimension, Mapping[str, float]] = {
         "mph": 1609.344 / 3600.0,
         "ft/s": 0.3048,
     },
+    Dimension.ACCELERATION: {"m/s2": 1.0, "m/s²": 1.0, "m/s^2": 1.0},
     Dimension.ANGLE: {"rad": 1.0, "deg": math.pi / 180.0},
     Dimension.ANGULAR_SPEED: {"rad/s": 1.0, "deg/s": math.pi / 180.0},
 }
@@ -68,7 +70,7 @@ def _expected(dimension: Dimension) -> str:
 
 
 def quantity(value: object, dimension: Dimension) -> float:
-    """Read a quantity of `dimension`, in SI: seconds, metres, m/s, radians, rad/s.
+    """Read a quantity of `dimension`, in SI: seconds, metres, m/s, m/s², radians, rad/s.
 
     `value` is a text ("5 km/h", also "5km/h"; units are case-sensitive) or a number. A number
     without a unit is SI; an angle needs one.

@@ -75,8 +75,8 @@ KINDS = ("ptz", "camera", "gpr")
 _KINEMATICS = {
     "max_speed": ("max_speed_m_s", Dimension.SPEED),
     "cruise_speed": ("cruise_speed_m_s", Dimension.SPEED),
-    "acceleration": ("acceleration_m_s2", None),
-    "deceleration": ("deceleration_m_s2", None),
+    "acceleration": ("acceleration_m_s2", Dimension.ACCELERATION),
+    "deceleration": ("deceleration_m_s2", Dimension.ACCELERATION),
     "turn_rate": ("turn_rate_rad_s", Dimension.ANGULAR_SPEED),
     "turn_radius": ("turn_radius_m", Dimension.DISTANCE),
     "climb_rate": ("climb_rate_m_s", Dimension.SPEED),

@@ -13,7 +13,6 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
 _NAME = re.compile(rf"/?{_TOKEN}(/{_TOKEN})*")
-_ACCELERATION = re.compile(r"\s*(\S+?)\s*m/s(?:2|\^2|²)\s*")
 HIGHEST_DOMAIN = 232
 
 
@@ -112,21 +111,6 @@ class ConnectionReader:
         except UnitError as error:
             raise self.error(key, str(error)) from None
         return self._positive(key, number, zero)
-
-    def acceleration(self, key: str, default: float) -> float:
-        """In m/s²: a number, or a text such as "1.5 m/s2"."""
-        value = self.values.get(key, default)
-        if isinstance(value, str) and (match := _ACCELERATION.fullmatch(value)):
-            value = match[1]
-        try:
-            # Numbers are read as those of all quantities; a bare one is SI.
-            number = quantity(value, Dimension.DISTANCE)
-        except UnitError:
-            number = None
-        unit_is_wrong = isinstance(value, str) and not value.strip()[-1:].isdigit()
-        if number is None or unit_is_wrong:
-            raise self.error(key, f"{value!r} is no acceleration, such as 1.5 m/s2")
-        return self._positive(key, number, zero=False)
 
     def _positive(self, key: str, number: float, zero: bool) -> float:
         if number < 0.0 or (number == 0.0 and not zero):

@@ -211,10 +211,10 @@ def _bounds(reader: ConnectionReader) -> Bounds:
     return Bounds(
         reader.number("speed", usual.speed_m_s, Dimension.SPEED),
         reader.number("reverse_speed", usual.reverse_m_s, Dimension.SPEED),
-        reader.acceleration("acceleration", usual.acceleration_m_s2),
+        reader.number("acceleration", usual.acceleration_m_s2, Dimension.ACCELERATION),
         reader.number("yaw_rate", usual.yaw_rate_rad_s, Dimension.ANGULAR_SPEED),
         reader.number("turn_radius", usual.turn_radius_m, Dimension.DISTANCE, zero=True),
-        reader.acceleration("lateral_acceleration", usual.lateral_m_s2),
+        reader.number("lateral_acceleration", usual.lateral_m_s2, Dimension.ACCELERATION),
     )
 
 

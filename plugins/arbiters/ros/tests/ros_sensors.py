@@ -76,6 +76,22 @@ class Sensors:
         async with asyncio.timeout(AMPLE_S):
             await self._said.get()
 
+    async def repeat(
+        self, until_true: Callable[[], object], what: str, *messages: tuple[str, dict]
+    ) -> None:
+        """Say it again and again, as sensors do, until something is so.
+
+        What is said just when DDS has two find each other may be lost, and what is said to who
+        is about to leave is not heard by who comes: only who was heard once is heard surely.
+        """
+        try:
+            async with asyncio.timeout(AMPLE_S):
+                while not until_true():
+                    await self.say(*messages)
+                    await asyncio.sleep(0.05)
+        except TimeoutError:
+            raise AssertionError(f"not within {AMPLE_S:g} s: {what}") from None
+
 
 @asynccontextmanager
 async def sensors(domain: int):

@@ -110,7 +110,7 @@ def test_names_are_in_the_namespace_unless_they_are_full() -> None:
         ({**LEAST, "bounds": {"speed": math.inf}}, "connection.bounds.speed"),
         ({**LEAST, "bounds": {"yaw_rate": 1}}, "connection.bounds.yaw_rate: 1 has no unit"),
         ({**LEAST, "bounds": {"turn_radius": -1}}, "connection.bounds.turn_radius: -1 is below 0"),
-        ({**LEAST, "bounds": {"acceleration": "1 m"}}, "'1 m' is no acceleration, such as"),
+        ({**LEAST, "bounds": {"acceleration": "1 m"}}, "'1 m' is a distance, not an acceleration"),
         ({**LEAST, "bounds": {"acceleration": "fast"}}, "connection.bounds.acceleration: 'fast'"),
         ({**LEAST, "bounds": {"acceleration": True}}, "connection.bounds.acceleration: True"),
     ],

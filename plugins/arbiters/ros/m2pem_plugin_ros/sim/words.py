@@ -117,15 +117,6 @@ def _number(key: str, value: Any) -> float:
     return number
 
 
-def _plain(key: str, value: Any) -> float:
-    """A number above 0; an acceleration may have its unit."""
-    text = value.removesuffix("m/s2").strip() if isinstance(value, str) else value
-    number = _number(key, text)
-    if number <= 0:
-        raise WordError(f"{key}: {value!r} is not above 0")
-    return number
-
-
 def _fraction(key: str, value: Any) -> float:
     percent = isinstance(value, str) and value.strip().endswith("%")
     number = _number(key, value.strip()[:-1] if percent else value) / (100 if percent else 1)
@@ -166,7 +157,7 @@ WORDS: Mapping[str, tuple[str, str, Read | None]] = {
     "battery": ("", "battery", _fraction),
     "max_speed": ("chassis", "speed_m_s", _SPEED),
     "max_reverse": ("chassis", "reverse_m_s", _positive(Dimension.SPEED, zero=True)),
-    "acceleration": ("chassis", "acceleration_m_s2", _plain),
+    "acceleration": ("chassis", "acceleration_m_s2", _positive(Dimension.ACCELERATION)),
     "turn_rate": ("chassis", "yaw_rate_rad_s", _positive(Dimension.ANGULAR_SPEED)),
     "turn_radius": ("chassis", "turn_radius_m", _NO_DISTANCE),
     "lag": ("chassis", "lag_s", _NO_DURATION),

@@ -56,6 +56,7 @@ class BaseDriver:
         self._pilot = Pilot(self._bounds, self._surroundings.outside_m)
         self._ended = EndedGoals()
         self._progress_told: UUID | None = None
+        self._interrupted: UUID | None = None
         self._warned: UUID | None = None
         self._looked_s = -math.inf
         self._trouble = ""
@@ -108,6 +109,8 @@ class BaseDriver:
             outcome = Outcome(BehaviorState.REJECTED, "REJECTED", str(error))
             self._loop.call_soon(self._tell_ended, order.goal, outcome)
             return
+        if order.goal == self._interrupted:
+            motion.take_up()
         self._pilot.begin(order.goal, motion)
 
     def end(self, goal: UUID) -> None:
@@ -136,7 +139,7 @@ class BaseDriver:
 
     async def look(self, order: Order) -> Outcome:
         """A goal of an earlier process is not known here: then only where the base stands tells,
-        and only if it can."""
+        and only if it can. If it is begun once more, it goes on from there."""
         if order.goal == self._pilot.goal:
             return Outcome(BehaviorState.RUNNING)
         ended = self._ended.outcome(order.goal)
@@ -150,6 +153,7 @@ class BaseDriver:
             with contextlib.suppress(RefusedError):
                 if self._motion(order.request).ends_at(pose):
                     return Outcome(BehaviorState.SUCCEEDED)
+        self._interrupted = order.goal
         return Outcome(BehaviorState.UNKNOWN, "", "nobody has driven the base meanwhile")
 
     def forget(self) -> None:

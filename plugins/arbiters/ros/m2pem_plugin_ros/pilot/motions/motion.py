@@ -34,6 +34,9 @@ class Motion(ABC):
     def found_at(self, place: Place, moved_m: float) -> None:  # noqa: B027  # most keep no place
         """The vehicle is at a place that it has not driven to, so far from where it was."""
 
+    def take_up(self) -> None:  # noqa: B027  # most begin anew
+        """A part of it was done before: go on from where the base stands, if that can be told."""
+
     def adjust(self, wishes: Wishes) -> None:
         """Go on with these; what is not given, or cannot be changed, stays as it is."""
         self._take_speed(wishes)

@@ -6,6 +6,7 @@ from m2pem_plugin_ros.pilot.approach import Approach
 from m2pem_plugin_ros.pilot.motions.motion import Motion
 from m2pem_plugin_ros.pilot.path import SHORTEST_M, Path
 from m2pem_plugin_ros.pilot.plane import Place, place_of
+from m2pem_plugin_ros.pilot.rejoining import next_waypoint
 from m2pem_plugin_ros.pilot.tour import Tour
 from m2pem_plugin_ros.pilot.wishes import Wishes
 from m2pem_plugin_ros.pilot.words import Ending, RefusedError, Scene, Wish
@@ -29,6 +30,7 @@ class SingleVehicleRouting(Motion):
         super().__init__(wishes, bounds)
         self.places = wishes.route()
         self._loop = wishes.flag("loop")
+        self._taken_up = False
         self._tour: Tour | None = None
         self._ends: Approach | None = None
         if self._loop and all(math.dist(p, self.places[0]) < SHORTEST_M for p in self.places):
@@ -57,6 +59,10 @@ class SingleVehicleRouting(Motion):
         if self._tour is not None and self._ends is None:
             self._tour.found_at(place, moved_m, self.bounds)
 
+    def take_up(self) -> None:
+        """Go on where the base stands on the route, if it comes by there once."""
+        self._taken_up = True
+
     def ends_at(self, pose: Pose) -> bool:
         """At the end of a route, if it does not begin there too."""
         end = self.places[-1]
@@ -68,7 +74,21 @@ class SingleVehicleRouting(Motion):
 
     def _path(self, pose: Pose) -> Path:
         here = place_of(pose)
-        near = math.dist(here, self.places[0]) <= JOIN_M + self.bounds.turn_radius_m
+        joins_m = JOIN_M + self.bounds.turn_radius_m
+        if self._taken_up and (path := self._rest(here, joins_m)) is not None:
+            return path
+        near = math.dist(here, self.places[0]) <= joins_m
         if near and len(self.places) > 1:
             return Path(self.places, 0 if self._loop else None)
         return Path((here, *self.places), 1 if self._loop else None)
+
+    def _rest(self, here: Place, within_m: float) -> Path | None:
+        """What is left of the route; with `loop`, of the lap, and then whole laps."""
+        lap = (*self.places, self.places[0]) if self._loop else self.places
+        following = next_waypoint(lap, here, within_m)
+        if following is None:
+            return None
+        if not self._loop:
+            return Path((here, *self.places[following:]))
+        rest = self.places[following:]
+        return Path((here, *rest, *self.places), 1 + len(rest))
