@@ -14,7 +14,7 @@ from ros_base_bench import BASE, Bench, bench, geo, point, route, until
 from m2pem.api import Area, BehaviorState, GeoPosition, ResourceId, VehiclePosition, VehicleState
 from m2pem.executive.clock import SystemClock
 
-SPEED = 4.0
+SPEED = 8.0
 """Of time: the peer and the driver's clock run so much faster than the world."""
 
 

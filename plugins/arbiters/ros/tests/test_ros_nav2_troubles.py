@@ -288,7 +288,8 @@ async def test_a_nav2_that_was_started_anew_knows_nothing_of_its_goal(
 async def test_a_nav2_that_has_ended_lets_its_order_fail(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("m2pem_plugin_ros.drivers.nav2.driver.GONE_S", 2.0)
+    monkeypatch.setattr("m2pem_plugin_ros.drivers.nav2.driver.GONE_S", 1.0)
+    monkeypatch.setattr("m2pem_plugin_ros.drivers.nav2.goal_client.ANSWER_S", 0.5)
     with reserved_domain() as domain, Peer(PEER, domain, ["/ugv1", "0", "0"]) as peer:
         async with bench(domain) as ugv1:
             goal = ugv1.begin("goto", target=away(ugv1))
@@ -296,7 +297,7 @@ async def test_a_nav2_that_has_ended_lets_its_order_fail(
             peer.kill()
             outcome = await ugv1.outcome(goal)
             assert (outcome.state, outcome.code) == (BehaviorState.FAILED, "FAILED")
-            assert outcome.reason == "Nav2 has not been heard for 2 s"
+            assert outcome.reason == "Nav2 has not been heard for 1 s"
             assert ugv1.driver.health.not_ready_reasons == ("Nav2 is not heard",)
 
 

@@ -12,6 +12,9 @@ from ros_node_bench import CANCELLED, LOST, RUNNING, SUCCEEDED, UNKNOWN, Bench, 
 from m2pem.api import Route
 
 NODE = Path(__file__).with_name("ros_onboard_peer.py")
+SPEED = 5.0
+"""Of time, for the vehicle and for who commands it."""
+
 ROUTE = Route(((38.0, -77.0, None), (38.001, -77.0, None)))
 
 
@@ -20,9 +23,9 @@ def via(request: pytest.FixtureRequest) -> Via:
     return Via(request.param)
 
 
-async def start_peer(domain: int, speed: int = 1) -> Peer:
+async def start_peer(domain: int) -> Peer:
     """A node that is there; the loop goes on while it starts."""
-    return await asyncio.to_thread(lambda: Peer(NODE, domain, [f"{speed}", "evsg1"]).__enter__())
+    return await asyncio.to_thread(lambda: Peer(NODE, domain, [f"{SPEED:g}", "evsg1"]).__enter__())
 
 
 async def end_peer(peer: Peer) -> None:
@@ -38,7 +41,7 @@ async def gone_on(one: Bench) -> None:
 async def test_a_start_before_the_node_is_there_is_done_once_it_is(
     ros_domain: int, via: Via
 ) -> None:
-    async with bench(ros_domain, "evsg1", via) as one:
+    async with bench(ros_domain, "evsg1", via, SPEED) as one:
         order = one.begin("single_vehicle_routing", route=ROUTE)
         peer = await start_peer(ros_domain)
         await one.running(order)
@@ -52,7 +55,7 @@ async def test_a_start_before_the_node_is_there_is_done_once_it_is(
 async def test_a_node_that_is_killed_and_restarted_has_lost_the_behavior(
     ros_domain: int, via: Via
 ) -> None:
-    async with bench(ros_domain, "evsg1", via) as one:
+    async with bench(ros_domain, "evsg1", via, SPEED) as one:
         peer = await start_peer(ros_domain)
         order = one.begin("single_vehicle_routing", route=ROUTE)
         await one.running(order)
@@ -67,19 +70,19 @@ async def test_a_node_that_is_killed_and_restarted_has_lost_the_behavior(
 
 
 async def test_both_sides_are_restarted_and_nothing_is_known(ros_domain: int, via: Via) -> None:
-    async with bench(ros_domain, "evsg1", via) as one:
+    async with bench(ros_domain, "evsg1", via, SPEED) as one:
         peer = await start_peer(ros_domain)
         order = one.begin("single_vehicle_routing", route=ROUTE)
         await one.running(order)
         peer.kill()
     again = await start_peer(ros_domain)
-    async with bench(ros_domain, "evsg1", via) as other:
+    async with bench(ros_domain, "evsg1", via, SPEED) as other:
         assert (await other.driver.look(order)).state is UNKNOWN
         await end_peer(again)
 
 
 async def test_nobody_is_there_to_be_looked_at(ros_domain: int) -> None:
-    async with bench(ros_domain, "evsg1", speed=5.0) as one:
+    async with bench(ros_domain, "evsg1", speed=SPEED) as one:
         found = await one.driver.look(one.order("drive_stop"))
         assert (found.state, found.reason) == (
             UNKNOWN,
@@ -89,10 +92,10 @@ async def test_nobody_is_there_to_be_looked_at(ros_domain: int) -> None:
 
 async def test_what_ended_while_nobody_listened_is_found(ros_domain: int, via: Via) -> None:
     peer = await start_peer(ros_domain)
-    async with bench(ros_domain, "evsg1", via) as one:
-        order = one.begin("hold", duration=0.5)
+    async with bench(ros_domain, "evsg1", via, SPEED) as one:
+        order = one.begin("hold", duration=2.5)
         await one.running(order)
-    async with bench(ros_domain, "evsg1", via) as other:
+    async with bench(ros_domain, "evsg1", via, SPEED) as other:
         if (found := await other.driver.look(order)).state is RUNNING:
             found = await other.end_of(order)
         assert found.state is SUCCEEDED
@@ -100,8 +103,8 @@ async def test_what_ended_while_nobody_listened_is_found(ros_domain: int, via: V
 
 
 async def test_a_node_that_hears_no_vehicle_any_more_says_it_is_lost(ros_domain: int) -> None:
-    peer = await start_peer(ros_domain, speed=5)
-    async with bench(ros_domain, "evsg1", speed=5.0) as one:
+    peer = await start_peer(ros_domain)
+    async with bench(ros_domain, "evsg1", speed=SPEED) as one:
         order = one.begin("single_vehicle_routing", route=ROUTE)
         await one.running(order)
         peer.process.send_signal(signal.SIGUSR1)

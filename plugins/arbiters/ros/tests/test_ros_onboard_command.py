@@ -14,7 +14,7 @@ from m2pem.api import Point, Route
 
 HERE = Path(__file__).parent
 ORIGIN = ["--origin", "38.0,-77.0,60"]
-NEAR = Point((38.00003, -77.0, None))
+NEAR = Point((38.00002, -77.0, None))
 FAR = Route(((38.00003, -77.0, None), (38.01, -77.0, None)))
 
 needs_base = pytest.mark.skipif(
@@ -24,7 +24,7 @@ needs_base = pytest.mark.skipif(
 
 @needs_base
 async def test_a_plain_base_does_behaviors_and_stands_when_the_node_ends(ros_domain: int) -> None:
-    command = ["--vehicle", "evsg1", *ORIGIN, "--loopback", "--set", "bounds.speed=1.5 m/s"]
+    command = ["--vehicle", "evsg1", *ORIGIN, "--loopback", "--set", "bounds.acceleration=4"]
     with (
         Peer(HERE / "ros_base_peer.py", ros_domain, ["/evsg1", "plain", "1"]),
         Peer(HERE / "ros_onboard_command.py", ros_domain, command) as node,
