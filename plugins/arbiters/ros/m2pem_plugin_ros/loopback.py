@@ -1,11 +1,14 @@
 """Keeps DDS on this machine: for simulated vehicles, demos and tests.
 
+`python -m m2pem_plugin_ros.loopback [DOMAIN]` prints it for a shell to evaluate.
+
 Of itself, DDS looks for peers on every network. The profile restricts it to the interface
 127.0.0.1, where peers find each other by multicast. The range LOCALHOST of ROS would not do: with
 it, DDS opens sockets of all interfaces.
 """
 
 import os
+import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -51,3 +54,13 @@ def keep_on_loopback() -> None:
 def is_kept() -> bool:
     """Whether this process is kept on 127.0.0.1."""
     return all(os.environ.get(name) == value for name, value in environment().items())
+
+
+def _export() -> None:
+    domain_id = int(sys.argv[1]) if len(sys.argv) > 1 else None
+    for name, value in environment(domain_id).items():
+        sys.stdout.write(f"export {name}={shlex.quote(value)}\n")
+
+
+if __name__ == "__main__":
+    _export()

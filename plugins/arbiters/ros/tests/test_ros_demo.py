@@ -1,0 +1,117 @@
+"""`make demo-ros`: simulated vehicles, an executive and an operator, over real DDS."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from m2pem_plugin_ros.testing import reserved_domain
+from ros_e2e_programs import SOURCES, until
+
+REPOSITORY = Path(__file__).parents[4]
+ENDED_WITHIN_S = 110.0
+
+
+class Demo:
+    """A target of make in a process group of its own, as a terminal has it."""
+
+    def __init__(self, target: str, domain: int, folder: Path) -> None:
+        # What is installed is what runs the tests.
+        words = ["make", "--silent", "-o", "ros", target, f"ROS_PYTHON={sys.executable}"]
+        # None of the variables of a make that runs the tests.
+        known = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
+        self.process = subprocess.Popen(
+            [*words, f"ROS_DOMAIN={domain}"],
+            cwd=REPOSITORY,
+            env={**known, "PYTHONPATH": os.pathsep.join(map(str, SOURCES)), "HOME": str(folder)},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+        self.lines: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip("\n"))
+
+    def until(self, line: str) -> None:
+        until(lambda: line in self.lines, lambda: self.lines[-20:], ENDED_WITHIN_S)
+
+    def rest(self) -> int:
+        """Its exit status, when all that it has started has ended, too."""
+        status = self.process.wait(ENDED_WITHIN_S)
+        self._reader.join(ENDED_WITHIN_S)
+        assert not self.members(), "something of it still runs"
+        return status
+
+    def members(self) -> list[int]:
+        """The processes of its group that are there."""
+        found = []
+        for stat in Path("/proc").glob("[0-9]*/stat"):
+            try:
+                _, _, fields = stat.read_text(encoding="utf-8", errors="replace").rpartition(")")
+            except OSError:  # it has ended meanwhile
+                continue
+            state, _, group = fields.split()[:3]
+            if int(group) == self.process.pid and state != "Z":
+                found.append(int(stat.parent.name))
+        return found
+
+    def end(self) -> None:
+        for pid in self.members():
+            os.kill(pid, signal.SIGKILL)
+        self.process.wait()
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    with reserved_domain() as domain:
+        yield domain
+
+
+def test_a_hazard_is_found_and_the_second_time_the_route_is_driven_to_its_end(
+    domain: int, tmp_path: Path
+) -> None:
+    demo = Demo("demo-ros-vehicle", domain, tmp_path)
+    try:
+        assert demo.rest() == 0, demo.lines[-20:]
+    finally:
+        demo.end()
+    first = demo.lines.index("started r1")
+    second = demo.lines.index("started r2")
+    assert "active: Reverse reverse evsg1" in demo.lines[first:second]
+    assert "p2 was answered by ros_operator: abort" in demo.lines[first:second]
+    assert "r1 is terminated: terminated by mission ended" in demo.lines
+    assert not any("Reverse" in line for line in demo.lines[second:])
+    assert "r2 is terminated: terminated by mission ended" in demo.lines[second:]
+    assert not any(re.search("WARNING|Traceback|refused", line) for line in demo.lines)
+
+
+def test_ctrl_c_ends_all_that_was_started(domain: int, tmp_path: Path) -> None:
+    demo = Demo("demo-ros-team", domain, tmp_path)
+    try:
+        demo.until("active: UserSendRoute")
+        os.killpg(demo.process.pid, signal.SIGINT)
+        assert demo.rest() != 0
+    finally:
+        demo.end()
+
+
+@pytest.mark.long
+def test_a_team_sweeps_a_road_and_crosses_a_bridge(domain: int, tmp_path: Path) -> None:
+    demo = Demo("demo-ros-team", domain, tmp_path)
+    try:
+        assert demo.rest() == 0, demo.lines[-20:]
+    finally:
+        demo.end()
+    assert "r1 is completed" in demo.lines
