@@ -98,9 +98,9 @@ def test_a_hazard_is_found_and_the_second_time_the_route_is_driven_to_its_end(
 
 
 def test_ctrl_c_ends_all_that_was_started(domain: int, tmp_path: Path) -> None:
-    demo = Demo("demo-ros-team", domain, tmp_path)
+    demo = Demo("demo-ros-vehicle", domain, tmp_path)
     try:
-        demo.until("active: UserSendRoute")
+        demo.until("r1 is running")
         os.killpg(demo.process.pid, signal.SIGINT)
         assert demo.rest() != 0
     finally:
