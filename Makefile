@@ -19,7 +19,8 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages demo demo-air demo-ros test test-long test-ros fuzz lint format docs pictures
+.PHONY: help setup python-packages npm-packages demo demo-air demo-ros demo-ros-vehicle demo-ros-team
+.PHONY: test test-long test-ros fuzz lint format docs pictures
 .PHONY: bench bench-quick conformance clean ros
 
 help: ## list the targets
@@ -117,30 +118,33 @@ demo-air: python-packages ## survey a field with simulated MAVLink vehicles, one
 	@$(AUTOPILOTS) --fault "$(LINK_LOST)" & autopilots=$$!; trap 'kill $$autopilots' EXIT; \
 	$(BIN)/m2pem run missions/survey_pair.bpmn --fleet fleet_configs/survey_pair.yaml --speed 10
 
-# A ROS domain of its own, so that nobody else on this machine is met.
-DEMO_DOMAIN := 96
-DEMO_SPEED := 10
-OPERATOR := $(ROS_PYTHON) examples/t22_operator_over_ros/ros_operator.py --by demo
+ROS_SPEED := 10
+# None of those that tests reserve, so that nobody else is met.
+ROS_DOMAIN := 101
+OPERATOR := examples/t22_operator_over_ros/ros_operator.py
 
-# Three processes: vehicles, the executive, and an operator who speaks ROS alone.
-# 1: the fleet; 2: the mission; 3: what the operator brings and answers
-define over_ros
-@eval "$$($(ROS_PYTHON) -m m2pem_plugin_ros.loopback $(DEMO_DOMAIN))"; \
-$(ROS)/bin/m2pem sim ros --fleet $(1) --speed $(DEMO_SPEED) & vehicles=$$!; \
-$(ROS)/bin/m2pem serve --fleet $(1) --ocu mocu --speed $(DEMO_SPEED) --journal memory: >/dev/null & executive=$$!; \
-trap 'kill $$vehicles $$executive 2>/dev/null; wait' EXIT; \
-$(OPERATOR) --mission $(2) $(3)
+# The simulated vehicles of a fleet ($(1)) and an executive for them, while an operator does $(2). What was
+# started ends with it, also by Ctrl-C: the executive first, so that it can leave its vehicles in good order.
+define OVER_ROS
+@eval "$$($(ROS_PYTHON) -m m2pem_plugin_ros.loopback $(ROS_DOMAIN))"; vehicles= executive=; \
+trap 'for each in $$executive $$vehicles; do kill $$each 2>/dev/null || true; wait $$each || true; done' EXIT; \
+exec 3< <(exec $(ROS_PYTHON) -m m2pem sim ros --fleet $(1) --speed $(ROS_SPEED) </dev/null); vehicles=$$!; \
+while read -r line <&3; do echo "$$line"; [ "$$line" != ready ] || break; done; \
+$(ROS_PYTHON) -m m2pem serve --fleet $(1) --ocu mocu --speed $(ROS_SPEED) --journal memory: >/dev/null & executive=$$!; \
+operate() { $(ROS_PYTHON) $(OPERATOR) --mission "missions/$$1.bpmn" --answers "$(dir $(ANSWERS))$$2.yaml"; }; \
+$(2)
 endef
 
-demo-ros: ros ## run two missions over ROS: vehicles reached in three ways, an operator who speaks ROS
-	@echo "The paper's mission over ROS. The radar finds a mine: the vehicle stops and reverses, and the operator aborts."
-	$(call over_ros,fleet_configs/vignette1_ros.yaml,missions/vignette1.bpmn,--answer UserSendRoute=continue --answer UserSendRoute=abort)
-	@echo; echo "The operator sends another route: nothing is found there, and it is driven to its end."
-	$(call over_ros,fleet_configs/vignette1_ros.yaml,missions/vignette1.bpmn,--answer UserSendRoute=continue \
-	  --set-route route_alpha=fleet_configs/routes/bravo.geojson)
-	@echo; echo "The first field test: a section of three vehicles, each of which is reached in another way."
-	$(call over_ros,fleet_configs/mehds_ros.yaml,missions/mehds_vignette_1.bpmn,--answer UserSendRoute=sweep \
-	  --answer UserConfirmHazard=hazard --answer UserSwitchRoute=continue --answer UserConfirmBridge=cross)
+demo-ros: demo-ros-vehicle demo-ros-team ## run missions on simulated ROS 2 vehicles, with an operator over ROS
+
+demo-ros-vehicle: ros
+	@echo "A ground vehicle with an m2pem node, $(ROS_SPEED) times as fast as a real one. Its radar finds a mine:"
+	@echo "continue; at the second prompt, abort. Then once more: nothing is left to be found, and the route is driven."
+	$(call OVER_ROS,fleet_configs/vignette1_ros.yaml,operate vignette1 vignette1_detection; operate vignette1 vignette1_route)
+
+demo-ros-team: ros
+	@echo "Three vehicles, reached in three ways, sweep a road as a team; one finds a mine, and they cross the bridge."
+	$(call OVER_ROS,fleet_configs/mehds_ros.yaml,operate mehds_vignette_1 mehds_vignette_1_swept)
 
 lint: setup ## check style, types and layers
 	@$(BIN)/ruff check .

@@ -1,23 +1,21 @@
 """Keeps DDS on this machine: for simulated vehicles, demos and tests.
 
+`python -m m2pem_plugin_ros.loopback [DOMAIN]` prints it for a shell to evaluate.
+
 Of itself, DDS looks for peers on every network. The profile restricts it to the interface
 127.0.0.1, where peers find each other by multicast. The range LOCALHOST of ROS would not do: with
 it, DDS opens sockets of all interfaces.
-
-`eval "$(python -m m2pem_plugin_ros.loopback)"` keeps the programs of a shell there; a number behind
-it is their ROS domain.
 """
 
 import os
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from m2pem_plugin_ros.installation import RosError
 
 PROFILE = Path(__file__).with_name("loopback.xml")
-LAST_DOMAIN = 101
 
 
 def environment(domain_id: int | None = None) -> Mapping[str, str]:
@@ -58,13 +56,11 @@ def is_kept() -> bool:
     return all(os.environ.get(name) == value for name, value in environment().items())
 
 
-def main(words: Sequence[str]) -> str:
-    """What a shell is to do, as `environment` says. `words`: the ROS domain, or nothing."""
-    if len(words) > 1 or not all(word.isdecimal() and int(word) <= LAST_DOMAIN for word in words):
-        return f"echo 'm2pem_plugin_ros.loopback takes a ROS domain, 0 to {LAST_DOMAIN}' >&2; false"
-    variables = environment(*map(int, words))
-    return "\n".join(f"export {name}={shlex.quote(text)}" for name, text in variables.items())
+def _export() -> None:
+    domain_id = int(sys.argv[1]) if len(sys.argv) > 1 else None
+    for name, value in environment(domain_id).items():
+        sys.stdout.write(f"export {name}={shlex.quote(value)}\n")
 
 
 if __name__ == "__main__":
-    print(main(sys.argv[1:]))
+    _export()

@@ -43,11 +43,13 @@ def fleet_file(
     length_m: float,
     name: str = "fleet",
     first: int = 0,
+    lost_after: str = "10 s",
     **settings: Any,
 ) -> Path:
     """A fleet of simulated vehicles, each at the beginning of the route that is called like it.
 
-    `first`: the lane of the first one. `settings`: of the fleet.
+    `first`: the lane of the first one. `lost_after`: in simulated time; a computer with much to do
+    may be busy otherwise for a second. `settings`: of the fleet.
     """
     content: dict[str, Any] = {
         "version": 1,
@@ -69,7 +71,7 @@ def fleet_file(
             "domain": "ground",
             "arbiter": "ros",
             "sitl": True,
-            "lost_after": "3 s",
+            "lost_after": lost_after,
             "connection": {"namespace": f"/{vehicle}", "sim": sim, **connection},
         }
         content["routes"][f"route_{vehicle}"] = f"{vehicle}.geojson"

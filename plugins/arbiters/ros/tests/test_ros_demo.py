@@ -1,75 +1,117 @@
-"""`make demo-ros`: two missions over DDS, by an operator in a process of its own."""
+"""`make demo-ros`: simulated vehicles, an executive and an operator, over real DDS."""
 
 import os
+import re
 import signal
 import subprocess
+import sys
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from m2pem_plugin_ros.loopback import environment, main
+from m2pem_plugin_ros.testing import reserved_domain
+from ros_e2e_programs import SOURCES, until
 
 REPOSITORY = Path(__file__).parents[4]
-ENDED_WITHIN_S = 400
+ENDED_WITHIN_S = 110.0
+
+
+class Demo:
+    """A target of make in a process group of its own, as a terminal has it."""
+
+    def __init__(self, target: str, domain: int, folder: Path) -> None:
+        # What is installed is what runs the tests.
+        words = ["make", "--silent", "-o", "ros", target, f"ROS_PYTHON={sys.executable}"]
+        # None of the variables of a make that runs the tests.
+        known = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
+        self.process = subprocess.Popen(
+            [*words, f"ROS_DOMAIN={domain}"],
+            cwd=REPOSITORY,
+            env={**known, "PYTHONPATH": os.pathsep.join(map(str, SOURCES)), "HOME": str(folder)},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+        self.lines: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip("\n"))
+
+    def until(self, line: str) -> None:
+        until(lambda: line in self.lines, lambda: self.lines[-20:], ENDED_WITHIN_S)
+
+    def rest(self) -> int:
+        """Its exit status, when all that it has started has ended, too."""
+        status = self.process.wait(ENDED_WITHIN_S)
+        self._reader.join(ENDED_WITHIN_S)
+        assert not self.members(), "something of it still runs"
+        return status
+
+    def members(self) -> list[int]:
+        """The processes of its group that are there."""
+        found = []
+        for stat in Path("/proc").glob("[0-9]*/stat"):
+            try:
+                _, _, fields = stat.read_text(encoding="utf-8", errors="replace").rpartition(")")
+            except OSError:  # it has ended meanwhile
+                continue
+            state, _, group = fields.split()[:3]
+            if int(group) == self.process.pid and state != "Z":
+                found.append(int(stat.parent.name))
+        return found
+
+    def end(self) -> None:
+        for pid in self.members():
+            os.kill(pid, signal.SIGKILL)
+        self.process.wait()
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    with reserved_domain() as domain:
+        yield domain
+
+
+def test_a_hazard_is_found_and_the_second_time_the_route_is_driven_to_its_end(
+    domain: int, tmp_path: Path
+) -> None:
+    demo = Demo("demo-ros-vehicle", domain, tmp_path)
+    try:
+        assert demo.rest() == 0, demo.lines[-20:]
+    finally:
+        demo.end()
+    first = demo.lines.index("started r1")
+    second = demo.lines.index("started r2")
+    assert "active: Reverse reverse evsg1" in demo.lines[first:second]
+    assert "p2 was answered by ros_operator: abort" in demo.lines[first:second]
+    assert "r1 is terminated: terminated by mission ended" in demo.lines
+    assert not any("Reverse" in line for line in demo.lines[second:])
+    assert "r2 is terminated: terminated by mission ended" in demo.lines[second:]
+    assert not any(re.search("WARNING|Traceback|refused", line) for line in demo.lines)
+
+
+def test_ctrl_c_ends_all_that_was_started(domain: int, tmp_path: Path) -> None:
+    demo = Demo("demo-ros-vehicle", domain, tmp_path)
+    try:
+        demo.until("r1 is running")
+        os.killpg(demo.process.pid, signal.SIGINT)
+        assert demo.rest() != 0
+    finally:
+        demo.end()
 
 
 @pytest.mark.long
-@pytest.mark.timeout(ENDED_WITHIN_S + 30)
-def test_two_missions_go_their_ways_to_their_ends(ros_domain: int) -> None:
-    demo = subprocess.Popen(
-        ["make", "--old-file=ros", "demo-ros", f"DEMO_DOMAIN={ros_domain}"],
-        cwd=REPOSITORY,
-        env={name: text for name, text in os.environ.items() if name != "MAKEFLAGS"},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        start_new_session=True,
-    )
+def test_a_team_sweeps_a_road_and_crosses_a_bridge(domain: int, tmp_path: Path) -> None:
+    demo = Demo("demo-ros-team", domain, tmp_path)
     try:
-        story, _ = demo.communicate(timeout=ENDED_WITHIN_S)
-    except subprocess.TimeoutExpired:
-        os.killpg(demo.pid, signal.SIGTERM)
-        story, _ = demo.communicate()
-    assert demo.returncode == 0, story
-    found, clear, section = story.split("\n\n")
-    assert told(found, "active: Reverse reverse evsg1", "r1 is terminated: ")
-    assert told(clear, "route route_alpha is handed over", "active: CallDetection, DriveRoute")
-    assert "reverse" not in clear
-    assert "r1 is terminated: " in clear
-    assert told(
-        section,
-        "evsg3: /evsg3, plain base",
-        "RouteSweep road_sweep evsg3 evsg2 evsg1",
-        "DriveStop drive_stop evsg1 evsg2 evsg3",
-        "Teleop teleop evsg2",
-        "answer to p2: hazard: taken",
-        "TraverseAlternate road_following_formation evsg2 evsg1 evsg3",
-        "BridgeCrossing bridge_crossing",
-        "FinalSweep road_sweep",
-        "r1 is completed",
-    )
-
-
-def told(story: str, *steps: str) -> bool:
-    """Whether the steps are told, in this order."""
-    at = 0
-    for step in steps:
-        at = story.find(step, at)
-        if at < 0:
-            print(f"not told, or not then: {step}")
-            return False
-    return True
-
-
-def test_a_shell_is_told_what_keeps_its_programs_on_this_machine() -> None:
-    wanted = environment(7)
-    script = f"{main(['7'])}\nenv"
-    done = subprocess.run(["sh", "-c", script], capture_output=True, text=True, check=True)
-    told_to = dict(line.split("=", 1) for line in done.stdout.splitlines() if "=" in line)
-    assert {name: told_to[name] for name in wanted} == dict(wanted)
-
-
-@pytest.mark.parametrize("words", [["102"], ["-1"], ["seven"], ["1", "2"]])
-def test_what_is_no_domain_is_refused(words: list[str]) -> None:
-    done = subprocess.run(["sh", "-c", main(words)], capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert "takes a ROS domain, 0 to 101" in done.stderr
+        assert demo.rest() == 0, demo.lines[-20:]
+    finally:
+        demo.end()
+    assert "r1 is completed" in demo.lines

@@ -166,6 +166,7 @@ def test_what_the_journal_does_not_know_of_is_neither_lost_nor_done_twice(
     assert_begun_once(watch, NEAR_M)
 
 
+@pytest.mark.long
 def test_after_too_long_an_outage_vehicles_are_held_and_drive_on_when_told_so(
     m2pem: Programs, watch: Watch
 ) -> None:

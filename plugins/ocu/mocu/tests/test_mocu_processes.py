@@ -112,6 +112,30 @@ def test_an_operator_in_another_process_runs_a_mission(
     assert "Traceback" not in printed
 
 
+def test_an_operator_that_is_killed_is_followed_by_another(
+    served: subprocess.Popen[str], operate: Operate, environment: dict[str, str]
+) -> None:
+    mission = str(EXAMPLE / "mission.bpmn")
+    first = subprocess.Popen(
+        [sys.executable, str(EXAMPLE / "ros_operator.py"), "--mission", mission],
+        env={**environment, "PYTHONPATH": ""},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert first.stdout is not None
+        assert any(line.startswith("p1 SendRoute asks") for line in first.stdout)
+    finally:
+        first.kill()
+        first.communicate()
+    second = operate("--run", "r1", "--answer", "SendRoute=continue", "--by", "bob")
+    assert second.returncode == 0, second.stdout
+    lines = second.stdout.splitlines()
+    for line in ("p1 was answered by bob: continue", "r1 is completed"):
+        assert line in lines, second.stdout
+
+
 def test_without_what_it_needs_the_executive_does_not_start(
     environment: dict[str, str],
 ) -> None:
