@@ -65,6 +65,7 @@ async def test_a_behavior_that_fails_says_with_which_code(one: Bench) -> None:
 async def test_what_cannot_be_done_is_rejected_with_a_reason(
     one: Bench, behavior: str, parameters: dict[str, object], reason: str
 ) -> None:
+    await one.until(lambda: one.driver.health.mode)
     before = one.begun
     end = await one.end_of(one.begin(behavior, **parameters))
     assert end.state is REJECTED
@@ -167,6 +168,7 @@ async def test_another_driver_finds_what_runs_and_what_has_ended(
     await one.end_of(ended)
     order = one.begin("single_vehicle_routing", route=ROUTE)
     await one.running(order)
+    await one.until(lambda: one.driver.health.mode)
     begun = one.begun
     await one.driver.close()
     async with bench(domain, "evsg1", via) as other:
@@ -185,6 +187,7 @@ async def test_a_start_of_what_is_done_already_begins_nothing(
     running = one.begin("single_vehicle_routing", route=ROUTE)
     await one.running(running)
     await one.until(lambda: one.begun)
+    await one.until(lambda: one.driver.health.mode)
     begun = one.begun
     await one.driver.close()
     async with bench(domain, "evsg1", via) as other:

@@ -12,8 +12,8 @@ from ros_node_bench import CANCELLED, LOST, RUNNING, SUCCEEDED, UNKNOWN, Bench, 
 from m2pem.api import Route
 
 NODE = Path(__file__).with_name("ros_onboard_peer.py")
-SPEED = 5.0
-"""Of time, for the vehicle and for who commands it."""
+SPEED = 2.0
+"""Of time, for the vehicle and for who commands it. A node has a second of it to say its last."""
 
 ROUTE = Route(((38.0, -77.0, None), (38.001, -77.0, None)))
 

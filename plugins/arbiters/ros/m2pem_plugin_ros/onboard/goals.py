@@ -17,6 +17,8 @@ from m2pem_plugin_ros.statuses import ENDS, Status, write_status
 
 CANCELING_WITHIN_S = 1.0
 POLL_S = 0.005
+ASKED_WITHIN_S = 0.5
+"""Who hears that a goal has ended asks for its result then, which takes so long at the most."""
 
 
 class Desk(Protocol):
@@ -39,6 +41,7 @@ class Goals:
         self._loop = asyncio.get_running_loop()
         self._waiting: defaultdict[str, set[asyncio.Queue[Status]]] = defaultdict(set)
         self._cancelled: set[bytes] = set()
+        self._ended_s: float | None = None
         self._server = ActionServer(
             node,
             ExecuteBehavior,
@@ -54,10 +57,13 @@ class Goals:
             queue.put_nowait(status)
 
     async def settled(self, within_s: float) -> None:
-        """Wait until all goals have ended, or for so many real seconds."""
+        """Wait until all goals have ended, or for so many real seconds; and until their results can
+        have been asked for."""
         deadline = self._loop.time() + within_s
         while self._waiting and self._loop.time() < deadline:  # noqa: ASYNC110  # at the end only
             await asyncio.sleep(POLL_S)
+        if self._ended_s is not None:
+            await asyncio.sleep(self._ended_s + ASKED_WITHIN_S - self._loop.time())
 
     def _cancel(self, handle: Any) -> CancelResponse:
         # In the thread of ROS, before the goal is shown as being canceled.
@@ -80,6 +86,7 @@ class Goals:
                 self._desk.cancel(command.id)
             return _result(await self._follow(handle, queue))
         finally:
+            self._ended_s = self._loop.time()
             self._waiting[command.id].discard(queue)
             if not self._waiting[command.id]:
                 del self._waiting[command.id]
