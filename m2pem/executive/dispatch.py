@@ -13,6 +13,7 @@ from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
 from m2pem.engine.commands import CancelBehavior, StartBehavior
 from m2pem.executive.arbiters import FleetArbiters
+from m2pem.executive.clearance import Clearance
 from m2pem.executive.script import Script
 from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
@@ -40,7 +41,8 @@ class _Active:
 
 
 class Dispatcher:
-    """`post` takes every report, those of arbiters and those made here."""
+    """`post` takes every report, those of arbiters and those made here. `clearance`: who keeps
+    aircraft apart; None: nobody."""
 
     def __init__(
         self,
@@ -50,6 +52,7 @@ class Dispatcher:
         geometries: Geometries,
         post: Callable[[BehaviorReport], None],
         script: Script | None = None,
+        clearance: Clearance | None = None,
     ) -> None:
         self._arbiters = arbiters
         self._availability = availability
@@ -57,6 +60,7 @@ class Dispatcher:
         self._geometries = geometries
         self._post = post
         self._script = script
+        self._clearance = clearance
         self._active: dict[str, _Active] = {}
         self._tails: dict[str, asyncio.Task[None]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
@@ -105,12 +109,23 @@ class Dispatcher:
         if active is not None and active.deadline is not None:
             active.deadline.cancel()
         self._availability.release(behavior)
+        if self._clearance is not None:
+            self._clearance.airspace.release(behavior)
 
     def adopt(self, behavior: str, resources: Iterable[str], number: int, arbiter: Arbiter) -> None:
         """After a restart: the arbiter has it already."""
         ids = [ResourceId(resource) for resource in resources]
         self._active[behavior] = _Active(arbiter, tuple(ids), number)
         self._availability.acquire(ids, behavior)
+
+    def occupy(self, command: StartBehavior) -> None:
+        """After a restart: the room that a behavior takes up which an arbiter has already."""
+        if self._clearance is None:
+            return
+        ids, kind = _ids(command.resources), BehaviorType(command.type)
+        spec = self.spec(ids, command.name, kind)
+        if spec is not None:
+            self._clearance.airspace.adopt(self.request(command, spec), kind)
 
     async def close(self) -> None:
         """Let calls under way end, drop what waits for a limit."""
@@ -159,7 +174,7 @@ class Dispatcher:
         return ""
 
     async def _start(self, command: StartBehavior) -> None:
-        ids = tuple(ResourceId(resource) for resource in command.resources)
+        ids = _ids(command.resources)
         kind = BehaviorType(command.type)
         serving = self._arbiters.serving(ids, command.name, kind)
         arbiter = serving or self._arbiters.of(ids[0])
@@ -182,6 +197,11 @@ class Dispatcher:
         except ParameterError as error:
             self._refuse(command.behavior, "REJECTED", str(error))
             return
+        if self._clearance is not None:
+            near = await self._clearance.refusal(request, spec)
+            if near:
+                self._refuse(command.behavior, "REJECTED", near)
+                return
         self._apply_script(command, arbiter)
         wrong = await self._call(f"start {command.behavior}", arbiter.start(request))
         if wrong and self._active.get(command.behavior) is active:
@@ -194,7 +214,7 @@ class Dispatcher:
             ParameterError: a parameter makes no sense.
         """
         run = command.behavior.partition(".")[0]
-        ids = tuple(ResourceId(resource) for resource in command.resources)
+        ids = _ids(command.resources)
         parameters = resolve(
             spec,
             command.parameters,
@@ -215,6 +235,8 @@ class Dispatcher:
     async def _turn(self, what: str, resource: ResourceId) -> None:
         """Hold or resume; asked in its turn, as a team may have taken the resource meanwhile."""
         arbiter = self._arbiters.holding(resource)
+        if self._clearance is not None and what == "hold":
+            self._clearance.airspace.delay(resource)
         call = arbiter.hold(resource) if what == "hold" else arbiter.resume(resource)
         await self._call(f"{what} {resource}", call)
 
@@ -270,5 +292,9 @@ class Dispatcher:
         self._post(BehaviorReport(behavior, number, BehaviorState.REJECTED, code, reason))
 
 
+def _ids(names: Iterable[str]) -> tuple[ResourceId, ...]:
+    return tuple(ResourceId(name) for name in names)
+
+
 def _resource_ids(roles: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[ResourceId, ...]]:
-    return {role: tuple(ResourceId(name) for name in names) for role, names in roles.items()}
+    return {role: _ids(names) for role, names in roles.items()}

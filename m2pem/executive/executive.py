@@ -26,6 +26,7 @@ from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
 from m2pem.errors import JournalError, NotDrivenError, OperatorError, PluginError
 from m2pem.executive.arbiters import FleetArbiters
+from m2pem.executive.clearance import clearance_for
 from m2pem.executive.control import Control
 from m2pem.executive.dispatch import Dispatcher
 from m2pem.executive.handover import Handover
@@ -119,8 +120,10 @@ class Executive:
         self.arbiters = FleetArbiters(
             fleet, plugins, context, simulated=simulated, settings=settings
         )
+        self._clearance = clear = clearance_for(fleet, clock)
+        where, post = self._geometry, self._post_report
         self.dispatcher = Dispatcher(
-            self.arbiters, self.availability, clock, self._geometry, self._post_report, script
+            self.arbiters, self.availability, clock, where, post, script, clear
         )
         self.handover = Handover(self.arbiters, self.availability)
         self.services = Services(
@@ -206,6 +209,8 @@ class Executive:
     async def _read_telemetry(self, arbiter: Arbiter) -> None:
         async for state in arbiter.telemetry():
             self.bus.publish(state)
+            if self._clearance is not None:
+                self._clearance.heard(state)
             if state.resource in self._lost and state.link is not LinkState.LOST:
                 self._lost.discard(state.resource)
                 self.handover.restore(state.resource)
@@ -347,6 +352,8 @@ class Executive:
         if not fault.reachable and not self.availability.reason(resource):
             self._lost.add(resource)
             self.availability.withdraw(resource, f"lost: {fault.reason}")
+            if self._clearance is not None:
+                self._clearance.airspace.lost(resource)
         with_team = self.arbiters.teams.fault(resource, fault.code, fault.reason)
         for runner in self.runners.values():
             if not with_team and fault.resource in runner.run.state.held:

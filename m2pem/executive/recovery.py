@@ -6,6 +6,7 @@ running is asked for at its arbiter. Nothing is sent again that may have been do
 
 import asyncio
 import logging
+from contextlib import suppress
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport
 from m2pem.engine import commands as c
@@ -63,6 +64,8 @@ async def take_over(
             continue
         arbiter = _arbiter(arbiters, behavior)
         dispatcher.adopt(behavior.id, behavior.resources, number, arbiter)
+        with suppress(ParameterError):
+            dispatcher.occupy(_as_commanded(runner, behavior))
         item = _what_to_post(arbiters, behavior, report)
         if item is None and too_long and behavior.phase is BehaviorPhase.ACTIVE:
             reason = f"nobody drove the mission for {outage_s:.0f} s"
@@ -85,21 +88,25 @@ def _recall(runner: Runner, arbiters: FleetArbiters, dispatcher: Dispatcher) -> 
             continue
         ids = tuple(ResourceId(name) for name in behavior.resources)
         spec = dispatcher.spec(ids, behavior.name, BehaviorType(behavior.type))
-        command = c.StartBehavior(
-            behavior.id,
-            behavior.element,
-            runner.epoch,
-            behavior.type,
-            behavior.name,
-            behavior.resources,
-            behavior.roles,
-            behavior.parameters,
-        )
         try:
             if spec is not None:
-                arbiters.teams.recall(dispatcher.request(command, spec))
+                request = dispatcher.request(_as_commanded(runner, behavior), spec)
+                arbiters.teams.recall(request)
         except ParameterError as error:
             log.warning("%s: it cannot be taken up again: %s", behavior.id, error)
+
+
+def _as_commanded(runner: Runner, behavior: Behavior) -> c.StartBehavior:
+    return c.StartBehavior(
+        behavior.id,
+        behavior.element,
+        runner.epoch,
+        behavior.type,
+        behavior.name,
+        behavior.resources,
+        behavior.roles,
+        behavior.parameters,
+    )
 
 
 def _arbiter(arbiters: FleetArbiters, behavior: Behavior) -> Arbiter:

@@ -75,7 +75,9 @@ class Fleet:
     """A whole fleet file, with the geometries that it names read in.
 
     `origin`: of the local ENU frame, (latitude deg, longitude deg, altitude m above mean sea
-    level). `fence`: name of an area that no vehicle may leave, or "".
+    level). `fence`: name of an area that no vehicle may leave, or "". `vertical_separation_m`: of
+    aircraft that are nearer than `horizontal_separation_m`; None: nobody keeps them apart.
+    `time_separation_s`: between aircraft at a place of crossing routes; None: these conflict.
     """
 
     name: str
@@ -88,6 +90,8 @@ class Fleet:
     max_outage_s: float | None = None
     fence: str = ""
     vertical_separation_m: float | None = None
+    horizontal_separation_m: float = 20.0
+    time_separation_s: float | None = None
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:

@@ -10,7 +10,7 @@ from m2pem.errors import FleetError
 from m2pem.model.catalogue import ResourceId
 from m2pem.model.geometry import Area, Coordinate, Geometry, Point, Route
 from m2pem.resources.fleet import Domain, Fleet, LostMemberPolicy, Payload, Team, Vehicle
-from m2pem.resources.fleet_schema import FleetModel, VehicleModel
+from m2pem.resources.fleet_schema import DeconflictionModel, FleetModel, VehicleModel
 from m2pem.resources.geofiles import GeometryError, read_geometry
 from m2pem.resources.nearmiss import suggest
 from m2pem.resources.shape_findings import note_shape_findings
@@ -146,6 +146,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         )
         for name, team in model.teams.items()
     }
+    apart = model.deconfliction
     return Fleet(
         name=model.name or Path(source.file).stem,
         file=source.file,
@@ -156,7 +157,9 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         origin=_origin(model, geometries),
         max_outage_s=model.max_outage,
         fence=model.fence or "",
-        vertical_separation_m=model.deconfliction.vertical if model.deconfliction else None,
+        vertical_separation_m=apart.vertical if apart else None,
+        horizontal_separation_m=(apart or DeconflictionModel()).horizontal,
+        time_separation_s=apart.time if apart else None,
     )
 
 

@@ -119,10 +119,20 @@ class TeamModel(_Model):
 
 
 class DeconflictionModel(_Model):
-    """How vehicles are kept apart."""
+    """How far apart aircraft are planned: one of the distances is always kept."""
 
     vertical: Annotated[
-        Distance | None, Field(description="Least vertical distance between aircraft.")
+        Distance, Field(gt=0, description="Least difference of height between aircraft.")
+    ] = 10.0
+    horizontal: Annotated[
+        Distance, Field(gt=0, description="Least distance on the map between aircraft.")
+    ] = 20.0
+    time: Annotated[
+        Annotated[Duration, Field(gt=0)] | None,
+        Field(
+            description="Least time between aircraft at a place of crossing routes. Without it "
+            "routes may not cross at one height.",
+        ),
     ] = None
 
 

@@ -38,7 +38,7 @@ routes: {alpha: alpha.geojson}
 areas: {field: field.geojson}
 points: {gate: gate.geojson}
 fence: field
-deconfliction: {vertical: 30 ft}
+deconfliction: {vertical: 30 ft, horizontal: 25 m, time: 1 min}
 """
 
 
@@ -50,6 +50,8 @@ def test_every_key_of_a_fleet_file_arrives_in_si(tmp_path: Path) -> None:
     assert fleet.max_outage_s == 120.0
     assert fleet.fence == "field"
     assert fleet.vertical_separation_m == pytest.approx(9.144)
+    assert fleet.horizontal_separation_m == 25.0
+    assert fleet.time_separation_s == 60.0
     evsg1 = fleet.vehicles["evsg1"]
     assert evsg1.domain is Domain.GROUND
     assert evsg1.settings == {"namespace": "/evsg1", "domain_id": 42}
@@ -212,3 +214,25 @@ def test_importing_the_package_loads_no_parser_of_files() -> None:
     code = "import sys, m2pem; print(sorted({'pydantic', 'ruamel', 'lxml'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("said", "apart"),
+    [
+        ("", (None, 20.0, None)),
+        ("deconfliction: {}\n", (10.0, 20.0, None)),
+        ("deconfliction: {horizontal: 5 m}\n", (10.0, 5.0, None)),
+    ],
+)
+def test_aircraft_are_kept_apart_only_where_the_fleet_says_so(
+    tmp_path: Path, said: str, apart: tuple[float | None, float, float | None]
+) -> None:
+    fleet = load_fleet(write_fleet(tmp_path, f"version: 1\n{said}"))
+    found = fleet.vertical_separation_m, fleet.horizontal_separation_m, fleet.time_separation_s
+    assert found == apart
+
+
+def test_a_distance_to_be_kept_is_more_than_none(tmp_path: Path) -> None:
+    with pytest.raises(FleetError) as refused:
+        load_fleet(write_fleet(tmp_path, "version: 1\ndeconfliction: {vertical: 0 m}\n"))
+    assert "deconfliction.vertical" in str(refused.value)
