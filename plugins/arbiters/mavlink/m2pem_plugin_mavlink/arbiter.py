@@ -19,6 +19,7 @@ from m2pem.api import (
     LinkState,
     Mailbox,
     PayloadState,
+    ResolvedValue,
     ResourceId,
     VehicleState,
 )
@@ -94,7 +95,7 @@ def _station(
 
 
 class MavlinkArbiter:
-    """Implements `m2pem.api.Arbiter`. What a fleet may say of it: docs/mavlink.md.
+    """Implements `m2pem.api.AdjustingArbiter`. What a fleet may say of it: docs/mavlink.md.
 
     Raises:
         PluginError: a connection cannot be used; the text names the resource and the key.
@@ -204,6 +205,18 @@ class MavlinkArbiter:
             for resource, helm in self._helms.items():
                 if self._ledger.holder(resource) == behavior:
                     helm.cancel(behavior)
+
+    async def adjust(
+        self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
+    ) -> None:
+        """Have the vehicle that does it go on at another `speed`; other parameters stay."""
+        speed_m_s = parameters.get("speed")
+        if not isinstance(speed_m_s, int | float) or speed_m_s <= 0:
+            return
+        if self._ledger.may_adjust(behavior, epoch):
+            for resource, helm in self._helms.items():
+                if self._ledger.holder(resource) == behavior:
+                    helm.adjust(behavior, float(speed_m_s))
 
     async def hold(self, resource: ResourceId) -> None:
         """Have a vehicle stand still at once."""

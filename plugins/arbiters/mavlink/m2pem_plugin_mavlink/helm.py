@@ -31,13 +31,15 @@ _HELD = frozenset({FlightMode.HOLD})
 @dataclass(slots=True)
 class _Flight:
     """A behavior that goes on. `begun`: the vehicle does it; `looked`: it was recognised on a
-    vehicle that had it already, and nothing need be sent."""
+    vehicle that had it already, and nothing need be sent. `speed_m_s`: to be told to the vehicle
+    while it goes on; None: nothing is."""
 
     id: BehaviorId
     behavior: Behavior
     begun: bool = False
     looked: bool = False
     cancelled: bool = False
+    speed_m_s: float | None = None
 
 
 class Helm:
@@ -99,6 +101,12 @@ class Helm:
         if flight is not None and flight.id == id_ and not flight.cancelled:
             flight.cancelled = True
             self._replace(lambda: self._cancel(flight))
+
+    def adjust(self, id_: BehaviorId, speed_m_s: float) -> None:
+        """Go on at another speed; who is held does so when it goes on."""
+        flight = self._flight
+        if flight is not None and flight.id == id_ and flight.behavior.adjust(speed_m_s):
+            flight.speed_m_s = speed_m_s
 
     def hold(self) -> None:
         """Stand still, and keep the behavior."""
@@ -201,7 +209,8 @@ class Helm:
         self._ledger.progress(flight.id)
 
     async def _until_finished(self, flight: _Flight) -> None:
-        steps = asyncio.get_running_loop().create_task(flight.behavior.steps())
+        create = asyncio.get_running_loop().create_task
+        steps, telling = create(flight.behavior.steps()), create(self._tell_speeds(flight))
         try:
             while not flight.behavior.finished():
                 if steps.done():
@@ -209,8 +218,20 @@ class Helm:
                 self._look(modes_of(flight.behavior))
                 await self.vehicle.sleep(LOOK_EVERY_S)
         finally:
-            steps.cancel()
-            await asyncio.gather(steps, return_exceptions=True)
+            for task in (steps, telling):
+                task.cancel()
+            await asyncio.gather(steps, telling, return_exceptions=True)
+
+    async def _tell_speeds(self, flight: _Flight) -> None:
+        """Beside the behavior, whose end must not wait for it; of several the newest counts."""
+        while True:
+            speed_m_s, flight.speed_m_s = flight.speed_m_s, None
+            if speed_m_s is not None:
+                try:
+                    await self.vehicle.driver.set_speed(speed_m_s)
+                except ExchangeError as error:
+                    self._logger.warning("%s keeps its speed: %s", self.vehicle.resource, error)
+            await self.vehicle.sleep(LOOK_EVERY_S)
 
     def _look(self, modes: frozenset[FlightMode]) -> None:
         if takeover := self._watch.taken_over(modes):

@@ -44,6 +44,11 @@ class Reverse(Behavior):
         way = [self._behind(self._from, self._yaw_rad, self._distance_m)]
         return self.job.fence.breach(way, self._from, lambda _: "the place behind it")
 
+    def adjust(self, speed_m_s: float) -> bool:
+        """It can."""
+        self._speed_m_s = speed_m_s
+        return True
+
     async def begin(self) -> None:
         """Set it to drive backwards, to a place somewhat beyond the distance."""
         if self._from is None or self._yaw_rad is None:

@@ -90,6 +90,11 @@ class Behavior(ABC):
     async def go_on(self) -> None:
         """Have the vehicle go on after it was held."""
 
+    def adjust(self, speed_m_s: float) -> bool:
+        """Mean to go on at that speed from now on; False: its speed cannot be changed. The vehicle
+        is told by the helm, and again by what is sent after a hold."""
+        return False
+
     async def steps(self) -> None:  # noqa: B027  # most have none
         """What must be done over and over while it goes on and is not held."""
 

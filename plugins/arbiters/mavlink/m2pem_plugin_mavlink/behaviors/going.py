@@ -84,6 +84,11 @@ class Goto(Behavior):
         """Send it there again."""
         await self.begin()
 
+    def adjust(self, speed_m_s: float) -> bool:
+        """It can."""
+        self.wishes.adjusted_m_s = speed_m_s
+        return True
+
     async def steps(self) -> None:
         """Go after a target that moves."""
         while self.wishes.target_vehicle is not None:

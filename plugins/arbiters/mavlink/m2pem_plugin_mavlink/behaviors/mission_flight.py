@@ -130,12 +130,19 @@ class MissionFlight(Behavior):
         if (speed := self.wishes.speed_m_s) is not None:
             await self.vehicle.driver.set_speed(speed)
 
+    def adjust(self, speed_m_s: float) -> bool:
+        """It can; what was uploaded stays as it is."""
+        self.wishes.adjusted_m_s = speed_m_s
+        return True
+
     async def steps(self) -> None:
         """Begin again at the end of a loop."""
         while self.loop:
             await self.vehicle.until(self.at_the_end)
             self._standing.forget()
             await self.vehicle.driver.start_mission(0)
+            if self.wishes.adjusted_m_s is not None:  # the mission begins with the speed before
+                await self.vehicle.driver.set_speed(self.wishes.adjusted_m_s)
             await self.vehicle.until(lambda: not self.at_the_end())
 
     def at_the_end(self) -> bool:

@@ -11,9 +11,11 @@ _WITH_HEIGHT = frozenset({"air", "subsurface"})
 
 
 class Wishes:
-    """What was asked for; what the vehicle's domain has no use for is left out."""
+    """What was asked for; what the vehicle's domain has no use for is left out. `adjusted_m_s`: the
+    speed that it was told on its way; None: none."""
 
     def __init__(self, job: Job) -> None:
+        self.adjusted_m_s: float | None = None
         self._job = job
         self._values = job.parameters
         self.has_height = job.vehicle.domain in _WITH_HEIGHT
@@ -34,8 +36,8 @@ class Wishes:
 
     @property
     def speed_m_s(self) -> float | None:
-        """As asked for, or else as `set_speed` has set it; None: the vehicle's own."""
-        return self.number("speed") or self._job.cruise_m_s
+        """As adjusted or asked for, or else as `set_speed` has set it; None: the vehicle's own."""
+        return self.adjusted_m_s or self.number("speed") or self._job.cruise_m_s
 
     @property
     def route(self) -> Route | None:
