@@ -12,6 +12,7 @@ from m2pem.api.arbiter import (
     BehaviorRequest,
     Connection,
     Limits,
+    ResolvedValue,
 )
 from m2pem.api.epochs import Epochs
 from m2pem.api.telemetry import Detection, PayloadState, VehicleState
@@ -38,7 +39,7 @@ LOST_AFTER_S = 3.0
 
 
 class SimArbiter:
-    """Implements `m2pem.api.arbiter.Arbiter`. What a fleet may say of it: docs/simulation.md.
+    """Implements `m2pem.api.AdjustingArbiter`. What a fleet may say of it: docs/simulation.md.
 
     `telemetry_hz`: of every resource that does not say its own; 0 tells of changes alone, so that
     nothing happens while nothing moves, and then links can't be watched by silence.
@@ -175,6 +176,26 @@ class SimArbiter:
         self._reach.command(
             execution, "cancel", lambda at_us: self._conductor.cancel(execution, at_us), now_us
         )
+
+    async def adjust(
+        self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
+    ) -> None:
+        """Go on at another `speed`, in m/s; other parameters stay."""
+        now_us = self._catch_up()
+        speed = parameters.get("speed")
+        execution = self._memory.executions.get(behavior)
+        if not self._epochs.admit(behavior, epoch):
+            self._logger.warning("adjust of %s ignored: epoch %d is past", behavior, epoch)
+        elif execution is None or execution.ended:
+            return
+        elif isinstance(speed, int | float) and speed > 0:
+            wished = float(speed)
+            self._reach.command(
+                execution,
+                "adjust",
+                lambda at_us: self._conductor.adjust(execution, wished, at_us),
+                now_us,
+            )
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """The report that holds now; UNKNOWN, with number 0, if the behavior is not known."""

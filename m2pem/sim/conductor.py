@@ -20,6 +20,11 @@ LONGEST_CATCH_UP_US = 3_600_000_000
 """A pursuit that nobody watched for longer begins again where it was so long ago."""
 
 
+ADJUSTABLE = frozenset({"single_vehicle_routing", "goto", "area_survey", "reverse"})
+"""Behaviors whose speed can be changed on the way: they are over at a place, not after a time, and
+no member of a team waits for the time that another one takes."""
+
+
 class Conductor:
     """Knows every behavior, running or remembered. All calls are made at their time `now_us`.
 
@@ -104,6 +109,19 @@ class Conductor:
         self._reschedule(execution, now_us)
         self.memory.save(execution)
         self._finish_cancelled(execution, now_us)
+
+    def adjust(self, execution: Execution, speed_m_s: float, now_us: int) -> None:
+        """Let its vehicles go on at another speed, if that is all that changes."""
+        if execution.ended or execution.cancelling or execution.deaf:
+            return
+        if execution.behavior not in ADJUSTABLE:
+            return
+        for part in execution.parts:
+            body = part.body
+            if isinstance(body, SimVehicle) and not part.done and body.adjust(speed_m_s, now_us):
+                self._schedule(execution, part)
+                self._changed(body, now_us)
+                self.memory.save(execution, body)
 
     def abandon(self, execution: Execution, reason: str, now_us: int) -> None:
         """Give a behavior up, because its vehicle is out of reach."""

@@ -73,10 +73,15 @@ def fit(
     return Profile(length, v_in, max(v_in, v_out, min(limit, peak)), v_out, accel, decel)
 
 
-def chain(pieces: Sequence[tuple[float, float]], accel: float, decel: float) -> tuple[Profile, ...]:
-    """Profiles over pieces of (length, speed limit) in a row, from rest to rest."""
+def chain(
+    pieces: Sequence[tuple[float, float]], accel: float, decel: float, v_in: float = 0.0
+) -> tuple[Profile, ...]:
+    """Profiles over pieces of (length, speed limit) in a row, from `v_in` to rest.
+
+    From there one must be able to stop at the end, and before each piece to be as slow as it asks.
+    """
     joints = [
-        0.0,
+        v_in,
         *(min(a, b) for (_, a), (_, b) in pairwise(pieces)),
         0.0,
     ]
@@ -87,6 +92,7 @@ def chain(pieces: Sequence[tuple[float, float]], accel: float, decel: float) -> 
     for index in range(len(pieces) - 1, -1, -1):
         length = pieces[index][0]
         joints[index] = min(joints[index], math.sqrt(joints[index + 1] ** 2 + 2 * decel * length))
+    joints[0] = v_in
     return tuple(
         fit(
             length,

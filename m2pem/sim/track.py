@@ -75,6 +75,11 @@ class Plan(Generic[S]):
         found = self.phases[index].at(inside)
         return found.slowed(0.0) if t >= self.duration_s else found
 
+    def place(self, t: float) -> tuple[int, float]:
+        """Which phase plan time `t` is in, and for how long it has been."""
+        index, inside, _ = self._find(t)
+        return index, inside
+
     def work(self, t: float) -> float:
         """Seconds of full battery load until plan time `t`."""
         index, inside, laps_work = self._find(t)

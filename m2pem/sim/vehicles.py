@@ -10,6 +10,7 @@ from m2pem.sim.domains import STANDING_LOAD
 from m2pem.sim.frame import Frame
 from m2pem.sim.manoeuvres import yaw_of
 from m2pem.sim.phases import Pose, Stand, Vector
+from m2pem.sim.retiming import retimed
 from m2pem.sim.settings import Settings
 from m2pem.sim.track import Plan, Track
 
@@ -84,6 +85,19 @@ class SimVehicle:
         """Take its path up again."""
         self._count(now_us)
         self.track.go_on(now_us)
+
+    def adjust(self, limit_m_s: float, now_us: int) -> bool:
+        """Keep to another speed on the rest of its path; False: it goes on as it did. Who is held
+        stays so."""
+        tau, _ = self.track.warp.at(now_us)
+        speed = self.pose(now_us).speed
+        plan = retimed(self.track.plan, tau, speed, limit_m_s, self.kinematics)
+        if plan is None:
+            return False
+        self.take(plan, now_us)
+        if self.held:
+            self.hold(now_us)
+        return True
 
     def _count(self, now_us: int) -> None:
         # What hovered until now has hovered, even if it stands on the ground later.
