@@ -4,8 +4,10 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from m2pem.model.geometry import Route, VehiclePosition
+from m2pem.model.geometry import Area, Route, VehiclePosition
 from m2pem.resources.lawn_mower import lawn_mower, longest_edge_yaw
+from m2pem.resources.parameters import accepted
+from m2pem.teams.bands import Pass, bands, strips, turned
 from m2pem.teams.plan import Leg, Plan, Setting, TeamRefusedError
 from m2pem.teams.shapes import SPACING_M
 
@@ -16,7 +18,11 @@ FLYING_STANDOFF_M = 30.0
 
 
 def survey(setting: Setting) -> Plan:
-    """The passes over the area in as many bands as there are members, the faster the wider."""
+    """The passes over the area in as many bands as there are members, the faster the wider.
+
+    Where all can survey an area themselves, with cameras that their arbiters trigger perhaps, each
+    is given the area of its band; else each moves along the passes.
+    """
     area = setting.area()
     if area is None:
         raise TeamRefusedError("parameter 'area': there is none")
@@ -33,34 +39,39 @@ def survey(setting: Setting) -> Plan:
         setting.motion(member).nominal_m_s if wished is None else 1.0 for member in setting.members
     ]
     passes = [tracks[index : index + 2] for index in range(0, len(tracks), 2)]
+    themselves = all("area_survey" in setting.offered[member] for member in setting.members)
+    behavior = "area_survey" if themselves else "single_vehicle_routing"
     legs: list[Leg] = []
-    for member, band in zip(setting.members, _bands(passes, weights), strict=True):
-        if band:
-            route = Route(tuple(setting.coordinate(place, None) for each in band for place in each))
-            parameters = {"route": route, "speed": wished}
-            legs.append(setting.leg(member, "single_vehicle_routing", parameters))
+    if themselves:
+        parts = strips(rings, passes, yaw, weights)
+        for member, ring in zip(setting.members, parts, strict=True):
+            if ring:
+                own = {
+                    **{name: setting.parameters.get(name) for name in ("speed", "overshoot")},
+                    "area": _band_area(setting, area, ring),
+                    "heading": (math.pi / 2 - yaw) % math.tau,
+                    "spacing": spacing,
+                }
+                legs.append(setting.leg(member, behavior, own))
+    else:
+        for member, band in zip(setting.members, bands(passes, weights), strict=True):
+            if band:
+                places = (setting.coordinate(place, None) for each in band for place in each)
+                parameters = {"route": Route(tuple(places)), "speed": wished}
+                legs.append(setting.leg(member, behavior, parameters))
     takes = {
-        member: frozenset(setting.offered[member]["single_vehicle_routing"].by_name)
-        for member in setting.members
+        member: frozenset(accepted(setting.offered[member][behavior])) for member in setting.members
     }
     return Plan(tuple(legs), shared=True, takes=takes)
 
 
-def _bands(
-    passes: Sequence[Sequence[tuple[float, float]]], weights: Sequence[float]
-) -> list[list[Sequence[tuple[float, float]]]]:
-    """The passes in their order, cut so that the ways over the area are as the weights."""
-    lengths = [math.dist(*each) for each in passes]
-    whole = sum(lengths) or 1.0
-    bands: list[list[Sequence[tuple[float, float]]]] = [[] for _ in weights]
-    done = 0.0
-    bounds = [sum(weights[: index + 1]) / sum(weights) for index in range(len(weights))]
-    for each, length in zip(passes, lengths, strict=True):
-        middle = (done + length / 2) / whole
-        index = next((i for i, bound in enumerate(bounds) if middle <= bound), len(bounds) - 1)
-        bands[index].append(each)
-        done += length
-    return bands
+def _band_area(setting: Setting, area: Area, rings: Sequence[Pass]) -> Area:
+    """A part of the area, at the height that it says."""
+    up_m = area.rings[0][0][2]
+    return Area(
+        tuple(tuple(setting.coordinate(corner, up_m) for corner in ring) for ring in rings),
+        area.altitude_frame,
+    )
 
 
 def observe(setting: Setting) -> Plan:
@@ -93,19 +104,10 @@ def _reach(
     """How far it is from the centre to the outermost edge in a direction."""
     found = 0.0
     for a, b in pairwise(ring):
-        (ax, ay), (bx, by) = (_turned(corner, centre, angle_rad) for corner in (a, b))
+        (ax, ay), (bx, by) = (turned(corner, centre, angle_rad) for corner in (a, b))
         if (ay <= 0) != (by <= 0):
             found = max(found, ax + (bx - ax) * ay / (ay - by))
     return found
-
-
-def _turned(
-    place: tuple[float, float], centre: tuple[float, float], angle_rad: float
-) -> tuple[float, float]:
-    """In a frame at the centre whose first axis points that way."""
-    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
-    east, north = place[0] - centre[0], place[1] - centre[1]
-    return east * cos + north * sin, north * cos - east * sin
 
 
 def escort(setting: Setting) -> Plan:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
 from m2pem.model.geometry import Area, Coordinate, Point, Route, VehiclePosition
+from m2pem.resources.parameters import accepted
 from m2pem.teams.motion import MOTIONS, Motion
 from m2pem.teams.path import Path
 from m2pem.teams.plane import MAX_RANGE_M, Plane
@@ -178,7 +179,7 @@ class Setting:
         taken = {
             name: value
             for name, value in given.items()
-            if value is not None and name in spec.by_name
+            if value is not None and name in accepted(spec)
         }
         return Leg(member, behavior, taken, after)
 

@@ -1,6 +1,8 @@
 """Plans of teams, without anything that moves."""
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -11,7 +13,10 @@ from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import ResourceId
 from m2pem.model.geometry import Point, Route, VehiclePosition
 from m2pem.resources.behaviors import SHARED
+from m2pem.resources.lawn_mower import lawn_mower
+from m2pem.resources.parameters import accepted
 from m2pem.resources.team_needs import TEAM_NEEDS
+from m2pem.teams.bands import strips
 from m2pem.teams.path import Path
 from m2pem.teams.plan import Plan, Setting, Stand, TeamRefusedError
 from m2pem.teams.plane import Plane
@@ -174,3 +179,75 @@ def test_a_reference_that_cannot_be_read_is_an_empty_one(text: str | None) -> No
 def test_a_reference_is_read_as_it_was_written() -> None:
     written = Reference({"a": "x", "a/b": None}, ("a",), {ResourceId("b"): "FAILED: why"}, 3)
     assert read_reference(written.text()) == written
+
+
+def ring_of(leg: Any) -> list[tuple[float, float]]:
+    """The corners of the area that a member surveys."""
+    return [PLANE.level(*corner[:2]) for corner in leg.parameters["area"].rings[0]]
+
+
+def test_who_can_survey_itself_is_given_the_area_of_its_band() -> None:
+    offered = (*OFFERED, "area_survey")
+    wished = setting(
+        "ground", "air", offered=offered, area=FIELD, spacing=5.0, altitude=40.0, overshoot=7.0
+    )
+    plan = PLANS["area_survey"](wished)
+    assert [leg.behavior for leg in plan.legs] == ["area_survey"] * 2
+    for leg in plan.legs:
+        given = {name: leg.parameters[name] for name in ("spacing", "overshoot", "heading")}
+        assert given == {"spacing": 5.0, "overshoot": 7.0, "heading": pytest.approx(math.pi / 2)}
+    slow, fast = plan.legs
+    assert "altitude" not in slow.parameters
+    assert fast.parameters["altitude"] == 40.0
+    assert sorted({round(north, 3) for _, north in ring_of(slow)}) == [0.0, 20.0]
+    assert sorted({round(north, 3) for _, north in ring_of(fast)}) == [20.0, 60.0]
+    assert plan.takes["v1"] == {*accepted(SHARED["area_survey", BehaviorType.VEHICLE])}
+
+
+@pytest.mark.parametrize("offered", [OFFERED, (*OFFERED, "area_survey")])
+def test_the_frame_of_an_altitude_goes_with_it(offered: tuple[str, ...]) -> None:
+    high = {"altitude": 140.0, "altitude_frame": "amsl"}
+    plan = PLANS["area_survey"](setting("air", "air", offered=offered, area=FIELD, **high))
+    for leg in plan.legs:
+        assert {name: leg.parameters[name] for name in high} == high
+        assert set(high) <= plan.takes[leg.member]
+
+
+def test_one_who_cannot_survey_itself_has_all_move_along_the_passes() -> None:
+    wished = setting("ground", "air", area=FIELD, offered=(*OFFERED, "area_survey"))
+    less = {name: SHARED[name, BehaviorType.VEHICLE] for name in OFFERED}
+    wished = replace(wished, offered={**wished.offered, ResourceId("v1"): less})
+    plan = PLANS["area_survey"](wished)
+    assert {leg.behavior for leg in plan.legs} == {"single_vehicle_routing"}
+
+
+def size_m2(ring: Any) -> float:
+    """Of a polygon."""
+    return abs(sum(a[0] * b[1] - b[0] * a[1] for a, b in pairwise(ring))) / 2
+
+
+@given(
+    st.lists(st.floats(20.0, 90.0), min_size=3, max_size=9),
+    st.integers(1, 4),
+    st.floats(2.0, 40.0),
+    st.floats(0.0, math.tau),
+)
+def test_the_bands_of_an_area_are_all_of_it_and_each_is_within_reach_of_its_own_passes(
+    radii: list[float], members: int, spacing: float, yaw: float
+) -> None:
+    angles = [math.tau * index / len(radii) for index in range(len(radii))]
+    corners = [(r * math.cos(a), r * math.sin(a)) for r, a in zip(radii, angles, strict=True)]
+    rings = [[*corners, corners[0]]]
+    tracks = lawn_mower(rings, spacing, yaw)
+    passes = [tracks[index : index + 2] for index in range(0, len(tracks), 2)]
+    parts = strips(rings, passes, yaw, [1.0] * members)
+    sizes = [size_m2(part[0]) for part in parts if part]
+    assert sum(sizes) == pytest.approx(size_m2(rings[0]), rel=1e-6)
+    assert len(sizes) == min(members, len(sizes))
+    for part in parts:
+        if part:
+            own = lawn_mower(part, spacing, yaw)
+            across = [east * -math.sin(yaw) + north * math.cos(yaw) for east, north in own]
+            for east, north in part[0]:
+                off = east * -math.sin(yaw) + north * math.cos(yaw)
+                assert min(abs(off - each) for each in across) <= spacing / 2 + 1e-6
