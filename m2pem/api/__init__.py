@@ -41,6 +41,9 @@ if TYPE_CHECKING:
         GeoPosition,
         LinkState,
         PayloadState,
+        TeamMemberState,
+        TeamState,
+        Telemetry,
         VehicleState,
     )
     from m2pem.engine.records import Record
@@ -81,7 +84,10 @@ _MODULES = {
     "m2pem.api.mailbox": "Mailbox",
     "m2pem.api.ocu": "Ocu",
     "m2pem.api.service": "Service ServiceContext ServiceError",
-    "m2pem.api.telemetry": "Detection GeoPosition LinkState PayloadState VehicleState",
+    "m2pem.api.telemetry": (
+        "Detection GeoPosition LinkState PayloadState TeamMemberState TeamState Telemetry"
+        " VehicleState"
+    ),
     "m2pem.engine.records": "Record",
     "m2pem.findings": "Finding Severity",
     "m2pem.model.behavior": "BehaviorType Decision",
@@ -159,6 +165,9 @@ __all__ = [
     "longest_edge_yaw",
     "parse_mission",
     "quantity",
+    "TeamMemberState",
+    "Telemetry",
+    "TeamState",
 ]
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 from uuid import UUID, uuid4
 
-from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.api.telemetry import Telemetry
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.model.geometry import Area
 from m2pem.model.values import Value
@@ -156,7 +156,7 @@ class Arbiter(Protocol):
         """Reports as they come, for one reader, until `close`."""
         ...
 
-    def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
+    def telemetry(self) -> AsyncIterator[Telemetry]:
         """States as they come, for one reader, until `close`."""
         ...
 

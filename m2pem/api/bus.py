@@ -1,9 +1,9 @@
-"""The fleet bus: telemetry of all resources, for arbiters, services and OCUs."""
+"""The fleet bus: telemetry of all resources and teams, for arbiters, services and OCUs."""
 
 from collections.abc import AsyncIterator
 from typing import Protocol
 
-from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.api.telemetry import PayloadState, Telemetry, VehicleState
 from m2pem.model.catalogue import ResourceId
 
 
@@ -18,6 +18,6 @@ class FleetBus(Protocol):
         """Make a state known; never blocks."""
         ...
 
-    def subscribe(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
+    def subscribe(self, size: int = 100) -> AsyncIterator[Telemetry]:
         """States from now on, for one reader; `size` of them wait at most."""
         ...

@@ -6,7 +6,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, Union
 
-from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.api.telemetry import Telemetry
 from m2pem.engine.records import Record
 from m2pem.findings import Finding
 from m2pem.model.behavior import Decision
@@ -173,7 +173,7 @@ class MissionControl(Protocol):
         """What is committed from this call on, and first the prompts that stand now."""
         ...
 
-    def telemetry(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
+    def telemetry(self, size: int = 100) -> AsyncIterator[Telemetry]:
         """Telemetry from now on; the oldest waiting is dropped when a reader is slow."""
         ...
 

@@ -7,6 +7,7 @@ Telemetry is never journaled; `m2pem.gateway.watch` turns what matters into inpu
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TypeAlias, Union
 
 from m2pem.model.catalogue import ResourceId
 
@@ -71,3 +72,37 @@ class PayloadState:
     detections: tuple[Detection, ...] = ()
     link: LinkState = LinkState.CONNECTED
     behavior: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class TeamMemberState:
+    """Where a member of a march is, beside where it should be.
+
+    `along_m`: how far it is ahead of its place beside the lead, along the route in metres; below 0:
+    behind. `aside_m`: how far off its own lane. `gap_m`: the way to the next one ahead in its lane;
+    None: there is none. What was not heard yet is not known: None.
+    """
+
+    resource: ResourceId
+    along_m: float | None = None
+    aside_m: float | None = None
+    gap_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TeamState:
+    """How well the members of a team behavior keep their places, while they march.
+
+    `behavior`: its id ("r1.b3"), `name` what it is ("road_sweep"). `members`: those who are not
+    lost, the lead first. `spacing_m`: between two of them.
+    """
+
+    behavior: str
+    name: str
+    time_us: int
+    members: tuple[TeamMemberState, ...]
+    spacing_m: float
+
+
+Telemetry: TypeAlias = Union[VehicleState, PayloadState, TeamState]
+"""What a bus and MissionControl tell. More kinds may come: pass by what you do not know."""

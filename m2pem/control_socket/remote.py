@@ -18,7 +18,7 @@ from m2pem.api.control import (
     SimulationResult,
     StampedRecord,
 )
-from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.api.telemetry import PayloadState, TeamState, Telemetry, VehicleState
 from m2pem.control_socket.place import ControlSocketError, address
 from m2pem.control_socket.protocol import LONGEST_LINE_BYTES, Request, line, result_of
 from m2pem.errors import OperatorError
@@ -33,7 +33,7 @@ from m2pem.resources.snapshot import restore
 
 _KINDS: dict[str, type] = {
     kind.__name__: kind
-    for kind in (StampedRecord, OpenPrompt, PromptClosed, VehicleState, PayloadState)
+    for kind in (StampedRecord, OpenPrompt, PromptClosed, VehicleState, PayloadState, TeamState)
 }
 
 
@@ -93,7 +93,8 @@ class RemoteControl:
             result_of(await reader.readline())
             while message := await reader.readline():
                 told = msgspec.json.decode(message, type=Request).params
-                yield msgspec.convert(told["value"], _KINDS[told["kind"]])
+                if told["kind"] in _KINDS:  # an executive of a later release may tell more
+                    yield msgspec.convert(told["value"], _KINDS[told["kind"]])
         finally:
             writer.close()
 
@@ -174,7 +175,7 @@ class RemoteControl:
         """What is committed from now on, and first the prompts that stand now."""
         return self._stream("subscribe", run=run, size=size)
 
-    def telemetry(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
+    def telemetry(self, size: int = 100) -> AsyncIterator[Telemetry]:
         """Telemetry from now on."""
         return self._stream("telemetry", size=size)
 

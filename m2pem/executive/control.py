@@ -15,7 +15,7 @@ from m2pem.api.control import (
     SimulationResult,
     StampedRecord,
 )
-from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.api.telemetry import Telemetry
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
@@ -152,7 +152,7 @@ class Control:
             subscription.put(prompt)
         return subscription
 
-    def telemetry(self, size: int = 100) -> AsyncIterator[VehicleState | PayloadState]:
+    def telemetry(self, size: int = 100) -> AsyncIterator[Telemetry]:
         """Telemetry from now on."""
         return self._executive.bus.subscribe(size)
 

@@ -19,7 +19,7 @@ from m2pem.api.arbiter import Arbiter, ArbiterContext, BehaviorReport
 from m2pem.api.clock import Clock
 from m2pem.api.control import RunId, SimulationResult
 from m2pem.api.service import ServiceContext
-from m2pem.api.telemetry import LinkState
+from m2pem.api.telemetry import LinkState, TeamState
 from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
 from m2pem.engine.records import Record
 from m2pem.engine.run import MissionRun
@@ -121,10 +121,8 @@ class Executive:
             fleet, plugins, context, simulated=simulated, settings=settings
         )
         self._clearance = clear = clearance_for(fleet, clock)
-        where, post = self._geometry, self._post_report
-        self.dispatcher = Dispatcher(
-            self.arbiters, self.availability, clock, where, post, script, clear
-        )
+        told = self._geometry, self._post_report
+        self.dispatcher = Dispatcher(self.arbiters, self.availability, clock, *told, script, clear)
         self.handover = Handover(self.arbiters, self.availability)
         self.services = Services(
             plugins.service,
@@ -211,6 +209,8 @@ class Executive:
             self.bus.publish(state)
             if self._clearance is not None:
                 self._clearance.heard(state)
+            if isinstance(state, TeamState):
+                continue
             if state.resource in self._lost and state.link is not LinkState.LOST:
                 self._lost.discard(state.resource)
                 self.handover.restore(state.resource)
@@ -352,7 +352,7 @@ class Executive:
         if not fault.reachable and not self.availability.reason(resource):
             self._lost.add(resource)
             self.availability.withdraw(resource, f"lost: {fault.reason}")
-            if self._clearance is not None:
+            if self._clearance:
                 self._clearance.airspace.lost(resource)
         with_team = self.arbiters.teams.fault(resource, fault.code, fault.reason)
         for runner in self.runners.values():

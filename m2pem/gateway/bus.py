@@ -5,7 +5,7 @@ import weakref
 from collections import deque
 from typing import TypeAlias, Union
 
-from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.api.telemetry import PayloadState, TeamState, Telemetry, VehicleState
 from m2pem.model.catalogue import ResourceId
 
 State: TypeAlias = Union[VehicleState, PayloadState]
@@ -22,14 +22,14 @@ class Subscription:
         if size < 1:
             raise ValueError(f"a subscription holds at least one state, not {size}")
         self.dropped = 0
-        self._waiting: deque[State] = deque(maxlen=size)
+        self._waiting: deque[Telemetry] = deque(maxlen=size)
         self._reader: asyncio.Future[None] | None = None
         self._closed = False
 
     def __aiter__(self) -> "Subscription":
         return self
 
-    async def __anext__(self) -> State:
+    async def __anext__(self) -> Telemetry:
         while not self._waiting:
             if self._closed:
                 raise StopAsyncIteration
@@ -47,7 +47,7 @@ class Subscription:
         self._waiting.clear()
         self.end()
 
-    def put(self, state: State) -> None:
+    def put(self, state: Telemetry) -> None:
         """Hand a state to the reader; for the bus alone."""
         if self._closed:
             return
@@ -82,11 +82,12 @@ class Bus:
         """The state heard last, or None before the first."""
         return self._latest.get(resource)
 
-    def publish(self, state: State) -> None:
+    def publish(self, state: Telemetry) -> None:
         """Make a state known; never blocks. After `close` it changes nothing."""
         if self._closed:
             return
-        self._latest[state.resource] = state
+        if not isinstance(state, TeamState):
+            self._latest[state.resource] = state
         for reference in self._subscriptions:
             subscription = reference()
             if subscription is not None:

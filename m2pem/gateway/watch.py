@@ -13,7 +13,7 @@ from math import isfinite
 
 from m2pem.api.bus import FleetBus
 from m2pem.api.clock import Clock
-from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
+from m2pem.api.telemetry import LinkState, PayloadState, TeamState, VehicleState
 from m2pem.engine.inputs import ResourceFault
 from m2pem.model.catalogue import ResourceId
 
@@ -167,6 +167,8 @@ async def watch(
     async with asyncio.TaskGroup() as group:
         checking = group.create_task(check(), name="watch links")
         async for state in states:
+            if isinstance(state, TeamState):
+                continue
             for fault in rules.heard(state, clock.now_us()):
                 sink(fault)
         checking.cancel()

@@ -14,7 +14,7 @@ from m2pem.api.arbiter import (
 )
 from m2pem.api.ledger import Ledger
 from m2pem.api.mailbox import Mailbox
-from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.api.telemetry import TeamMemberState, TeamState
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.resources.allocation import spelled_out
 from m2pem.resources.fleet import Fleet, LostMemberPolicy
@@ -27,6 +27,7 @@ from m2pem.teams.restart import FoundParts, look_for_parts
 from m2pem.teams.scene import Scene, Scheme
 
 REMEMBERED = 1_000
+STATES_WAITING = 1_000
 CANCEL_MARGIN_S = 1.0
 """So that a team can say which member did not end in time, before it is itself given up."""
 
@@ -68,7 +69,7 @@ class Teams:
         self._requests: dict[BehaviorId, BehaviorRequest] = {}
         self._remains: dict[BehaviorId, _Remains] = {}
         self._scripts: dict[BehaviorId, tuple[float, str, str]] = {}
-        self._states: Mailbox[VehicleState | PayloadState] = Mailbox()
+        self._states: Mailbox[TeamState] = Mailbox(STATES_WAITING)
 
     # --- what can be done -----------------------------------------------------------------------
 
@@ -190,8 +191,8 @@ class Teams:
         """Of team behaviors, each as one."""
         return self._ledger.reports()
 
-    def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
-        """Nothing: the members have arbiters of their own."""
+    def telemetry(self) -> AsyncIterator[TeamState]:
+        """How well teams on the march keep their places; members have arbiters of their own."""
         return self._states.read()
 
     async def close(self) -> None:
@@ -250,6 +251,11 @@ class Teams:
             else:
                 self._ledger.progress(request.id)
 
+        def show(kept: tuple[TeamMemberState, ...], spacing_m: float) -> None:
+            now_us = self._context.clock.now_us()
+            state = TeamState(request.id, request.behavior, now_us, kept, spacing_m)
+            self._states.put(state)
+
         members = {each: Member(each, self._arbiter_of(each), failed) for each in request.resources}
         behavior = TeamBehavior(
             request,
@@ -259,6 +265,7 @@ class Teams:
             lambda member: self._scene.look(member, scheme.plane),
             tell,
             lambda reference: self._ledger.refer(request.id, reference.text()),
+            show,
             goes_on=self._goes_on(request),
         )
         self._behaviors.pop(request.id, None)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
+from m2pem.api.telemetry import TeamMemberState
 from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.teams.marshal import Marshal
 from m2pem.teams.member import Member
@@ -30,7 +31,8 @@ Tell = Callable[[BehaviorState, str, str], None]
 
 class TeamBehavior:
     """`look`: where a member is seen now; None: nobody knows. `tell` is told RUNNING and the end;
-    `refer` the reference to keep before each word of RUNNING. `goes_on`: without a lost member.
+    `refer` the reference to keep before each word of RUNNING. `show`: how well members of a march
+    keep their places, and their spacing in metres. `goes_on`: without a lost member.
 
     All is synchronous, for reports must be taken in their order; what arbiters are asked for waits
     in the members.
@@ -45,6 +47,7 @@ class TeamBehavior:
         look: Callable[[ResourceId], Stand | None],
         tell: Tell,
         refer: Callable[[Reference], None],
+        show: Callable[[tuple[TeamMemberState, ...], float], None],
         *,
         goes_on: bool,
     ) -> None:
@@ -57,6 +60,7 @@ class TeamBehavior:
         self._look = look
         self._tell = tell
         self._refer = refer
+        self._show = show
         self._goes_on = goes_on
         self._shares = Shares(plan)
         steady = [each.id for each in members.values() if not each.adjustable]
@@ -340,3 +344,4 @@ class TeamBehavior:
                 seen[member.id] = stand
         for name, speed_m_s in marshal.step(seen, self._shares.arrived).items():
             self.members[name].go(speed_m_s, self.epoch)
+        self._show(marshal.kept(), marshal.spacing_m)

@@ -9,6 +9,7 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
+from m2pem.api.telemetry import TeamMemberState
 from m2pem.model.catalogue import ResourceId
 from m2pem.teams.columns import GAP_SHARE, lane_mates
 from m2pem.teams.plan import March, Marcher, Stand
@@ -23,7 +24,7 @@ _RESTART_SHARE = 0.1
 """Of the spacing: how much wider than needed a gap is when one who can but stop and go goes on."""
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class _Track:
     """What is known of a member: how far it is, along its own path and the team's route."""
 
@@ -31,6 +32,7 @@ class _Track:
     back_m: float
     along_m: float | None = None
     mark_m: float = -math.inf
+    off_m: float | None = None
     stands: bool = False
     arrived: bool = False
 
@@ -45,6 +47,11 @@ class Marshal:
             marcher.member: _Track(marcher, marcher.back_m) for marcher in march.marchers
         }
         self._slack_m = max(march.spacing_m / 2, _SLACK_S * march.speed_m_s)
+
+    @property
+    def spacing_m(self) -> float:
+        """Between two of them."""
+        return self._march.spacing_m
 
     @property
     def floor_m(self) -> float:
@@ -85,6 +92,26 @@ class Marshal:
                 wanted[track.marcher.member] = speed
         return wanted
 
+    def kept(self) -> tuple[TeamMemberState, ...]:
+        """How well the members keep their places, by what `step` saw last."""
+        known = [track for track in self._tracks.values() if track.mark_m > -math.inf]
+        states = []
+        for track in self._tracks.values():
+            member = track.marcher.member
+            if track not in known:
+                states.append(TeamMemberState(member))
+                continue
+            gap_m = self._free_m(track, known[: known.index(track)]) + self.floor_m
+            states.append(
+                TeamMemberState(
+                    member,
+                    -_lag_m(track, known[0]),
+                    track.off_m,
+                    gap_m if math.isfinite(gap_m) else None,
+                )
+            )
+        return tuple(states)
+
     def _look(self, track: _Track, stand: Stand | None, arrived: bool) -> None:
         path = track.marcher.path
         if arrived:
@@ -92,6 +119,7 @@ class Marshal:
         elif stand is not None:
             found_m = path.find(stand.place, track.along_m, _LOOK_AHEAD_M, stand.yaw_rad)
             track.along_m, track.mark_m = found_m, path.mark_m(found_m)
+            track.off_m = path.off_m(stand.place, found_m)
 
     def _speed(self, track: _Track, before: list[_Track], waits_m: float) -> float:
         """`waits_m`: how far the last of the others has fallen back behind this one."""

@@ -61,6 +61,15 @@ class Path:
                 return a + (b - a) * min(1.0, max(0.0, part))
         return self._marks[0]
 
+    def off_m(self, place: tuple[float, float], along_m: float) -> float:
+        """How far a place is from that one of the path."""
+        for index, (begin_m, end_m) in enumerate(pairwise(self._lengths)):
+            if along_m <= end_m or index == len(self._lengths) - 2:
+                a, b = self._places[index], self._places[index + 1]
+                part = (along_m - begin_m) / (end_m - begin_m) if end_m > begin_m else 1.0
+                return math.dist(place, (a[0] + (b[0] - a[0]) * part, a[1] + (b[1] - a[1]) * part))
+        return math.dist(place, self._places[0])
+
     def _nearest(
         self, place: tuple[float, float], from_m: float, to_m: float, yaw_rad: float | None
     ) -> tuple[float, float]:

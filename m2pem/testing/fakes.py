@@ -15,7 +15,7 @@ from m2pem.api.arbiter import (
     Connection,
     Limits,
 )
-from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.api.telemetry import Telemetry
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.model.values import Value
 from m2pem.resources.behaviors import SHARED
@@ -49,7 +49,7 @@ class FakeArbiter:
         self.limit = Limits()
         self._numbers: dict[BehaviorId, int] = {}
         self._reports: asyncio.Queue[BehaviorReport | None] = asyncio.Queue()
-        self._states: asyncio.Queue[VehicleState | PayloadState | None] = asyncio.Queue()
+        self._states: asyncio.Queue[Telemetry | None] = asyncio.Queue()
         self._changed = asyncio.Condition()
 
     # --- for the test ---------------------------------------------------------------------------
@@ -68,8 +68,8 @@ class FakeArbiter:
             BehaviorReport(behavior, number, state, code, reason, outputs=outputs or {})
         )
 
-    def say(self, state: VehicleState | PayloadState) -> None:
-        """Have a vehicle or payload send telemetry."""
+    def say(self, state: Telemetry) -> None:
+        """Have a vehicle, a payload or a team send telemetry."""
         self._states.put_nowait(state)
 
     async def until_called(self, what: str, subject: str | None = None, times: int = 1) -> None:
@@ -123,7 +123,7 @@ class FakeArbiter:
         while (report := await self._reports.get()) is not None:
             yield report
 
-    async def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
+    async def telemetry(self) -> AsyncIterator[Telemetry]:
         """States as the test makes them."""
         while (state := await self._states.get()) is not None:
             yield state

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from m2pem.api.control import OpenPrompt, PromptClosed, StampedRecord
-from m2pem.api.telemetry import GeoPosition, VehicleState
+from m2pem.api.telemetry import GeoPosition, TeamMemberState, TeamState, Telemetry, VehicleState
 from m2pem.control_socket.place import ControlSocketError
 from m2pem.control_socket.remote import RemoteControl
 from m2pem.errors import NotDrivenError, OperatorError
@@ -68,8 +68,17 @@ async def test_the_second_answer_is_refused_through_it_too(served: Served) -> No
     assert sorted(type(answer).__name__ for answer in answers) == ["NoneType", "OperatorError"]
 
 
-async def test_telemetry_passes(served: Served) -> None:
-    state = VehicleState(ResourceId("v1"), 5, GeoPosition(1.0, 2.0, 3.0), battery_fraction=0.5)
+MEMBERS = (TeamMemberState(ResourceId("v1"), -1.5, 0.25, None), TeamMemberState(ResourceId("v2")))
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        VehicleState(ResourceId("v1"), 5, GeoPosition(1.0, 2.0, 3.0), battery_fraction=0.5),
+        TeamState("r1.b1", "road_sweep", 5, MEMBERS, 15.0),
+    ],
+)
+async def test_telemetry_passes(served: Served, state: Telemetry) -> None:
     async with RemoteControl(served.path) as remote:
         stream = remote.telemetry()
         next_state = asyncio.ensure_future(anext(stream))

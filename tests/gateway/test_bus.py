@@ -4,7 +4,7 @@ import gc
 import pytest
 
 from m2pem.api.bus import FleetBus
-from m2pem.api.telemetry import VehicleState
+from m2pem.api.telemetry import TeamState, VehicleState
 from m2pem.gateway.bus import Bus, State, Subscription
 from m2pem.model.catalogue import ResourceId
 
@@ -145,3 +145,13 @@ async def test_subscribers_are_woken_in_the_order_in_which_they_subscribed() -> 
 def test_a_subscription_that_could_hold_nothing_is_refused() -> None:
     with pytest.raises(ValueError, match="at least one"):
         Bus().subscribe(size=0)
+
+
+async def test_what_a_team_tells_passes_and_is_nobodys_latest() -> None:
+    bus = Bus()
+    states = bus.subscribe()
+    team = TeamState("r1.b1", "road_sweep", 1, (), 15.0)
+    bus.publish(team)
+    bus.publish(state(2))
+    assert [await anext(states), await anext(states)] == [team, state(2)]
+    assert bus.latest(ResourceId("r1.b1")) is None

@@ -1,5 +1,6 @@
 """Team behaviors to their ends, on arbiters that know nothing of teams."""
 
+import asyncio
 import math
 from collections import Counter
 from itertools import pairwise
@@ -8,7 +9,7 @@ from typing import Any
 import pytest
 
 from m2pem.api.control import RunStatus
-from m2pem.api.telemetry import VehicleState
+from m2pem.api.telemetry import TeamState, VehicleState
 from m2pem.engine.records import BehaviorProgressed
 from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.resources.fleet import Domain
@@ -199,3 +200,34 @@ def test_members_of_different_arbiters_and_domains_march_as_one(
     assert min(gaps) > 15
     for name, place in {"a": (400, 0), "b": (370, 0), "c": (340, 0)}.items():
         assert math.dist(ends[name], place) < 1.0
+
+
+def test_how_well_a_march_keeps_its_places_is_told_while_it_lasts(play: Play) -> None:
+    async def story(world: World) -> Any:
+        told: list[TeamState] = []
+        states = world.executive.control.telemetry(10_000)
+
+        async def listen() -> None:
+            async for state in states:
+                if isinstance(state, TeamState):
+                    told.append(state)
+
+        listening = asyncio.create_task(listen())
+        await done(world, one_task("road_following_formation", route="bridge", spacing="20 m"))
+        await world.clock.sleep(1)
+        count = len(told)
+        await world.clock.sleep(20)
+        listening.cancel()
+        assert len(told) == count, "nobody marches any more"
+        return told
+
+    yard = Yard(a=(0, 0), b=(-20, 0), c=(-60, 0))
+    told = play(story, yard, geometries=BRIDGE)
+    assert {(each.behavior, each.name, each.spacing_m) for each in told} == {
+        ("r1.b1", "road_following_formation", 20.0)
+    }
+    assert [each.resource for each in told[0].members] == ["a", "b", "c"]
+    assert told[0].members[2].along_m == pytest.approx(-20.0, abs=2)
+    assert told[-1].members[2].along_m == pytest.approx(0.0, abs=2)
+    between = [(b.time_us - a.time_us) / 1e6 for a, b in pairwise(told)]
+    assert min(between) >= 0.2, "at most five times a second"

@@ -3,6 +3,7 @@
 import math
 from collections import deque
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -220,3 +221,46 @@ def test_who_is_abreast_stays_so_though_one_is_slow(
             bound_m = 2 * 9.0 + MOTIONS["ground"].stopping_m(6.0)
             assert max(marks) - min(marks) < bound_m, marks
     raise AssertionError("they have not arrived")
+
+
+def test_it_tells_how_well_each_keeps_its_place() -> None:
+    starts = [(0.0, 0.0), (-20.0, 0.0), (-40.0, 0.0), (-60.0, 0.0)]
+    field = Field([(0, 0), (500, 0)], starts, "column", 20.0, 4.0, frozenset(), 0.0, [2.0] * 4)
+    names = list(field.carts)
+    seen = {
+        names[0]: Stand((100.0, 0.0)),
+        names[1]: Stand((85.0, 0.0)),
+        names[2]: Stand((50.0, 3.0)),
+    }
+    assert all(each.along_m is None for each in field.marshal.kept())
+    field.marshal.step(seen)
+    first, second, third, unseen = field.marshal.kept()
+    assert (first.along_m, first.gap_m) == (pytest.approx(0.0, abs=0.01), None)
+    assert second.along_m == pytest.approx(5.0, abs=0.01)
+    assert second.gap_m == pytest.approx(15.0, abs=0.01)
+    assert third.along_m == pytest.approx(-10.0, abs=0.01)
+    assert third.aside_m == pytest.approx(3.0, abs=0.01)
+    assert third.gap_m == pytest.approx(35.0, abs=0.01)
+    assert (unseen.along_m, unseen.aside_m, unseen.gap_m) == (None, None, None)
+    field.marshal.drop(names[1])
+    assert [each.resource for each in field.marshal.kept()] == [names[0], names[2], names[3]]
+
+
+def test_members_abreast_have_no_gap_and_are_off_their_own_lanes() -> None:
+    field = Field(
+        [(0, 0), (500, 0)],
+        [(0.0, 0.0), (0.0, 20.0)],
+        "line",
+        20.0,
+        4.0,
+        frozenset(),
+        0.0,
+        [2.0] * 2,
+    )
+    one, two = field.carts
+    field.marshal.step({one: Stand((100.0, 0.0)), two: Stand((98.0, 21.0))})
+    lead, other = field.marshal.kept()
+    assert lead.gap_m is None
+    assert other.gap_m is None
+    assert other.along_m == pytest.approx(-2.0, abs=0.1)
+    assert other.aside_m == pytest.approx(1.0, abs=0.1)

@@ -13,7 +13,7 @@ from m2pem.api.arbiter import (
     ResolvedValue,
 )
 from m2pem.api.clock import Clock
-from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.api.telemetry import PayloadState, TeamState, VehicleState
 from m2pem.gateway.bus import Bus
 from m2pem.model.catalogue import BehaviorState, ResourceId
 
@@ -128,5 +128,7 @@ class ArbiterBench:
 
     async def _read_states(self) -> None:
         async for state in self.arbiter.telemetry():
+            if isinstance(state, TeamState):
+                continue
             self.states.append(state)
             self._news.set()

@@ -7,7 +7,7 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from m2pem_plugin_ros.runtime import RosRuntime
 
-from m2pem.api import MissionControl
+from m2pem.api import MissionControl, TeamState
 from m2pem.errors import M2pemError
 from m2pem_plugin_mocu.diagnostics import Health, Vehicles, diagnostics
 from m2pem_plugin_mocu.feed import Feed
@@ -45,7 +45,8 @@ class Examiner:
     async def listen(self) -> None:
         """Hear what vehicles say."""
         async for state in self._control.telemetry():
-            self._vehicles.hear(state)
+            if not isinstance(state, TeamState):
+                self._vehicles.hear(state)
 
     async def run(self) -> None:
         """Examine, and say what was found."""

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
+from m2pem.api.telemetry import (
+    LinkState,
+    PayloadState,
+    TeamMemberState,
+    TeamState,
+    Telemetry,
+    VehicleState,
+)
 from m2pem_plugin_terminal.words import shortened
 
 if TYPE_CHECKING:
@@ -24,6 +31,10 @@ LINKS = {
     LinkState.LOST: ("✗", "#e07a6a"),
 }
 NAME_CELLS = 9
+MARCH_FOR_S = 2.0
+"""What was told of a march is shown for so long."""
+
+AT_ITS_PLACE_M = 1.0
 LOW_BATTERY = 0.2
 
 
@@ -39,9 +50,13 @@ class Vehicles:
     def __init__(self, fleet: "Fleet") -> None:
         self._fleet = fleet
         self._heard: dict[str, _Heard] = {}
+        self._marching: dict[str, tuple[TeamMemberState, float]] = {}
 
-    def hear(self, state: VehicleState | PayloadState, now: float) -> None:
+    def hear(self, state: Telemetry, now: float) -> None:
         """Take telemetry in; `now` is the operator's clock, in seconds."""
+        if isinstance(state, TeamState):
+            self._marching.update({each.resource: (each, now) for each in state.members})
+            return
         self._heard[state.resource] = _Heard(state, now)
 
     def table(
@@ -66,8 +81,20 @@ class Vehicles:
                 lines += _silent(heard.state, age_s)
             else:
                 lines += _vehicle(heard.state, payloads, width, named)
+                lines += self._place(vehicle.id, now)
             lines += holders
         return Text("\n").join(lines)
+
+    def _place(self, vehicle: str, now: float) -> list[Text]:
+        """How well a member of a march keeps its place, as long as that is told."""
+        member, at = self._marching.get(vehicle, (None, 0.0))
+        if member is None or member.along_m is None or now - at > MARCH_FOR_S:
+            return []
+        text = f"{abs(member.along_m):.0f} m {'ahead' if member.along_m >= 0 else 'behind'}"
+        text = "in its place" if abs(member.along_m) < AT_ITS_PLACE_M else text
+        if member.gap_m is not None:
+            text += f", gap {member.gap_m:.0f} m"
+        return [Text(f"  {text}", DETAIL)]
 
 
 def _name(resource: str) -> str:

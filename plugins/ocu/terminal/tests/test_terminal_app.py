@@ -3,7 +3,14 @@
 from m2pem_plugin_terminal.tree import mission_tree
 from terminal_world import MISSION, World, scout
 
-from m2pem.api.telemetry import GeoPosition, LinkState, PayloadState, VehicleState
+from m2pem.api.telemetry import (
+    GeoPosition,
+    LinkState,
+    PayloadState,
+    TeamMemberState,
+    TeamState,
+    VehicleState,
+)
 from m2pem.model.catalogue import BehaviorState, ResourceId
 
 POINT = {"type": "Point", "coordinates": [-77.3, 38.1]}
@@ -107,6 +114,19 @@ async def test_vehicles_are_shown_with_all_that_matters(world: World) -> None:
         await terminal.until_shown("● scout      75%  5.0 m/s auto", "38.10750 -77.31920")
         await terminal.until_shown("◐ uav", "38.20000 -77.40000 +40 m", "eye: r9.b1")
         assert terminal.screen.count("drive_stop") == 3  # tree, log and vehicle
+
+
+async def test_a_member_of_a_march_is_shown_with_its_place(world: World) -> None:
+    async with world.terminal() as terminal:
+        await world.start()
+        member = TeamMemberState(ResourceId("scout"), -4.2, 0.3, 18.6)
+        world.fake.say(scout(0.75, behavior="r1.b1"))
+        world.fake.say(TeamState("r1.b1", "road_sweep", 0, (member,), 15.0))
+        await terminal.until_shown("● scout", "4 m behind, gap 19 m")
+        world.hand.now_s += 2.5
+        world.fake.say(scout(0.74, behavior="r1.b1"))
+        await terminal.until_shown("● scout      74%")
+        assert "behind" not in terminal.screen
 
 
 async def test_a_vehicle_that_falls_silent_is_greyed(world: World) -> None:
