@@ -80,6 +80,16 @@ def test_who_takes_off_without_an_altitude_is_asked_for_one() -> None:
     assert "two: nobody says how high it is to fly: give it an altitude: fly at 30 m" in said
 
 
+def test_a_return_comes_down_where_it_leads_to() -> None:
+    sky = airspace("one", "two")
+    sky.heard(state("one", 0, 0, 0))
+    sky.heard(state("one", 300, 0, 45))
+    sky.heard(state("two", 0, 10, 12))
+    assert "two, which flies at 12 m" in claim(sky, request("return_to_launch", "one"))
+    sky.heard(state("two", 150, 0, 12))
+    assert not claim(sky, request("return_to_launch", "one"))
+
+
 def test_a_follower_needs_a_height_of_its_own_wherever_it_goes() -> None:
     sky = airspace("one", "two", ground=("cart",))
     sky.heard(state("one", 0, 0, 40))
