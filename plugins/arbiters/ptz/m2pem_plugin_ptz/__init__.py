@@ -1,0 +1,1 @@
+"""Cameras that turn: over ROS, MAVLink and ONVIF (docs/ptz.md)."""

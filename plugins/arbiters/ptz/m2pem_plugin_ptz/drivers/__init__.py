@@ -1,0 +1,1 @@
+"""The ways to reach a camera that turns: over ROS, MAVLink and ONVIF."""
