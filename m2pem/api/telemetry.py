@@ -2,6 +2,8 @@
 
 Positions are WGS-84 (EPSG:4979): degrees, metres above mean sea level. Local vectors are ENU
 (REP-103). `yaw_rad` is from east, counter-clockwise (REP-103); headings for people are made of it.
+A positive `roll_rad` has the right side down, a positive `pitch_rad` the bow (REP-103; autopilots,
+who speak NED, have the other sign of pitch).
 Telemetry is never journaled; `m2pem.gateway.watch` turns what matters into inputs.
 """
 
@@ -62,7 +64,12 @@ class Detection:
 
 @dataclass(frozen=True, slots=True)
 class PayloadState:
-    """A payload at one moment. `detections`: found since the last state."""
+    """A payload at one moment. `detections`: found since the last state.
+
+    `pan_rad`: from the vehicle's bow, clockwise. `tilt_rad`: up from the vehicle's deck, or from
+    the horizon, if the payload keeps level by itself. `footprint`: the corners of what it sees of
+    the ground, in order; empty if it looks above the horizon, or its vehicle's place is unknown.
+    """
 
     resource: ResourceId
     time_us: int
@@ -72,6 +79,7 @@ class PayloadState:
     detections: tuple[Detection, ...] = ()
     link: LinkState = LinkState.CONNECTED
     behavior: str = ""
+    footprint: tuple[GeoPosition, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,1 +1,17 @@
 """Cameras that turn: over ROS, MAVLink and ONVIF (docs/ptz.md)."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from m2pem import hookimpl
+
+if TYPE_CHECKING:
+    from m2pem.api import Arbiter
+
+
+@hookimpl
+def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], None]") -> None:
+    """Register `ptz`."""
+    from m2pem_plugin_ptz.arbiter import PtzArbiter  # noqa: PLC0415  # starting up must be fast
+
+    register("ptz", PtzArbiter)

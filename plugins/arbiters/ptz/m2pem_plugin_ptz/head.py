@@ -1,7 +1,8 @@
 """Where a camera looks, and where it can.
 
-Pan is from the vehicle's bow, clockwise; tilt is up from the vehicle's deck; both as the camera is
-mounted, so that a vehicle that turns or rolls takes them along. Zoom 1 is the widest view.
+Pan is clockwise from where pan 0 points: the vehicle's bow, unless `Mounting` says otherwise. Tilt
+is up from the vehicle's deck, or from the horizon, for a camera that keeps that level. A vehicle
+that turns or rolls takes both along. Zoom 1 is the widest view.
 """
 
 import math

@@ -1,13 +1,19 @@
 """What a fleet says of the connection to a camera that turns (docs/ptz.md)."""
 
-from collections.abc import Mapping
+import difflib
+import math
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from m2pem.api import Connection, ResourceId
+from m2pem.api import Connection, Dimension, ResourceId, UnitError, quantity
+from m2pem.errors import PluginError
 from m2pem_plugin_ptz.head import Reach
+
+LONGEST_S = 2.0
+"""A camera that is later than that follows nothing."""
 
 
 class DriverName(StrEnum):
@@ -32,7 +38,8 @@ class Mounting:
 @dataclass(frozen=True, slots=True)
 class Settings:
     """`own`: the keys that are the driver's own, unread. `pictures`: the folder that pictures are
-    stored in; `stabilized`: the camera keeps its horizon level by itself."""
+    stored in; `stabilized`: the camera keeps its horizon level by itself. `delay_s`: so late it
+    does what it is told: what moves is aimed at where it will be then."""
 
     driver: DriverName
     reach: Reach = field(default_factory=Reach)
@@ -40,6 +47,7 @@ class Settings:
     pictures: Path = Path("pictures")
     stabilized: bool = False
     own: Mapping[str, Any] = field(default_factory=dict)
+    delay_s: float = 0.0
 
 
 def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[ResourceId, Settings]:
@@ -48,4 +56,146 @@ def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[Resource
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
     """
-    raise NotImplementedError
+    return {resource: _read(resource, each.settings) for resource, each in connections.items()}
+
+
+_KEYS = ("driver", "reach", "mounting", "pictures", "stabilized", "delay")
+_REACH = ("pan", "tilt", "zoom_max", "rate", "view", "endless")
+_MOUNTING = ("forward", "left", "up", "pan")
+_MISSPELT = 0.8
+_WIDEST_RAD = math.radians(170.0)
+
+
+def _read(resource: ResourceId, given: Mapping[str, Any]) -> Settings:
+    if "/" not in resource:
+        raise PluginError(
+            f"{resource}: the arbiter 'ptz' serves payloads; this is a vehicle: "
+            "name the arbiter of the camera under the vehicle's `payloads`"
+        )
+    for key in given:
+        near = difflib.get_close_matches(str(key), _KEYS, n=1, cutoff=_MISSPELT)
+        if near and key not in _KEYS:
+            raise _error(resource, str(key), f"there is no such setting; did you mean '{near[0]}'?")
+    names = [str(name) for name in DriverName]
+    driver = given.get("driver")
+    if driver not in names:
+        found = "it is missing" if driver is None else f"{driver!r} is no way to reach a camera"
+        raise _error(resource, "driver", f"{found}; say one of {', '.join(names)}")
+    pictures = given.get("pictures", "pictures")
+    if not isinstance(pictures, str) or not pictures.strip():
+        raise _error(resource, "pictures", f"{pictures!r} is no name of a folder")
+    return Settings(
+        DriverName(driver),
+        _reach(resource, _map(resource, "reach", given.get("reach", {}), _REACH)),
+        _mounting(resource, _map(resource, "mounting", given.get("mounting", {}), _MOUNTING)),
+        Path(pictures).expanduser(),
+        _flag(resource, "stabilized", given.get("stabilized", False)),
+        {key: value for key, value in given.items() if key not in _KEYS},
+        _quantity(resource, "delay", given.get("delay", 0.0), Dimension.DURATION, 0.0, LONGEST_S),
+    )
+
+
+def _reach(resource: ResourceId, given: Mapping[str, Any]) -> Reach:
+    usual = Reach()
+    endless = _flag(resource, "reach.endless", given.get("endless", False))
+    if endless and "pan" in given:
+        raise _error(resource, "reach.pan", "an endless camera has no pan stops; leave one out")
+    turn, right = 2 * math.tau, math.pi / 2
+    view = given.get("view", None)
+    if view is None:
+        view_rad = usual.view_rad
+    else:
+        width, height = _pair(resource, "reach.view", view)
+        view_rad = (
+            _quantity(resource, "reach.view", width, Dimension.ANGLE, 0.001, _WIDEST_RAD),
+            _quantity(resource, "reach.view", height, Dimension.ANGLE, 0.001, _WIDEST_RAD),
+        )
+    rate = given.get("rate")
+    return Reach(
+        _range(resource, "reach.pan", given.get("pan"), usual.pan_rad, turn),
+        _range(resource, "reach.tilt", given.get("tilt"), usual.tilt_rad, right),
+        _number(resource, "reach.zoom_max", given.get("zoom_max", usual.zoom_max), 1.0, 1000.0),
+        usual.rate_rad_s
+        if rate is None
+        else _quantity(resource, "reach.rate", rate, Dimension.ANGULAR_SPEED, 0.001, 100.0),
+        view_rad,
+        endless,
+    )
+
+
+def _mounting(resource: ResourceId, given: Mapping[str, Any]) -> Mounting:
+    usual = Mounting()
+
+    def metres(key: str, default: float) -> float:
+        value = given.get(key, default)
+        return _quantity(resource, f"mounting.{key}", value, Dimension.DISTANCE, -1000.0, 1000.0)
+
+    pan = given.get("pan")
+    return Mounting(
+        metres("forward", usual.forward_m),
+        metres("left", usual.left_m),
+        metres("up", usual.up_m),
+        0.0
+        if pan is None
+        else _quantity(resource, "mounting.pan", pan, Dimension.ANGLE, -math.tau, math.tau),
+    )
+
+
+def _range(
+    resource: ResourceId, key: str, value: Any, usual: tuple[float, float], most: float
+) -> tuple[float, float]:
+    if value is None:
+        return usual
+    low, high = (
+        _quantity(resource, key, end, Dimension.ANGLE, -most, most)
+        for end in _pair(resource, key, value)
+    )
+    if low >= high:
+        raise _error(resource, key, "the lowest comes first, such as [-90 deg, 30 deg]")
+    return low, high
+
+
+def _pair(resource: ResourceId, key: str, value: Any) -> tuple[Any, Any]:
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise _error(resource, key, f"{value!r} is not two angles, such as [-90 deg, 30 deg]")
+    return value[0], value[1]
+
+
+def _map(resource: ResourceId, key: str, value: Any, known: Collection[str]) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise _error(resource, key, f"{value!r} is not a map; known in it: {', '.join(known)}")
+    for name in value:
+        if name not in known:
+            near = difflib.get_close_matches(str(name), known, n=1)
+            hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
+            raise _error(resource, f"{key}.{name}", f"there is no such setting; {hint}")
+    return value
+
+
+def _flag(resource: ResourceId, key: str, value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise _error(resource, key, f"{value!r} is neither true nor false")
+    return value
+
+
+def _quantity(
+    resource: ResourceId, key: str, value: Any, dimension: Dimension, low: float, high: float
+) -> float:
+    try:
+        read = quantity(value, dimension)
+    except UnitError as error:
+        raise _error(resource, key, str(error)) from error
+    if not low <= read <= high:
+        raise _error(resource, key, f"{value!r} is not within {low:g} and {high:g} (SI)")
+    return read
+
+
+def _number(resource: ResourceId, key: str, value: Any, low: float, high: float) -> float:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not low <= value <= high:
+        raise _error(resource, key, f"{value!r} is not a number from {low:g} to {high:g}")
+    return float(value)
+
+
+def _error(resource: ResourceId, key: str, problem: str) -> PluginError:
+    return PluginError(f"{resource}: connection.{key}: {problem}")

@@ -1,0 +1,165 @@
+"""To look over an area, once: all of it, from wherever the vehicle is meanwhile."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from m2pem.api import Area
+from m2pem_plugin_ptz.behaviors.behavior import BehaviorFailedError, Job
+from m2pem_plugin_ptz.behaviors.sweeping import Sweeping
+from m2pem_plugin_ptz.geometry.area import places_of
+from m2pem_plugin_ptz.geometry.eye import Eye
+from m2pem_plugin_ptz.geometry.frames import Vector
+from m2pem_plugin_ptz.geometry.ground import visible
+from m2pem_plugin_ptz.geometry.rows import next_row
+from m2pem_plugin_ptz.head import Look
+
+OVERLAP = 0.2
+ENOUGH = 0.99
+"""Of the area: when so much was seen, and the rest cannot be, it has been looked over."""
+
+_SURE = 0.9
+"""Of the picture: its rim does not count, for a place stands for what is around it."""
+
+_MOVED = 0.25
+"""Of the view: when what is left has shifted by so much, the row is planned anew."""
+
+
+class ScanPolygon(Sweeping):
+    """In rows, from the farthest to the nearest. What the camera has seen is kept: whatever held it
+    up or moved it, it goes on with what is left."""
+
+    name = "ptz_scan_polygon"
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        self._places: Vector = np.empty((0, 3))
+        self._seen: NDArray[np.bool_] = np.zeros(0, dtype=bool)
+        self._given_up: NDArray[np.bool_] = np.zeros(0, dtype=bool)
+        self._row: NDArray[np.intp] | None = None
+        self._left_at_start = 0
+        self._planned_from: Vector = np.zeros(3)
+
+    def refusal(self) -> str:
+        """It must be able to see nearly all of the area from where it is now."""
+        if reason := self.sight.carrier.missing():
+            return reason
+        self._survey()
+        eye = self._eye()
+        reached = self._reached(eye)
+        share = float(reached.mean())
+        if share >= ENOUGH:
+            self._given_up = ~reached
+            return ""
+        over = ~visible(eye, self._places)
+        if float(over.mean()) > 1 - ENOUGH:
+            return f"{_percent(over.mean())} of the area is beyond the horizon of the camera"
+        reach = self.driver.reach
+        pan = (
+            "all round"
+            if reach.endless
+            else " to ".join(f"{math.degrees(end):.0f}" for end in reach.pan_rad)
+        )
+        tilt = " to ".join(f"{math.degrees(end):.0f}" for end in reach.tilt_rad)
+        return f"only {_percent(share)} of the area is within reach: pan {pan}, tilt {tilt} deg"
+
+    async def step(self, elapsed_s: float) -> bool:
+        """Done when everything was in the picture."""
+        eye = self._eye()
+        self._look(eye)
+        left = np.flatnonzero(~self._seen & ~self._given_up)
+        if self._row is not None and (self._row_seen() or self._shifted(eye)):
+            self._row = None
+        if not len(left):
+            return self._over()
+        if self._row is None:
+            self._plan(eye, left)
+        if self.sweep(elapsed_s):
+            self._look(eye)
+            row = self._row
+            if row is not None and int((~self._seen[row]).sum()) == self._left_at_start:
+                # The camera was there, and saw nothing more of it: nor would it the next time.
+                self._given_up[row] = True
+            self._row = None
+        return False
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _eye(self) -> Eye:
+        eye = self.sight.eye(self.sight.now_us)
+        if eye is None:
+            raise BehaviorFailedError(self.sight.carrier.missing())
+        return eye
+
+    def _survey(self) -> None:
+        area = self.job.parameters["area"]
+        assert isinstance(area, Area)  # the catalogue asks for one
+        ground_m = self.sight.carrier.ground_m()
+        self._places = places_of(area, self._eye(), self.view, ground_m)
+        self._seen = np.zeros(len(self._places), dtype=bool)
+        self._given_up = self._seen.copy()
+
+    def _overlap(self) -> float:
+        overlap = self.job.number("overlap")
+        return OVERLAP if overlap is None else overlap
+
+    def _reached(self, eye: Eye) -> NDArray[np.bool_]:
+        """Which places some look within reach has in the picture."""
+        reached = visible(eye, self._places)
+        vectors = eye.seen(self._places)
+        for index in np.flatnonzero(reached):
+            turn = self.sight.turn(*eye.deck.angles(vectors[index]))
+            reached[index] = turn.missing_rad <= _SURE * self.seen_rad()
+        return reached
+
+    def _look(self, eye: Eye) -> None:
+        """What is in the picture now, has been seen."""
+        look: Look | None = self.driver.look
+        if look is None:
+            return
+        left = np.flatnonzero(~self._seen)
+        axes = eye.deck.axes(look.pan_rad, look.tilt_rad)
+        held = self.view.holds(axes, eye.seen(self._places[left]), _SURE)
+        self._seen[left[held]] = True
+
+    def _row_seen(self) -> bool:
+        return bool(self._seen[self._row].all())
+
+    def _shifted(self, eye: Eye) -> bool:
+        """Whether the vehicle has moved so far that what is left is elsewhere in the picture."""
+        moved = float(np.linalg.norm(eye.place - self._planned_from))
+        if moved < 0.01 or self._row is None:
+            return False
+        nearest = float(np.linalg.norm(self._places[self._row] - eye.place, axis=1).min())
+        return moved > nearest * _MOVED * 2 * self.seen_rad()
+
+    def _plan(self, eye: Eye, left: NDArray[np.intp]) -> None:
+        here, _ = self.heading()
+        row = next_row(
+            eye.seen(self._places), left, self.view, self._overlap(), here, self._stop(eye)
+        )
+        self._row, self._planned_from = row.points, eye.place
+        self._left_at_start = len(row.points)
+        self.set_out(row.start_rad, row.end_rad, row.elevation_rad)
+
+    def _stop(self, eye: Eye) -> float | None:
+        """The heading over which the camera cannot turn."""
+        reach = self.driver.reach
+        low, high = reach.pan_rad
+        if reach.endless or high - low > math.tau + 1e-6:
+            return None
+        heading, _ = eye.deck.heading((low + high) / 2 + math.pi, 0.0)
+        return heading
+
+    def _over(self) -> bool:
+        share = float(self._seen.mean())
+        if share >= ENOUGH:
+            return True
+        raise BehaviorFailedError(
+            f"only {_percent(share)} of the area could be looked over: the rest is out of reach"
+        )
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
