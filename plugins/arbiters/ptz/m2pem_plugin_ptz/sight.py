@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime
 
-from m2pem.api import ArbiterContext, GeoPosition, Point, ResourceId, VehiclePosition
+from m2pem.api import ArbiterContext, GeoPosition, Point, ResourceId, VehiclePosition, VehicleState
 from m2pem_plugin_ptz.carrier import Carrier
 from m2pem_plugin_ptz.drivers.driver import CameraDriver
 from m2pem_plugin_ptz.geometry.eye import Deck, Eye, deck, eye
@@ -31,6 +31,8 @@ class Sight:
         self.context = context
         self.carrier = Carrier(ResourceId(resource.partition("/")[0]), domain, context)
         self._targets: dict[str, Carrier] = {}
+        self._seen_by: tuple[Look | None, VehicleState | None] = (None, None)
+        self._seen: tuple[GeoPosition, ...] = ()
 
     @property
     def now_us(self) -> int:
@@ -76,11 +78,16 @@ class Sight:
 
     def footprint(self, look: Look | None) -> tuple[GeoPosition, ...]:
         """What it sees of the ground; see `PayloadState.footprint`."""
+        state = self.carrier.state()
+        if (look, state) == self._seen_by:
+            return self._seen
         seeing = self.eye(self.now_us)
         if look is None or seeing is None:
             return ()
         axes = seeing.deck.axes(look.pan_rad, look.tilt_rad)
-        return footprint(seeing, axes, self.view(look), self.carrier.ground_m())
+        self._seen_by = (look, state)
+        self._seen = footprint(seeing, axes, self.view(look), self.carrier.ground_m())
+        return self._seen
 
 
 def iso(time_us: int) -> str:

@@ -12,6 +12,7 @@ from m2pem_plugin_ptz.geometry.area import places_of
 from m2pem_plugin_ptz.geometry.eye import Eye
 from m2pem_plugin_ptz.geometry.frames import Vector
 from m2pem_plugin_ptz.geometry.ground import visible
+from m2pem_plugin_ptz.geometry.limits import within
 from m2pem_plugin_ptz.geometry.rows import next_row
 from m2pem_plugin_ptz.head import Look
 
@@ -21,6 +22,9 @@ ENOUGH = 0.99
 
 _SURE = 0.9
 """Of the picture: its rim does not count, for a place stands for what is around it."""
+
+_ROW = 0.88
+"""Of the picture: no row is higher, so that the whole of it counts."""
 
 _MOVED = 0.25
 """Of the view: when what is left has shifted by so much, the row is planned anew."""
@@ -102,16 +106,15 @@ class ScanPolygon(Sweeping):
 
     def _overlap(self) -> float:
         overlap = self.job.number("overlap")
-        return OVERLAP if overlap is None else overlap
+        return max(OVERLAP if overlap is None else overlap, 1.0 - _ROW)
 
     def _reached(self, eye: Eye) -> NDArray[np.bool_]:
         """Which places some look within reach has in the picture."""
-        reached = visible(eye, self._places)
         vectors = eye.seen(self._places)
-        for index in np.flatnonzero(reached):
-            turn = self.sight.turn(*eye.deck.angles(vectors[index]))
-            reached[index] = turn.missing_rad <= _SURE * self.seen_rad()
-        return reached
+        vectors = vectors / np.linalg.norm(vectors, axis=1)[:, None]
+        directions = eye.deck.as_pan_zero_sees(vectors)
+        reached = within(self.driver.reach, directions, _SURE * self.seen_rad())
+        return reached & visible(eye, self._places)
 
     def _look(self, eye: Eye) -> None:
         """What is in the picture now, has been seen."""

@@ -2,12 +2,15 @@
 
 import math
 
-from m2pem_plugin_ptz.behaviors.aiming import Aiming
+from m2pem_plugin_ptz.behaviors.aiming import THERE_RAD, Aiming
 from m2pem_plugin_ptz.behaviors.behavior import BehaviorFailedError
 from m2pem_plugin_ptz.geometry.view import View
 
 _VIEWS_PER_S = 0.5
 """Without a wish of the mission: what is looked over stays in the picture for two seconds."""
+
+_LINGERS_S = 1.0
+"""At the end of a sweep, so long at most for a camera that does not get there quite."""
 
 _BEHIND = 0.25
 """Of the view: when the camera is farther behind, the sweep waits for it."""
@@ -20,6 +23,7 @@ class Sweeping(Aiming):
     _heading_rad = 0.0
     _end_rad = 0.0
     _stepped_s = 0.0
+    _ended_s = math.inf
 
     def wanted(self, at_us: int) -> tuple[float, float]:
         """Towards the heading at which the sweep is."""
@@ -43,6 +47,7 @@ class Sweeping(Aiming):
         """Look along this next."""
         self._heading_rad, self._end_rad = start_rad, end_rad
         self._elevation_rad = elevation_rad
+        self._ended_s = math.inf
 
     def sweep(self, elapsed_s: float) -> bool:
         """Go on; whether the end has been looked at.
@@ -61,7 +66,10 @@ class Sweeping(Aiming):
         left = self._end_rad - self._heading_rad
         step = min(abs(left), self.speed_rad_s() * passed_s)
         self._heading_rad += math.copysign(step, left)
-        return abs(left) <= step and off <= near_rad / 2
+        if abs(left) > step:
+            return False
+        self._ended_s = min(self._ended_s, elapsed_s)
+        return off <= THERE_RAD or elapsed_s - self._ended_s >= _LINGERS_S
 
     def heading(self) -> tuple[float, float]:
         """The heading and the elevation to which it looks now."""

@@ -45,6 +45,11 @@ class Deck:
         bearing, tilt = deck_angles(self.enu.T @ enu)
         return bearing - self.pan_zero_rad, tilt
 
+    def as_pan_zero_sees(self, enu: Vector) -> Vector:
+        """Directions of ENU, one in each row, in the frame of a deck whose bow is at pan 0."""
+        turned: Vector = enu @ self.enu @ enu_of_deck(0.0, 0.0, -self.pan_zero_rad)
+        return turned
+
     def vector(self, pan_rad: float, tilt_rad: float) -> Vector:
         """The direction, in ENU, of a pan and a tilt."""
         vector: Vector = self.enu @ deck_vector(pan_rad + self.pan_zero_rad, tilt_rad)

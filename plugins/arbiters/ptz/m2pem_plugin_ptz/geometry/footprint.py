@@ -3,11 +3,12 @@
 import math
 
 import numpy as np
+import pymap3d
 from numpy.typing import NDArray
 
 from m2pem.api import GeoPosition
 from m2pem_plugin_ptz.geometry.eye import Eye
-from m2pem_plugin_ptz.geometry.frames import Matrix, Vector, enu_vector, geodetic
+from m2pem_plugin_ptz.geometry.frames import Matrix, Vector, enu_vector
 from m2pem_plugin_ptz.geometry.ground import ranges_m
 from m2pem_plugin_ptz.geometry.view import View
 
@@ -15,6 +16,7 @@ RANGE_M = 5_000.0
 """Farther away nothing is said to be seen; a horizon that is nearer is the end, too."""
 
 _EACH_SIDE = 16
+_STEPS, _ROUNDS = 17, 3
 _ARC = 4
 """So many corners along the far end, where the view reaches beyond it."""
 
@@ -56,13 +58,12 @@ def _within(ranges: Vector, range_m: float) -> NDArray[np.bool_]:
 
 def _edge(eye: Eye, far: Vector, near: Vector, ground_m: float, range_m: float) -> Vector:
     """Between a direction that is beyond the range and one that is not: the last that is not."""
-    for _ in range(20):
-        middle = far + near
-        middle /= np.linalg.norm(middle)
-        if _within(ranges_m(eye, middle[None, :], ground_m), range_m)[0]:
-            near = middle
-        else:
-            far = middle
+    for _ in range(_ROUNDS):
+        rays = near + np.linspace(0.0, 1.0, _STEPS)[:, None] * (far - near)
+        rays /= np.linalg.norm(rays, axis=1)[:, None]
+        inside = _within(ranges_m(eye, rays, ground_m), range_m)
+        last = max(int(np.argmin(inside)) - 1, 0)
+        near, far = rays[last], rays[last + 1]
     return near
 
 
@@ -80,7 +81,8 @@ def _arc(start: Vector, end: Vector) -> list[Vector]:
 def _places(eye: Eye, rays: Vector, ground_m: float, range_m: float) -> tuple[GeoPosition, ...]:
     far = ranges_m(eye, rays, ground_m)
     far = np.where(np.isfinite(far), far, range_m)
+    places = eye.place + far[:, None] * (rays @ eye.enu)
     return tuple(
-        geodetic(eye.place + distance * (ray @ eye.enu))
-        for distance, ray in zip(far, rays, strict=True)
+        GeoPosition(float(latitude), float(longitude), float(altitude))
+        for latitude, longitude, altitude in zip(*pymap3d.ecef2geodetic(*places.T), strict=True)
     )

@@ -3,7 +3,10 @@
 import math
 from dataclasses import dataclass
 
-from m2pem_plugin_ptz.geometry.frames import between
+import numpy as np
+from numpy.typing import NDArray
+
+from m2pem_plugin_ptz.geometry.frames import Vector, between
 from m2pem_plugin_ptz.head import Reach
 
 _ROUNDING_RAD = 1e-9
@@ -38,11 +41,29 @@ def turn(
         why = f"tilt {_degrees(tilt_rad)} is beyond its limits, {_range(reach.tilt_rad)}"
     pan, stopped = _pan(reach, pan_rad, from_pan_rad, slack_rad)
     if stopped:
-        asked = _degrees(math.remainder(pan_rad, math.tau))
-        why = f"pan {asked} is beyond its stops, {_range(reach.pan_rad)}"
+        asked = 180 - (180 - round(math.degrees(pan_rad))) % 360
+        why = f"pan {asked} deg is beyond its stops, {_range(reach.pan_rad)}"
     missing = between((pan, tilt), (pan_rad, tilt_rad)) if why else 0.0
     # Straight up and down, no pan misses anything.
     return Turn(pan, tilt, missing, why) if missing > _ROUNDING_RAD else Turn(pan, tilt)
+
+
+def within(reach: Reach, vectors: Vector, bound_rad: float) -> NDArray[np.bool_]:
+    """Which directions (unit vectors of the deck as pan 0 sees it, one in each row) are no farther
+    than `bound_rad` from where a camera can look."""
+    forward, left, up = vectors.T
+    pan, tilt = np.arctan2(-left, forward), np.arcsin(np.clip(up, -1.0, 1.0))
+    near_tilt = np.clip(tilt, *reach.tilt_rad)
+    near_pan = pan
+    low, high = reach.pan_rad
+    if not reach.endless and high - low < math.tau:
+        beyond = (pan - low) % math.tau - (high - low)
+        nearer = np.where(beyond < (math.tau - (high - low)) / 2, high, low)
+        near_pan = np.where(beyond > 0, nearer, pan)
+    level = np.cos(near_tilt)
+    near = np.column_stack((level * np.cos(near_pan), -level * np.sin(near_pan), np.sin(near_tilt)))
+    reached: NDArray[np.bool_] = np.einsum("ij,ij->i", near, vectors) >= math.cos(bound_rad)
+    return reached
 
 
 def _pan(reach: Reach, wanted: float, start: float, slack: float) -> tuple[float, bool]:
