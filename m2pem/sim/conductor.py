@@ -3,6 +3,8 @@
 import logging
 from collections.abc import Callable, Collection, Mapping
 
+from msgspec.structs import replace
+
 from m2pem.api.arbiter import BehaviorRequest
 from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.sim.agenda import Agenda, Entry
@@ -71,12 +73,12 @@ class Conductor:
             other = self.memory.executions.get(preempted)
             if other is not None and not other.ended:
                 self._finish(other, Outcome(BehaviorState.CANCELLED), now_us, keep=taken)
-        self._links.report(execution, BehaviorState.ACCEPTED)
+        self._links.report(execution, Outcome(BehaviorState.ACCEPTED))
         execution.strike = strike
         for assignment in assignments:
             self._begin(execution, assignment, now_us)
         self.memory.note_of(execution, EffectKind.START, now_us)
-        self._links.report(execution, BehaviorState.RUNNING)
+        self._links.report(execution, Outcome(BehaviorState.RUNNING))
         self._reschedule(execution, now_us)
         self.memory.save(execution)
 
@@ -84,7 +86,7 @@ class Conductor:
         """Refuse a behavior before anything of it has happened."""
         execution.outcome = Outcome(BehaviorState.REJECTED, code, reason)
         self._logger.info("%s refused: %s", execution.id, reason)
-        self._links.report(execution, BehaviorState.REJECTED, code, reason)
+        self._links.report(execution, execution.outcome)
         self.memory.save(execution)
 
     def cancel(self, execution: Execution, now_us: int) -> None:
@@ -95,7 +97,8 @@ class Conductor:
         execution.cancelling = True
         execution.forget_timers()
         if execution.deaf:
-            execution.next_report(BehaviorState.CANCELLED)  # known to `query`, said to nobody
+            # Known to `query`, said to nobody.
+            execution.next_report(Outcome(BehaviorState.CANCELLED))
             self._finish(execution, Outcome(BehaviorState.CANCELLED), now_us)
             return
         for part in execution.parts:
@@ -128,7 +131,7 @@ class Conductor:
         outcome = Outcome(BehaviorState.LOST, "LINK_LOST", reason)
         if execution.ended:
             execution.outcome = outcome
-            self._links.report(execution, outcome.state, outcome.code, outcome.reason)
+            self._links.report(execution, outcome)
             self.memory.save(execution)
         else:
             self._finish(execution, outcome, now_us)
@@ -156,8 +159,7 @@ class Conductor:
                 continue  # the fleet has changed: nobody can tell any more
             self.memory.register(execution)
             if execution.outcome is not None and not execution.reported_end:
-                outcome = execution.outcome
-                self._links.report(execution, outcome.state, outcome.code, outcome.reason)
+                self._links.report(execution, execution.outcome)
             if execution.ended or execution.deaf:
                 continue
             for part in execution.parts:
@@ -192,6 +194,7 @@ class Conductor:
             self._step(execution, part, now_us)
         if assignment.cruise_m_s is not None and isinstance(body, SimVehicle):
             body.cruise_m_s = assignment.cruise_m_s
+        execution.shots = assignment.shots or execution.shots
         if assignment.limit_s is not None:
             execution.limit_s = max(execution.limit_s or 0.0, assignment.limit_s)
 
@@ -224,7 +227,7 @@ class Conductor:
     ) -> None:
         """End it; its bodies stop, but those in `keep`: another behavior takes them on the move."""
         execution.forget_timers()
-        execution.outcome = outcome
+        execution.outcome = outcome = self._with_shots(execution, outcome, now_us)
         for part in execution.parts:
             body = part.body
             if body.behavior != execution.id:
@@ -235,8 +238,23 @@ class Conductor:
                 self._settle(body, now_us)
         if execution.parts:
             self.memory.note_of(execution, EffectKind.END, now_us)
-        self._links.report(execution, outcome.state, outcome.code, outcome.reason)
+        self._links.report(execution, outcome)
         self.memory.save(execution)
+
+    def _with_shots(self, execution: Execution, outcome: Outcome, now_us: int) -> Outcome:
+        """With what was taken; of a camera that is lost, nobody has it."""
+        shots = execution.shots
+        if shots is None or outcome.state in (BehaviorState.LOST, BehaviorState.REJECTED):
+            return outcome
+        camera = next(each for each in execution.resources if "/" in each)
+        outputs = shots.outputs(
+            execution.id,
+            execution.watch.at(now_us)[0],
+            now_us,
+            self._launcher.lens(camera, now_us) if shots.count else None,
+            done=outcome.state is BehaviorState.SUCCEEDED,
+        )
+        return replace(outcome, outputs=dict(outputs))
 
     def _struck(self, execution: Execution, strike: Strike, now_us: int) -> None:
         execution.timer = None

@@ -8,10 +8,12 @@ import msgspec
 
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.model.values import Value
 from m2pem.sim.agenda import Entry
 from m2pem.sim.payloads import SimPayload
 from m2pem.sim.phases import Vector
 from m2pem.sim.pursuit import Pursuit
+from m2pem.sim.shots import Shots
 from m2pem.sim.track import Warp
 from m2pem.sim.vehicles import SimVehicle, carrier_of
 
@@ -29,11 +31,12 @@ Chase: TypeAlias = Union[Pursuit, Aim]
 
 
 class Outcome(msgspec.Struct, frozen=True):
-    """How a behavior ended."""
+    """How a behavior ended. `outputs`: what it writes to the mission's data store."""
 
     state: BehaviorState
     code: str = ""
     reason: str = ""
+    outputs: dict[str, Value] = msgspec.field(default_factory=dict)
 
 
 class Strike(msgspec.Struct, frozen=True):
@@ -69,7 +72,8 @@ class Execution:
     """One behavior. `watch` is its own time, which stops while its first body is held.
 
     `last`: the report given last, `number` its number. `outcome`: what physically became of it,
-    which may not have been reported yet; None while it lasts. `deaf`: it stalled.
+    which may not have been reported yet; None while it lasts. `deaf`: it stalled. `shots`: what it
+    takes.
     """
 
     id: BehaviorId
@@ -86,6 +90,7 @@ class Execution:
     deaf: bool = False
     cancelling: bool = False
     timer: Entry | None = None
+    shots: Shots | None = None
 
     @property
     def ended(self) -> bool:
@@ -102,10 +107,18 @@ class Execution:
         """Whether its terminal report was given."""
         return self.last is not None and self.last.state.terminal
 
-    def next_report(self, state: BehaviorState, code: str = "", reason: str = "") -> BehaviorReport:
+    def next_report(self, outcome: Outcome) -> BehaviorReport:
         """Make and remember the next report."""
         self.number += 1
-        self.last = BehaviorReport(self.id, self.number, state, code, reason, native_ref=self.id)
+        self.last = BehaviorReport(
+            self.id,
+            self.number,
+            outcome.state,
+            outcome.code,
+            outcome.reason,
+            native_ref=self.id,
+            outputs=outcome.outputs,
+        )
         return self.last
 
     def forget_timers(self) -> None:

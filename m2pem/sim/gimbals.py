@@ -8,6 +8,7 @@ from m2pem.sim.corners import turned
 from m2pem.sim.manoeuvres import nearest_edge, yaw_of
 from m2pem.sim.phases import Look, Pose, Slew, Vector
 from m2pem.sim.settings import Gimbal
+from m2pem.sim.shots import Shots
 from m2pem.sim.track import Plan
 from m2pem.sim.wishes import RefusedError, Wishes
 
@@ -45,11 +46,13 @@ class Gaze:
     """What a payload does. After `plan` it keeps aiming at `aim`, if there is one.
 
     `aim`: a vehicle's name, or a place. `limit_s`: how long the aiming lasts; None: for ever.
+    `shots`: the pictures or the video that it takes.
     """
 
     plan: Plan[Look]
     aim: str | Vector | None = None
     limit_s: float | None = None
+    shots: Shots | None = None
 
 
 class _Looks:
@@ -209,12 +212,15 @@ def _take_picture(mount: Mount, wishes: Wishes) -> Gaze:
     count = 1.0 if count is None else count
     interval = 1.0 if interval is None else interval
     shutter = mount.gimbal.shutter_s
-    return Gaze(_Looks(mount).stare((count - 1) * max(interval, shutter) + shutter).plan())
+    shots = Shots(int(count), max(interval, shutter), shutter)
+    plan = _Looks(mount).stare((shots.count - 1) * shots.every_s + shutter).plan()
+    return Gaze(plan, shots=shots)
 
 
 def _record(mount: Mount, wishes: Wishes) -> Gaze:
     seconds = wishes.number("duration")
-    return Gaze(_Looks(mount).stare(math.inf if seconds is None else seconds).plan())
+    plan = _Looks(mount).stare(math.inf if seconds is None else seconds).plan()
+    return Gaze(plan, shots=Shots())
 
 
 GAZES: Mapping[str, Callable[[Mount, Wishes], Gaze]] = {

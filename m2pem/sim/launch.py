@@ -4,22 +4,25 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from msgspec.structs import replace
+
 from m2pem.api.arbiter import ArbiterContext, BehaviorRequest, Connection
 from m2pem.api.refusal import refusal
-from m2pem.api.telemetry import VehicleState
+from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
 from m2pem.resources.nearmiss import suggest
 from m2pem.sim.abilities import payload_behaviors, vehicle_behaviors
 from m2pem.sim.executions import Aim, Body, Chase
 from m2pem.sim.frame import Frame
-from m2pem.sim.gimbals import GAZES
+from m2pem.sim.gimbals import GAZES, MAST_M
 from m2pem.sim.manoeuvres import MANOEUVRES, Manoeuvre
 from m2pem.sim.payloads import SimPayload
 from m2pem.sim.phases import Pose
+from m2pem.sim.shots import Shots
 from m2pem.sim.teams import TEAM_MANOEUVRES
 from m2pem.sim.track import Plan
-from m2pem.sim.vehicles import SimVehicle
+from m2pem.sim.vehicles import SimVehicle, carrier_of
 from m2pem.sim.wishes import RefusedError, Wishes
 
 
@@ -32,6 +35,7 @@ class Assignment:
     chase: Chase | None = None
     limit_s: float | None = None
     cruise_m_s: float | None = None
+    shots: Shots | None = None
 
 
 class Launcher:
@@ -64,6 +68,14 @@ class Launcher:
         up = state.position.altitude_m - self._frame.origin[2]
         velocity = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
         return Pose((*level, up), state.yaw_rad or 0.0, velocity)
+
+    def lens(self, payload: ResourceId, now_us: int) -> GeoPosition | None:
+        """Where a payload is; None: where its vehicle is, is not known."""
+        pose = self.whereabouts(carrier_of(payload), now_us)
+        if pose is None:
+            return None
+        east, north, up = pose.place
+        return self._frame.geo((east, north, up + MAST_M))
 
     def assign(self, request: BehaviorRequest, now_us: int) -> list[Assignment]:
         """What each of the request's resources does.
@@ -138,7 +150,8 @@ class Launcher:
             chase = Aim(gaze.aim)
         elif gaze.aim is not None:
             chase = Aim("", gaze.aim)
-        return Assignment(body, gaze.plan, chase, gaze.limit_s)
+        shots = None if gaze.shots is None else replace(gaze.shots, began_us=now_us)
+        return Assignment(body, gaze.plan, chase, gaze.limit_s, shots=shots)
 
 
 def _type(behavior: str, vehicles: int) -> BehaviorType | None:

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.api.mailbox import Mailbox
 from m2pem.model.catalogue import BehaviorState, ResourceId
-from m2pem.sim.executions import Execution
+from m2pem.sim.executions import Execution, Outcome
 
 
 @dataclass(slots=True)
 class _Broken:
     """A broken link. `lost`: it has been for so long that the arbiter has given up."""
 
-    reports: list[tuple[Execution, BehaviorState, str, str]] = field(default_factory=list)
+    reports: list[tuple[Execution, Outcome]] = field(default_factory=list)
     commands: list[tuple[str, Callable[[int], None]]] = field(default_factory=list)
     lost: bool = False
 
@@ -43,17 +43,15 @@ class Links:
         """The first of a behavior's vehicles that is not heard."""
         return next((vehicle for vehicle in execution.carriers if not self.up(vehicle)), None)
 
-    def report(
-        self, execution: Execution, state: BehaviorState, code: str = "", reason: str = ""
-    ) -> None:
+    def report(self, execution: Execution, outcome: Outcome) -> None:
         """Say what became of a behavior, as soon as it can be known."""
         if execution.reported_end:
             return
         vehicle = self.broken_of(execution)
-        if vehicle is None or state is BehaviorState.LOST:
-            self._emit(execution, state, code, reason)
+        if vehicle is None or outcome.state is BehaviorState.LOST:
+            self._emit(execution, outcome)
         else:
-            self._broken[vehicle].reports.append((execution, state, code, reason))
+            self._broken[vehicle].reports.append((execution, outcome))
 
     def cut(self, vehicle: ResourceId) -> None:
         """Break a link."""
@@ -84,12 +82,12 @@ class Links:
         broken = self._broken.pop(vehicle, None)
         if broken is None:
             return
-        for execution, state, code, reason in broken.reports:
-            self.report(execution, state, code, reason)
+        for execution, outcome in broken.reports:
+            self.report(execution, outcome)
         for _, command in broken.commands:
             command(now_us)
 
-    def _emit(self, execution: Execution, state: BehaviorState, code: str, reason: str) -> None:
-        report = execution.next_report(state, code, reason)
+    def _emit(self, execution: Execution, outcome: Outcome) -> None:
+        report = execution.next_report(outcome)
         if not self.muted:
             self.reports.put(report)

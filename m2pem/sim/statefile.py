@@ -19,6 +19,7 @@ from m2pem.sim.executions import Aim, Body, Execution, Outcome, Part, Strike
 from m2pem.sim.payloads import SimPayload
 from m2pem.sim.phases import PayloadPhase, VehiclePhase
 from m2pem.sim.pursuit import Pursuit
+from m2pem.sim.shots import Shots
 from m2pem.sim.track import Plan, Track, Warp
 from m2pem.sim.vehicles import SimVehicle
 
@@ -91,6 +92,7 @@ class _Behavior(msgspec.Struct):
     outcome: Outcome | None
     deaf: bool
     cancelling: bool
+    shots: Shots | None = None
 
 
 class StateFile:
@@ -256,6 +258,7 @@ def _behavior_record(execution: Execution) -> _Behavior:
         outcome=execution.outcome,
         deaf=execution.deaf,
         cancelling=execution.cancelling,
+        shots=execution.shots,
     )
 
 
@@ -284,4 +287,5 @@ def _execution(record: _Behavior, bodies: dict[ResourceId, Body]) -> Execution:
         outcome=record.outcome,
         deaf=record.deaf,
         cancelling=record.cancelling,
+        shots=record.shots,
     )

@@ -136,6 +136,52 @@ def test_pictures_take_their_interval_and_the_shutter(simulate: Simulate) -> Non
     simulate(FLEET, main)
 
 
+def test_pictures_and_videos_have_names_that_missions_can_read(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+        await bench.start("r1.b1", "take_picture", PTZ, count=3, interval=2.0)
+        taken = await bench.ended("r1.b1", 10)
+        latitude, longitude = place(0, 0)[:2]
+        files = ["sim:r1/b1_1.jpg", "sim:r1/b1_2.jpg", "sim:r1/b1_3.jpg"]
+        assert taken.outputs == {
+            "picture.file": files[-1],
+            "picture.files": files,
+            "picture.position": pytest.approx([latitude, longitude, 60.0 + MAST_M]),
+            "picture.time": "2026-01-01T00:00:04.500000Z",
+        }
+        found = await arbiter.query("r1.b1", "r1.b1")
+        assert found.outputs == taken.outputs
+        await bench.start("r1.b2", "record_video", PTZ)
+        await bench.clock.sleep(5)
+        await arbiter.cancel("r1.b2", 1)
+        filmed = await bench.ended("r1.b2", 1)
+        assert filmed.outputs == {
+            "video.file": "sim:r1/b2.mp4",
+            "video.time": "2026-01-01T00:00:04.500000Z",
+        }
+
+    simulate(FLEET, main)
+
+
+def test_cancelled_pictures_are_those_that_were_taken_without_the_time_in_a_hold(
+    simulate: Simulate,
+) -> None:
+    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+        await bench.start("r1.b1", "take_picture", PTZ, count=100, interval=2.0)
+        await bench.clock.sleep(3)
+        await arbiter.hold(ResourceId(PTZ))
+        await bench.clock.sleep(60)
+        await arbiter.resume(ResourceId(PTZ))
+        await bench.clock.sleep(1)
+        await arbiter.cancel("r1.b1", 1)
+        end = await bench.ended("r1.b1", 1)
+        assert end.outputs["picture.files"] == ["sim:r1/b1_1.jpg", "sim:r1/b1_2.jpg"]
+        await bench.start("r1.b2", "take_picture", PTZ)
+        await arbiter.cancel("r1.b2", 1)
+        assert (await bench.ended("r1.b2", 1)).outputs == {}
+
+    simulate(FLEET, main)
+
+
 def test_a_zoom_beyond_the_lens_is_refused(simulate: Simulate) -> None:
     async def main(bench: ArbiterBench, _: SimArbiter) -> None:
         await do(bench, "zoom", level=8.0)

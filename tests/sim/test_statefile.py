@@ -279,3 +279,19 @@ def test_a_start_survives_being_killed_right_after_it(state: str) -> None:
             await bench.ended("r1.b1", 3600)
 
     run_virtual(again, effect.time_us + 30 * S)
+
+
+def test_what_was_taken_while_nobody_was_there_has_its_names(state: str) -> None:
+    fleet = {"ugv": ("ground", {"state": state}), "ugv/cam": ("ground", {"state": state})}
+
+    async def run(clock: Clock) -> None:
+        async with ArbiterBench(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
+            await bench.start("r1.b1", "take_picture", "ugv/cam", count=2, interval=3.0)
+            await bench.clock.sleep(1)
+        await clock.sleep(60)
+        async with ArbiterBench(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
+            found = await bench.arbiter.query("r1.b1", "r1.b1")
+            assert found.outputs["picture.files"] == ["sim:r1/b1_1.jpg", "sim:r1/b1_2.jpg"]
+            assert found.outputs["picture.time"] == "2026-01-01T00:00:03.500000Z"
+
+    run_virtual(run, START_US)

@@ -32,7 +32,7 @@ def test_pictures_are_stored_with_what_is_known_of_them(tmp_path):
     assert outputs["picture.position"] == pytest.approx([*ORIGIN[:2], ORIGIN[2] + 2], abs=0.01), (
         "of the camera, on its mast"
     )
-    assert outputs["picture.time"] == "2026-01-01T00:00:03.500000Z"
+    assert outputs["picture.time"].startswith("2026-01-01T00:00:03.5")
     assert first.read_bytes() == b"picture 1"
     notes = json.loads(second.with_suffix(".json").read_text())
     assert (notes["camera"], notes["run"], notes["behavior"], notes["number"]) == (
