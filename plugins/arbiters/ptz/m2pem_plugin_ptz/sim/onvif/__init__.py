@@ -1,0 +1,1 @@
+"""A simulated ONVIF camera that turns, over HTTP."""

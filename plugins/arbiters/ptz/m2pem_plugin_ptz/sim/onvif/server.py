@@ -1,0 +1,139 @@
+"""The simulated camera on HTTP.
+
+async with OnvifServer(CameraSpec(account=Account("operator", "secret"))) as server:
+    server.port, server.camera.look, server.faults.silence(5.0)
+"""
+
+import asyncio
+import math
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Self
+
+from aiohttp import web
+
+from m2pem_plugin_ptz.sim.onvif import soap
+from m2pem_plugin_ptz.sim.onvif.camera import Camera, Moment
+from m2pem_plugin_ptz.sim.onvif.faults import Faults
+from m2pem_plugin_ptz.sim.onvif.picture import draw
+from m2pem_plugin_ptz.sim.onvif.security import HttpCheck, TokenCheck
+from m2pem_plugin_ptz.sim.onvif.services import device, media, ptz, recording
+from m2pem_plugin_ptz.sim.onvif.services.service import Operations
+from m2pem_plugin_ptz.sim.onvif.soap import FaultError
+from m2pem_plugin_ptz.sim.onvif.specification import Asks, CameraSpec
+
+SERVICES: Mapping[str, Operations] = {
+    soap.DEVICE: device.OPERATIONS,
+    soap.MEDIA: media.MEDIA,
+    soap.MEDIA2: media.MEDIA2,
+    soap.PTZ: ptz.OPERATIONS,
+    soap.RECORDING: recording.OPERATIONS,
+}
+XML = "application/soap+xml; charset=utf-8"
+CLOSE_S = 0.2
+
+
+class OnvifServer:
+    """One camera on one port; 0: a free one is chosen, and kept when it restarts."""
+
+    def __init__(
+        self,
+        spec: CameraSpec | None = None,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        monotonic: Moment | None = None,
+    ) -> None:
+        spec = spec or CameraSpec()
+        self.camera = Camera(spec) if monotonic is None else Camera(spec, monotonic)
+        self.host, self.port = host, port
+        self.faults = Faults(self.camera, self._open, self._close)
+        self._tokens = TokenCheck(spec.account) if spec.account else None
+        pictures = spec.account is not None and spec.asks is not Asks.NOTHING
+        self._http = HttpCheck(spec.account, spec.asks) if pictures and spec.account else None
+        self._runner: web.AppRunner | None = None
+
+    async def __aenter__(self) -> Self:
+        await self._open()
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        await self.faults.close()
+        await self._close()
+
+    async def _open(self) -> None:
+        app = web.Application(client_max_size=1 << 20)
+        app.router.add_post("/onvif/{service}", self._soap)
+        app.router.add_get(media.SNAPSHOT, self._snapshot)
+        runner = web.AppRunner(app, access_log=None, shutdown_timeout=CLOSE_S)
+        await runner.setup()
+        site = web.TCPSite(runner, self.host, self.port, reuse_address=True)
+        try:
+            await site.start()
+        except BaseException:
+            await runner.cleanup()
+            raise
+        self._runner = runner
+        self.port = runner.addresses[0][1]
+
+    async def _close(self) -> None:
+        runner, self._runner = self._runner, None
+        if runner is not None:
+            await runner.cleanup()
+
+    async def _delay(self, share: float) -> None:
+        troubles = self.camera.troubles
+        await troubles.speaks.wait()
+        await asyncio.sleep((self.camera.spec.latency_s + troubles.slow_s) * share)
+
+    async def _soap(self, request: web.Request) -> web.Response:
+        # Half of the time is the way there, half the way back: what is done is done in between.
+        content = await request.read()
+        await self._delay(0.5)
+        try:
+            header, asked = soap.read(content)
+            status, body = 200, soap.answer(self._do(header, asked, str(request.url.origin())))
+        except FaultError as fault:
+            status, body = fault.status, soap.refusal(fault)
+        await self._delay(0.5)
+        return web.Response(status=status, body=body, headers={"Content-Type": XML})
+
+    def _do(self, header: soap.Element | None, asked: soap.Element, base: str) -> str:
+        offered = tuple(device.offered(self.camera))
+        operations = SERVICES[asked.namespace] if asked.namespace in offered else {}
+        if asked.namespace != soap.DEVICE or asked.name not in device.FREE:
+            if self.camera.troubles.locked:
+                raise FaultError("Sender not authorized", "NotAuthorized")
+            if self._tokens is not None:
+                self._tokens.check(header, self.camera.now_s)
+        operation = operations.get(asked.name)
+        if operation is None:
+            raise FaultError(f"no {asked.name} here", "ActionNotSupported", receiver=True)
+        answer = operation(self.camera, asked, base)
+        self.camera.calls[asked.name] += 1
+        return answer
+
+    async def _snapshot(self, request: web.Request) -> web.StreamResponse:
+        await self._delay(1.0)
+        camera = self.camera
+        if camera.troubles.locked or (
+            self._http is not None
+            and not self._http.passes(
+                "GET", request.raw_path, request.headers.get("Authorization", "")
+            )
+        ):
+            challenge = self._http.challenge() if self._http is not None else 'Digest realm="-"'
+            return web.Response(status=401, headers={"WWW-Authenticate": challenge})
+        if not camera.spec.snapshots:
+            return web.Response(status=404)
+        if camera.troubles.picture is not None:
+            return web.Response(body=camera.troubles.picture, content_type="text/html")
+        width, height = map(math.radians, camera.spec.view_deg)
+        picture = draw(*camera.look, (width, height), camera.spec.name)
+        camera.calls["snapshot"] += 1
+        return web.Response(body=picture, content_type="image/jpeg")
