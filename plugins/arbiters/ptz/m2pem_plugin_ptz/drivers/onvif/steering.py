@@ -31,6 +31,8 @@ AGAIN_S = 1.5
 """A camera that does not move to its goal is told so again."""
 
 ARRIVED_RAD = math.radians(0.1)
+STUCK = 3
+"""A camera that was told so often again does not turn."""
 
 FIRST_LAG_S = 0.1
 TAKES_EFFECT = 0.6
@@ -76,6 +78,12 @@ class Steering:
         self._moved_s = -math.inf
         self._bias: Pair = (0.0, 0.0)
         self._bias_s = 0.0
+        self._agains = 0
+
+    @property
+    def stuck(self) -> bool:
+        """It was told again and again, and does not turn."""
+        return self._agains >= STUCK
 
     @property
     def lag_s(self) -> float:
@@ -87,7 +95,7 @@ class Steering:
         if self._seen is not None:
             way = max(map(abs, self.aim.apart((pan_rad, tilt_rad), self._seen[1])))
             if way > SAME_RAD / 4:
-                self._moved_s = at_s
+                self._moved_s, self._agains = at_s, 0
         self._seen = at_s, (pan_rad, tilt_rad)
 
     def took(self, seconds: float) -> None:
@@ -109,6 +117,7 @@ class Steering:
         """The camera does something else now, or nothing: what it was told counts no more."""
         self._turn, self._turned_s = None, -math.inf
         self._bias = (0.0, 0.0)
+        self._agains = 0
         self._driven.clear()
         self._driven.append((-math.inf, (0.0, 0.0)))
 
@@ -146,7 +155,10 @@ class Steering:
         if self._seen is None or now_s - max(self._turned_s, self._moved_s) < AGAIN_S:
             return False
         goal = turn.pan_rad, turn.tilt_rad
-        return max(map(abs, self.aim.apart(goal, self._seen[1]))) > ARRIVED_RAD
+        if max(map(abs, self.aim.apart(goal, self._seen[1]))) <= ARRIVED_RAD:
+            return False
+        self._agains += 1
+        return True
 
     def _follow(self, error: Pair, velocity: Pair, rate_rad_s: float, now_s: float) -> Drive:
         share = 1.0 / max(SHARE_S, LAGS * self._lag_s)

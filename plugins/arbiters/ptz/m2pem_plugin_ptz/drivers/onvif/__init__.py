@@ -1,0 +1,5 @@
+"""Cameras that speak ONVIF."""
+
+from m2pem_plugin_ptz.drivers.onvif.driver import OnvifDriver
+
+__all__ = ["OnvifDriver"]

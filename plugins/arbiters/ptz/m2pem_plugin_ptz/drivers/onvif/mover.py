@@ -1,0 +1,269 @@
+"""Turns one camera: tells it what `Steering` finds, watches where it looks, stops it."""
+
+import asyncio
+import logging
+import math
+from collections.abc import Callable
+
+from m2pem.api import Clock
+from m2pem_plugin_ptz.drivers.driver import CameraError
+from m2pem_plugin_ptz.drivers.onvif.abilities import Abilities
+from m2pem_plugin_ptz.drivers.onvif.session import Session
+from m2pem_plugin_ptz.drivers.onvif.spaces import Spaces
+from m2pem_plugin_ptz.drivers.onvif.steering import TAKES_EFFECT, Drive, Steering, Turn
+from m2pem_plugin_ptz.drivers.onvif.troubles import RefusedError, SilentError
+from m2pem_plugin_ptz.head import Look, Reach
+
+IDLE_S = 0.25
+"""How often a camera that need not turn is asked where it looks."""
+
+RUNS_ON_S = 1.0
+"""A camera that hears no more stops turning by itself after so long, or `LAGS_ON` calls."""
+
+LAGS_ON = 4.0
+SILENT_CALLS = 3
+"""After so many calls without an answer, all begins anew."""
+
+BACKOFF_S = 0.5
+ZOOM_AGAIN_S = 3.0
+SAME_ZOOM = 0.02
+"""Of a factor."""
+
+
+class Mover:
+    """Before the camera is there, and while it is away, wishes are kept: the last one counts."""
+
+    def __init__(
+        self, clock: Clock, logger: logging.Logger, heard: Callable[[], None], name: str
+    ) -> None:
+        self._clock, self._logger, self._heard, self._name = clock, logger, heard, name
+        self.look: Look | None = None
+        self.says_position = True
+        self._spaces: Spaces | None = None
+        self._steering = Steering(Reach())
+        self._wish: tuple[float, float, float | None] | None = None
+        self._zoom: float | None = None
+        self._zoomed_s = -math.inf
+        self._halting = False
+        self._news = asyncio.Event()
+        self._stops: set[asyncio.Task[None]] = set()
+        self._session: Session | None = None
+        self._profile = ""
+        self._fault = ""
+
+    @property
+    def trouble(self) -> str:
+        """Why it does not turn as it is told now; "" if it does, or is told nothing."""
+        if self._wish is None and self._zoom is None:
+            return ""
+        if self._steering.stuck:
+            return f"{self._name} takes moves, but does not turn: see whether its head is free"
+        return self._fault
+
+    def point(self, pan_rad: float, tilt_rad: float, rate_rad_s: float | None) -> None:
+        """See `CameraDriver`."""
+        self._halting = False
+        self._wish = pan_rad, tilt_rad, rate_rad_s
+        self._steering.aim.want(pan_rad, tilt_rad, rate_rad_s, self._now_s)
+        self._news.set()
+
+    def zoom(self, level: float) -> None:
+        """See `CameraDriver`."""
+        self._halting = False
+        if self._zoom != level:
+            self._zoom, self._zoomed_s = level, -math.inf
+        self._news.set()
+
+    def halt(self) -> None:
+        """Stop at once, and once more when what is under way has come through."""
+        self._wish = self._zoom = None
+        self._steering.aim.forget()
+        self._steering.forget()
+        self._halting = True
+        self._news.set()
+        if self._session is not None:
+            task = asyncio.get_running_loop().create_task(self._stop_now(self._session))
+            self._stops.add(task)
+            task.add_done_callback(self._stops.discard)
+
+    async def run(self, session: Session, abilities: Abilities) -> None:
+        """Turn it, as long as it answers.
+
+        Raises:
+            CameraError: it does not any more, or answers strangely.
+        """
+        spaces = abilities.spaces
+        self._spaces, self._profile, self._session = spaces, abilities.profile, session
+        if spaces is not None:
+            self._steering = Steering(
+                spaces.reach, turns=bool(spaces.positions), drives=spaces.velocity is not None
+            )
+            if self._wish is not None:
+                self._steering.aim.want(*self._wish, self._now_s)
+        self._zoomed_s = -math.inf
+        self._fault = ""
+        create = asyncio.get_running_loop().create_task
+        tasks = {create(self._watch(session)), create(self._turn(session))}
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        finally:
+            self._session = None
+            for task in (*tasks, *self._stops):
+                task.cancel()
+            await asyncio.gather(*tasks, *self._stops, return_exceptions=True)
+
+    # --- watching -------------------------------------------------------------------------------
+
+    async def _watch(self, session: Session) -> None:
+        silent = 0
+        while True:
+            started_s = self._now_s
+            try:
+                await self._ask(session)
+                silent = 0
+            except SilentError:
+                silent += 1
+                if silent >= SILENT_CALLS:
+                    raise
+            busy = self._wish is not None or self._zoom is not None or self._halting
+            await self._wait(started_s, self._interval_s(session) if busy else IDLE_S)
+
+    async def _ask(self, session: Session) -> None:
+        if self._spaces is None:
+            await session.call("devicemgmt", "GetSystemDateAndTime")
+            self._heard()
+            return
+        started_s = self._now_s
+        status = await session.call("ptz", "GetStatus", ProfileToken=self._profile)
+        at_s = (started_s + self._now_s) / 2
+        position = getattr(status, "Position", None)
+        place = getattr(position, "PanTilt", None)
+        found = None
+        if place is not None:
+            found = self._spaces.look(float(place.x), float(place.y), place.space or "")
+        self.says_position = found is not None
+        if found is not None:
+            said = getattr(position, "Zoom", None)
+            zoom = self._spaces.zoom(float(said.x), said.space or "") if said is not None else None
+            self._steering.saw(*found, at_s)
+            self.look = Look(*found, 1.0 if zoom is None else zoom)
+        self._heard()
+
+    # --- turning --------------------------------------------------------------------------------
+
+    async def _turn(self, session: Session) -> None:
+        while True:
+            started_s = self._now_s
+            try:
+                if not await self._do(session):
+                    self._news.clear()
+                    if self._wish is None and self._zoom is None and not self._halting:
+                        await self._news.wait()
+                    else:
+                        await self._wait(started_s, self._interval_s(session))
+                    continue
+                self._fault = ""
+            except SilentError:
+                # What watches notices it, too, and says so.
+                self._steering.forget()
+            except RefusedError as error:
+                self._steering.forget()
+                if self._fault != error.reason:
+                    self._logger.warning("%s", error.reason)
+                self._fault = error.reason
+                await self._clock.sleep(BACKOFF_S)
+            await self._wait(started_s, self._interval_s(session))
+
+    async def _do(self, session: Session) -> bool:
+        """Tell the camera something, if there is something to tell."""
+        if self._halting:
+            await self._stop(session)
+            self._halting = False
+            return True
+        if self._stops:
+            # A stop that is overtaken by a move would stop that.
+            await asyncio.wait(self._stops)
+        spaces = self._spaces
+        if spaces is None:
+            return False
+        level = self._zoom_to_tell(spaces)
+        if level is not None:
+            self._zoomed_s = self._now_s
+            space = spaces.zooms[0]
+            zoom = {"x": space.scale.to_units(level), "space": space.uri}
+            await self._call(session, "AbsoluteMove", Position={"Zoom": zoom})
+            return True
+        started_s = self._now_s
+        move = self._steering.next(started_s)
+        if move is None:
+            return False
+        if isinstance(move, Turn):
+            await self._call(session, "AbsoluteMove", **_absolute(spaces, move))
+        else:
+            await self._call(session, "ContinuousMove", **self._continuous(spaces, move))
+        took_s = self._now_s - started_s
+        self._steering.took(took_s)
+        if self._wish is not None:
+            self._steering.told(move, started_s + TAKES_EFFECT * took_s)
+        return True
+
+    def _continuous(self, spaces: Spaces, move: Drive) -> dict[str, object]:
+        space = spaces.velocity
+        assert space is not None, "nothing drives a camera that takes no velocities"
+        seconds = max(RUNS_ON_S, LAGS_ON * self._steering.lag_s)
+        velocity = {
+            "x": space.pan.to_units(move.pan_rad_s),
+            "y": space.tilt.to_units(move.tilt_rad_s),
+            "space": space.uri,
+        }
+        return {"Velocity": {"PanTilt": velocity}, "Timeout": f"PT{seconds:.1f}S"}
+
+    def _zoom_to_tell(self, spaces: Spaces) -> float | None:
+        if self._zoom is None or not spaces.zooms:
+            return None
+        level = min(max(self._zoom, 1.0), spaces.reach.zoom_max)
+        if self._zoomed_s == -math.inf:
+            return level
+        look = self.look
+        if look is None or abs(look.zoom - level) <= SAME_ZOOM * level:
+            return None
+        return level if self._now_s - self._zoomed_s > ZOOM_AGAIN_S else None
+
+    async def _stop_now(self, session: Session) -> None:
+        try:
+            await self._stop(session)
+        except CameraError as error:
+            # It is told again, in its turn.
+            self._logger.debug("%s", error.reason)
+
+    async def _stop(self, session: Session) -> None:
+        if self._spaces is not None:
+            await self._call(session, "Stop", PanTilt=True, Zoom=True)
+
+    async def _call(self, session: Session, operation: str, **arguments: object) -> None:
+        await session.call("ptz", operation, ProfileToken=self._profile, **arguments)
+
+    # --- time -----------------------------------------------------------------------------------
+
+    @property
+    def _now_s(self) -> float:
+        return self._clock.now_us() / 1e6
+
+    def _interval_s(self, session: Session) -> float:
+        """Half of all calls ask, half tell."""
+        return 2.0 / session.settings.calls_s
+
+    async def _wait(self, since_s: float, seconds: float) -> None:
+        await self._clock.sleep(max(0.0, since_s + seconds - self._now_s))
+
+
+def _absolute(spaces: Spaces, move: Turn) -> dict[str, object]:
+    told: dict[str, object] = {
+        "Position": {"PanTilt": spaces.position(move.pan_rad, move.tilt_rad)}
+    }
+    if spaces.speed is not None:
+        speed = spaces.speed.scale.to_units(move.rate_rad_s)
+        told["Speed"] = {"PanTilt": {"x": speed, "y": speed, "space": spaces.speed.uri}}
+    return told

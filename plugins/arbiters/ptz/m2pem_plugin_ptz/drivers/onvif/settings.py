@@ -1,0 +1,110 @@
+"""What a fleet says of the connection to an ONVIF camera."""
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from m2pem.api import Dimension, ResourceId, UnitError, quantity
+from m2pem.errors import PluginError
+
+KEYS = ("host", "port", "credentials", "profile", "timeout", "calls", "invert")
+AXES = ("pan", "tilt")
+LIKE = 0.75
+"""So like a known key, another one is a mistake; else it is the vehicle's, which is inherited."""
+
+
+@dataclass(frozen=True, slots=True)
+class OnvifSettings:
+    """`credentials`: the file with user and password; None: the camera asks for none. `profile`:
+    token or name of the media profile; "": the first one that turns. `timeout_s`: of one call.
+    `calls_s`: so many calls per second at most. `inverted`: axes that run the other way."""
+
+    host: str
+    port: int = 80
+    credentials: Path | None = None
+    profile: str = ""
+    timeout_s: float = 2.0
+    calls_s: float = 16.0
+    inverted: frozenset[str] = frozenset()
+
+    @property
+    def address(self) -> str:
+        """For people."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{host}:{self.port}"
+
+
+def read_onvif(resource: ResourceId, own: Mapping[str, Any]) -> OnvifSettings:
+    """The settings of one camera. Keys that are its vehicle's are left alone.
+
+    Raises:
+        PluginError: something is missing or wrong; the text names the resource and the key.
+    """
+    for key in own:
+        near = difflib.get_close_matches(str(key), KEYS, n=1, cutoff=LIKE)
+        if key not in KEYS and near:
+            raise _error(resource, str(key), f"there is no such setting; did you mean '{near[0]}'?")
+    host = own.get("host")
+    if not isinstance(host, str) or not host.strip() or "/" in host:
+        raise _error(resource, "host", "an ONVIF camera needs its name or IP address")
+    calls_s = own.get("calls", 16.0)
+    if isinstance(calls_s, bool) or not isinstance(calls_s, int | float) or not 2 <= calls_s <= 100:
+        raise _error(resource, "calls", f"{calls_s!r} is no number of calls per second, 2 to 100")
+    return OnvifSettings(
+        host.strip().strip("[]"),
+        _port(resource, own.get("port", 80)),
+        _path(resource, own),
+        _text(resource, own, "profile"),
+        _timeout_s(resource, own.get("timeout", 2.0)),
+        float(calls_s),
+        _inverted(resource, own.get("invert", [])),
+    )
+
+
+def _port(resource: ResourceId, value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 65535:
+        raise _error(resource, "port", f"{value!r} is no TCP port, 1 to 65535")
+    return value
+
+
+def _path(resource: ResourceId, own: Mapping[str, Any]) -> Path | None:
+    for key in ("user", "username", "password"):
+        if key in own:
+            raise _error(
+                resource,
+                key,
+                "fleets are read by many: write user and password into a file of their own, and "
+                "name it as connection.credentials",
+            )
+    text = _text(resource, own, "credentials")
+    return Path(text).expanduser() if text else None
+
+
+def _text(resource: ResourceId, own: Mapping[str, Any], key: str) -> str:
+    value = own.get(key, "")
+    if key in own and (not isinstance(value, str) or not value.strip()):
+        raise _error(resource, key, f"{value!r} is no text")
+    return str(value).strip()
+
+
+def _timeout_s(resource: ResourceId, value: object) -> float:
+    try:
+        seconds = quantity(value, Dimension.DURATION)
+    except UnitError as error:
+        raise _error(resource, "timeout", str(error)) from error
+    if not 0.1 <= seconds <= 60:
+        raise _error(resource, "timeout", f"{seconds:g} s is not in 0.1 s to 60 s")
+    return seconds
+
+
+def _inverted(resource: ResourceId, value: object) -> frozenset[str]:
+    axes = [value] if isinstance(value, str) else value
+    if not isinstance(axes, list) or not all(axis in AXES for axis in axes):
+        raise _error(resource, "invert", f"{value!r} are none of the axes pan, tilt")
+    return frozenset(axes)
+
+
+def _error(resource: ResourceId, key: str, problem: str) -> PluginError:
+    return PluginError(f"{resource}: connection.{key}: {problem}")

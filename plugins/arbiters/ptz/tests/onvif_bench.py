@@ -1,0 +1,93 @@
+"""An ONVIF driver and a simulated camera, with real HTTP on 127.0.0.1 between them."""
+
+import asyncio
+import logging
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from m2pem_plugin_ptz.drivers.driver import Seat
+from m2pem_plugin_ptz.drivers.onvif import OnvifDriver
+from m2pem_plugin_ptz.head import Reach
+from m2pem_plugin_ptz.settings import DriverName, Settings
+from m2pem_plugin_ptz.sim.onvif.server import OnvifServer
+from m2pem_plugin_ptz.sim.onvif.specification import Account, CameraSpec
+
+from m2pem.api import Connection, ResourceId
+from m2pem.executive.clock import SystemClock
+from m2pem.testing.contracts.bench import context
+
+ACCOUNT = Account("operator", "s3cret: #1")
+RESOURCE = ResourceId("evsg2/ptz")
+ANSWERS_S = 0.01
+"""Quick, so that tests are."""
+
+
+def write_credentials(folder: Path, password: str = ACCOUNT.password) -> Path:
+    path = folder / "camera.yaml"
+    path.touch(mode=0o600)
+    path.write_text(f"user: {ACCOUNT.user}\npassword: '{password}'\n")
+    return path
+
+
+async def until(condition: Callable[[], object], within_s: float = 10.0) -> None:
+    deadline = time.monotonic() + within_s
+    while not condition():
+        assert time.monotonic() < deadline, "it did not come about in time"
+        await asyncio.sleep(0.01)
+
+
+class Bench:
+    """A driver, and how often it was heard."""
+
+    def __init__(self, port: int, reach: Reach, own: dict[str, object]) -> None:
+        self.heard = 0
+        settings = {"driver": "onvif", "host": "127.0.0.1", "port": port, "timeout": "1 s", **own}
+        own_keys = {key: value for key, value in settings.items() if key != "driver"}
+        self.driver = OnvifDriver(
+            Seat(
+                Connection(RESOURCE, "ground", settings),
+                Settings(DriverName.ONVIF, reach=reach, own=own_keys),
+                context(SystemClock()),
+                self._hear,
+            )
+        )
+
+    def _hear(self) -> None:
+        self.heard += 1
+
+    async def ready(self) -> None:
+        await until(lambda: not self.driver.refusal("take_picture") and self.driver.look)
+
+    def looks_at(self, pan_rad: float, tilt_rad: float, within_rad: float = 0.005) -> bool:
+        look = self.driver.look
+        return (
+            look is not None
+            and abs(look.pan_rad - pan_rad) < within_rad
+            and abs(look.tilt_rad - tilt_rad) < within_rad
+        )
+
+
+@asynccontextmanager
+async def camera(**options: object) -> AsyncIterator[OnvifServer]:
+    spec = CameraSpec(**{"latency_s": ANSWERS_S, **options})  # type: ignore[arg-type]
+    async with OnvifServer(spec) as server:
+        yield server
+
+
+@asynccontextmanager
+async def driven(
+    server: OnvifServer, folder: Path, reach: Reach | None = None, **own: object
+) -> AsyncIterator[Bench]:
+    if server.camera.spec.account is not None:
+        own = {"credentials": str(write_credentials(folder)), **own}
+    bench = Bench(server.port, reach or Reach(rate_rad_s=2.0), own)
+    await bench.driver.open()
+    try:
+        yield bench
+    finally:
+        await bench.driver.close()
+
+
+logging.getLogger("m2pem.testing").setLevel(logging.DEBUG)
