@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 from m2pem import hookimpl
 
 if TYPE_CHECKING:
+    import click
+
     from m2pem.api import Arbiter
 
 
@@ -15,3 +17,11 @@ def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], N
     from m2pem_plugin_ptz.arbiter import PtzArbiter  # noqa: PLC0415  # starting up must be fast
 
     register("ptz", PtzArbiter)
+
+
+@hookimpl
+def m2pem_register_commands(cli: "click.Group") -> None:
+    """Add `sim onvif`."""
+    from m2pem_plugin_ptz.commands import add_to  # noqa: PLC0415  # starting up must be fast
+
+    add_to(cli.commands)
