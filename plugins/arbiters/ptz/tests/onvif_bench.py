@@ -1,7 +1,6 @@
 """An ONVIF driver and a simulated camera, with real HTTP on 127.0.0.1 between them."""
 
 import asyncio
-import logging
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -80,14 +79,13 @@ async def camera(**options: object) -> AsyncIterator[OnvifServer]:
 async def driven(
     server: OnvifServer, folder: Path, reach: Reach | None = None, **own: object
 ) -> AsyncIterator[Bench]:
-    if server.camera.spec.account is not None:
-        own = {"credentials": str(write_credentials(folder)), **own}
-    bench = Bench(server.port, reach or Reach(rate_rad_s=2.0), own)
+    """A driver that is open; with the camera's password, unless `credentials` is said."""
+    if server.camera.spec.account is not None and "credentials" not in own:
+        own["credentials"] = str(write_credentials(folder))
+    said = {key: value for key, value in own.items() if value is not None}
+    bench = Bench(server.port, reach or Reach(rate_rad_s=2.0), said)
     await bench.driver.open()
     try:
         yield bench
     finally:
         await bench.driver.close()
-
-
-logging.getLogger("m2pem.testing").setLevel(logging.DEBUG)

@@ -60,7 +60,7 @@ def _read(path: Path) -> str:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError as error:
         raise PluginError(f"{path}: cannot be read: {error.strerror}") from error
-    with os.fdopen(handle, "rb") as file:
+    try:
         mode = os.fstat(handle).st_mode
         if not stat.S_ISREG(mode):
             raise PluginError(f"{path}: this is no file; it should hold {EXAMPLE}")
@@ -69,7 +69,9 @@ def _read(path: Path) -> str:
                 f"{path}: others may read this password (mode {stat.S_IMODE(mode):04o}): "
                 f"chmod 600 {shlex.quote(str(path))}"
             )
-        content = file.read(LONGEST + 1)
+        content = os.read(handle, LONGEST + 1)
+    finally:
+        os.close(handle)
     try:
         if len(content) > LONGEST:
             raise ValueError

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import math
 
 from m2pem.errors import PluginError
 from m2pem_plugin_ptz.drivers.driver import CameraError, Seat
@@ -43,6 +44,7 @@ class OnvifDriver:
         self._recording: Recording | None = None
         self._trouble = f"{camera(self._settings)} has not answered yet"
         self._logged = ""
+        self._doubted_us = -math.inf
         self._task: asyncio.Task[None] | None = None
 
     # --- life -----------------------------------------------------------------------------------
@@ -75,6 +77,8 @@ class OnvifDriver:
                     self._session = None
                     await session.close()
             except UnauthorizedError as error:
+                if self._may_be_the_clock():
+                    continue
                 self._say(error.reason)
                 await self._until_file_changes(REFUSED_RETRY_S)
             except CameraError as error:
@@ -93,6 +97,14 @@ class OnvifDriver:
             except PluginError as error:
                 self._say(str(error))
                 await self._until_file_changes(LONGEST_RETRY_S)
+
+    def _may_be_the_clock(self) -> bool:
+        """The password was right a moment ago: the camera's clock may have been set."""
+        now_us = self._clock.now_us()
+        if not self._mover.answered or now_us - self._doubted_us < REFUSED_RETRY_S * 1e6:
+            return False
+        self._doubted_us = now_us
+        return True
 
     async def _talk(self, session: Session) -> None:
         await session.open()
@@ -142,6 +154,8 @@ class OnvifDriver:
         if self._trouble or abilities is None:
             return self._trouble
         who = camera(self._settings)
+        if not self._mover.says_position:
+            return f"{who} does not say where it looks (GetStatus without a known position)"
         if behavior == "take_picture":
             return abilities.no_snapshot
         if behavior == "record_video":
@@ -157,8 +171,6 @@ class OnvifDriver:
             return self._mover.trouble
         if not spaces.positions:
             return f"{who} does not say where it looks: it has no positions, only velocities"
-        if not self._mover.says_position:
-            return f"{who} does not say where it looks"
         return self._mover.trouble
 
     # --- what is done ---------------------------------------------------------------------------

@@ -31,7 +31,10 @@ SAME_ZOOM = 0.02
 
 
 class Mover:
-    """Before the camera is there, and while it is away, wishes are kept: the last one counts."""
+    """Before the camera is there, and while it is away, wishes are kept: the last one counts.
+
+    `answered`: it did, since `run` began.
+    """
 
     def __init__(
         self, clock: Clock, logger: logging.Logger, heard: Callable[[], None], name: str
@@ -39,6 +42,7 @@ class Mover:
         self._clock, self._logger, self._heard, self._name = clock, logger, heard, name
         self.look: Look | None = None
         self.says_position = True
+        self.answered = False
         self._spaces: Spaces | None = None
         self._steering = Steering(Reach())
         self._wish: tuple[float, float, float | None] | None = None
@@ -101,7 +105,7 @@ class Mover:
             if self._wish is not None:
                 self._steering.aim.want(*self._wish, self._now_s)
         self._zoomed_s = -math.inf
-        self._fault = ""
+        self._fault, self.answered = "", False
         create = asyncio.get_running_loop().create_task
         tasks = {create(self._watch(session)), create(self._turn(session))}
         try:
@@ -122,7 +126,8 @@ class Mover:
             started_s = self._now_s
             try:
                 await self._ask(session)
-                silent = 0
+                silent, self.answered = 0, True
+                self._heard()
             except SilentError:
                 silent += 1
                 if silent >= SILENT_CALLS:
@@ -133,7 +138,7 @@ class Mover:
     async def _ask(self, session: Session) -> None:
         if self._spaces is None:
             await session.call("devicemgmt", "GetSystemDateAndTime")
-            self._heard()
+            self.look = Look(0.0, 0.0)  # what does not turn looks ahead
             return
         started_s = self._now_s
         status = await session.call("ptz", "GetStatus", ProfileToken=self._profile)
@@ -149,7 +154,6 @@ class Mover:
             zoom = self._spaces.zoom(float(said.x), said.space or "") if said is not None else None
             self._steering.saw(*found, at_s)
             self.look = Look(*found, 1.0 if zoom is None else zoom)
-        self._heard()
 
     # --- turning --------------------------------------------------------------------------------
 

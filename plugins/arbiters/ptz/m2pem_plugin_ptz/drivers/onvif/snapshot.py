@@ -1,6 +1,7 @@
 """A picture over HTTP: as the camera asks for the password, bounded in size and time."""
 
 import asyncio
+import base64
 from typing import Any
 
 from m2pem_plugin_ptz.drivers.onvif.session import Session
@@ -50,8 +51,9 @@ async def _ask(client: Any, session: Session, url: str) -> bytes:
         asked = answer.headers.get("WWW-Authenticate", "").lower()
         if answer.status != 401 or account is None or not asked.startswith("basic"):
             return await _read(answer, session)
-    basic = aiohttp.BasicAuth(account.user, account.password)
-    async with client.get(url, auth=basic, allow_redirects=False) as answer:
+    basic = base64.b64encode(f"{account.user}:{account.password}".encode()).decode()
+    headers = {"Authorization": f"Basic {basic}"}
+    async with client.get(url, headers=headers, allow_redirects=False) as answer:
         return await _read(answer, session)
 
 
