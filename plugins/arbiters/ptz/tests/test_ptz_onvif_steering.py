@@ -159,6 +159,22 @@ def test_an_endless_camera_goes_on_all_round():
     assert play.head.pan.at > math.tau, "it went on, and not back"
 
 
+def test_another_rate_is_told_while_there_is_a_way_to_go_at_it():
+    steering = Steering(Reach(rate_rad_s=1.0))
+    for seen, rate, told in (
+        (0.0, 1.0, Turn(1.0, 0.0, 1.0)),
+        (0.1, 0.5, Turn(1.0, 0.0, 0.5)),
+        (0.2, 1.0, Turn(1.0, 0.0, 1.0)),
+        (0.9, 0.4, None),
+        (0.99, 0.02, None),
+    ):
+        steering.aim.want(1.0, 0.0, rate, seen)
+        steering.saw(seen, 0.0, seen)
+        assert steering.next(seen) == told
+        if told is not None:
+            steering.told(told, seen)
+
+
 def test_a_wish_out_of_reach_is_met_as_far_as_it_goes():
     steering = Steering(Reach(pan_rad=(-1.0, 1.0), tilt_rad=(-0.5, 0.2)))
     steering.aim.want(2.0, 1.0, 9.0, 0.0)

@@ -30,6 +30,9 @@ CAUGHT_RAD = math.radians(1.0)
 AGAIN_S = 1.5
 """A camera that does not move to its goal is told so again."""
 
+WORTH_S = 0.3
+"""A way that takes less time is gone at the rate that was told."""
+
 ARRIVED_RAD = math.radians(0.1)
 STUCK = 3
 """A camera that was told so often again does not turn."""
@@ -144,11 +147,19 @@ class Steering:
 
     def _goto(self, goal: Pair, rate_rad_s: float, now_s: float, same_rad: float) -> Turn | None:
         turn = self._turn
-        if turn is not None and rate_rad_s == turn.rate_rad_s:
+        if turn is not None and not self._other_rate(turn, rate_rad_s):
             way = max(map(abs, self.aim.apart(goal, (turn.pan_rad, turn.tilt_rad))))
             if way <= same_rad and not self._idle_elsewhere(turn, now_s):
                 return None
         return Turn(*goal, rate_rad_s)
+
+    def _other_rate(self, turn: Turn, rate_rad_s: float) -> bool:
+        """Another rate counts while there is a way left for it; who aims at something says another
+        one with every look."""
+        if rate_rad_s == turn.rate_rad_s or self._seen is None:
+            return False
+        left = self.aim.apart((turn.pan_rad, turn.tilt_rad), self._seen[1])
+        return max(map(abs, left)) > WORTH_S * max(rate_rad_s, turn.rate_rad_s)
 
     def _idle_elsewhere(self, turn: Turn, now_s: float) -> bool:
         """It neither looks where it was told to, nor turns."""
