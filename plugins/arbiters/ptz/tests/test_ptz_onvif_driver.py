@@ -79,9 +79,8 @@ async def test_a_rate_is_kept(tmp_path):
         await until(lambda: bench.looks_at(0.3, 0.0))
 
 
-@pytest.mark.parametrize("latency_s", [0.05, 0.2])
-async def test_a_moving_target_is_followed_within_a_degree(tmp_path, latency_s):
-    async with camera(latency_s=latency_s) as server, driven(server, tmp_path) as bench:
+async def test_a_moving_target_is_followed_within_a_degree(tmp_path):
+    async with camera(latency_s=0.2) as server, driven(server, tmp_path) as bench:
         await bench.ready()
         clock = asyncio.get_running_loop().time
         began, worst = clock(), 0.0

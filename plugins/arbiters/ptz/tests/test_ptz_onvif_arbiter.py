@@ -1,0 +1,125 @@
+"""Behaviors on a simulated ONVIF camera over HTTP: what a mission gets of it."""
+
+import asyncio
+import math
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from m2pem_plugin_ptz.arbiter import PtzArbiter
+from onvif_bench import ACCOUNT, camera, write_credentials
+from PIL import Image
+from ptz_head import at, rad, vehicle
+
+from m2pem.api import ArbiterContext, BehaviorState, Connection, Point, ResourceId
+from m2pem.executive.clock import SystemClock
+from m2pem.testing.contracts.bench import ArbiterBench, context
+
+PTZ = ResourceId("a/ptz")
+SPEED_M_S, TURN_RAD_S = 4.0, rad(6)
+TARGET = (60.0, 40.0)
+
+
+class Way:
+    """A vehicle that drives a curve, and says ten times a second where it is."""
+
+    def __init__(self, lent: ArbiterContext) -> None:
+        self._lent = lent
+        self._began_us = lent.clock.now_us()
+
+    def pose(self, now_us):
+        """East, north, yaw, and the velocity."""
+        seconds = (now_us - self._began_us) / 1e6
+        yaw = math.pi / 2 - TURN_RAD_S * seconds
+        radius = SPEED_M_S / TURN_RAD_S
+        east = radius * (1 - math.sin(yaw))
+        north = radius * math.cos(yaw)
+        return east, north, yaw, (SPEED_M_S * math.cos(yaw), SPEED_M_S * math.sin(yaw), 0.0)
+
+    def bearing(self, now_us):
+        """Of the target, from the bow, clockwise."""
+        east, north, yaw, _ = self.pose(now_us)
+        return math.remainder(yaw - math.atan2(TARGET[1] - north, TARGET[0] - east), math.tau)
+
+    async def drive(self):
+        while True:
+            now_us = self._lent.clock.now_us()
+            east, north, yaw, velocity = self.pose(now_us)
+            self._lent.bus.publish(vehicle("a", now_us, east, north, 0.0, yaw, velocity))
+            await self._lent.clock.sleep(0.1)
+
+
+@asynccontextmanager
+async def bench(server, folder: Path, *, drives=False, **said):
+    clock = SystemClock()
+    lent = context(clock)
+    settings = {
+        "driver": "onvif",
+        "host": "127.0.0.1",
+        "port": server.port,
+        "pictures": str(folder / "pictures"),
+        "reach": {"endless": True, "rate": "100 deg/s"},
+        **said,
+    }
+    way = Way(lent)
+    lent.bus.publish(vehicle("a", clock.now_us()))
+    driving = asyncio.create_task(way.drive()) if drives else None
+    arbiter = PtzArbiter({PTZ: Connection(PTZ, "ground", settings)}, lent)
+    async with ArbiterBench(arbiter, clock) as found:
+        yield found, way
+    if driving is not None:
+        driving.cancel()
+
+
+async def test_a_camera_stays_on_its_target_while_its_vehicle_drives_and_turns(tmp_path):
+    round_about = camera(latency_s=0.1, endless=True)
+    async with round_about as server, bench(server, tmp_path, drives=True) as (found, way):
+        place = Point((*at(*TARGET)[:2], None))
+        await found.start("r1.b1", "ptz_track", PTZ, target=place, duration=5.0)
+        await found.running("r1.b1")
+        worst, began_us = 0.0, found.clock.now_us()
+        while not found.states_of("r1.b1")[-1].terminal:
+            now_us = found.clock.now_us()
+            if 2.5e6 < now_us - began_us < 4.5e6:
+                off = math.remainder(server.camera.look[0] - way.bearing(now_us), math.tau)
+                worst = max(worst, abs(off))
+            await asyncio.sleep(0.03)
+        assert found.of("r1.b1")[-1].state is BehaviorState.SUCCEEDED
+        assert 0.0 < math.degrees(worst) < 1.0
+        assert server.camera.calls["ContinuousMove"] > 5
+
+
+def note_in(picture):
+    with Image.open(picture) as image:
+        return image.info["comment"].decode()
+
+
+async def test_pictures_and_a_video_come_into_the_missions_data(tmp_path):
+    said = {"credentials": str(write_credentials(tmp_path))}
+    async with camera(account=ACCOUNT) as server, bench(server, tmp_path, **said) as (found, _):
+        await found.start("r1.b1", "ptz_point_at", PTZ, bearing=rad(30), elevation=rad(-10))
+        assert (await found.ended("r1.b1", 10)).state is BehaviorState.SUCCEEDED
+        await found.start("r1.b2", "take_picture", PTZ, count=2, interval=0.2)
+        end = await found.ended("r1.b2", 10)
+        assert end.state is BehaviorState.SUCCEEDED, end
+        assert len(end.outputs["picture.files"]) == 2
+        shown = note_in(end.outputs["picture.file"])
+        assert abs(float(shown.split()[1]) - 30) < 0.6
+        await found.start("r1.b3", "record_video", PTZ, duration=0.3)
+        end = await found.ended("r1.b3", 10)
+        assert end.outputs["video.file"].startswith("onvif://127.0.0.1:")
+        assert len(server.camera.recorded) == 1
+
+
+async def test_a_wrong_password_and_a_missing_recorder_reject_with_whose_fault_it_is(tmp_path):
+    path = write_credentials(tmp_path, "wrong")
+    said = {"credentials": str(path)}
+    async with camera(account=ACCOUNT) as server, bench(server, tmp_path, **said) as (found, _):
+        await found.start("r1.b1", "ptz_point_at", PTZ, bearing=0.1, elevation=0.0)
+        end = await found.ended("r1.b1", 5)
+        assert end.state is BehaviorState.REJECTED
+        assert f"correct user or password in {path}" in end.reason
+    async with camera(recording=False) as server, bench(server, tmp_path) as (found, _):
+        await found.start("r1.b1", "record_video", PTZ, duration=1.0)
+        end = await found.ended("r1.b1", 5)
+        assert (end.state, end.code) == (BehaviorState.REJECTED, "REJECTED")
+        assert "cannot be told to record" in end.reason
