@@ -5,13 +5,16 @@ from typing import Any
 
 import pytest
 from m2pem_plugin_mavlink.microservices.camera import (
+    Camera,
     FindCamera,
     ReadCaptureStatus,
     ReadStorage,
+    ReadZoom,
     camera_mode,
     start_video,
     stop_images,
     stop_video,
+    stop_zoom,
     take_image,
     take_images,
     zoom,
@@ -33,6 +36,7 @@ def photographs(command: Any, vehicle: Commanded) -> Sequence[Message]:
 
 def tells(command: Any, vehicle: Commanded) -> Sequence[Message]:
     name = {259: "CAMERA_INFORMATION", 262: "CAMERA_CAPTURE_STATUS", 261: "STORAGE_INFORMATION"}
+    name |= {260: "CAMERA_SETTINGS"}
     type_ = message_type(name[int(command.param1)])
     fields: dict[str, Any] = {
         "CAMERA_INFORMATION": {
@@ -40,6 +44,7 @@ def tells(command: Any, vehicle: Commanded) -> Sequence[Message]:
             "model_name": tuple(b"Eye".ljust(32, b"\0")),
             "flags": dialect.CAMERA_CAP_FLAGS_CAPTURE_IMAGE,
         },
+        "CAMERA_SETTINGS": {"zoomLevel": 25.0},
         "CAMERA_CAPTURE_STATUS": {"video_status": 1, "recording_time_ms": 2500, "image_count": 9},
         "STORAGE_INFORMATION": {
             "storage_id": int(command.param2),
@@ -76,6 +81,7 @@ def test_several_images_are_asked_for_only_once_as_they_would_be_taken_again() -
         (start_video(VEHICLE, 1.0, 2), dialect.MAV_CMD_VIDEO_START_CAPTURE, (0, 1.0, 2)),
         (stop_video(VEHICLE, 2), dialect.MAV_CMD_VIDEO_STOP_CAPTURE, (0, 2)),
         (zoom(VEHICLE, 0.25), dialect.MAV_CMD_SET_CAMERA_ZOOM, (2, 25.0, 0)),
+        (stop_zoom(VEHICLE), dialect.MAV_CMD_SET_CAMERA_ZOOM, (1, 0.0, 0)),
         (camera_mode(VEHICLE, 1), dialect.MAV_CMD_SET_CAMERA_MODE, (0, 1)),
     ],
 )
@@ -92,10 +98,13 @@ def test_what_cameras_tell_of_themselves() -> None:
     assert (camera.vendor, camera.model, camera.device) == ("Maker", "Eye", 0)
     assert camera.has(dialect.CAMERA_CAP_FLAGS_CAPTURE_IMAGE)
     assert not camera.has(dialect.CAMERA_CAP_FLAGS_CAPTURE_VIDEO)
+    assert (camera.takes_images, camera.records, camera.zooms) == (True, False, False)
 
     status = run(ReadCaptureStatus(VEHICLE), Commanded(tells)).result
     assert (status.takes_images, status.records, status.recorded_s) == (False, True, 2.5)
     assert status.images == 9
+
+    assert run(ReadZoom(VEHICLE), Commanded(tells)).result == 0.25
 
     storage = run(ReadStorage(VEHICLE, 2), Commanded(tells)).result
     assert (storage.storage, storage.is_ready, storage.free_mib) == (2, True, 100.5)
@@ -103,3 +112,29 @@ def test_what_cameras_tell_of_themselves() -> None:
 
 def test_another_camera_behind_the_same_autopilot_is_not_meant() -> None:
     assert isinstance(run(FindCamera(VEHICLE, 2), Commanded(tells)).error, NoAnswerError)
+
+
+@pytest.mark.parametrize(
+    ("flags", "for_images", "for_videos"),
+    [
+        (0, None, None),
+        (dialect.CAMERA_CAP_FLAGS_HAS_MODES, 0, 1),
+        (
+            dialect.CAMERA_CAP_FLAGS_HAS_MODES
+            | dialect.CAMERA_CAP_FLAGS_CAN_CAPTURE_IMAGE_IN_VIDEO_MODE,
+            None,
+            1,
+        ),
+        (
+            dialect.CAMERA_CAP_FLAGS_HAS_MODES
+            | dialect.CAMERA_CAP_FLAGS_CAN_CAPTURE_VIDEO_IN_IMAGE_MODE,
+            0,
+            None,
+        ),
+    ],
+)
+def test_a_camera_with_modes_must_be_in_one_of_them(
+    flags: int, for_images: int | None, for_videos: int | None
+) -> None:
+    camera = Camera(VEHICLE, 0, "Maker", "Eye", flags)
+    assert (camera.mode_for(video=False), camera.mode_for(video=True)) == (for_images, for_videos)

@@ -9,10 +9,12 @@ from m2pem_plugin_mavlink.microservices.commands import REASON_S
 from m2pem_plugin_mavlink.microservices.gimbal import (
     Aim,
     FindGimbal,
+    Gimbal,
     YawFrame,
     point,
     pointing,
     release,
+    stop,
     take_control,
 )
 from m2pem_plugin_mavlink.microservices.patience import PATIENCE
@@ -94,3 +96,22 @@ def test_no_gimbal_points_nowhere(angle_rad: float) -> None:
         Aim(angle_rad)
     with pytest.raises(ValueError, match="cannot point"):
         Aim(yaw_rad=angle_rad)
+
+
+def test_a_gimbal_is_stopped_by_a_rate_of_nothing() -> None:
+    gimbal = Commanded(lambda heard, _: (ack(heard.command),))
+    assert run(stop(VEHICLE, YawFrame.NORTH, 3), gimbal).error is None
+    (heard,) = gimbal.heard
+    assert heard.command == dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
+    assert math.isnan(heard.param1)
+    assert math.isnan(heard.param2)
+    assert (heard.param3, heard.param4, heard.param7) == (0.0, 0.0, 3)
+    assert int(heard.param5) == LEVEL | dialect.GIMBAL_MANAGER_FLAGS_YAW_LOCK
+
+
+def test_what_a_gimbal_can_do_is_in_its_capabilities() -> None:
+    locks = dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_LOCK
+    plain = Gimbal(VEHICLE, 1, 0, (-1.0, 1.0), (-1.0, 1.0))
+    able = Gimbal(VEHICLE, 1, locks | 2048, (-1.0, 1.0), (-1.0, 1.0))
+    assert (plain.locks_yaw, plain.turns_endlessly) == (False, False)
+    assert (able.locks_yaw, able.turns_endlessly) == (True, True)

@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 import pytest
+from m2pem_plugin_mavlink.sim.camera import Camera
 from mavlink_bench import Bench
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -20,7 +21,8 @@ def to_camera(bench: Bench, command: int, *params: float) -> list[Any]:
     padded = [*params, *[0.0] * (7 - len(params))]
     message = dialect.MAVLink_command_long_message(1, CAMERA, command, 0, *padded)
     answers = bench.tell(message)
-    assert {each.get_srcComponent() for each in answers} == {CAMERA}
+    of_camera = [each for each in answers if each.get_type() != "STATUSTEXT"]
+    assert {each.get_srcComponent() for each in of_camera} == {CAMERA}
     return answers
 
 
@@ -28,6 +30,11 @@ def result(bench: Bench, command: int, *params: float) -> int:
     answers = to_camera(bench, command, *params)
     (ack,) = [each for each in answers if each.get_type() == "COMMAND_ACK"]
     return int(ack.result)
+
+
+def camera(bench: Bench) -> Camera:
+    (found,) = [each for each in bench.autopilot.parts if isinstance(each, Camera)]
+    return found
 
 
 def pictures(bench: Bench) -> list[Any]:
@@ -127,3 +134,38 @@ def test_the_autopilot_takes_no_command_for_the_camera(bench: Bench) -> None:
     assert bench.command(2000, 0, 0, 1) == 3
     bench.run(1)
     assert not pictures(bench)
+
+
+def test_a_picture_with_a_number_is_taken_once(bench: Bench) -> None:
+    for number in (5, 5, 6, 6):
+        assert result(bench, 2000, 0, 0, 1, number) == 0
+        bench.run(1)
+    assert [each.image_index for each in pictures(bench)] == [0, 1]
+
+
+def test_it_tells_of_a_picture_again_if_it_is_asked(bench: Bench) -> None:
+    camera(bench).untold = 1
+    assert result(bench, 2000, 0, 0, 1) == 0
+    bench.run(1)
+    assert not pictures(bench)
+    answers = to_camera(bench, 512, CAPTURED, 0)
+    assert [each.image_index for each in answers if each.get_msgId() == CAPTURED] == [0]
+    assert result(bench, 512, CAPTURED, 1) == dialect.MAV_RESULT_DENIED
+
+
+def test_a_picture_that_it_cannot_take_it_tells_of(bench: Bench) -> None:
+    camera(bench).spoilt = 1
+    assert result(bench, 2000, 0, 0, 1) == 0
+    bench.run(1)
+    assert [each.capture_result for each in pictures(bench)] == [0]
+    assert asked(bench, STATUS).image_count == 0
+
+
+def test_a_full_camera_takes_and_records_nothing_more(bench: Bench) -> None:
+    bench.autopilot.troubles.camera_full = True
+    assert result(bench, 2000, 0, 0, 1) == dialect.MAV_RESULT_FAILED
+    assert result(bench, 2500) == dialect.MAV_RESULT_FAILED
+    assert asked(bench, 261).available_capacity == 0
+    assert "Camera: storage full" in bench.texts()
+    bench.autopilot.troubles.camera_full = False
+    assert result(bench, 2000, 0, 0, 1) == 0

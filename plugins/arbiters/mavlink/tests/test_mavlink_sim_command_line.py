@@ -25,9 +25,15 @@ def group() -> click.Group:
     return cli
 
 
+def boat_has_gimbal(ground: Ground) -> bool:
+    ground.link.mav.command_long_send(3, 1, 512, 0, 280, 0, 0, 0, 0, 0, 0)
+    told = ground.wait("GIMBAL_MANAGER_INFORMATION", that=lambda m: m.get_srcSystem() == 3)
+    return bool(told.gimbal_device_id)
+
+
 def test_vehicles_are_named_and_simulated_until_ctrl_c() -> None:
     ground = Ground("udpin:127.0.0.1:0")
-    words = ["sim", "mavlink", "--copters", "2", "--boats", "1", "--speed", "10"]
+    words = ["sim", "mavlink", "--copters", "2", "--boats", "1", "--speed", "10", "--gimbal"]
     words += ["--to", f"udp://127.0.0.1:{ground.port}", "--home", "60.1,24.9,5", "--ekf", "500ms"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
     process = subprocess.Popen(
@@ -39,6 +45,8 @@ def test_vehicles_are_named_and_simulated_until_ctrl_c() -> None:
             ground.wait("HEARTBEAT", that=lambda m: m.get_srcSystem() == 3 and m.type == 11)
             home = ground.wait("HOME_POSITION", that=lambda m: m.get_srcSystem() == 1)
             assert (home.latitude, home.longitude, home.altitude) == (601000000, 249000000, 5000)
+            # Only copters would have one without being told to.
+            assert boat_has_gimbal(ground)
             lines = [process.stdout.readline().split() for _ in range(3)]
         finally:
             process.send_signal(signal.SIGINT)

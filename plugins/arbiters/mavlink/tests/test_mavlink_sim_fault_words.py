@@ -62,6 +62,7 @@ def test_the_others_do_what_they_say() -> None:
     assert happening("battery 12.5 %").autopilot.battery.percent == 12
     assert not happening("lose gps").autopilot.estimator.ready
     assert happening("refuse command 400").command(400, 1) == 4
+    assert happening("camera full").autopilot.troubles.camera_full
     world = happening('refuse arming "Gyros: not today"')
     world.command(176, 1, 4)
     assert world.command(400, 1) == 4

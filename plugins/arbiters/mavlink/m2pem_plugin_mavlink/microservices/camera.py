@@ -28,6 +28,33 @@ class Camera:
         """Whether it has a CAMERA_CAP_FLAGS."""
         return bool(self.capabilities & capability)
 
+    @property
+    def takes_images(self) -> bool:
+        """Whether it can take single images."""
+        return self.has(dialect.CAMERA_CAP_FLAGS_CAPTURE_IMAGE)
+
+    @property
+    def records(self) -> bool:
+        """Whether it can record videos."""
+        return self.has(dialect.CAMERA_CAP_FLAGS_CAPTURE_VIDEO)
+
+    @property
+    def zooms(self) -> bool:
+        """Whether it can zoom."""
+        return self.has(dialect.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM)
+
+    def mode_for(self, video: bool) -> int | None:
+        """The CAMERA_MODE that it must be in to record, or to take images; None: any will do."""
+        if not self.has(dialect.CAMERA_CAP_FLAGS_HAS_MODES):
+            return None
+        if video:
+            anyway = dialect.CAMERA_CAP_FLAGS_CAN_CAPTURE_VIDEO_IN_IMAGE_MODE
+            mode: int = dialect.CAMERA_MODE_VIDEO
+        else:
+            anyway = dialect.CAMERA_CAP_FLAGS_CAN_CAPTURE_IMAGE_IN_VIDEO_MODE
+            mode = dialect.CAMERA_MODE_IMAGE
+        return None if self.has(anyway) else mode
+
 
 @dataclass(frozen=True, slots=True)
 class CaptureStatus:
@@ -94,6 +121,19 @@ class ReadCaptureStatus(RequestMessage[CaptureStatus]):
         super().__init__(target, "CAMERA_CAPTURE_STATUS", read)
 
 
+class ReadZoom(RequestMessage[float]):
+    """How far a camera has zoomed: 0 is wide, 1 is narrow; NaN where it does not know
+    (CAMERA_SETTINGS)."""
+
+    def __init__(self, target: Address, device: int = 0) -> None:
+        def read(message: Message) -> float | None:
+            if device not in (0, message.camera_device_id):
+                return None
+            return float(message.zoomLevel) / 100.0
+
+        super().__init__(target, "CAMERA_SETTINGS", read)
+
+
 class ReadStorage(RequestMessage[Storage]):
     """One of a camera's storages, the first is 1."""
 
@@ -147,6 +187,12 @@ def stop_video(target: Address, device: int = 0) -> Command:
 def zoom(target: Address, fraction: float, device: int = 0) -> Command:
     """Zoom to a fraction of the camera's range: 0 is wide, 1 is narrow."""
     params = (dialect.ZOOM_TYPE_RANGE, 100.0 * fraction, device, _NAN, 0, 0, _NAN)
+    return Command(target, dialect.MAV_CMD_SET_CAMERA_ZOOM, params)
+
+
+def stop_zoom(target: Address, device: int = 0) -> Command:
+    """Zoom no further."""
+    params = (dialect.ZOOM_TYPE_CONTINUOUS, 0.0, device, _NAN, 0, 0, _NAN)
     return Command(target, dialect.MAV_CMD_SET_CAMERA_ZOOM, params)
 
 

@@ -70,6 +70,16 @@ class Gimbal:
         """Whether it has a GIMBAL_MANAGER_CAP_FLAGS."""
         return bool(self.capabilities & capability)
 
+    @property
+    def turns_endlessly(self) -> bool:
+        """Whether it can pan on and on in one direction."""
+        return self.has(dialect.GIMBAL_MANAGER_CAP_FLAGS_SUPPORTS_INFINITE_YAW)
+
+    @property
+    def locks_yaw(self) -> bool:
+        """Whether it can point to somewhere from north (`YawFrame.NORTH`)."""
+        return self.has(dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_LOCK)
+
 
 class FindGimbal(RequestMessage[Gimbal]):
     """The gimbal of a component, if that manages one.
@@ -126,6 +136,13 @@ def pointing(manager: Address, aim: Aim, device: int = ALL) -> Message:
         gimbal_device_id=device,
     )
     return message
+
+
+def stop(manager: Address, yaw_frame: YawFrame = YawFrame.VEHICLE, device: int = ALL) -> Command:
+    """Turn no further: to be told to turn at a rate of 0."""
+    flags = Aim(yaw_frame=yaw_frame).flags
+    params = (math.nan, math.nan, 0.0, 0.0, flags, 0, device)
+    return Command(manager, dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, params)
 
 
 def _angles(aim: Aim) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from m2pem_plugin_mavlink.sim.command import Command, Result
 from m2pem_plugin_mavlink.sim.commands.dispatch import CommandServer
 from m2pem_plugin_mavlink.sim.identity import EPOCH_S
 from m2pem_plugin_mavlink.sim.part import CommandHandler, MessageHandler, Part, ReportMaker
+from m2pem_plugin_mavlink.sim.peers import Heard
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.sim.autopilot import Autopilot
@@ -41,7 +42,11 @@ class Series:
 
 
 class Camera(Part):
-    """`pictures`: how many it has taken; `zoom`: 0 to 100; `recording`: it takes a video."""
+    """`pictures`: how many it has taken; `zoom`: 0 to 100; `recording`: it takes a video.
+
+    `untold`: of so many more pictures nobody is told, unless they ask. `spoilt`: so many more
+    pictures cannot be taken, which is told.
+    """
 
     component = dialect.MAV_COMP_ID_CAMERA
 
@@ -50,6 +55,9 @@ class Camera(Part):
         self.pictures = 0
         self.zoom = 0.0
         self.recording = False
+        self.untold = self.spoilt = 0
+        self._taken: dict[int, Any] = {}
+        self._last: dict[Heard, float] = {}
         self._recorded_s = 0.0
         self._used_mib = 0.0
         self._zoom_rate = 0.0
@@ -110,7 +118,18 @@ class Camera(Part):
             dialect.MAV_CMD_SET_CAMERA_ZOOM: self._set_zoom,
         }
 
+    @property
+    def _free_mib(self) -> float:
+        full = self.autopilot.troubles.camera_full
+        return 0.0 if full else max(0.0, CAPACITY_MIB - self._used_mib)
+
     def _request(self, command: Command) -> Result:
+        if command.param1 == dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED:
+            taken = self._taken.get(int(command.param2))
+            if taken is None:
+                return Result.DENIED
+            self._send(taken, command.sender.peer)
+            return Result.ACCEPTED
         maker = self._makers.get(int(command.param1))
         if maker is None:
             return Result.UNSUPPORTED
@@ -128,21 +147,35 @@ class Camera(Part):
         return answer
 
     def _start_pictures(self, command: Command) -> Result:
-        """Parameter 2: seconds between them; 3: how many, 0 for as long as it goes."""
+        """Parameter 2: seconds between them; 3: how many, 0 for as long as it goes; 4: of a single
+        one its number, so that it is not taken twice."""
+        number = command.param4 if command.param3 == 1 else 0.0
+        if number and self._last.get(command.sender) == number:
+            return Result.ACCEPTED
+        if self._free_mib < PICTURE_MIB:
+            return self._full()
         count, every_s = int(command.param3), command.param2
         if count < 0 or (count != 1 and not every_s >= SHORTEST_S):
             return Result.DENIED
         if self._series is not None:
             return Result.TEMPORARILY_REJECTED
+        if number:
+            self._last[command.sender] = number
         left = count if count else None
         self._series = Series(max(every_s, SHORTEST_S), left, self.autopilot.now_s)
         return Result.ACCEPTED
+
+    def _full(self) -> Result:
+        self.autopilot.warn("Camera: storage full")
+        return Result.FAILED
 
     def _stop_pictures(self, command: Command) -> Result:
         self._series = None
         return Result.ACCEPTED
 
     def _record(self, on: bool) -> Result:
+        if on and self._free_mib < VIDEO_MIB_PER_S:
+            return self._full()
         if on and not self.recording:
             self._recorded_s = 0.0
         self.recording = on
@@ -168,27 +201,38 @@ class Camera(Part):
 
     def _take_picture(self) -> None:
         """All are told where it was taken."""
+        if self.spoilt:
+            self.spoilt -= 1
+            self._tell_of_picture(taken=False)
+            return
+        self._used_mib += PICTURE_MIB
+        self._tell_of_picture(taken=True)
+        self.pictures += 1
+        self.autopilot.note("picture", str(self.pictures))
+
+    def _tell_of_picture(self, *, taken: bool) -> None:
         pilot, body = self.autopilot, self.autopilot.body
         place = pilot.frame.to_location(pilot.position)
-        self._used_mib += PICTURE_MIB
         half = body.yaw_rad / 2
-        self._send(
-            dialect.MAVLink_camera_image_captured_message(
-                pilot.boot_ms,
-                int((EPOCH_S + pilot.now_s) * 1e6),
-                0,
-                round(place.latitude_deg * 1e7),
-                round(place.longitude_deg * 1e7),
-                round(place.altitude_amsl_m * 1e3),
-                round((body.up_m - pilot.home.point.up_m) * 1e3),
-                [math.cos(half), 0.0, 0.0, math.sin(half)],
-                self.pictures,
-                1,
-                f"/{self.pictures:05d}.jpg".encode(),
-            )
+        message = dialect.MAVLink_camera_image_captured_message(
+            pilot.boot_ms,
+            int((EPOCH_S + pilot.now_s) * 1e6),
+            0,
+            round(place.latitude_deg * 1e7),
+            round(place.longitude_deg * 1e7),
+            round(place.altitude_amsl_m * 1e3),
+            round((body.up_m - pilot.home.point.up_m) * 1e3),
+            [math.cos(half), 0.0, 0.0, math.sin(half)],
+            self.pictures,
+            int(taken),
+            f"/{self.pictures:05d}.jpg".encode() if taken else b"",
         )
-        self.pictures += 1
-        pilot.note("picture", str(self.pictures))
+        if taken:
+            self._taken[self.pictures] = message
+        if taken and self.untold:
+            self.untold -= 1
+        else:
+            self._send(message)
 
     # --- telemetry --------------------------------------------------------------------------------
 
@@ -223,15 +267,14 @@ class Camera(Part):
         )
 
     def _storage(self) -> Any:
-        free_mib = max(0.0, CAPACITY_MIB - self._used_mib)
         return dialect.MAVLink_storage_information_message(
             self.autopilot.boot_ms,
             1,
             1,
             dialect.STORAGE_STATUS_READY,
             CAPACITY_MIB,
-            self._used_mib,
-            free_mib,
+            CAPACITY_MIB - self._free_mib,
+            self._free_mib,
             math.nan,
             math.nan,
         )
@@ -245,6 +288,6 @@ class Camera(Part):
             int(self.recording),
             0.0 if series is None else series.every_s,
             int(self._recorded_s * 1000) if self.recording else 0,
-            max(0.0, CAPACITY_MIB - self._used_mib),
+            self._free_mib,
             self.pictures,
         )

@@ -169,6 +169,7 @@ class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
     help="A parameter of all vehicles, such as FS_GCS_ENABLE=1. May be given more than once.",
 )
 @click.option("--camera", is_flag=True, help="All vehicles have a camera (component 100).")
+@click.option("--gimbal", is_flag=True, help="All vehicles have a gimbal, not copters alone.")
 @click.option(
     "--fault",
     "faults",
@@ -191,6 +192,7 @@ def mavlink(
     firmware: str,
     parameters: tuple[tuple[str, float], ...],
     camera: bool,
+    gimbal: bool,
     faults: tuple[PlannedFault, ...],
 ) -> None:
     """Simulate MAVLink vehicles over UDP, as ArduPilot or PX4 speaks, until Ctrl-C.
@@ -211,6 +213,7 @@ def mavlink(
         firmware=firmware,
         parameters=dict(parameters),
         camera=camera,
+        gimbal=True if gimbal else None,
     )
     try:
         specs = list(_specs(kinds, like, first_system))

@@ -16,9 +16,11 @@ class Refusal:
 
 @dataclass(slots=True)
 class Troubles:
-    """`gps_lost`: no satellites; `arming`: why it does not arm; `commands`: by MAV_CMD."""
+    """`gps_lost`: no satellites; `arming`: why it does not arm; `commands`: by MAV_CMD;
+    `camera_full`: there is no room for another picture."""
 
     gps_lost: bool = False
+    camera_full: bool = False
     arming: str | None = None
     commands: dict[int, Refusal] = field(default_factory=dict)
 

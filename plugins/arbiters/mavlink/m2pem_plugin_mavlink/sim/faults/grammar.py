@@ -120,6 +120,10 @@ def _refuse_command(match: re.Match[str]) -> Made:
     )
 
 
+def _full(is_so: bool) -> Action:
+    return lambda faults: setattr(faults.autopilot.troubles, "camera_full", is_so)
+
+
 def _mode(match: re.Match[str]) -> Made:
     mode = match[1].upper()
     return (lambda faults: faults.take_over(mode)), None
@@ -136,6 +140,7 @@ ACTIONS: Mapping[str, tuple[str, Callable[[re.Match[str]], Made]]] = {
     "battery low, battery 12 %": (rf"battery\s+(?:low|{NUMBER}\s*%)", _battery),
     "lose gps": (r"lose gps", lambda _: (Faults.lose_gps, Faults.find_gps)),
     'refuse arming, refuse arming "text"': (r"refuse arming(?:\s+\"([^\"]+)\")?", _refuse_arming),
+    "camera full": (r"camera full", lambda _: (_full(True), _full(False))),
     "refuse command 22": (r"refuse command\s+(\d+)", _refuse_command),
     "mode LOITER at 40 s": (r"mode\s+(\S+)", _mode),
 }
