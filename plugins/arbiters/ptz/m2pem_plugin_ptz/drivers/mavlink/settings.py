@@ -1,0 +1,99 @@
+"""What a fleet says of a camera that is reached over MAVLink."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from m2pem.api import Connection
+from m2pem_plugin_ptz.drivers.own_settings import OwnSettings
+
+AUTOPILOT_COMPONENT, CAMERA_COMPONENT = 1, 100
+GCS_SYSTEM_ID = 255
+OWN_COMPONENT = 191
+"""As which component of the ground station cameras are commanded; its vehicles are as 190."""
+
+MOST_DEVICES = 255
+
+
+class Yaw(StrEnum):
+    """What a gimbal keeps between two orders."""
+
+    VEHICLE = "vehicle"
+    NORTH = "north"
+
+
+@dataclass(frozen=True, slots=True)
+class MavlinkSettings:
+    """`system_id`, `component_id`: of the vehicle's autopilot. `gimbal`: there is one; without, the
+    camera looks ahead, fixed. `gimbal_component`: of the gimbal's manager. `camera_component` None:
+    a camera of its own, or else the autopilot. Devices: 0 is the one that is there."""
+
+    urls: tuple[str, ...]
+    system_id: int
+    component_id: int = AUTOPILOT_COMPONENT
+    gcs_system_id: int = GCS_SYSTEM_ID
+    own_component: int = OWN_COMPONENT
+    gimbal: bool = True
+    gimbal_component: int = AUTOPILOT_COMPONENT
+    gimbal_device: int = 0
+    camera_component: int | None = None
+    camera_device: int = 0
+    yaw: Yaw = Yaw.VEHICLE
+
+    @property
+    def camera_components(self) -> tuple[int, ...]:
+        """Who may speak for the camera, the likeliest first."""
+        if self.camera_component is not None:
+            return (self.camera_component,)
+        return CAMERA_COMPONENT, self.component_id
+
+
+_KEYS = (
+    "url",
+    "system_id",
+    "component_id",
+    "gcs_system_id",
+    "own_component",
+    "gimbal",
+    "gimbal_component",
+    "gimbal_device",
+    "camera_component",
+    "camera_device",
+    "yaw",
+)
+
+
+def read_settings(connection: Connection) -> MavlinkSettings:
+    """Those of one camera.
+
+    Raises:
+        PluginError: something is missing or wrong; the text names the resource and the key.
+    """
+    own = OwnSettings.of(connection)
+    own.refuse_slips(_KEYS)
+    autopilot = own.whole("component_id", AUTOPILOT_COMPONENT, 1, 255, "of the autopilot")
+    camera = None
+    if "camera_component" in own.values:
+        camera = own.whole("camera_component", CAMERA_COMPONENT, 1, 255, "of the camera")
+    return MavlinkSettings(
+        urls=_urls(own),
+        system_id=own.whole("system_id", None, 1, 255, "the MAVLink system id of the vehicle"),
+        component_id=autopilot,
+        gcs_system_id=own.whole("gcs_system_id", GCS_SYSTEM_ID, 1, 255, "our own"),
+        own_component=own.whole("own_component", OWN_COMPONENT, 1, 255, "our own"),
+        gimbal=own.flag("gimbal", True),
+        gimbal_component=own.whole("gimbal_component", autopilot, 1, 255, "of the manager"),
+        gimbal_device=own.whole("gimbal_device", 0, 0, MOST_DEVICES, "of the manager's gimbals"),
+        camera_component=camera,
+        camera_device=own.whole("camera_device", 0, 0, MOST_DEVICES, "of its cameras"),
+        yaw=own.choice("yaw", Yaw, Yaw.VEHICLE),
+    )
+
+
+def _urls(own: OwnSettings) -> tuple[str, ...]:
+    value = own.values.get("url")
+    urls = value if isinstance(value, list | tuple) else [value]
+    if not urls or not all(isinstance(url, str) and "://" in url for url in urls):
+        raise own.error(
+            "url", f"{value!r} is no URL such as udpin://127.0.0.1:14550: that of the vehicle"
+        )
+    return tuple(urls)

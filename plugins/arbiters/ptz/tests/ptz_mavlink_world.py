@@ -1,0 +1,114 @@
+"""A camera driver on a simulated autopilot, over real UDP."""
+
+import asyncio
+import logging
+import math
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+from m2pem_plugin_mavlink.sim.camera import Camera
+from m2pem_plugin_mavlink.sim.gimbal.gimbal import Gimbal
+from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
+from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_ptz.drivers.driver import Seat
+from m2pem_plugin_ptz.drivers.mavlink import MavlinkDriver
+from m2pem_plugin_ptz.head import Reach
+from m2pem_plugin_ptz.settings import DriverName, Settings
+
+from m2pem.api import ArbiterContext, Connection, ResourceId, VehicleState
+from m2pem.executive.clock import SystemClock
+from m2pem.gateway.bus import Bus
+
+SPEED = 10.0
+AMPLE_S = 20.0
+VEHICLE, CAMERA = ResourceId("v1"), ResourceId("v1/ptz")
+REACH = Reach(zoom_max=11.0, rate_rad_s=2.0)
+
+
+async def until(true: Callable[[], bool]) -> None:
+    """Wait until something is so, or fail."""
+    async with asyncio.timeout(AMPLE_S):
+        while not true():  # noqa: ASYNC110  # what is waited for has no event
+            await asyncio.sleep(0.005)
+
+
+@dataclass
+class World:
+    """The driver, and what is true of its camera."""
+
+    driver: MavlinkDriver
+    real: SimulatedVehicle
+    clock: SystemClock
+    bus: Bus
+    heard: list[float] = field(default_factory=list)
+
+    @property
+    def gimbal(self) -> Gimbal:
+        (found,) = (each for each in self.real.autopilot.parts if isinstance(each, Gimbal))
+        return found
+
+    @property
+    def camera(self) -> Camera:
+        (found,) = (each for each in self.real.autopilot.parts if isinstance(each, Camera))
+        return found
+
+    @property
+    def truly_deg(self) -> tuple[float, float]:
+        """Pan from the bow and tilt from the horizon, as it really is."""
+        pointing = self.gimbal.pointing
+        return math.degrees(pointing.yaw_rad), math.degrees(pointing.pitch_rad)
+
+    async def ready(self, behavior: str = "ptz_point_at") -> None:
+        await until(lambda: self.driver.refusal(behavior) == "")
+        if behavior.startswith("ptz"):
+            await until(lambda: self.driver.look is not None)
+
+    def is_at(self, pan_deg: float, tilt_deg: float, within_deg: float = 0.6) -> bool:
+        pan, tilt = self.truly_deg
+        return abs(pan - pan_deg) < within_deg and abs(tilt - tilt_deg) < within_deg
+
+    def point(self, pan_deg: float, tilt_deg: float, rate_deg_s: float | None = None) -> None:
+        rate = None if rate_deg_s is None else math.radians(rate_deg_s)
+        self.driver.point(math.radians(pan_deg), math.radians(tilt_deg), rate)
+
+    def vehicle_is(self, **state: Any) -> None:
+        """What the arbiter of the vehicle says of it."""
+        self.bus.publish(VehicleState(VEHICLE, self.clock.now_us(), **state))
+
+
+def make_seat(
+    settings: dict[str, Any], clock: SystemClock, heard: Callable[[], None], **more: Any
+) -> Seat:
+    context = ArbiterContext(clock, Bus(), logging.getLogger("test"), (47.4, 8.5, 488.0))
+    own = Settings(DriverName.MAVLINK, REACH, own=settings, **{"stabilized": True, **more})
+    return Seat(Connection(CAMERA, "air", settings), own, context, heard)
+
+
+@asynccontextmanager
+async def world(
+    kind: Kind = Kind.COPTER,
+    *,
+    to: tuple[str, int] | None = None,
+    spec: dict[str, Any] | None = None,
+    own: dict[str, Any] | None = None,
+    **more: Any,
+) -> AsyncIterator[World]:
+    """A vehicle with gimbal and camera. `own`: of the connection; `more`: of its settings."""
+    what = {"gimbal": True, "camera": True, "heading_deg": 90.0, **(spec or {})}
+    async with Simulator([VehicleSpec(kind, **what)], speed=SPEED, to=to) as simulator:
+        real = simulator[1]
+        host, port = real.address
+        clock = SystemClock(SPEED)
+        heard: list[float] = []
+        connection = {"url": f"udpout://{host}:{port}", "system_id": 1, **(own or {})}
+        seat = make_seat(connection, clock, lambda: heard.append(clock.now_us() / 1e6), **more)
+        driver = MavlinkDriver(seat)
+        await driver.open()
+        try:
+            bus = seat.context.bus
+            assert isinstance(bus, Bus)
+            yield World(driver, real, clock, bus, heard)
+        finally:
+            await driver.close()
