@@ -1,0 +1,211 @@
+"""Reaches a camera on a pan-tilt head by the topics of its joints and its images."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from m2pem.api import ResourceId
+from m2pem.errors import PluginError
+from m2pem_plugin_ptz.drivers.driver import CameraError, Seat
+from m2pem_plugin_ptz.drivers.ros import shared_runtime
+from m2pem_plugin_ptz.drivers.ros.joints import Axis
+from m2pem_plugin_ptz.drivers.ros.settings import Command, read_settings
+from m2pem_plugin_ptz.head import Look, Picture, Reach
+
+if TYPE_CHECKING:
+    from m2pem_plugin_ros.runtime import RosRuntime
+
+    from m2pem_plugin_ptz.drivers.ros.image_feed import ImageFeed
+    from m2pem_plugin_ptz.drivers.ros.recorder import Recorder
+    from m2pem_plugin_ptz.drivers.ros.steering import Steering
+
+MISSING = "cameras over ROS need the plugin m2pem-plugin-ros: pip install 'm2pem-plugin-ptz[ros]'"
+NOT_OPEN = "the camera is not connected"
+
+
+class RosDriver:
+    """Implements `CameraDriver`.
+
+    Raises:
+        PluginError: the connection cannot be used; the text names the resource and the key.
+    """
+
+    def __init__(self, seat: Seat) -> None:
+        self._seat = seat
+        self._settings = read_settings(seat.connection)
+        self._ros: RosRuntime | None = None
+        self._made: list[Any] = []
+        self._positions: dict[Axis, float] = {}
+        self._strangers: tuple[str, ...] = ()
+        self._steering: Steering | None = None
+        self._images: ImageFeed | None = None
+        self._recorder: Recorder | None = None
+
+    # --- life -----------------------------------------------------------------------------------
+
+    async def open(self) -> None:
+        """Listen; the camera need not be there yet.
+
+        Raises:
+            PluginError: ROS or its plugin is not installed, or cannot be used.
+        """
+        self._ros = self._join()
+        try:
+            self._listen(self._ros)
+        except BaseException:
+            await self.close()
+            raise
+
+    def _join(self) -> "RosRuntime":
+        try:
+            from m2pem_plugin_ros import loopback  # noqa: PLC0415  # optional
+        except ModuleNotFoundError as error:
+            raise PluginError(f"{self._resource}: {MISSING} ({error})") from error
+        if self._seat.connection.sitl and not loopback.is_kept():
+            try:
+                loopback.keep_on_loopback()
+            except PluginError:  # other vehicles are reached over other networks already
+                self._seat.context.logger.info("%s: DDS is not on 127.0.0.1 alone", self._resource)
+        # Two executives on one network have two journals, and so two names.
+        name = f"m2pem_ptz_{self._seat.context.journal.hex[:8]}"
+        return shared_runtime.join(self._settings.domain_id, name)
+
+    def _listen(self, ros: "RosRuntime") -> None:
+        from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415  # they need ROS
+        from sensor_msgs.msg import JointState  # noqa: PLC0415
+        from std_msgs.msg import Float64MultiArray  # noqa: PLC0415
+        from trajectory_msgs.msg import JointTrajectory  # noqa: PLC0415
+
+        from m2pem_plugin_ptz.drivers.ros.image_feed import ImageFeed  # noqa: PLC0415
+        from m2pem_plugin_ptz.drivers.ros.recorder import Recorder  # noqa: PLC0415
+        from m2pem_plugin_ptz.drivers.ros.steering import Steering  # noqa: PLC0415
+
+        own, clock = self._settings, self._seat.context.clock
+        as_trajectory = own.command is Command.TRAJECTORY
+        kind = JointTrajectory if as_trajectory else Float64MultiArray
+        publisher = ros.node.create_publisher(kind, own.command_topic, qos.COMMANDS)
+        heard = ros.subscribe(JointState, own.joint_states, self._hear, qos.TELEMETRY)
+        self._made = [publisher, heard]
+        self._steering = Steering(
+            own.joints,
+            self.reach,
+            clock,
+            lambda: self.look,
+            publisher.publish,
+            as_trajectory=as_trajectory,
+        )
+        self._images = ImageFeed(ros, own.image, clock)
+        folder = self._seat.settings.pictures
+        self._recorder = Recorder(self._images, folder, self._resource, clock)
+
+    async def close(self) -> None:
+        """Let go. The camera stays as it is; a video that is being recorded ends."""
+        if self._steering is not None:
+            await self._steering.close()
+        if self._recorder is not None:
+            await self._recorder.close()
+        if self._images is not None:
+            self._images.close()
+        ros, self._ros = self._ros, None
+        if ros is not None:
+            for each in self._made[:1]:
+                ros.node.destroy_publisher(each)
+            for each in self._made[1:]:
+                ros.node.destroy_subscription(each)
+            self._made = []
+            await shared_runtime.leave(self._settings.domain_id)
+
+    # --- what is known --------------------------------------------------------------------------
+
+    @property
+    def look(self) -> Look | None:
+        """Where it looks, as its joints said last."""
+        endless = self._seat.settings.reach.endless
+        return self._settings.joints.look(self._positions, endless=endless)
+
+    @property
+    def reach(self) -> Reach:
+        """Where it can look: the fleet says."""
+        reach = self._seat.settings.reach
+        return reach if self._settings.joints.zooms else replace(reach, zoom_max=1.0)
+
+    def refusal(self, behavior: str) -> str:
+        """Why the camera cannot do such a behavior, now or ever; "" if it can."""
+        if self._ros is None or self._images is None:
+            return NOT_OPEN
+        if behavior in ("take_picture", "record_video"):
+            is_there = self._images.has_publisher
+            return "" if is_there else f"nobody publishes images on {self._images.topic}"
+        if behavior == "zoom" and not self._settings.joints.zooms:
+            return "the fleet names no joint that zooms (connection.joints.zoom)"
+        if self.look is None:
+            return self._unheard()
+        if not self._ros.node.count_subscribers(self._settings.command_topic):
+            return f"nobody listens to {self._settings.command_topic}, which moves its joints"
+        return ""
+
+    # --- orders ---------------------------------------------------------------------------------
+
+    def point(self, pan_rad: float, tilt_rad: float, rate_rad_s: float | None = None) -> None:
+        """Turn there, not faster than `rate_rad_s`, and stay."""
+        if self._steering is not None:
+            self._steering.point(pan_rad, tilt_rad, rate_rad_s)
+
+    def zoom(self, level: float) -> None:
+        """Zoom there, if there is a joint for it."""
+        if self._steering is not None and self._settings.joints.zooms:
+            self._steering.zoom(level)
+
+    def halt(self) -> None:
+        """Stop turning and zooming."""
+        if self._steering is not None:
+            self._steering.halt()
+
+    async def take_picture(self) -> Picture:
+        """The next image.
+
+        Raises:
+            CameraError: none comes.
+        """
+        if self._images is None:
+            raise CameraError(NOT_OPEN)
+        frame = await self._images.next()
+        return Picture(frame.taken_us, frame.content, frame.suffix)
+
+    async def start_recording(self) -> None:
+        """Store the images from now on.
+
+        Raises:
+            CameraError: there are none, or they cannot be stored.
+        """
+        if self._recorder is None:
+            raise CameraError(NOT_OPEN)
+        await self._recorder.start()
+
+    async def stop_recording(self) -> str:
+        """End the video; returns the path of its file.
+
+        Raises:
+            CameraError: none was begun, or not all could be stored.
+        """
+        if self._recorder is None:
+            raise CameraError(NOT_OPEN)
+        return await self._recorder.stop()
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    @property
+    def _resource(self) -> ResourceId:
+        return self._seat.connection.resource
+
+    def _hear(self, message: Any) -> None:
+        found = self._settings.joints.heard(message.name, message.position)
+        self._positions.update(found)
+        if self.look is None:
+            self._strangers = tuple(message.name)
+        elif found:
+            self._seat.heard()
+
+    def _unheard(self) -> str:
+        names = " and ".join(list(self._settings.joints.names.values())[:2])
+        others = f"; it tells of {', '.join(self._strangers)}" if self._strangers else ""
+        return f"{self._settings.joint_states} does not tell of {names}{others}"

@@ -1,0 +1,102 @@
+"""What a fleet says of a camera that is reached over ROS."""
+
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+
+from m2pem.api import Connection
+from m2pem_plugin_ptz.drivers.own_settings import OwnSettings
+from m2pem_plugin_ptz.drivers.ros.joints import Axis, Joints
+
+_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*")
+HIGHEST_DOMAIN = 232
+
+
+class Command(StrEnum):
+    """What moves the joints: trajectory_msgs/JointTrajectory, or std_msgs/Float64MultiArray."""
+
+    TRAJECTORY = "trajectory"
+    POSITIONS = "positions"
+
+
+class Via(StrEnum):
+    """How a camera is commanded. A camera inherits what its vehicle says of its own node."""
+
+    JOINTS = "joints"
+    TOPICS = "topics"
+    ACTION = "action"
+
+
+COMMAND_TOPICS = {
+    Command.TRAJECTORY: "pan_tilt_controller/joint_trajectory",
+    Command.POSITIONS: "pan_tilt_controller/commands",
+}
+"""As ros2_control names those of its controllers."""
+
+
+@dataclass(frozen=True, slots=True)
+class RosSettings:
+    """Topics have their full names. `domain_id` None: that of the environment."""
+
+    joints: Joints
+    command: Command
+    command_topic: str
+    joint_states: str
+    image: str
+    domain_id: int | None = None
+
+
+_KEYS = ("via", "namespace", "domain_id", "joints", "command", "command_topic", "joint_states")
+_ALL = (*_KEYS, "image")
+_JOINTS = ("pan", "tilt", "zoom", "reversed")
+
+
+def read_settings(connection: Connection) -> RosSettings:
+    """Those of one camera.
+
+    Raises:
+        PluginError: something is wrong; the text names the resource and the key.
+    """
+    own = OwnSettings.of(connection)
+    own.refuse_slips(_ALL)
+    own.choice("via", Via, Via.JOINTS)
+    command = own.choice("command", Command, Command.TRAJECTORY)
+    namespace = own.text("namespace", "/").strip("/")
+    if namespace and not _NAME.fullmatch(namespace):
+        raise own.error("namespace", f"'{namespace}' is no ROS namespace, such as /evsg1")
+
+    def topic(key: str, default: str) -> str:
+        name = own.text(key, default)
+        if not _NAME.fullmatch(name):
+            raise own.error(key, f"'{name}' is no name of a ROS topic, such as {default}")
+        return name if name.startswith("/") else f"/{namespace}/{name}".replace("//", "/")
+
+    domain_id = None
+    if "domain_id" in own.values:
+        domain_id = own.whole("domain_id", None, 0, HIGHEST_DOMAIN, "the ROS domain")
+    return RosSettings(
+        _joints(own),
+        command,
+        topic("command_topic", COMMAND_TOPICS[command]),
+        topic("joint_states", "joint_states"),
+        topic("image", "camera/image_raw/compressed"),
+        domain_id,
+    )
+
+
+def _joints(own: OwnSettings) -> Joints:
+    inner = own.inner("joints", "{pan: pan_joint, tilt: tilt_joint}")
+    inner.refuse_others(_JOINTS)
+    names = {
+        Axis.PAN: inner.text("pan", "pan_joint"),
+        Axis.TILT: inner.text("tilt", "tilt_joint"),
+    }
+    if "zoom" in inner.values:
+        names[Axis.ZOOM] = inner.text("zoom", "zoom_joint")
+    if len(set(names.values())) < len(names):
+        raise own.error("joints", "two of them have the same name")
+    backwards = inner.values.get("reversed", [])
+    known = [str(axis) for axis in (Axis.PAN, Axis.TILT)]
+    if not isinstance(backwards, list | tuple) or not set(backwards) <= set(known):
+        raise inner.error("reversed", f"{backwards!r} is no list of {' and '.join(known)}")
+    return Joints(names, frozenset(Axis(each) for each in backwards))

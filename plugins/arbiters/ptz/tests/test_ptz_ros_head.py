@@ -1,0 +1,142 @@
+"""Pointing over ROS: what the joints really do."""
+
+import asyncio
+import math
+
+import pytest
+from ptz_ros_world import make_driver, until, world
+
+COMMANDS = ["trajectory", "positions"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+async def test_it_points_clockwise_and_up_and_says_so(ros_domain, tmp_path, command) -> None:
+    async with world(ros_domain, tmp_path, command=command) as it:
+        await it.ready()
+        it.point(40.0, 20.0)
+        # A joint counts counter-clockwise (REP-103).
+        await until(lambda: it.joints_are(pan_joint=-40.0, tilt_joint=20.0))
+        await until(lambda: it.driver.look.pan_rad == pytest.approx(math.radians(40), abs=0.01))
+        assert it.driver.look.tilt_rad == pytest.approx(math.radians(20), abs=0.01)
+        assert it.heard
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+async def test_it_turns_no_faster_than_asked_and_the_last_order_counts(
+    ros_domain, tmp_path, command
+) -> None:
+    async with world(ros_domain, tmp_path, command=command) as it:
+        await it.ready()
+        loop = asyncio.get_running_loop()
+        it.point(90.0, 0.0)
+        it.point(-30.0, 0.0, rate_deg_s=20.0)
+        began_s = loop.time()
+        await until(lambda: it.joints_are(pan_joint=30.0))
+        assert 1.2 < loop.time() - began_s < 4.0
+        assert min(each["pan_joint"] for each in it.history) > -0.1
+
+
+async def test_orders_that_come_again_and_again_arrive_no_sooner(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path, command="positions") as it:
+        await it.ready()
+        loop = asyncio.get_running_loop()
+        began_s = loop.time()
+        while not it.joints_are(pan_joint=-30.0):
+            it.point(30.0, 0.0, rate_deg_s=20.0)
+            await asyncio.sleep(0.08)
+            assert loop.time() - began_s < 6.0
+        assert loop.time() - began_s > 1.2
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+async def test_halt_stops_it_on_its_way(ros_domain, tmp_path, command) -> None:
+    async with world(ros_domain, tmp_path, command=command) as it:
+        await it.ready()
+        it.point(150.0, 0.0, rate_deg_s=30.0)
+        await until(lambda: it.joint_deg("pan_joint") < -20.0)
+        it.driver.halt()
+        await asyncio.sleep(0.3)
+        stood = it.joint_deg("pan_joint")
+        count = len(it.history)
+        await until(lambda: len(it.history) > count + 10)
+        assert it.joint_deg("pan_joint") == pytest.approx(stood, abs=0.3)
+        assert stood > -60.0
+
+
+async def test_it_zooms_while_it_turns(ros_domain, tmp_path) -> None:
+    joints = {"pan": "pan_joint", "tilt": "tilt_joint", "zoom": "zoom_joint"}
+    async with world(ros_domain, tmp_path, joints=joints) as it:
+        await it.ready()
+        it.point(30.0, 0.0)
+        it.driver.zoom(4.0)
+        await until(lambda: it.driver.look.zoom == pytest.approx(4.0, abs=0.05))
+        await until(lambda: it.joints_are(pan_joint=-30.0))
+        assert it.joints["zoom_joint"] == pytest.approx(4.0, abs=0.05)
+        assert it.driver.refusal("zoom") == ""
+
+
+async def test_joints_may_be_the_other_way_round_and_have_other_names(ros_domain, tmp_path) -> None:
+    joints = {"pan": "mast_yaw", "tilt": "mast_pitch", "reversed": ["tilt"]}
+    async with world(ros_domain, tmp_path, joints=joints) as it:
+        await it.ready()
+        it.point(-20.0, 15.0)
+        await until(lambda: it.joints_are(mast_yaw=20.0, mast_pitch=-15.0))
+        await until(lambda: it.driver.look.tilt_rad == pytest.approx(math.radians(15), abs=0.01))
+
+
+async def test_what_turns_endlessly_goes_the_shorter_way(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path, endless=True) as it:
+        await it.ready()
+        it.point(170.0, 0.0)
+        await until(lambda: it.joints_are(pan_joint=-170.0))
+        it.point(-170.0, 0.0)
+        await until(lambda: it.joints_are(pan_joint=-190.0))
+        await until(lambda: abs(it.driver.look.pan_rad - math.radians(-170)) < 0.02)
+
+
+async def test_a_head_that_was_deaf_is_told_again(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        await it.ready()
+        await it.fault("stuck")
+        await asyncio.sleep(0.2)
+        it.point(30.0, 0.0)
+        await asyncio.sleep(0.5)
+        assert it.joints_are(pan_joint=0.0)
+        await it.fault("well")
+        await until(lambda: it.joints_are(pan_joint=-30.0))
+
+
+async def test_joints_that_fall_silent_are_not_heard(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        await it.ready()
+        await it.fault("silent")
+        loop = asyncio.get_running_loop()
+        await until(lambda: it.heard[-1] < loop.time() - 0.5)
+        await it.fault("well")
+        await until(lambda: it.heard[-1] > loop.time() - 0.2)
+
+
+async def test_a_camera_that_is_not_there_says_what_is_missing(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path, camera=False) as it:
+        told = it.driver.refusal("ptz_point_at")
+        assert told == "/evsg2/joint_states does not tell of pan_joint and tilt_joint"
+        told = it.driver.refusal("take_picture")
+        assert told == "nobody publishes images on /evsg2/camera/image_raw/compressed"
+        assert it.driver.look is None
+        it.point(10.0, 10.0)
+        it.driver.halt()
+        assert not it.heard
+
+
+async def test_joints_of_others_are_named(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        await it.ready()
+        settings = {"namespace": "/evsg2", "domain_id": ros_domain, "joints": {"pan": "p"}}
+        other = make_driver(settings, tmp_path, lambda: None)
+        await other.open()
+        try:
+            known = "it tells of wheel, pan_joint, tilt_joint"
+            await until(lambda: known in other.refusal("ptz_track"))
+            assert other.look is None
+        finally:
+            await other.close()

@@ -1,0 +1,121 @@
+"""Pictures and videos over ROS."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from m2pem_plugin_ptz.drivers.driver import CameraError
+from m2pem_plugin_ptz.drivers.ros import image_feed
+from ptz_ros_world import until, world
+
+
+async def test_a_picture_shows_where_the_camera_looked(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        await it.ready()
+        it.point(30.0, -10.0)
+        await until(lambda: it.joints_are(0.05, pan_joint=-30.0, tilt_joint=-10.0))
+        picture = await it.driver.take_picture()
+        assert picture.suffix == ".jpg"
+        assert picture.content.startswith(b"\xff\xd8")
+        assert b"pan 30.00 tilt -10.00" in picture.content
+        again = await it.driver.take_picture()
+        assert again.taken_us > picture.taken_us
+
+
+async def test_images_are_listened_to_only_while_they_are_wanted(
+    ros_domain, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.setattr(image_feed, "LINGER_S", 0.2)
+    async with world(ros_domain, tmp_path) as it:
+        await it.ready()
+        topic = "/evsg2/camera/image_raw/compressed"
+        assert it.ros.node.count_subscribers(topic) == 0
+        await it.driver.take_picture()
+        await until(lambda: it.ros.node.count_subscribers(topic) == 0)
+
+
+async def test_a_camera_that_shows_nothing_is_an_error(ros_domain, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(image_feed, "WITHIN_S", 0.5)
+    async with world(ros_domain, tmp_path) as it:
+        await it.ready()
+        await it.fault("blind")
+        await asyncio.sleep(0.2)
+        with pytest.raises(CameraError, match="publishes there, but sends none"):
+            await it.driver.take_picture()
+
+
+async def test_what_is_no_picture_is_an_error(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        await it.ready()
+        await it.fault("garbled")
+        await asyncio.sleep(0.2)
+        with pytest.raises(CameraError, match="neither a JPEG nor a PNG"):
+            await it.driver.take_picture()
+
+
+async def test_a_video_is_a_file_of_pictures(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path / "new") as it:
+        await it.ready()
+        await it.driver.start_recording()
+        it.point(40.0, 0.0)
+        await until(lambda: it.joints_are(pan_joint=-40.0))
+        (path,) = (tmp_path / "new").iterdir()
+        await until(lambda: b"pan 40.00" in path.read_bytes())
+        told = await it.driver.stop_recording()
+        assert Path(told) == path.absolute()
+        assert path.name.startswith("evsg2_ptz_20")
+        content = path.read_bytes()
+        assert content.count(b"\xff\xd8\xff\xfe") == content.count(b"pan ") >= 2
+
+
+async def test_two_videos_never_share_a_file(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        await it.ready()
+        for _ in range(3):
+            await it.driver.start_recording()
+            await it.driver.stop_recording()
+        assert len(list(tmp_path.iterdir())) == 3
+
+
+async def test_a_video_that_cannot_be_stored_is_an_error(ros_domain, tmp_path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    async with world(ros_domain, blocked) as it:
+        await it.ready()
+        with pytest.raises(CameraError, match="no video can be stored in"):
+            await it.driver.start_recording()
+        with pytest.raises(CameraError, match="no video was begun"):
+            await it.driver.stop_recording()
+
+
+async def test_a_video_that_goes_on_ends_with_the_driver(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        await it.ready()
+        await it.driver.start_recording()
+        recorder = it.driver._recorder
+        assert recorder._file is not None
+    assert recorder._file is None
+    (path,) = tmp_path.iterdir()
+    assert path.read_bytes().endswith(b"\xff\xd9")
+
+
+async def test_a_disk_that_is_full_is_told_at_the_end(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        await it.ready()
+        await it.driver.start_recording()
+        recorder, failed = it.driver._recorder, asyncio.Event()
+        real = recorder._file
+
+        class Full:
+            def __getattr__(self, name):
+                return getattr(real, name)
+
+            def close(self):
+                failed.set()
+                real.close()
+                raise OSError(28, "No space left on device")
+
+        recorder._file = Full()
+        with pytest.raises(CameraError, match=r"is not whole: .*No space left"):
+            await it.driver.stop_recording()
+        assert failed.is_set()
