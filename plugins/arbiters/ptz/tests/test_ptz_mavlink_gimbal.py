@@ -1,12 +1,16 @@
 """Pointing over MAVLink: what the driver says, and where the gimbal really points."""
 
 import math
+import socket
 
 import pytest
+from m2pem_plugin_mavlink import Address, open_link
 from m2pem_plugin_mavlink.sim.command import Result
 from m2pem_plugin_mavlink.sim.gimbal.gimbal import Controller
 from m2pem_plugin_mavlink.sim.specification import Kind
-from ptz_mavlink_world import REACH, until, world
+from ptz_mavlink_world import REACH, SPEED, until, world
+
+from m2pem.executive.clock import SystemClock
 
 OURS = Controller(255, 191)
 THEIRS = Controller(77, 190)
@@ -214,6 +218,23 @@ async def test_a_vehicle_without_a_gimbal_says_who_did_not_answer() -> None:
         assert "component 1 of system 1 has not said" in it.driver.refusal("ptz_track")
         assert it.driver.look is None
         assert it.heard  # by its camera
+
+
+async def test_the_socket_is_that_of_the_vehicles_arbiter() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    url = f"udpin://127.0.0.1:{port}"
+    link = await open_link(Address(1, 1), [url], SystemClock(SPEED))
+    try:
+        async with world(to=("127.0.0.1", port), own={"url": url}) as it:
+            await it.ready()
+            it.point(20.0, 0.0)
+            await until(lambda: it.is_at(20.0, 0.0))
+            assert link.quality() is not None
+        assert link.quality() is not None
+    finally:
+        await link.close()
 
 
 async def test_a_fixed_camera_looks_ahead() -> None:

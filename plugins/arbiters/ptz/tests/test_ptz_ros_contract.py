@@ -1,0 +1,158 @@
+"""The contract of arbiters, on simulated heads in another process, over real DDS."""
+
+import asyncio
+import json
+import math
+import threading
+from collections.abc import Callable, Coroutine, Iterator
+from dataclasses import replace
+from typing import Any, ClassVar
+from uuid import UUID
+
+import pytest
+from m2pem_plugin_ros.runtime import RosRuntime, qos
+from m2pem_plugin_ros.testing import Peer
+from ptz_ros_world import PEER, until
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from m2pem.api import ArbiterContext, Connection, GeoPosition, ResourceId, VehicleState
+from m2pem.testing import ArbiterCase, ArbiterContract
+
+arbiter = pytest.importorskip("m2pem_plugin_ptz.arbiter")
+
+A, B = ResourceId("ugv1/ptz"), ResourceId("ugv2/ptz")
+JOURNAL = UUID("7a4f3c52-6d0e-5c6d-9a3b-2d8a6d7e9f11")
+"""The same after a restart."""
+
+STOOD_S = 0.5
+
+
+def settings(camera: ResourceId, domain: int) -> dict[str, Any]:
+    return {"namespace": f"/{camera.partition('/')[0]}", "domain_id": domain}
+
+
+class Watcher:
+    """Sees and does what the arbiter does not, in a thread and loop of its own."""
+
+    def __init__(self, domain: int) -> None:
+        self.motions = {A: 0, B: 0}
+        self._at: dict[ResourceId, tuple[float, ...]] = {}
+        self._moved_s: dict[ResourceId, float] = {A: 0.0, B: 0.0}
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name="watcher", daemon=True)
+        self._thread.start()
+        self._ros: RosRuntime = self.do(lambda: self._open(domain))
+
+    def do(self, work: Callable[[], Coroutine[Any, Any, Any]]) -> Any:
+        return asyncio.run_coroutine_threadsafe(work(), self._loop).result(30.0)
+
+    def silence(self, camera: ResourceId) -> None:
+        async def switch() -> None:
+            topic = f"/{camera.partition('/')[0]}/sim_fault"
+            publisher = self._ros.node.create_publisher(String, topic, qos.COMMANDS)
+            await until(publisher.get_subscription_count)
+            publisher.publish(String(data="silent"))
+
+        self.do(switch)
+
+    def close(self) -> None:
+        self.do(self._ros.close)
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    async def _open(self, domain: int) -> RosRuntime:
+        ros = RosRuntime("watcher", domain_id=domain)
+        for camera in (A, B):
+            topic = f"/{camera.partition('/')[0]}/joint_states"
+            ros.subscribe(
+                JointState,
+                topic,
+                lambda message, camera=camera: self._hear(camera, tuple(message.position)),
+                qos.TELEMETRY,
+            )
+        await until(lambda: len(self._at) == 2)
+        return ros
+
+    def _hear(self, camera: ResourceId, at: tuple[float, ...]) -> None:
+        now_s = self._loop.time()
+        before = self._at.get(camera, at)
+        self._at[camera] = at
+        if math.dist(before, at) > 1e-6:
+            self.motions[camera] += now_s - self._moved_s[camera] > STOOD_S
+            self._moved_s[camera] = now_s
+
+
+@pytest.mark.long
+class TestHeads(ArbiterContract):
+    unsupported: ClassVar = {
+        "virtual clock": "cameras are told over real DDS",
+        "telemetry": "a camera that turns has a look, not a speed",
+    }
+
+    @pytest.fixture
+    def watcher(self, ros_domain: int) -> Iterator[Watcher]:
+        def peer(camera: ResourceId) -> Peer:
+            said = json.dumps(settings(camera, ros_domain))
+            return Peer(PEER, ros_domain, [camera, said, "no"])
+
+        with peer(A), peer(B):
+            watcher = Watcher(ros_domain)
+            yield watcher
+            watcher.close()
+
+    @pytest.fixture
+    def make_arbiter(self, ros_domain: int, watcher: Watcher, tmp_path) -> Any:
+        said = {
+            "driver": "ros",
+            "pictures": str(tmp_path),
+            "reach": {
+                "pan": ["-160 deg", "160 deg"],
+                "tilt": ["-85 deg", "45 deg"],
+                "rate": "2 rad/s",
+            },
+        }
+
+        def make(context: ArbiterContext) -> Any:
+            for camera in (A, B):
+                vehicle = ResourceId(camera.partition("/")[0])
+                place = GeoPosition(38.1075, -77.3192, 60.0)
+                now_us = context.clock.now_us()
+                north = {"yaw_rad": math.pi / 2, "velocity_enu_m_s": (0.0, 0.0, 0.0)}
+                context.bus.publish(VehicleState(vehicle, now_us, place, **north))
+            connections = {
+                camera: Connection(
+                    camera,
+                    "ground",
+                    {**settings(camera, ros_domain), **said},
+                    lost_after_s=2.0,
+                    sitl=True,
+                )
+                for camera in (A, B)
+            }
+            return arbiter.PtzArbiter(connections, replace(context, journal=JOURNAL))
+
+        return make
+
+    @pytest.fixture
+    def cut_link(self, watcher: Watcher) -> Callable[[object, ResourceId], None]:
+        return lambda _, camera: watcher.silence(camera)
+
+    @pytest.fixture
+    def effects(self, watcher: Watcher) -> Callable[[object, ResourceId], int]:
+        return lambda _, camera: watcher.motions[camera]
+
+    @pytest.fixture
+    def case(self) -> ArbiterCase:
+        return ArbiterCase(
+            vehicle=A,
+            other=B,
+            long=(
+                "ptz_scan_sector",
+                {"heading": 0.0, "sector": math.radians(170), "speed": math.radians(8)},
+            ),
+            short=("ptz_point_at", {"bearing": math.radians(150), "elevation": -0.4}),
+            bad=("speed", -1.0),
+            short_s=10.0,
+        )
