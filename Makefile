@@ -58,6 +58,7 @@ $(JS)/node_modules/.package-lock.json: $(JS)/package-lock.json $(JS)/.npmrc
 ROS := .venv-ros
 ROS_PYTHON := $(ROS)/bin/python
 ROS_PLUGINS := $(wildcard plugins/arbiters/ros plugins/ocu/mocu)
+ROS_TESTS := $(ROS_PLUGINS:%=%/tests) $(wildcard plugins/arbiters/ptz/tests/test_ptz_ros_*.py)
 ROS_PIP := PIP_CONSTRAINT=ros/constraints.txt PIP_BUILD_CONSTRAINT=ros/constraints.txt \
   $(ROS_PYTHON) -m pip --quiet --disable-pip-version-check
 # Of Nav2, the tests have a double: its own interfaces are in no registry of wheels.
@@ -94,7 +95,7 @@ $(ROS)/installed: $(ROS)/created pyproject.toml constraints.txt $(PLUGINS:%=%/py
 	@touch $@
 
 test-ros: ros ## check the plugins that need ROS, over DDS on 127.0.0.1
-	@$(ROS_PYTHON) -m pytest -n 2 -m "not long" $(ROS_PLUGINS:%=%/tests)
+	@$(ROS_PYTHON) -m pytest -n 2 -m "not long" $(ROS_TESTS)
 	@$(ROS_PYTHON) -m bench --quick --only ros_command,ros_fleet,ros_discovery
 
 DEMO := $(BIN)/m2pem run missions/vignette1.bpmn --fleet fleet_configs/vignette1.yaml --simulate --speed 20
@@ -163,7 +164,7 @@ test: lint bench-quick ## check all but the long tests
 
 test-long: lint ros ## check everything: fuzzing, large random counts, foreign corpora too
 	@$(BIN)/pytest -n 2 --timeout 1800
-	@$(ROS_PYTHON) -m pytest -n 2 --timeout 1800 $(ROS_PLUGINS:%=%/tests)
+	@$(ROS_PYTHON) -m pytest -n 2 --timeout 1800 $(ROS_TESTS)
 
 FUZZ_S := 600
 

@@ -21,7 +21,7 @@ def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], N
 
 @hookimpl
 def m2pem_register_commands(cli: "click.Group") -> None:
-    """Add `sim onvif`."""
+    """Add `sim onvif` and `sim ros-cameras`."""
     from m2pem_plugin_ptz.commands import add_to  # noqa: PLC0415  # starting up must be fast
 
     add_to(cli.commands)

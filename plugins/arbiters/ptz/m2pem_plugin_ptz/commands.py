@@ -1,6 +1,7 @@
 """The commands of this plugin. What simulates cameras is loaded only when it is called."""
 
-from collections.abc import MutableMapping
+from collections.abc import Collection, MutableMapping
+from importlib import import_module
 from typing import Any
 
 import click
@@ -8,8 +9,17 @@ import click
 from m2pem.errors import PluginError
 
 
-class Onvif(click.Command):
-    """Stands for `sim.onvif.command_line.onvif` in the list of commands."""
+class Later(click.Command):
+    """Stands for a command of another module in the list of commands.
+
+    `needs`: the top packages that the extra `extra` of this plugin brings.
+    """
+
+    def __init__(
+        self, name: str, module: str, summary: str, extra: str, needs: Collection[str]
+    ) -> None:
+        super().__init__(name, help=summary)
+        self._module, self._extra, self._needs = module, extra, needs
 
     def make_context(
         self,
@@ -20,20 +30,40 @@ class Onvif(click.Command):
     ) -> click.Context:
         """That of the command itself, which then is what is invoked."""
         try:
-            from m2pem_plugin_ptz.sim.onvif.command_line import onvif  # noqa: PLC0415
+            module = import_module(self._module)
         except ModuleNotFoundError as error:
-            if (error.name or "").partition(".")[0] not in ("aiohttp", "PIL"):
+            if (error.name or "").partition(".")[0] not in self._needs:
                 raise
             raise PluginError(
-                f"`m2pem sim onvif` needs {error.name}: pip install 'm2pem-plugin-ptz[onvif]'"
+                f"`m2pem sim {self.name}` needs {error.name}: "
+                f"pip install 'm2pem-plugin-ptz[{self._extra}]'"
             ) from error
-        return onvif.make_context(info_name, args, parent, **extra)
+        command: click.Command = getattr(module, str(self.name).replace("-", "_"))
+        return command.make_context(info_name, args, parent, **extra)
 
 
 def add_to(commands: MutableMapping[str, click.Command]) -> None:
-    """Add `sim onvif`; the group `sim` may have commands of other plugins, too."""
+    """Add `sim onvif` and `sim ros-cameras`; the group `sim` may have others' commands, too."""
     group = commands.get("sim")
     if not isinstance(group, click.Group):
         group = click.Group("sim", help="Simulate vehicles that speak as real ones do.")
         commands["sim"] = group
-    group.add_command(Onvif("onvif", help="Simulate a camera that turns and speaks ONVIF."))
+    simulators = "m2pem_plugin_ptz.sim"
+    group.add_command(
+        Later(
+            "onvif",
+            f"{simulators}.onvif.command_line",
+            "Simulate a camera that turns and speaks ONVIF.",
+            "onvif",
+            ("aiohttp", "PIL"),
+        )
+    )
+    group.add_command(
+        Later(
+            "ros-cameras",
+            f"{simulators}.ros.command_line",
+            "Simulate cameras that turn over ROS, on 127.0.0.1.",
+            "ros",
+            ("m2pem_plugin_ros", "rclpy"),
+        )
+    )

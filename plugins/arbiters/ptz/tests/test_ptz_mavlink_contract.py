@@ -9,11 +9,10 @@ import pytest
 from m2pem_plugin_mavlink.sim.gimbal.gimbal import Gimbal
 from m2pem_plugin_mavlink.sim.simulator import Simulator
 from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_ptz.arbiter import PtzArbiter
 
 from m2pem.api import Connection, GeoPosition, ResourceId, VehicleState
 from m2pem.testing import ArbiterCase, ArbiterContract
-
-arbiter = pytest.importorskip("m2pem_plugin_ptz.arbiter")
 
 A, B = ResourceId("v1/ptz"), ResourceId("v2/ptz")
 NUMBERS = {A: 1, B: 2}
@@ -104,7 +103,7 @@ class _Gimbals(ArbiterContract):
                 now_us = context.clock.now_us()
                 north = {"yaw_rad": math.pi / 2, "velocity_enu_m_s": (0.0, 0.0, 0.0)}
                 context.bus.publish(VehicleState(vehicle, now_us, place, **north))
-            return arbiter.PtzArbiter({each: connection(each) for each in NUMBERS}, context)
+            return PtzArbiter({each: connection(each) for each in NUMBERS}, context)
 
         return make
 

@@ -7,21 +7,19 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import aclosing, asynccontextmanager
 from typing import Any
 
+import mavsdk
 import pytest
 from m2pem_plugin_mavlink.sim.specification import Kind
-from ptz_mavlink_world import AMPLE_S, World, until, world
-
-mavsdk = pytest.importorskip("mavsdk")
-
-from mavsdk.asyncio import Configuration, Mavsdk  # noqa: E402  # as it is there
-from mavsdk.asyncio.plugins.camera import CameraAsync  # noqa: E402
-from mavsdk.asyncio.plugins.gimbal import GimbalAsync  # noqa: E402
-from mavsdk.asyncio.plugins.mavlink_direct import (  # noqa: E402
+from mavsdk.asyncio import Configuration, Mavsdk
+from mavsdk.asyncio.plugins.camera import CameraAsync
+from mavsdk.asyncio.plugins.gimbal import GimbalAsync
+from mavsdk.asyncio.plugins.mavlink_direct import (
     MavlinkDirectAsync,
     MavlinkMessage,
 )
-from mavsdk.component_type import ComponentType  # noqa: E402
-from mavsdk.plugins.gimbal import ControlMode, GimbalMode, SendMode  # noqa: E402
+from mavsdk.component_type import ComponentType
+from mavsdk.plugins.gimbal import ControlMode, GimbalMode, SendMode
+from ptz_mavlink_world import AMPLE_S, World, until, world
 
 SET_MESSAGE_INTERVAL = 511
 GIMBAL_MANAGER_STATUS, GIMBAL_DEVICE_ATTITUDE_STATUS = 281, 285

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 from uuid import UUID
 
 import pytest
+from m2pem_plugin_ptz.arbiter import PtzArbiter
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.testing import Peer
 from ptz_ros_world import PEER, until
@@ -18,8 +19,6 @@ from std_msgs.msg import String
 
 from m2pem.api import ArbiterContext, Connection, GeoPosition, ResourceId, VehicleState
 from m2pem.testing import ArbiterCase, ArbiterContract
-
-arbiter = pytest.importorskip("m2pem_plugin_ptz.arbiter")
 
 A, B = ResourceId("ugv1/ptz"), ResourceId("ugv2/ptz")
 JOURNAL = UUID("7a4f3c52-6d0e-5c6d-9a3b-2d8a6d7e9f11")
@@ -131,7 +130,7 @@ class TestHeads(ArbiterContract):
                 )
                 for camera in (A, B)
             }
-            return arbiter.PtzArbiter(connections, replace(context, journal=JOURNAL))
+            return PtzArbiter(connections, replace(context, journal=JOURNAL))
 
         return make
 

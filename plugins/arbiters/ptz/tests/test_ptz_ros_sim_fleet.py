@@ -14,8 +14,6 @@ from sensor_msgs.msg import JointState
 from m2pem import load_fleet
 from m2pem.errors import PluginError
 
-pytest.importorskip("m2pem_plugin_ptz.arbiter")
-
 COMMAND = Path(__file__).with_name("ptz_ros_sim_command.py")
 FLEET = """
 version: 1
