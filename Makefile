@@ -96,7 +96,7 @@ $(ROS)/installed: $(ROS)/created pyproject.toml constraints.txt $(PLUGINS:%=%/py
 
 test-ros: ros ## check the plugins that need ROS, over DDS on 127.0.0.1
 	@$(ROS_PYTHON) -m pytest -n 2 -m "not long" $(ROS_TESTS)
-	@$(ROS_PYTHON) -m bench --quick --only ros_command,ros_fleet,ros_discovery
+	@$(ROS_PYTHON) -m bench --quick --only ros_command,team_orders,ros_fleet,ros_discovery
 
 DEMO := $(BIN)/m2pem run missions/vignette1.bpmn --fleet fleet_configs/vignette1.yaml --simulate --speed 20
 ANSWERS := missions/answers/vignette1

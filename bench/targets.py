@@ -119,6 +119,22 @@ def _ros_command(journal: str, bound_ms: float | None) -> Program:
     return Program("20 vehicles, 10 messages/s each", command, quick, goals, ros=True)
 
 
+def _team_orders(journal: str) -> Program:
+    orders = {"start": None, "hold": 200, "resume": 200, "cancel": 200}
+    goals = [
+        goal
+        for order, bound_ms in orders.items()
+        for goal in (
+            Goal(f"{order}_p50_ms", f"{order} to a team's last member, {journal} journal", "ms"),
+            Goal(f"{order}_max_ms", "the same, the longest of 100", "ms", bound_ms),
+        )
+    ]
+    command = ("team_orders", journal, "5", "5", "100")
+    quick = ("team_orders", journal, "2", "2", "3")
+    size = "5 ROS and 5 MAVLink members, 10 and 50 messages/s each"
+    return Program(size, command, quick, tuple(goals), ros=True)
+
+
 def _ros_discovery(count: int) -> Program:
     goals = (
         Goal("all_s", "ROS, from connect until all are heard", "s"),
@@ -220,6 +236,8 @@ PROGRAMS = (
     _mavlink_command("sqlite", None),
     _ros_command("memory", 3),
     _ros_command("sqlite", None),
+    _team_orders("memory"),
+    _team_orders("sqlite"),
     Program(
         "100 vehicles, odometry and status at 10 Hz, 30 s",
         ("ros_fleet", "100", "10", "30"),

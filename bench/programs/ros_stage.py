@@ -57,11 +57,15 @@ def own_domain() -> Iterator[int]:
 class Vehicles(Peer):
     """A process of so many vehicles, which tell of themselves so often a second.
 
+    `endless`: none of them gets to an end, not v0 alone, and cancels are told of, too.
     `began_ns`: when it began to make them (ns since the epoch).
     """
 
-    def __init__(self, domain: int, count: int, rate_hz: float, first: int = 0) -> None:
-        super().__init__(VEHICLES, domain, [str(count), str(rate_hz), str(first)])
+    def __init__(
+        self, domain: int, count: int, rate_hz: float, first: int = 0, *, endless: bool = False
+    ) -> None:
+        arguments = [str(count), str(rate_hz), str(first), *["endless"] * endless]
+        super().__init__(VEHICLES, domain, arguments)
         assert self.process.stdout is not None
         self.began_ns = int(self.process.stdout.readline())
         self._got: queue.SimpleQueue[Got] = queue.SimpleQueue()

@@ -1,11 +1,12 @@
 """A process of vehicles with arbiter nodes, in plain rclpy, as far as an executive needs them.
 
-python bench/programs/ros_vehicles.py <vehicles> <Hz of odometry and status> [<first>]
+python bench/programs/ros_vehicles.py <vehicles> <Hz of odometry and status> [<first> [endless]]
 
 They are v0, v1 and so on, from `first` on, in namespaces of those names. Each stands in its place,
-accepts whatever it is commanded, and has done it at once; v0 never gets to an end. On standard
-output, the line before "ready" says when the nodes began to be made (ns since the epoch), and each
-after it what a vehicle was commanded: its number, the verb, and when the callback was called.
+accepts whatever it is commanded, and has done it at once; v0 never gets to an end. With `endless`
+nobody does, and cancels are told of, too. On standard output, the line before "ready" says when the
+nodes began to be made (ns since the epoch), and each after it what a vehicle was commanded: its
+number, the verb, and when the callback was called.
 """
 
 import sys
@@ -26,8 +27,10 @@ LATCHED = DurabilityPolicy.TRANSIENT_LOCAL
 class Vehicle:
     """One of them, on a node that all share."""
 
-    def __init__(self, node: Node, number: int) -> None:
+    def __init__(self, node: Node, number: int, endless: bool) -> None:
         self._number = number
+        self._ends = not endless and number != NEVER_ENDS
+        self._told = (*TOLD, BehaviorCommand.CANCEL) if endless else TOLD
         name = f"v{number}"
         self._status = VehicleStatus(vehicle=name, readiness=VehicleStatus.READY, battery=0.8)
         self._odometry = Odometry(child_frame_id="base_link")
@@ -55,7 +58,7 @@ class Vehicle:
             if command.id in self._seen:
                 return
             self._seen.add(command.id)
-        elif command.verb in TOLD:
+        elif command.verb in (BehaviorCommand.HOLD, BehaviorCommand.RESUME):
             held = command.verb == BehaviorCommand.HOLD
             if self._status.held == held:  # said again
                 return
@@ -63,11 +66,11 @@ class Vehicle:
             self._states.publish(self._status)
         if command.verb == BehaviorCommand.START:
             self._say(command.id, BehaviorStatus.ACCEPTED, BehaviorStatus.RUNNING)
-            if self._number != NEVER_ENDS:
+            if self._ends:
                 self._say(command.id, BehaviorStatus.SUCCEEDED)
         elif command.verb == BehaviorCommand.CANCEL:
             self._say(command.id, BehaviorStatus.CANCELLED)
-        if command.verb in TOLD:
+        if command.verb in self._told:
             print(self._number, command.verb, came_ns, flush=True)
 
     def _say(self, behavior: str, *states: int) -> None:
@@ -84,7 +87,8 @@ def main() -> None:
     print(time.time_ns(), flush=True)
     rclpy.init()
     node = rclpy.create_node(f"vehicles_{first}")
-    vehicles = [Vehicle(node, number) for number in range(first, first + count)]
+    endless = "endless" in sys.argv
+    vehicles = [Vehicle(node, number, endless) for number in range(first, first + count)]
     told = 0
     began_s = time.monotonic()
 
