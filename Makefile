@@ -19,7 +19,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages demo demo-air demo-ros demo-ros-vehicle demo-ros-team
+.PHONY: help setup python-packages npm-packages demo demo-air demo-ros demo-ros-vehicle demo-ros-team demo-team
 .PHONY: test test-long test-ros fuzz lint format docs pictures
 .PHONY: bench bench-quick conformance clean ros
 
@@ -146,6 +146,39 @@ demo-ros-vehicle: ros
 demo-ros-team: ros
 	@echo "Three vehicles, reached in three ways, sweep a road as a team; one finds a mine, and they cross the bridge."
 	$(call OVER_ROS,fleet_configs/mehds_ros.yaml,operate mehds_vignette_1 mehds_vignette_1_swept)
+
+# As fast as real ones: how quickly a camera is told where to look, is a matter of real time.
+TEAM_SPEED := 1
+TEAM_FLEET := fleet_configs/mehds_mixed.yaml
+# Where the fleet expects the copter.
+TEAM_PORT := 14550
+TEAM_AUTOPILOT = --copters 1 --home 38.107162,-77.319941,60 --to udp://127.0.0.1:$(TEAM_PORT) \
+  --set FS_GCS_ENABLE=1 --set FS_GCS_TIMEOUT=10 --set BATT_FS_LOW_ACT=2 --set LAND_SPEED=100 --set WPNAV_SPEED_DN=250
+TEAM_POINTING_DEG := 1
+TEAM_END := EndBypassed
+TEAM_ANSWERS := missions/answers/team_column_bypassed.yaml
+# Each program says on a line of its own that it is ready; one that ends before, ends the demo.
+TEAM_READY = line=; until [ "$$line" = $(2) ]; do read -r line <&$(1); echo "$$line"; done
+
+# Bash waits for its own children alone, and not for what it reads from.
+TEAM_GONE = while kill -0 $(1) 2>/dev/null; do sleep 0.1; done
+
+# The column, its copter and its camera are simulated by programs of their own; one more measures what they did.
+demo-team: ros ## march in a column with a camera and a copter, over ROS 2 and MAVLink, and measure how well
+	@echo "Three ROS vehicles march in a column. The camera on the last one scans, a copter follows over MAVLink; the"
+	@echo "radar on the first one finds a mine. It takes less than two minutes."
+	@eval "$$($(ROS_PYTHON) -m m2pem_plugin_ros.loopback $(ROS_DOMAIN))"; executive= others=; \
+	trap 'for each in $$executive $$others; do kill $$each 2>/dev/null || true; $(call TEAM_GONE,$$each); done' EXIT; \
+	exec 3< <(exec $(ROS_PYTHON) -m m2pem sim ros --fleet $(TEAM_FLEET) --speed $(TEAM_SPEED) </dev/null); others+=" $$!"; \
+	exec 4< <(exec $(ROS_PYTHON) -m m2pem sim ros-cameras --fleet $(TEAM_FLEET) --speed $(TEAM_SPEED) </dev/null); others+=" $$!"; \
+	$(ROS_PYTHON) -m m2pem sim mavlink $(TEAM_AUTOPILOT) --speed $(TEAM_SPEED) </dev/null & others+=" $$!"; \
+	$(call TEAM_READY,3,ready); $(call TEAM_READY,4,ready); \
+	$(ROS_PYTHON) -m m2pem serve --fleet $(TEAM_FLEET) --ocu mocu --speed $(TEAM_SPEED) --journal memory: >/dev/null & executive=$$!; \
+	exec 5< <(exec $(ROS_PYTHON) -m bench.column --fleet $(TEAM_FLEET) --team camera_last --camera evsg2/ptz \
+	  --speed $(TEAM_SPEED) --bound $(TEAM_POINTING_DEG) --reached $(TEAM_END) </dev/null); watch=$$!; others+=" $$watch"; \
+	$(call TEAM_READY,5,watching); \
+	$(ROS_PYTHON) $(OPERATOR) --mission missions/team_column.bpmn --answers $(TEAM_ANSWERS) --within 300; \
+	cat <&5; wait $$watch
 
 lint: setup ## check style, types and layers
 	@$(BIN)/ruff check .

@@ -19,6 +19,7 @@ from typing import Any
 
 import rclpy
 from m2pem_interfaces import msg, srv
+from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -40,7 +41,7 @@ WORDS = {
     msg.RunStatus.FAILED: "failed",
     msg.RunStatus.STOPPED: "stopped",
 }
-REFUSED, TOO_LONG = 2, 3
+REFUSED, TOO_LONG, INTERRUPTED = 2, 3, 130
 LAST_EVENTS_S = 0.5
 
 
@@ -302,4 +303,8 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        status = main()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        status = INTERRUPTED
+    sys.exit(status)

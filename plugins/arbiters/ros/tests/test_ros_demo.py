@@ -1,8 +1,10 @@
-"""`make demo-ros`: simulated vehicles, an executive and an operator, over real DDS."""
+"""`make demo-ros` and `make demo-team`: simulated vehicles, an executive and an operator, over
+real DDS and UDP."""
 
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -14,19 +16,22 @@ from m2pem_plugin_ros.testing import reserved_domain
 from ros_e2e_programs import SOURCES, until
 
 REPOSITORY = Path(__file__).parents[4]
-ENDED_WITHIN_S = 110.0
+FLEETS = REPOSITORY / "fleet_configs"
+ENDED_WITHIN_S = 170.0
+POINTING_DEG = 3.0
+"""What is asked of the camera here, where other tests have the processor, too."""
 
 
 class Demo:
     """A target of make in a process group of its own, as a terminal has it."""
 
-    def __init__(self, target: str, domain: int, folder: Path) -> None:
+    def __init__(self, target: str, domain: int, folder: Path, *variables: str) -> None:
         # What is installed is what runs the tests.
         words = ["make", "--silent", "-o", "ros", target, f"ROS_PYTHON={sys.executable}"]
         # None of the variables of a make that runs the tests.
         known = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
         self.process = subprocess.Popen(
-            [*words, f"ROS_DOMAIN={domain}"],
+            [*words, f"ROS_DOMAIN={domain}", *variables],
             cwd=REPOSITORY,
             env={**known, "PYTHONPATH": os.pathsep.join(map(str, SOURCES)), "HOME": str(folder)},
             stdin=subprocess.DEVNULL,
@@ -115,3 +120,65 @@ def test_a_team_sweeps_a_road_and_crosses_a_bridge(domain: int, tmp_path: Path) 
     finally:
         demo.end()
     assert "r1 is completed" in demo.lines
+
+
+@pytest.fixture
+def team(tmp_path: Path) -> Iterator[list[str]]:
+    """Variables of make: a fleet whose autopilot sends to a port of its own."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+    for folder in ("geo", "routes"):
+        (tmp_path / folder).symlink_to(FLEETS / folder)
+    fleet = tmp_path / "fleet.yaml"
+    text = (FLEETS / "mehds_mixed.yaml").read_text(encoding="utf-8")
+    assert text.count(":14550") == 1
+    fleet.write_text(text.replace(":14550", f":{port}"), encoding="utf-8")
+    yield [f"TEAM_FLEET={fleet}", f"TEAM_PORT={port}", f"TEAM_POINTING_DEG={POINTING_DEG}"]
+
+
+@pytest.mark.long
+@pytest.mark.timeout(200)
+def test_a_column_marches_with_its_camera_on_the_target_and_drives_round_a_mine(
+    domain: int, tmp_path: Path, team: list[str]
+) -> None:
+    demo = Demo("demo-team", domain, tmp_path, *team)
+    try:
+        assert demo.rest() == 0, demo.lines[-20:]
+    finally:
+        demo.end()
+    assert "the run completed; EndBypassed reached" in demo.lines
+    measured = [line.split()[1] for line in demo.lines if line.startswith("spacing ")]
+    assert measured == ["RoadFollowing:", "DriveRound:"]
+    (total,) = [line for line in demo.lines if line.startswith("pointing from the moving")]
+    found = re.search(r"at most ([\d.]+) deg \((\d+) times\)", total)
+    assert found is not None
+    assert float(found[1]) < POINTING_DEG
+    assert int(found[2]) > 500
+
+
+@pytest.mark.long
+@pytest.mark.timeout(200)
+def test_a_demo_that_ends_elsewhere_has_failed(
+    domain: int, tmp_path: Path, team: list[str]
+) -> None:
+    answers = tmp_path / "answers.yaml"
+    answers.write_text("answers: {UserMoveOut: [abort]}", encoding="utf-8")
+    demo = Demo("demo-team", domain, tmp_path, *team, f"TEAM_ANSWERS={answers}")
+    try:
+        assert demo.rest() != 0
+    finally:
+        demo.end()
+    assert "the run completed; EndBypassed not reached" in demo.lines
+
+
+@pytest.mark.long
+def test_ctrl_c_ends_the_whole_team(domain: int, tmp_path: Path, team: list[str]) -> None:
+    demo = Demo("demo-team", domain, tmp_path, *team)
+    try:
+        demo.until("r1 is running")
+        os.killpg(demo.process.pid, signal.SIGINT)
+        assert demo.rest() != 0
+    finally:
+        demo.end()
+    assert not [line for line in demo.lines if re.search("Traceback|not a child", line)]
