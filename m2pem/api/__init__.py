@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         Connection,
         Limits,
         ResolvedValue,
+        SightedArbiter,
     )
     from m2pem.api.bus import FleetBus
     from m2pem.api.clock import Clock
@@ -71,7 +72,7 @@ if TYPE_CHECKING:
 _MODULES = {
     "m2pem.api.arbiter": (
         "AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport BehaviorRequest"
-        " Connection Limits ResolvedValue"
+        " Connection Limits ResolvedValue SightedArbiter"
     ),
     "m2pem.api.bus": "FleetBus",
     "m2pem.api.clock": "Clock",
@@ -155,6 +156,7 @@ __all__ = [
     "ServiceContext",
     "ServiceError",
     "Severity",
+    "SightedArbiter",
     "SimulationResult",
     "StampedRecord",
     "UnitError",

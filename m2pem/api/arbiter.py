@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 from uuid import UUID, uuid4
 
-from m2pem.api.telemetry import Telemetry
+from m2pem.api.telemetry import Telemetry, VehicleState
 from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.model.geometry import Area
 from m2pem.model.values import Value
@@ -176,4 +176,15 @@ class AdjustingArbiter(Protocol):
 
         What cannot be changed on the way, and a behavior that has ended, is left as it is.
         """
+        ...
+
+
+@runtime_checkable
+class SightedArbiter(Protocol):
+    """An arbiter that can tell at any moment where a vehicle is, not only when the vehicle tells of
+    itself. Teams look through it where it is offered."""
+
+    def sight(self, resource: ResourceId) -> VehicleState | None:
+        """The state of a vehicle now; None: it cannot be known now, and what its telemetry said
+        last holds."""
         ...

@@ -28,7 +28,6 @@ _BY_DOMAIN: Mapping[str, frozenset[str]] = {
     "surface": _EVERYWHERE | {"reverse"},
     "subsurface": _EVERYWHERE | {"reverse", "change_altitude"},
 }
-_ON_ROADS = frozenset({"road_following_formation", "road_sweep", "bridge_crossing"})
 _PICTURES = frozenset({"zoom", "take_picture", "record_video"})
 _BY_KIND: Mapping[str, frozenset[str]] = {
     "camera": _PICTURES,
@@ -38,13 +37,12 @@ _BY_KIND: Mapping[str, frozenset[str]] = {
 
 
 def vehicle_behaviors(domain: str) -> tuple[BehaviorSpec, ...]:
-    """What a vehicle of the domain can do, alone and as a member of a team."""
+    """What a vehicle of the domain can do alone. Teams are made of that, as everywhere."""
     alone = _BY_DOMAIN.get(domain, _BY_DOMAIN["ground"])
     return tuple(
         spec
         for (name, type_), spec in SHARED.items()
-        if (type_ is BehaviorType.VEHICLE and name in alone)
-        or (type_ is BehaviorType.TEAM and (domain == "ground" or name not in _ON_ROADS))
+        if type_ is BehaviorType.VEHICLE and name in alone
     )
 
 

@@ -30,7 +30,7 @@ from m2pem.sim.links import Links
 from m2pem.sim.memory import Memory
 from m2pem.sim.payloads import SimPayload
 from m2pem.sim.reach import Reach
-from m2pem.sim.settings import read_settings
+from m2pem.sim.settings import own_faults, read_settings
 from m2pem.sim.statefile import StateFile
 from m2pem.sim.track import Warp
 from m2pem.sim.vehicles import SimVehicle, carrier_of
@@ -39,7 +39,7 @@ LOST_AFTER_S = 3.0
 
 
 class SimArbiter:
-    """Implements `m2pem.api.AdjustingArbiter`. What a fleet may say of it: docs/simulation.md.
+    """Implements `m2pem.api.AdjustingArbiter` and `SightedArbiter`; settings: docs/simulation.md.
 
     `telemetry_hz`: of every resource that does not say its own; 0 tells of changes alone, so that
     nothing happens while nothing moves, and then links can't be watched by silence.
@@ -59,7 +59,7 @@ class SimArbiter:
         self._logger = context.logger
         self._context = context
         now_us = context.clock.now_us()
-        frame = Frame(context.origin)
+        self._frame = frame = Frame(context.origin)
         self._settings = {
             resource: read_settings(connection) for resource, connection in connections.items()
         }
@@ -100,7 +100,9 @@ class SimArbiter:
             self._bodies, frame, self._agenda, self._detected, self._keep_found
         )
         self._epochs = Epochs()
-        self._faults = {resource: self._own_faults(resource) for resource in self._bodies}
+        self._faults = {
+            resource: FaultList(own_faults(resource, self._settings)) for resource in self._bodies
+        }
         self._scripts: dict[BehaviorId, Strike] = {}
         self._connected = False
         self._late: list[tuple[SimPayload, Detection]] = []
@@ -235,6 +237,13 @@ class SimArbiter:
             file.close()
         self._memory.files = {}
 
+    def sight(self, resource: ResourceId) -> VehicleState | None:
+        """How a vehicle is now, if its link is up."""
+        body = self._bodies.get(resource)
+        if not isinstance(body, SimVehicle) or not self._audible(resource):
+            return None
+        return body.state(self._catch_up(), self._frame)
+
     # --- for tests and rehearsals ---------------------------------------------------------------
 
     @property
@@ -308,15 +317,6 @@ class SimArbiter:
                 if fault is not None:
                     return fault
         return None
-
-    def _own_faults(self, resource: ResourceId) -> FaultList:
-        """A payload inherits its vehicle's settings, but not the vehicle's faults."""
-        faults = self._settings[resource].faults
-        vehicle = carrier_of(resource)
-        inherited = vehicle != resource and vehicle in self._settings
-        if inherited and faults == self._settings[vehicle].faults:
-            faults = ()
-        return FaultList(faults)
 
     def _turn(self, resource: ResourceId, command: str) -> None:
         now_us = self._catch_up()

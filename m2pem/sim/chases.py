@@ -5,7 +5,6 @@ from m2pem.sim.executions import Aim, Part
 from m2pem.sim.gimbals import aimed
 from m2pem.sim.launch import Launcher
 from m2pem.sim.payloads import SimPayload
-from m2pem.sim.phases import Pose
 from m2pem.sim.pursuit import STEP_S, Pursuit, steer
 from m2pem.sim.track import US_PER_S, Plan
 from m2pem.sim.vehicles import SimVehicle
@@ -20,9 +19,7 @@ def next_step(part: Part, launcher: Launcher, now_us: int) -> None:
         pose = body.pose(now_us)
         chase = part.chase
         station, velocity = pose.place, (0.0, 0.0, 0.0)
-        if not chase.target:
-            station = chase.station(Pose(chase.place, 0.0))
-        elif (target := launcher.whereabouts(chase.target, now_us)) is not None:
+        if (target := launcher.whereabouts(chase.target, now_us)) is not None:
             station, velocity = chase.station(target), target.velocity
         phase = steer(
             body.kinematics,

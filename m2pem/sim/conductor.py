@@ -21,10 +21,8 @@ from m2pem.sim.wishes import RefusedError
 LONGEST_CATCH_UP_US = 3_600_000_000
 """A pursuit that nobody watched for longer begins again where it was so long ago."""
 
-
 ADJUSTABLE = frozenset({"single_vehicle_routing", "goto", "area_survey", "reverse"})
-"""Behaviors whose speed can be changed on the way: they are over at a place, not after a time, and
-no member of a team waits for the time that another one takes."""
+"""Behaviors whose speed can be changed on the way: they are over at a place, not after a time."""
 
 
 class Conductor:

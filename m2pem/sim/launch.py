@@ -20,7 +20,6 @@ from m2pem.sim.manoeuvres import MANOEUVRES, Manoeuvre
 from m2pem.sim.payloads import SimPayload
 from m2pem.sim.phases import Pose
 from m2pem.sim.shots import Shots
-from m2pem.sim.teams import TEAM_MANOEUVRES
 from m2pem.sim.track import Plan
 from m2pem.sim.vehicles import SimVehicle, carrier_of
 from m2pem.sim.wishes import RefusedError, Wishes
@@ -88,7 +87,7 @@ class Launcher:
             raise RefusedError(f"{request.behavior} has no resource")
         vehicles = [body for body in bodies if isinstance(body, SimVehicle)]
         payloads = [body for body in bodies if isinstance(body, SimPayload)]
-        type_ = _type(request.behavior, len(vehicles))
+        type_ = _type(request.behavior)
         acting: Sequence[Body] = payloads if type_ is BehaviorType.PAYLOAD else vehicles
         for body in acting or bodies:
             problem = refusal(self._spec(body, request.behavior, type_), request.parameters)
@@ -104,9 +103,6 @@ class Launcher:
         for craft, vehicle in zip(crafts, vehicles, strict=True):
             if vehicle.battery_at(now_us) <= 0:
                 raise RefusedError(f"the battery of {craft.name} is empty", "BATTERY_LOW")
-        if type_ is BehaviorType.TEAM:
-            done = TEAM_MANOEUVRES[request.behavior](crafts, wishes)
-            return [_assignment(*pair) for pair in zip(vehicles, done, strict=True)] + idle
         manoeuvre: Callable[..., Manoeuvre] = MANOEUVRES[request.behavior]
         return [
             _assignment(vehicle, manoeuvre(craft, wishes))
@@ -154,12 +150,10 @@ class Launcher:
         return Assignment(body, gaze.plan, chase, gaze.limit_s, shots=shots)
 
 
-def _type(behavior: str, vehicles: int) -> BehaviorType | None:
-    """Which of its types a behavior has for so many vehicles; None: nobody has it."""
+def _type(behavior: str) -> BehaviorType | None:
+    """Whether a behavior is a vehicle's or a payload's; None: nobody has it."""
     if behavior in GAZES:
         return BehaviorType.PAYLOAD
-    if behavior in TEAM_MANOEUVRES and (vehicles > 1 or behavior not in MANOEUVRES):
-        return BehaviorType.TEAM
     return BehaviorType.VEHICLE if behavior in MANOEUVRES else None
 
 

@@ -122,8 +122,8 @@ def _climb(craft: Craft, wishes: Wishes) -> Manoeuvre:
     return Manoeuvre(Course(craft).climb_to(flying_height(craft, wishes)).plan())
 
 
-def survey_tracks(craft: Craft, wishes: Wishes) -> list[tuple[float, float]]:
-    """The points of an area survey, two for each pass."""
+def _survey(craft: Craft, wishes: Wishes) -> Manoeuvre:
+    """Drive or fly the passes over an area; each is driven to its very end."""
     area = wishes.area()
     if area is None:
         raise RefusedError("parameter 'area': there is none")
@@ -131,7 +131,7 @@ def survey_tracks(craft: Craft, wishes: Wishes) -> list[tuple[float, float]]:
     heading = wishes.number("heading")
     yaw = longest_edge_yaw(rings[0]) if heading is None else yaw_of(heading)
     try:
-        return lawn_mower(
+        tracks = lawn_mower(
             rings,
             wishes.number("spacing") or SURVEY_SPACING_M,
             yaw,
@@ -139,25 +139,17 @@ def survey_tracks(craft: Craft, wishes: Wishes) -> list[tuple[float, float]]:
         )
     except ValueError as error:
         raise RefusedError(f"parameter 'spacing': {error}") from None
-
-
-def survey(craft: Craft, wishes: Wishes, tracks: list[tuple[float, float]]) -> Manoeuvre:
-    """Drive or fly the passes of a survey; each is driven to its very end."""
     up = flying_height(craft, wishes)
     places: list[Vector] = [(east, north, up) for east, north in tracks]
     course = under_way(craft, up).through(places, wishes.number("speed"), radius_m=0.0)
     return Manoeuvre(course.plan())
 
 
-def _survey(craft: Craft, wishes: Wishes) -> Manoeuvre:
-    return survey(craft, wishes, survey_tracks(craft, wishes))
-
-
 def _orbit(craft: Craft, wishes: Wishes) -> Manoeuvre:
     centre = wishes.target(craft, flying_height(craft, wishes))
     radius = wishes.number("radius") or ORBIT_RADIUS_M
     speed = wishes.number("speed")
-    course = onto_circle(craft, centre, radius, speed)
+    course = _onto_circle(craft, centre, radius, speed)
     turns, seconds = wishes.number("turns"), wishes.number("duration")
     if turns is None and seconds is not None:
         course.circle(centre[:2], speed, seconds=seconds)
@@ -166,38 +158,27 @@ def _orbit(craft: Craft, wishes: Wishes) -> Manoeuvre:
     return Manoeuvre(course.plan())
 
 
-def onto_circle(
-    craft: Craft,
-    centre: Vector,
-    radius_m: float,
-    speed_m_s: float | None,
-    angle_rad: float | None = None,
-) -> Course:
-    """A course to the nearest point of a circle, or to that at `angle_rad`."""
+def _onto_circle(craft: Craft, centre: Vector, radius_m: float, speed_m_s: float | None) -> Course:
+    """A course to the nearest point of a circle."""
     course = under_way(craft, centre[2])
-    if angle_rad is None:
-        angle_rad = math.atan2(course.place[1] - centre[1], course.place[0] - centre[0])
+    angle_rad = math.atan2(course.place[1] - centre[1], course.place[0] - centre[0])
     east = centre[0] + radius_m * math.cos(angle_rad)
     north = centre[1] + radius_m * math.sin(angle_rad)
     return course.through([(east, north, centre[2])], speed_m_s)
 
 
 def _observe(craft: Craft, wishes: Wishes) -> Manoeuvre:
-    return observe(craft, wishes, None)
-
-
-def observe(craft: Craft, wishes: Wishes, angle_rad: float | None) -> Manoeuvre:
     """Watch an area: from a circle above it when flying, else standing at its edge."""
     up = flying_height(craft, wishes)
     area = wishes.area()
     seconds = wishes.number("duration")
     centre = wishes.target(craft, up) if area is None else (*_middle(wishes, area), up)
     if craft.flies:
-        course = onto_circle(craft, centre, ORBIT_RADIUS_M, None, angle_rad)
+        course = _onto_circle(craft, centre, ORBIT_RADIUS_M, None)
         course.circle(centre[:2], seconds=seconds)
         return Manoeuvre(course.plan(course.steps - 1 if seconds is None else None))
-    if area is None or angle_rad is not None:
-        course = onto_circle(craft, centre, STANDOFF_M, None, angle_rad)
+    if area is None:
+        course = _onto_circle(craft, centre, STANDOFF_M, None)
     else:
         course = Course(craft)
         course.through([(*nearest_edge(wishes.rings(area)[0], course.place), up)])
@@ -230,27 +211,15 @@ def _follow(craft: Craft, wishes: Wishes) -> Manoeuvre:
     if vehicle is None or vehicle == craft.name:
         raise RefusedError("parameter 'target': another vehicle is expected")
     offset, bearing = wishes.number("offset"), wishes.number("bearing")
-    return pursue(
-        craft,
-        wishes,
+    up = flying_height(craft, wishes)
+    wishes.pose_of(vehicle)  # refused here if nobody knows where it is
+    pursuit = Pursuit(
         vehicle,
         FOLLOW_OFFSET_M if offset is None else offset,
         math.pi if bearing is None else bearing,
+        up,
+        craft.kinematics.max_speed_m_s,
     )
-
-
-def pursue(
-    craft: Craft, wishes: Wishes, vehicle: str | None, offset_m: float, bearing_rad: float
-) -> Manoeuvre:
-    """Keep a station at a vehicle, or (None) at the place that `target` says."""
-    up = flying_height(craft, wishes)
-    if vehicle is None:
-        place = wishes.target(craft, up)
-    else:
-        place = wishes.pose_of(vehicle).place
-    wished = wishes.number("speed")
-    speed = min(craft.kinematics.max_speed_m_s, wished or math.inf)
-    pursuit = Pursuit(vehicle or "", place, offset_m, bearing_rad, up, speed)
     # What moves already is steered on from its speed; only a landed one must rise first.
     landed = craft.flies and not craft.aloft
     return Manoeuvre(under_way(craft, up).plan() if landed else None, pursuit)

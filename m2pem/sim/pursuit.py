@@ -16,13 +16,10 @@ _STANDING_M_S = 0.05
 
 
 class Pursuit(msgspec.Struct, frozen=True):
-    """Keep a station: `offset_m` from the target at `bearing_rad` from its bow, clockwise.
-
-    `target`: a vehicle, or "" for the fixed `place`. `up_m`: the height to keep.
-    """
+    """Keep a station: `offset_m` from the vehicle `target` at `bearing_rad` from its bow,
+    clockwise. `up_m`: the height to keep."""
 
     target: str
-    place: Vector
     offset_m: float
     bearing_rad: float
     up_m: float

@@ -202,6 +202,7 @@ class _Rehearsal:
             or any(
                 behavior.phase is BehaviorPhase.CANCELLING for behavior in state.behaviors.values()
             )
+            or executive.arbiters.teams.expects
             or any(arbiter.expects for arbiter in _arbiters(executive))
         )
 

@@ -13,6 +13,7 @@ from typing import Any
 from m2pem.api.arbiter import Connection
 from m2pem.errors import FleetError
 from m2pem.findings import Finding, Severity
+from m2pem.model.catalogue import ResourceId
 from m2pem.resources.units import Dimension, quantity
 from m2pem.sim.domains import DEFAULTS, Kinematics
 from m2pem.sim.faults import FAULT_KINDS, Fault
@@ -120,6 +121,14 @@ def read_settings(connection: Connection) -> Settings:
     )
     reader.finish()
     return settings
+
+
+def own_faults(resource: ResourceId, known: Mapping[ResourceId, Settings]) -> Sequence[Fault]:
+    """A payload inherits its vehicle's settings, but not the vehicle's faults."""
+    faults = known[resource].faults
+    vehicle = ResourceId(resource.partition("/")[0])
+    inherited = vehicle != resource and vehicle in known
+    return () if inherited and faults == known[vehicle].faults else faults
 
 
 class _Reader:

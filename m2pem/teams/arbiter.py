@@ -63,7 +63,7 @@ class Teams:
         self._arbiter_of = arbiter_of
         self._context = context
         self._offers = offers
-        self._scene = Scene(fleet, offers, context.bus)
+        self._scene = Scene(fleet, offers, context.bus, arbiter_of)
         self._ledger = Ledger(self.catalogue, _log)
         self._behaviors: dict[BehaviorId, TeamBehavior] = {}
         self._requests: dict[BehaviorId, BehaviorRequest] = {}
@@ -232,6 +232,11 @@ class Teams:
     def script(self, behavior: BehaviorId, after_s: float, end: str, error: str = "") -> None:
         """For rehearsals: say, before it starts, how every part of a behavior ends."""
         self._scripts[behavior] = (after_s, end, error)
+
+    @property
+    def expects(self) -> bool:
+        """For rehearsals: whether a team may yet do something by itself."""
+        return any(behavior.expects for behavior in self._behaviors.values())
 
     # --- inside ---------------------------------------------------------------------------------
 

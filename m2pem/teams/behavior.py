@@ -18,6 +18,10 @@ PERIOD_S = 0.25
 """How often a march is looked at."""
 
 IDLE_PERIOD_S = 1.0
+STIRS_WITHIN_S = 120.0
+"""A march of which nobody has moved for so long waits for something that it cannot bring about."""
+
+STIR_M = 0.01
 ACCEPT_WITHIN_S = 15.0
 """A member that has said nothing of its part by then has not understood it."""
 
@@ -70,6 +74,7 @@ class TeamBehavior:
         self._ending: tuple[BehaviorState, str, str] | None = None
         self._ending_due_us = 0
         self._stayed_s = 0.0
+        self._stirred_us = clock.now_us()
         self._over = False
         self._wake = asyncio.Event()
         self._ticking: asyncio.Task[None] | None = None
@@ -120,6 +125,15 @@ class TeamBehavior:
     def paused(self) -> bool:
         """Whether a run holds one of them: then nobody is let go, slowed or sent off."""
         return any(member.paused for member in self.members.values() if not member.lost)
+
+    @property
+    def expects(self) -> bool:
+        """Whether anything may come of it by the passing of time alone."""
+        if self._over or self._period_s() is None:
+            return False
+        if self._ending is not None or self._marshal is None:
+            return True
+        return self._clock.now_us() - self._stirred_us < STIRS_WITHIN_S * US_PER_S
 
     # --- what happens to members ----------------------------------------------------------------
 
@@ -339,9 +353,13 @@ class TeamBehavior:
     def _march(self, marshal: Marshal) -> None:
         seen = {}
         for member in self.members.values():
-            stand = self._look(member.id) if member.told_of and not member.lost else None
+            stand = self._look(member.id) if member.in_sight and not member.lost else None
             if stand is not None:
                 seen[member.id] = stand
+        before = marshal.marks_m
         for name, speed_m_s in marshal.step(seen, self._shares.arrived).items():
             self.members[name].go(speed_m_s, self.epoch)
-        self._show(marshal.kept(), marshal.spacing_m)
+        if any(abs(now - then) > STIR_M for now, then in zip(marshal.marks_m, before, strict=True)):
+            self._stirred_us = self._clock.now_us()
+        if any(member.told_of for member in self.members.values()):
+            self._show(marshal.kept(), marshal.spacing_m)

@@ -58,9 +58,10 @@ class Marshal:
         """The least way along the route between two in one lane."""
         return GAP_SHARE * self._march.spacing_m
 
-    def mark_m(self, member: ResourceId) -> float:
-        """How far along the route a member was seen last; -inf before it was."""
-        return self._tracks[member].mark_m
+    @property
+    def marks_m(self) -> tuple[float, ...]:
+        """How far along the route each was seen last."""
+        return tuple(track.mark_m for track in self._tracks.values())
 
     def drop(self, member: ResourceId) -> None:
         """Go on without a member; in a column, who is behind it moves up."""

@@ -5,7 +5,13 @@ import logging
 import math
 from collections.abc import Awaitable, Callable
 
-from m2pem.api.arbiter import AdjustingArbiter, Arbiter, BehaviorReport, BehaviorRequest
+from m2pem.api.arbiter import (
+    AdjustingArbiter,
+    Arbiter,
+    BehaviorReport,
+    BehaviorRequest,
+    SightedArbiter,
+)
 from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.teams.plan import Leg
 
@@ -43,6 +49,9 @@ class Member:
         self.lost = ""
         self._arbiter = arbiter
         self._failed = failed
+        # Asked for at each look at a march; finding out is slow.
+        self._sighted = isinstance(arbiter, SightedArbiter)
+        self._adjusting = arbiter if isinstance(arbiter, AdjustingArbiter) else None
         self._speed_m_s: float | None = None
         self._cancelled = ""
         self._tail: asyncio.Task[None] | None = None
@@ -51,12 +60,17 @@ class Member:
     @property
     def adjustable(self) -> bool:
         """Whether it can be told to go slower while it goes on."""
-        return isinstance(self._arbiter, AdjustingArbiter)
+        return self._adjusting is not None
 
     @property
     def told_of(self) -> bool:
-        """Whether it tells where it is all the time, so that it can be marshalled."""
+        """Whether it tells where it is all the time."""
         return math.isfinite(self.limits.lost_after_s)
+
+    @property
+    def in_sight(self) -> bool:
+        """Whether it is known all the time where it is, so that it can be marshalled."""
+        return self._sighted or self.told_of
 
     @property
     def active(self) -> bool:
@@ -157,9 +171,9 @@ class Member:
         return last is None or abs(speed_m_s - last) > SPEED_STEP_SHARE * last
 
     async def _adjust(self, speed_m_s: float, epoch: int) -> None:
-        if isinstance(self._arbiter, AdjustingArbiter) and self.active and not self.paused:
+        if self._adjusting is not None and self.active and not self.paused:
             self._speed_m_s = speed_m_s
-            wished = self._arbiter.adjust(self.part, epoch, {"speed": speed_m_s})
+            wished = self._adjusting.adjust(self.part, epoch, {"speed": speed_m_s})
             await self._call(f"adjust {self.part}", wished)
 
     async def _go_on(self) -> None:

@@ -1,8 +1,9 @@
 """What a team can see: where its members are, what each can do alone, and so what each is to do."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from m2pem.api.arbiter import BehaviorRequest
+from m2pem.api.arbiter import Arbiter, BehaviorRequest, SightedArbiter
 from m2pem.api.bus import FleetBus
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import VehicleState
@@ -27,12 +28,24 @@ class Scheme:
 
 
 class Scene:
-    """Looks through the fleet's bus."""
+    """Looks through the fleet's bus, and through arbiters that need not wait for telemetry."""
 
-    def __init__(self, fleet: Fleet, offers: Offers, bus: FleetBus) -> None:
+    def __init__(
+        self,
+        fleet: Fleet,
+        offers: Offers,
+        bus: FleetBus,
+        arbiter_of: Callable[[ResourceId], Arbiter],
+    ) -> None:
         self._fleet = fleet
         self._offers = offers
         self._bus = bus
+        arbiters = {vehicle: arbiter_of(vehicle) for vehicle in fleet.vehicles}
+        self._sighted = {
+            vehicle: arbiter
+            for vehicle, arbiter in arbiters.items()
+            if isinstance(arbiter, SightedArbiter)
+        }
 
     def scheme(self, request: BehaviorRequest, *, begun: bool) -> Scheme:
         """What each member of a request does.
@@ -82,9 +95,14 @@ class Scene:
         return None if state is None else stand_of(plane, state)
 
     def _state(self, vehicle: ResourceId) -> VehicleState | None:
+        sighted = self._sighted.get(vehicle)
+        state = sighted.sight(vehicle) if sighted is not None else None
+        state = state or self._heard(vehicle)
+        return state if state is not None and state.position is not None else None
+
+    def _heard(self, vehicle: ResourceId) -> VehicleState | None:
         state = self._bus.latest(vehicle)
-        known = isinstance(state, VehicleState) and state.position is not None
-        return state if known and isinstance(state, VehicleState) else None
+        return state if isinstance(state, VehicleState) else None
 
 
 def stand_of(plane: Plane, state: VehicleState) -> Stand:

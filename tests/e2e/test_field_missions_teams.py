@@ -1,7 +1,6 @@
-"""The field-test vignettes, run to each of their ends on arbiters that know nothing of teams."""
+"""The field-test vignettes, run to each of their ends, with vehicles that tell where they are."""
 
 import asyncio
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -10,12 +9,10 @@ from m2pem.engine import records as r
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
-from m2pem.model.behavior import BehaviorType
-from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.model.catalogue import BehaviorState
 from m2pem.model.elements import EndEvent
 from m2pem.plugins import PluginManager
 from m2pem.sim.answers import load_answers
-from m2pem.sim.arbiters import SimArbiter
 
 from .test_field_missions import ANSWERS, STORIES, Story, fleet, mission
 
@@ -24,23 +21,12 @@ INNER = {"DETECTION", "ADVANCE"}
 """Called processes, whose end events are not ends of the vignette."""
 
 
-class LoneSimArbiter(SimArbiter):
-    """The simulated arbiter without its team behaviors."""
-
-    def catalogue(self, resource: ResourceId) -> tuple[BehaviorSpec, ...]:
-        offered = super().catalogue(resource)
-        return tuple(spec for spec in offered if spec.type is not BehaviorType.TEAM)
-
-
-class LonePlugins(PluginManager):
-    """The built-in plugins, with that arbiter in the place of the simulated one."""
+class SeeingPlugins(PluginManager):
+    """The built-in plugins, and what is told to observers."""
 
     def __init__(self, seen: list[r.Record]) -> None:
         super().__init__(block=("all",))
         self._seen = seen
-
-    def arbiter(self, name: str) -> Callable[..., Any]:
-        return LoneSimArbiter if name == "sim" else super().arbiter(name)
 
     def records_committed(self, run_id: str, records: Any) -> None:
         self._seen.extend(records)
@@ -52,7 +38,7 @@ def test_the_vignette_is_run_with_teams_made_of_single_vehicles(story: Story) ->
     answers = load_answers(ANSWERS / f"{story.answers}.yaml")
 
     async def main(clock: VirtualClock) -> tuple[Any, list[str]]:
-        executive = Executive(fleet(), MemoryJournal(), LonePlugins(seen), clock, script=answers)
+        executive = Executive(fleet(), MemoryJournal(), SeeingPlugins(seen), clock, script=answers)
         async with executive:
             run = await executive.control.start(story.mission)
             act = answers.act(executive.control, run, clock, default_first_decision=True)

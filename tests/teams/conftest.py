@@ -11,25 +11,15 @@ from m2pem.engine.records import BehaviorEnded, Record
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
-from m2pem.model.behavior import BehaviorType
-from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.model.catalogue import ResourceId
 from m2pem.model.geometry import Area, Geometry, Route
 from m2pem.plugins import PluginManager
 from m2pem.resources.fleet import Domain, Fleet, LostMemberPolicy, Team, Vehicle
-from m2pem.sim.arbiters import SimArbiter
 from tests.executive.conftest import mission, sequence
 
 from .carts import ORIGIN, PLANE, CartArbiter, WillingCartArbiter, Yard
 
 START_US = 1_767_225_600_000_000
-
-
-class LoneSimArbiter(SimArbiter):
-    """The simulated arbiter, but it knows nothing of teams."""
-
-    def catalogue(self, resource: ResourceId) -> tuple[BehaviorSpec, ...]:
-        offered = super().catalogue(resource)
-        return tuple(spec for spec in offered if spec.type is not BehaviorType.TEAM)
 
 
 def route(*places: tuple[float, float]) -> Route:
@@ -104,7 +94,7 @@ class _Plugins(PluginManager):
                 return arbiter
 
             return make
-        return LoneSimArbiter if name == "lone" else super().arbiter(name)
+        return super().arbiter(name)
 
     def records_committed(self, run_id: str, records: Any) -> None:
         self._seen.extend(records)

@@ -29,7 +29,7 @@ def far(east_m: float) -> str:
     return f"[{latitude}, {longitude}]"
 
 
-@pytest.mark.parametrize("arbiter", ["carts", {"a": "carts", "b": "willing", "c": "lone"}])
+@pytest.mark.parametrize("arbiter", ["carts", {"a": "carts", "b": "willing", "c": "sim"}])
 def test_each_vehicle_does_it_and_it_is_one_behavior(play: Play, arbiter: Any) -> None:
     async def story(world: World) -> Any:
         run = await world.executive.control.start(all_do("drive_stop", "a", "b", "c"))

@@ -19,7 +19,7 @@ from .conftest import Play, World, area, one_task, route
 
 BRIDGE = {"bridge": route((50, 0), (150, 0))}
 FIELD = {"field": area((0, 0), (200, 0), (200, 100), (0, 100))}
-ARBITERS = pytest.mark.parametrize("arbiter", ["carts", "willing", "lone"])
+ARBITERS = pytest.mark.parametrize("arbiter", ["carts", "willing", "sim"])
 
 
 def places(world: World) -> dict[str, tuple[float, float]]:
@@ -150,7 +150,7 @@ def test_members_observe_an_area_from_around_it_for_the_duration(play: Play, arb
         assert on_edge < 1.0, "each stands at the edge"
 
 
-@pytest.mark.parametrize("arbiter", ["carts", "lone"])
+@pytest.mark.parametrize("arbiter", ["carts", "sim"])
 def test_an_escort_stays_around_its_target_until_it_is_stopped(play: Play, arbiter: str) -> None:
     async def story(world: World) -> Any:
         run = await world.executive.control.start(one_task("escort", target="vip", spacing="20 m"))
@@ -170,7 +170,7 @@ def test_an_escort_stays_around_its_target_until_it_is_stopped(play: Play, arbit
     assert [each.state for each in ended] == [BehaviorState.CANCELLED]
 
 
-@pytest.mark.parametrize("arbiters", [("carts", "willing", "lone"), ("lone", "carts", "willing")])
+@pytest.mark.parametrize("arbiters", [("carts", "willing", "sim"), ("sim", "carts", "willing")])
 def test_members_of_different_arbiters_and_domains_march_as_one(
     play: Play, arbiters: tuple[str, ...]
 ) -> None:

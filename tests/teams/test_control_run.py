@@ -291,6 +291,5 @@ def test_a_rehearsal_in_which_nobody_tells_where_it_is_comes_to_its_end() -> Non
     }
     crew = Team("crew", tuple(vehicles), ResourceId("ugv"))
     fleet = Fleet("f", "f.yaml", vehicles, {}, {"crew": crew}, ROAD, ORIGIN)
-    # The simulated arbiter itself keeps aircraft off roads.
     result = rehearse(MARCH, fleet, plugins=PluginManager(block=("all",)))
     assert result.summary.status is RunStatus.COMPLETED, result.records[-5:]

@@ -28,6 +28,7 @@ from .conftest import area, route
 
 OFFERED = ("single_vehicle_routing", "goto", "follow")
 FIELD = area((0, 0), (120, 0), (120, 60), (0, 60))
+from m2pem.teams.shapes import slot
 
 
 def setting(
@@ -251,3 +252,12 @@ def test_the_bands_of_an_area_are_all_of_it_and_each_is_within_reach_of_its_own_
             for east, north in part[0]:
                 off = east * -math.sin(yaw) + north * math.cos(yaw)
                 assert min(abs(off - each) for each in across) <= spacing / 2 + 1e-6
+
+
+@pytest.mark.parametrize(
+    "shape", ["column", "line", "wedge", "vee", "diamond", "echelon_left", "echelon_right"]
+)
+def test_no_two_members_share_a_place(shape: str) -> None:
+    slots = [slot(shape, index) for index in range(12)]
+    assert len(set(slots)) == 12
+    assert slots[0] == (0, 0)
