@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 
 from m2pem.api.mailbox import Mailbox
-from m2pem.api.telemetry import Detection, PayloadState, VehicleState
+from m2pem.api.telemetry import Detection, GeoPosition, PayloadState, VehicleState
 from m2pem.model.catalogue import ResourceId
 from m2pem.sim.agenda import Agenda, Entry
 from m2pem.sim.executions import Body
@@ -54,7 +54,7 @@ class Broadcast:
             return
         if self._audible(body.id):
             if isinstance(body, SimPayload):
-                self.states.put(body.state(now_us, detections))
+                self.states.put(body.state(now_us, detections, self._footprint(body, now_us)))
             else:
                 self.states.put(body.state(now_us, self._frame))
         entry = self._next.pop(body.id, None)
@@ -71,3 +71,11 @@ class Broadcast:
                 lambda at_us: self.tell(body, at_us),
                 background=True,
             )
+
+    def _footprint(self, payload: SimPayload, now_us: int) -> tuple[GeoPosition, ...]:
+        """None of a payload whose vehicle is not simulated."""
+        carrier = self._bodies.get(payload.carrier)
+        if not isinstance(carrier, SimVehicle):
+            return ()
+        corners = payload.ground(now_us, carrier.pose(now_us), carrier.home[2])
+        return tuple(self._frame.geo(corner) for corner in corners)

@@ -1,12 +1,14 @@
 """A simulated payload: where it looks, as a function of time."""
 
 import math
+from collections.abc import Sequence
 
 from m2pem.api.arbiter import Connection
-from m2pem.api.telemetry import Detection, LinkState, PayloadState
+from m2pem.api.telemetry import Detection, GeoPosition, LinkState, PayloadState
 from m2pem.model.catalogue import ResourceId
+from m2pem.sim.footprints import around, seen
 from m2pem.sim.gimbals import Mount
-from m2pem.sim.phases import Look, Pose, Slew
+from m2pem.sim.phases import Look, Pose, Slew, Vector
 from m2pem.sim.settings import Settings
 from m2pem.sim.track import Plan, Track
 from m2pem.sim.vehicles import carrier_of
@@ -56,7 +58,18 @@ class SimPayload:
         """Take the plan up again."""
         self.track.go_on(now_us)
 
-    def state(self, now_us: int, detections: tuple[Detection, ...] = ()) -> PayloadState:
+    def ground(self, now_us: int, carrier: Pose, ground_up_m: float) -> Sequence[Vector]:
+        """What it sees of the ground, as corners; a detector sees all round."""
+        if self.detector:
+            return around(self.settings.detection_range_m, carrier, ground_up_m)
+        return seen(self.settings.gimbal, self.look(now_us), carrier, ground_up_m)
+
+    def state(
+        self,
+        now_us: int,
+        detections: tuple[Detection, ...] = (),
+        footprint: tuple[GeoPosition, ...] = (),
+    ) -> PayloadState:
         """What it says about itself."""
         look = self.look(now_us)
         return PayloadState(
@@ -68,4 +81,5 @@ class SimPayload:
             detections=detections,
             link=LinkState.CONNECTED,
             behavior=self.doing,
+            footprint=footprint,
         )

@@ -6,7 +6,16 @@ from pathlib import Path
 import pytest
 
 from m2pem.api.control import OpenPrompt, PromptClosed, StampedRecord
-from m2pem.api.telemetry import GeoPosition, TeamMemberState, TeamState, Telemetry, VehicleState
+from m2pem.api.telemetry import (
+    Detection,
+    GeoPosition,
+    LinkState,
+    PayloadState,
+    TeamMemberState,
+    TeamState,
+    Telemetry,
+    VehicleState,
+)
 from m2pem.control_socket.place import ControlSocketError
 from m2pem.control_socket.remote import RemoteControl
 from m2pem.errors import NotDrivenError, OperatorError
@@ -68,6 +77,9 @@ async def test_the_second_answer_is_refused_through_it_too(served: Served) -> No
     assert sorted(type(answer).__name__ for answer in answers) == ["NoneType", "OperatorError"]
 
 
+PTZ = ResourceId("v1/ptz")
+SEEN = Detection("car", PTZ, GeoPosition(1.0, 2.0, 3.0), 5)
+FOOTPRINT = (GeoPosition(1.0, 2.0, 3.0), GeoPosition(1.5, 2.0, 3.0), GeoPosition(1.5, 2.5, 3.0))
 MEMBERS = (TeamMemberState(ResourceId("v1"), -1.5, 0.25, None), TeamMemberState(ResourceId("v2")))
 
 
@@ -76,6 +88,8 @@ MEMBERS = (TeamMemberState(ResourceId("v1"), -1.5, 0.25, None), TeamMemberState(
     [
         VehicleState(ResourceId("v1"), 5, GeoPosition(1.0, 2.0, 3.0), battery_fraction=0.5),
         TeamState("r1.b1", "road_sweep", 5, MEMBERS, 15.0),
+        PayloadState(PTZ, 5, 0.5, -0.25, 2.0, (SEEN,), LinkState.DEGRADED, "zoom", FOOTPRINT),
+        PayloadState(PTZ, 5),
     ],
 )
 async def test_telemetry_passes(served: Served, state: Telemetry) -> None:

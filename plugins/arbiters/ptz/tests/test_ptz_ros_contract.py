@@ -1,21 +1,17 @@
 """The contract of arbiters, on simulated heads in another process, over real DDS."""
 
-import asyncio
 import json
 import math
-import threading
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, ClassVar
 from uuid import UUID
 
 import pytest
 from m2pem_plugin_ptz.arbiter import PtzArbiter
-from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.testing import Peer
-from ptz_ros_world import PEER, until
-from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from ptz_ros_watcher import Watcher
+from ptz_ros_world import PEER
 
 from m2pem.api import ArbiterContext, Connection, GeoPosition, ResourceId, VehicleState
 from m2pem.testing import ArbiterCase, ArbiterContract
@@ -24,63 +20,9 @@ A, B = ResourceId("ugv1/ptz"), ResourceId("ugv2/ptz")
 JOURNAL = UUID("7a4f3c52-6d0e-5c6d-9a3b-2d8a6d7e9f11")
 """The same after a restart."""
 
-STOOD_S = 0.5
-
 
 def settings(camera: ResourceId, domain: int) -> dict[str, Any]:
     return {"namespace": f"/{camera.partition('/')[0]}", "domain_id": domain}
-
-
-class Watcher:
-    """Sees and does what the arbiter does not, in a thread and loop of its own."""
-
-    def __init__(self, domain: int) -> None:
-        self.motions = {A: 0, B: 0}
-        self._at: dict[ResourceId, tuple[float, ...]] = {}
-        self._moved_s: dict[ResourceId, float] = {A: 0.0, B: 0.0}
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._loop.run_forever, name="watcher", daemon=True)
-        self._thread.start()
-        self._ros: RosRuntime = self.do(lambda: self._open(domain))
-
-    def do(self, work: Callable[[], Coroutine[Any, Any, Any]]) -> Any:
-        return asyncio.run_coroutine_threadsafe(work(), self._loop).result(30.0)
-
-    def silence(self, camera: ResourceId) -> None:
-        async def switch() -> None:
-            topic = f"/{camera.partition('/')[0]}/sim_fault"
-            publisher = self._ros.node.create_publisher(String, topic, qos.COMMANDS)
-            await until(publisher.get_subscription_count)
-            publisher.publish(String(data="silent"))
-
-        self.do(switch)
-
-    def close(self) -> None:
-        self.do(self._ros.close)
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
-        self._loop.close()
-
-    async def _open(self, domain: int) -> RosRuntime:
-        ros = RosRuntime("watcher", domain_id=domain)
-        for camera in (A, B):
-            topic = f"/{camera.partition('/')[0]}/joint_states"
-            ros.subscribe(
-                JointState,
-                topic,
-                lambda message, camera=camera: self._hear(camera, tuple(message.position)),
-                qos.TELEMETRY,
-            )
-        await until(lambda: len(self._at) == 2)
-        return ros
-
-    def _hear(self, camera: ResourceId, at: tuple[float, ...]) -> None:
-        now_s = self._loop.time()
-        before = self._at.get(camera, at)
-        self._at[camera] = at
-        if math.dist(before, at) > 1e-6:
-            self.motions[camera] += now_s - self._moved_s[camera] > STOOD_S
-            self._moved_s[camera] = now_s
 
 
 @pytest.mark.long
@@ -97,7 +39,7 @@ class TestHeads(ArbiterContract):
             return Peer(PEER, ros_domain, [camera, said, "no"])
 
         with peer(A), peer(B):
-            watcher = Watcher(ros_domain)
+            watcher = Watcher(ros_domain, {A: "/ugv1", B: "/ugv2"})
             yield watcher
             watcher.close()
 

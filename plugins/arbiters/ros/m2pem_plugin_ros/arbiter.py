@@ -1,4 +1,4 @@
-"""The arbiter of ROS vehicles. Its catalogue needs no ROS, and no connection."""
+"""The arbiter of ROS vehicles and payloads. Its catalogue needs no ROS, and no connection."""
 
 import asyncio
 import math
@@ -22,12 +22,13 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
-from m2pem_plugin_ros.catalogue import LEVEL
+from m2pem_plugin_ros.catalogue import LEVEL, PAYLOAD
 from m2pem_plugin_ros.complaints import Complaints
 from m2pem_plugin_ros.drivers.choice import make_driver as driver_of_the_fleet
 from m2pem_plugin_ros.drivers.driver import Driver, Seat
 from m2pem_plugin_ros.instruments import Installation, Station
 from m2pem_plugin_ros.native_ref import Kept, native_ref, read_native_ref
+from m2pem_plugin_ros.payload_settings import read_payloads
 from m2pem_plugin_ros.settings import DriverName, read_detectors, read_settings
 from m2pem_plugin_ros.vehicle import Post, Vehicle
 
@@ -77,8 +78,9 @@ class RosArbiter:
     ) -> None:
         self._connections = connections
         self._context = context
-        self._settings = read_settings(connections)
-        self._detectors = read_detectors(connections)
+        vehicles = read_settings(connections)
+        self._settings = {**vehicles, **read_payloads(connections, vehicles)}
+        self._detectors = read_detectors(connections, self._settings)
         self._make_driver = make_driver
         self._make_station = make_station
         self._station: Station | None = None
@@ -91,19 +93,21 @@ class RosArbiter:
     # --- what is offered ------------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """What a vehicle can do; payloads are carried, no more."""
+        """What a vehicle, or a payload with a node, can do; other payloads are carried, no more."""
         if resource not in self._settings:
             return ()
-        settings = self._settings[resource]
-        known = {spec.name for spec in LEVEL}
-        return (*LEVEL, *(spec for spec in settings.own_behaviors if spec.name not in known))
+        own, usual = self._settings[resource].own_behaviors, PAYLOAD if "/" in resource else LEVEL
+        known = {spec.name for spec in usual}
+        return (*usual, *(spec for spec in own if spec.name not in known))
 
     def _taken(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """A payload may be held by what its vehicle does."""
-        return self.catalogue(ResourceId(resource.partition("/")[0]))
+        """A payload may be held by what its vehicle does; what it does itself comes first."""
+        vehicle = ResourceId(resource.partition("/")[0])
+        of_vehicle = self.catalogue(vehicle) if vehicle != resource else ()
+        return (*of_vehicle, *self.catalogue(resource))
 
     def limits(self, resource: ResourceId) -> Limits:
-        """The bounds that hold for a vehicle. Detectors may be silent for ever."""
+        """The bounds that hold for a vehicle or a payload. Detectors may be silent for ever."""
         if resource not in self._settings:
             return Limits(math.inf, HOLD_WITHIN_S, CANCEL_TIMEOUT_S)
         own = self._connections[resource].lost_after_s
@@ -166,7 +170,7 @@ class RosArbiter:
         self._asked.discard(request.id)
         kept = Kept(request.resources, request.behavior, request.epoch, request.parameters)
         if self._ledger.admit(request, lambda: native_ref(kept), self._refusal):
-            vehicle = self._vehicles[_vehicles(request.resources)[0]]
+            vehicle = self._vehicles[self._doers(request.resources)[0]]
             await vehicle.take(request, look_first=asked)
 
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
@@ -202,9 +206,10 @@ class RosArbiter:
         kept = read_native_ref(native_ref) if native_ref else None
         if kept is None:
             return await self._search(behavior, known)
-        resource = next(iter(_vehicles(kept.resources)), ResourceId(""))
+        resource = next(iter([*self._doers(kept.resources), *kept.resources]), ResourceId(""))
         if resource not in self._vehicles:
-            return replace(known, reason=f"there is no vehicle '{resource}' any more")
+            kind = "payload with a node" if "/" in resource else "vehicle"
+            return replace(known, reason=f"there is no {kind} '{resource}' any more")
         return await self._look(self._vehicles[resource], behavior, kept, native_ref)
 
     # --- streams --------------------------------------------------------------------------------
@@ -246,10 +251,12 @@ class RosArbiter:
             await station.close()
 
     def _refusal(self, request: BehaviorRequest) -> str:
-        vehicles = _vehicles(request.resources)
-        if len(vehicles) != 1:
-            return f"{request.behavior} takes one vehicle, and has {len(vehicles)}"
-        resource = vehicles[0]
+        doers = self._doers(request.resources)
+        if len(doers) != 1:
+            return f"{request.behavior} takes one vehicle or payload, and has {len(doers)}"
+        resource = doers[0]
+        if all(spec.name != request.behavior for spec in self.catalogue(resource)):
+            return f"{resource} has no behavior '{request.behavior}'; its vehicle is to have a role"
         allowed = self._connections[resource].behaviors
         if allowed is not None and request.behavior not in allowed:
             return f"the fleet does not allow {resource} the behavior '{request.behavior}'"
@@ -257,12 +264,13 @@ class RosArbiter:
             return "the arbiter is not connected"
         return self._vehicles[resource].refusal(request)
 
+    def _doers(self, resources: Sequence[ResourceId]) -> list[ResourceId]:
+        """Who is commanded: vehicles, or without any, payloads with a node of their own."""
+        vehicles = [resource for resource in resources if "/" not in resource]
+        return vehicles or [resource for resource in resources if resource in self._settings]
+
     def _doing(self, behavior: BehaviorId) -> list[Vehicle]:
-        return [
-            vehicle
-            for resource, vehicle in self._vehicles.items()
-            if self._ledger.holder(resource) == behavior
-        ]
+        return [vehicle for vehicle in self._vehicles.values() if vehicle.doing == behavior]
 
     async def _search(self, behavior: BehaviorId, unknown: BehaviorReport) -> BehaviorReport:
         """Nothing was kept of it: ask every vehicle that could do it without us."""
@@ -305,6 +313,7 @@ class RosArbiter:
             outcome.code,
             outcome.reason,
             reference,
+            outcome.outputs,
         )
 
     async def _attend(self) -> None:
@@ -338,10 +347,6 @@ class RosArbiter:
                 vehicle = self._vehicles.get(ResourceId(resource.partition("/")[0]))
                 link = LinkState.CONNECTED if vehicle is None else vehicle.link
                 self._states.put(PayloadState(resource, now_us, link=link))
-
-
-def _vehicles(resources: Sequence[ResourceId]) -> list[ResourceId]:
-    return [resource for resource in resources if "/" not in resource]
 
 
 def _may_be_missed(state: VehicleState | PayloadState) -> bool:

@@ -1,4 +1,4 @@
-"""What a ROS vehicle can be asked for, however it is reached; needs no ROS."""
+"""What ROS vehicles and payloads can be asked for, however they are reached; needs no ROS."""
 
 from m2pem.api import SHARED, BehaviorType
 
@@ -15,3 +15,6 @@ LEVEL = tuple(
     )
 )
 """What moves in the plane, on land or on water, can be asked for."""
+
+PAYLOAD = tuple(spec for (_, type_), spec in SHARED.items() if type_ is BehaviorType.PAYLOAD)
+"""What a payload with a node of its own can be asked for."""

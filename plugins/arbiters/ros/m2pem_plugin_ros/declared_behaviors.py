@@ -1,4 +1,4 @@
-"""Behaviors of an m2pem node beyond those that all vehicles have, as the fleet declares them.
+"""Behaviors of an m2pem node beyond those that all vehicles, or payloads, have: the fleet says.
 
 The executive knows them by this only: it offers them to missions, and checks their parameters. The
 setting is `own_behaviors` of a connection, a map of names. A name alone is a behavior that all
@@ -12,12 +12,14 @@ arbiters share (docs/fleets.md); a new one says what it takes:
           route: {kind: route, required: true}
           passes: {kind: count, minimum: 1, maximum: 5, default: 1}
           speed: speed
+        writes: [sweep.swept]
 
 Bounds and defaults carry units, as everywhere in a fleet.
 """
 
 import difflib
 import math
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
@@ -36,8 +38,9 @@ from m2pem.api import (
 )
 from m2pem.errors import PluginError
 
-_BEHAVIOR_KEYS = ("parameters", "required_one_of", "resume", "ends", "doc")
+_BEHAVIOR_KEYS = ("parameters", "required_one_of", "resume", "ends", "writes", "doc")
 _PARAMETER_KEYS = ("kind", "required", "minimum", "maximum", "choices", "default", "doc")
+_DOTTED = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _PLAIN = frozenset({ParameterKind.NUMBER, ParameterKind.COUNT})
 _DIMENSIONS: Mapping[ParameterKind, Dimension] = {
     ParameterKind.DURATION: Dimension.DURATION,
@@ -49,28 +52,32 @@ _DIMENSIONS: Mapping[ParameterKind, Dimension] = {
 }
 
 
-def read_declared_behaviors(resource: ResourceId, value: Any) -> tuple[BehaviorSpec, ...]:
-    """What `own_behaviors` of a vehicle declares; `value` as it stands in the fleet, or None.
+def read_declared_behaviors(
+    resource: ResourceId, value: Any, type_: BehaviorType = BehaviorType.VEHICLE
+) -> tuple[BehaviorSpec, ...]:
+    """What `own_behaviors` declares; `value` as it stands in the fleet, or None. `type_`: of what
+    the behaviors are.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
     """
     place = f"{resource}: connection.own_behaviors"
     declared = {} if value is None else _map(place, value, "names of behaviors")
-    return tuple(_behavior(f"{place}.{name}", name, body) for name, body in declared.items())
+    return tuple(_behavior(f"{place}.{name}", name, body, type_) for name, body in declared.items())
 
 
-def _behavior(place: str, name: str, body: Any) -> BehaviorSpec:
-    shared = SHARED.get((name, BehaviorType.VEHICLE))
+def _behavior(place: str, name: str, body: Any, type_: BehaviorType) -> BehaviorSpec:
+    all_ = f"all {type_.value}s"
+    shared = SHARED.get((name, type_))
     if shared is not None:
         if body is not None:
-            wrong = f"'{name}' means the same for all vehicles; write '{name}:' alone, or rename it"
+            wrong = f"'{name}' means the same for {all_}; write '{name}:' alone, or rename it"
             raise _error(place, wrong)
         return shared
     if body is None:
-        known = [known for known, type_ in SHARED if type_ is BehaviorType.VEHICLE]
-        new = f"Of a new one, say what it takes: {name}: {{parameters: {{route: route}}}}"
-        raise _error(place, f"all vehicles share no such behavior; {_near(name, known)}{new}")
+        known = [known for known, of in SHARED if of is type_]
+        new = f"Of a new one, say what it takes: {name}: {{parameters: {{speed: speed}}}}"
+        raise _error(place, f"{all_} share no such behavior; {_near(name, known)}{new}")
     given = _map(place, body, "parameters and what else there is to say")
     _known(place, given, _BEHAVIOR_KEYS)
     parameters = _map(
@@ -82,12 +89,13 @@ def _behavior(place: str, name: str, body: Any) -> BehaviorSpec:
     resume = given.get("resume", ResumePolicy.HOLD.value)
     return BehaviorSpec(
         name,
-        BehaviorType.VEHICLE,
+        type_,
         specs,
         _groups(f"{place}.required_one_of", given.get("required_one_of", []), parameters),
         ResumePolicy(_one_of(f"{place}.resume", resume, [each.value for each in ResumePolicy])),
         _flag(f"{place}.ends", given.get("ends", True)),
         _text(f"{place}.doc", given.get("doc", "")),
+        _writes(f"{place}.writes", given.get("writes", [])),
     )
 
 
@@ -143,6 +151,15 @@ def _groups(place: str, value: Any, parameters: Collection[str]) -> tuple[tuple[
     for name in [name for group in value for name in group]:
         _one_of(place, name, list(parameters))
     return tuple(tuple(group) for group in value)
+
+
+def _writes(place: str, value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
+        raise _error(place, f"{value!r} is not a list of names, such as [sweep.swept]")
+    for name in value:
+        if not _DOTTED.fullmatch(name):
+            raise _error(place, f"'{name}' is no name of the data store, such as sweep.swept")
+    return tuple(value)
 
 
 def _choices(place: str, value: Any, kind: ParameterKind) -> tuple[str, ...]:

@@ -1,4 +1,5 @@
-"""What the arbiter has of ROS: for each vehicle what is heard of it beside its driver."""
+"""What the arbiter has of ROS: for each vehicle, and each payload that is commanded itself, what is
+heard of it beside its driver."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from m2pem_plugin_ros.localization import Localization
 from m2pem_plugin_ros.settings import DetectorSettings, Settings
 
 if TYPE_CHECKING:
+    from m2pem_plugin_ros.payload_sight import PayloadSight
     from m2pem_plugin_ros.runtime import RosRuntime
 
 
@@ -43,11 +45,13 @@ class Senses(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Instruments:
-    """Of one vehicle. `show_target` tells it where a vehicle is that it goes to or follows."""
+    """Of one vehicle, or payload. `show_target` tells it where a vehicle is that it goes to,
+    follows or looks at, and a payload where it is carried. `sight`: where a payload looks."""
 
     ros: "RosRuntime"
     senses: Senses
     show_target: Callable[[VehicleState], None]
+    sight: "PayloadSight | None" = None
 
 
 class Station(Protocol):
@@ -72,7 +76,8 @@ class Station(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Installation:
-    """What a station is made for. `hear` is given the states of payloads that detect."""
+    """What a station is made for. `hear` is given the states of payloads that detect. `vehicles`:
+    also payloads with a node of their own."""
 
     connections: Mapping[ResourceId, Connection]
     vehicles: Mapping[ResourceId, Settings]

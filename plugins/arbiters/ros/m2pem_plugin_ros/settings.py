@@ -1,6 +1,6 @@
 """What a fleet says of the connection to a ROS vehicle, or to a detector on it (docs/ros.md)."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from typing import Any
@@ -76,10 +76,11 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Of a vehicle. `namespace`: with its leading "/", "" is the root. `odom_frame`: "map": its
-    odometry is in the fleet's local frame; "odom": it begins anywhere, and NavSatFix says where
-    (REP-105). `stamped`: cmd_vel is a TwistStamped. `hardware_id`: the vehicle's in /diagnostics;
-    its name in the fleet, if the fleet does not say."""
+    """Of a vehicle, or a payload with an m2pem node. `namespace`: with its leading "/", "" is the
+    root. `odom_frame`: "map": its odometry is in the fleet's local frame; "odom": it begins
+    anywhere, and NavSatFix says where (REP-105). `stamped`: cmd_vel is a TwistStamped.
+    `hardware_id`: the vehicle's in /diagnostics; its name in the fleet, if the fleet does not
+    say."""
 
     namespace: str
     domain_id: int | None = None
@@ -118,7 +119,10 @@ def in_namespace(namespace: str, name: str) -> str:
 _KEYS = (*(each.name for each in fields(Settings)), "sim")
 """`sim` is what a simulated vehicle is like; whoever simulates it reads that."""
 
-_DETECTOR_KEYS = ("namespace", "domain_id", "topic", "message", "type", "sim")
+DETECTOR_KEYS = ("namespace", "domain_id", "topic", "message", "type", "sim")
+NODE_KEYS = ("driver", "via", "own_behaviors")
+"""What a payload with an m2pem node may say beside."""
+
 BOUNDS = {
     "speed": "speed_m_s",
     "reverse_speed": "reverse_m_s",
@@ -151,15 +155,16 @@ def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[Resource
 
 
 def read_detectors(
-    connections: Mapping[ResourceId, Connection],
+    connections: Mapping[ResourceId, Connection], with_node: Collection[ResourceId] = ()
 ) -> dict[ResourceId, DetectorSettings]:
     """The settings of all payloads that detect: they have a `topic`, or `detector: true`.
+    `with_node`: those whose connection also tells of the node that they have.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
     """
     return {
-        resource: _read_detector(connection, _inherited(connection, connections))
+        resource: _read_detector(connection, inherited(connection, connections), with_node)
         for resource, connection in connections.items()
         if "/" in resource and (connection.detector or "topic" in connection.settings)
     }
@@ -218,7 +223,7 @@ def _bounds(reader: ConnectionReader) -> Bounds:
     )
 
 
-def _inherited(
+def inherited(
     connection: Connection, connections: Mapping[ResourceId, Connection]
 ) -> Mapping[str, Any] | None:
     """What a payload's connection has of its vehicle's; None: that is another arbiter's."""
@@ -226,16 +231,26 @@ def _inherited(
     return vehicle.settings if vehicle is not None else None
 
 
-def _read_detector(connection: Connection, inherited: Mapping[str, Any] | None) -> DetectorSettings:
-    values = connection.settings
-    own = {
+def own_settings(
+    connection: Connection, of_vehicle: Mapping[str, Any] | None, known: Collection[str] = ()
+) -> dict[str, Any]:
+    """What a payload's connection says beyond its vehicle's, and of `known` what it has at all.
+    `of_vehicle` None: that is another arbiter's, and what is not `known` is its business."""
+    return {
         key: value
-        for key, value in values.items()
-        if key in _DETECTOR_KEYS
-        or (inherited is not None and (key not in inherited or inherited[key] != value))
+        for key, value in connection.settings.items()
+        if key in known
+        or (of_vehicle is not None and (key not in of_vehicle or of_vehicle[key] != value))
     }
+
+
+def _read_detector(
+    connection: Connection, of_vehicle: Mapping[str, Any] | None, with_node: Collection[ResourceId]
+) -> DetectorSettings:
+    own = own_settings(connection, of_vehicle, DETECTOR_KEYS)
     reader = ConnectionReader(connection.resource, own)
-    reader.refuse_others(_DETECTOR_KEYS)
+    node_keys = NODE_KEYS if connection.resource in with_node else ()
+    reader.refuse_others((*DETECTOR_KEYS, *node_keys))
     topic = reader.topic("topic", "detections")
     namespace = reader.namespace("" if topic.startswith("/") else None)
     message = reader.choice("message", DetectorMessage, DetectorMessage.DETECTION)

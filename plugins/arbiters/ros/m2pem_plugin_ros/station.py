@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 from m2pem.api import GeoPosition, ResourceId, VehicleState
 from m2pem_plugin_ros import loopback
 from m2pem_plugin_ros.battery import Battery
+from m2pem_plugin_ros.complaints import Complaints
 from m2pem_plugin_ros.detectors import DetectorTopic
 from m2pem_plugin_ros.diagnostics import Diagnostics
 from m2pem_plugin_ros.instruments import Installation, Instruments
 from m2pem_plugin_ros.localization import TopicLocalization
+from m2pem_plugin_ros.payload_sight import PayloadSenses, PayloadSight
 from m2pem_plugin_ros.settings import DriverName, Settings
 from m2pem_plugin_ros.targets import TargetTopic
 
@@ -105,6 +107,9 @@ class DdsStation:
     def _listen_to(self, resource: ResourceId, settings: Settings) -> Instruments:
         context = self._installation.context
         ros = self._runtime(settings.domain_id)
+        if "/" in resource:
+            sight = PayloadSight(ros, resource, settings, Complaints(context.logger, resource))
+            return Instruments(ros, PayloadSenses(sight), TargetTopic(ros, settings).show, sight)
         localization = TopicLocalization(ros, resource, settings, context)
         self._localizations[resource] = localization
         topic = settings.topic(settings.topics.diagnostics)

@@ -3,11 +3,12 @@
 Needs no ROS: what is read and written are messages of m2pem_interfaces/msg/BehaviorStatus.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
-from m2pem.api import BehaviorState
+from m2pem.api import BehaviorState, Value
+from m2pem_plugin_ros.outputs import decode_outputs, encode_outputs
 from m2pem_plugin_ros.wire import WireError
 
 STATES: Mapping[int, BehaviorState] = {
@@ -34,7 +35,8 @@ LONGEST_REASON = 2000
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What is said of a behavior. `number` rises with each change, from 1; UNKNOWN has 0."""
+    """What is said of a behavior. `number` rises with each change, from 1; UNKNOWN has 0.
+    `outputs`: of one that has ended; what the mission's data store gets."""
 
     id: str
     number: int
@@ -42,10 +44,11 @@ class Status:
     code: str = ""
     reason: str = ""
     native_ref: str = ""
+    outputs: Mapping[str, Value] = field(default_factory=dict)
 
 
 def read_status(message: Any) -> Status:
-    """What a message says.
+    """What a message says. An end counts also if an output of it is wrong: `reason` tells then.
 
     Raises:
         WireError: it breaks the rules of BehaviorStatus.msg; the text says which.
@@ -57,22 +60,28 @@ def read_status(message: Any) -> Status:
         raise WireError(f"a status of {message.id} with a state of {message.state}")
     if (state is BehaviorState.UNKNOWN) != (message.number == 0):
         raise WireError(f"a status of {message.id} that is {state} with number {message.number}")
+    outputs, wrong = decode_outputs((pair.key, pair.value) for pair in message.outputs)
+    reason = "; ".join(each for each in (message.reason, *wrong) if each)
     return Status(
         message.id,
         message.number,
         state,
         message.code[:LONGEST_CODE],
-        message.reason[:LONGEST_REASON],
+        reason[:LONGEST_REASON],
         message.native_ref,
+        outputs if state in ENDS else {},
     )
 
 
-def write_status(message: Any, status: Status) -> Any:
-    """Fill a message, but for its stamp, and return it."""
+def write_status(message: Any, status: Status, make_pair: Callable[..., Any]) -> Any:
+    """Fill a message, but for its stamp, and return it. `make_pair`: a KeyValue of `key` and
+    `value`."""
     message.id = status.id
     message.number = status.number
     message.state = CONSTANTS[status.state]
     message.code = status.code
     message.reason = status.reason
     message.native_ref = status.native_ref
+    pairs = encode_outputs(status.outputs)
+    message.outputs = [make_pair(key=key, value=value) for key, value in pairs]
     return message

@@ -1,4 +1,5 @@
-"""One vehicle of the arbiter: its driver, what it was given, and when it was heard."""
+"""One vehicle of the arbiter, or a payload with a node of its own: its driver, what it was given,
+and when it was heard."""
 
 import asyncio
 from collections.abc import Callable, Mapping
@@ -14,6 +15,7 @@ from m2pem.api import (
     Ledger,
     Limits,
     LinkState,
+    PayloadState,
     ResolvedValue,
     ResourceId,
     VehiclePosition,
@@ -82,12 +84,21 @@ class Vehicle:
             Seat(post.connection, post.settings, post.context, instruments.ros, localization, self)
         )
 
+    @property
+    def doing(self) -> BehaviorId | None:
+        """The behavior that it was given and that goes on. What only holds a payload, while its
+        vehicle does it, is none of the payload's."""
+        holder = self._ledger.holder(self.resource)
+        is_ours = self._order is not None and self._order.request.id == holder
+        return holder if is_ours else None
+
     # --- what the arbiter asks ------------------------------------------------------------------
 
     async def take(self, request: BehaviorRequest, *, look_first: bool = False) -> None:
         """Do this, in place of what it does. `look_first`: it may have been begun already."""
         order = self._order_for(request)
         self._keep(order)
+        self._show_targets()
         # A plain base does nothing while nobody drives it.
         if look_first and self.settings.driver is not DriverName.BASE:
             outcome = await self.look(order)
@@ -229,7 +240,7 @@ class Vehicle:
             self._order = None
         if outcome.state is BehaviorState.SUCCEEDED:
             self._ledger.progress(behavior)  # one that was done so soon ran all the same
-        self._ledger.end(behavior, outcome.state, outcome.code, outcome.reason)
+        self._ledger.end(behavior, outcome.state, outcome.code, outcome.reason, outcome.outputs)
 
     # --- time -----------------------------------------------------------------------------------
 
@@ -237,7 +248,7 @@ class Vehicle:
         """Silence counts from now on."""
         self._heard_us = self._context.clock.now_us()
 
-    def attend(self, *, may_lose: bool) -> VehicleState | None:
+    def attend(self, *, may_lose: bool) -> VehicleState | PayloadState | None:
         """Look after the vehicle; what the fleet is to be told, if there is news.
 
         `may_lose`: what it said until now has been heard, so that silence means something.
@@ -246,7 +257,7 @@ class Vehicle:
         silent_s = (now_us - self._heard_us) / 1e6
         bound_s = self._limits.lost_after_s
         is_silent = silent_s >= SILENT_SHARE * bound_s
-        holder = self._ledger.holder(self.resource)
+        holder = self.doing
         if not self._heard:
             self.link = LinkState.LOST
         elif may_lose or not is_silent:
@@ -254,15 +265,16 @@ class Vehicle:
         if is_silent and may_lose and holder is not None:
             self._lose(holder, silent_s)
             holder = None
-        if holder is not None and self._order is not None:
-            self._show_targets(self._order)
+        self._show_targets()
         news = (self._heard, self._instruments.senses.changes, self.link, holder)
         still_lost = self.link is LinkState.LOST and self._told[2:3] == (self.link,)
         if still_lost or news == self._told:
             return None
         self._told = news
-        health, behavior = self._health(), self._order.request.behavior if self._order else ""
-        senses = self._instruments.senses
+        behavior = self._order.request.behavior if self._order else ""
+        if self._instruments.sight is not None:
+            return self._instruments.sight.state(now_us, self.link, behavior)
+        health, senses = self._health(), self._instruments.senses
         return vehicle_state(self.resource, now_us, senses, health, self.link, behavior)
 
     # --- inside ---------------------------------------------------------------------------------
@@ -279,7 +291,7 @@ class Vehicle:
     async def _give_up(self, behavior: BehaviorId) -> None:
         limit_s = CANCEL_SHARE * self._limits.cancel_timeout_s
         await self._context.clock.sleep(limit_s)
-        if self._ledger.holder(self.resource) == behavior:
+        if self.doing == behavior:
             self._leave(behavior)
             reason = f"it did not stop within {limit_s:g} s of the cancel"
             self._ledger.end(behavior, BehaviorState.FAILED, "TIMEOUT", reason)
@@ -328,12 +340,17 @@ class Vehicle:
             self._complaints.add("what its driver says of its health", repr(error))
             return Health()
 
-    def _show_targets(self, order: Order) -> None:
-        for value in order.request.parameters.values():
-            if isinstance(value, VehiclePosition):
-                state = self._context.bus.latest(ResourceId(value.vehicle))
-                if isinstance(state, VehicleState):
-                    self._instruments.show_target(state)
+    def _show_targets(self) -> None:
+        """A payload is told all the time where it is carried, for what it is asked next."""
+        carrier, of_a_vehicle, _ = self.resource.partition("/")
+        names = {carrier: None} if of_a_vehicle else {}
+        if self._order is not None and self.doing is not None:
+            values = self._order.request.parameters.values()
+            names |= {value.vehicle: None for value in values if isinstance(value, VehiclePosition)}
+        for name in names:
+            state = self._context.bus.latest(ResourceId(name))
+            if isinstance(state, VehicleState):
+                self._instruments.show_target(state)
 
 
 def _bug(error: Exception) -> str:

@@ -45,6 +45,7 @@ def test_a_new_behavior_says_all_that_it_takes() -> None:
             },
             "resume": "restart",
             "ends": False,
+            "writes": ["sweep.swept", "dust"],
         }
     }
     assert read(declared) == (
@@ -63,8 +64,19 @@ def test_a_new_behavior_says_all_that_it_takes() -> None:
             resume=ResumePolicy.RESTART,
             ends=False,
             doc="Drive along a route with the brush down.",
+            writes=("sweep.swept", "dust"),
         ),
     )
+
+
+def test_a_payload_declares_behaviors_of_payloads() -> None:
+    declared = {"ptz_track": None, "wipe": {"writes": ["wiper.wiped"]}}
+    read = read_declared_behaviors(ResourceId("ugv1/ptz"), declared, BehaviorType.PAYLOAD)
+    shared, wipe = read
+    assert shared == SHARED["ptz_track", BehaviorType.PAYLOAD]
+    assert (wipe.type, wipe.writes) == (BehaviorType.PAYLOAD, ("wiper.wiped",))
+    with pytest.raises(PluginError, match="all payloads share no such behavior"):
+        read_declared_behaviors(ResourceId("ugv1/ptz"), {"goto": None}, BehaviorType.PAYLOAD)
 
 
 def test_bounds_and_defaults_carry_units() -> None:
@@ -101,6 +113,8 @@ REFUSED = [
     ({"sweep": {"resume": "retry"}}, r"\.resume: 'retry' is none of restart, fail, hold"),
     ({"sweep": {"ends": "no"}}, r"\.ends: 'no' is neither true nor false"),
     ({"sweep": {"doc": 5}}, r"\.doc: 5 is not a text"),
+    ({"sweep": {"writes": "dust"}}, r"\.writes: 'dust' is not a list of names"),
+    ({"sweep": {"writes": ["so much"]}}, r"\.writes: 'so much' is no name of the data store"),
     ({"sweep": {"required_one_of": ["route"]}}, r"\.required_one_of: .* is not a list of lists"),
     ({"sweep": {"required_one_of": [["route"]]}}, r"\.required_one_of: 'route' is none of"),
     (parameter(required=True), r"\.p\.kind: it is missing: one of duration, "),

@@ -6,7 +6,7 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus
+from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus, KeyValue
 from m2pem_plugin_ros.onboard.asked import Verb
 from m2pem_plugin_ros.statuses import STATES, Status, read_status, write_status
 from m2pem_plugin_ros.wire import (
@@ -148,8 +148,41 @@ def test_states_and_verbs_are_the_constants_of_the_messages() -> None:
 
 
 def test_a_status_comes_back_as_it_was() -> None:
-    status = Status("a", 3, BehaviorState.FAILED, "ROUTE_BLOCKED", "a wall", "n1")
-    assert read_status(write_status(BehaviorStatus(), status)) == status
+    outputs = {"picture.files": ["1.jpg", "2.jpg"], "picture.time": 5, "swept": {"m": 2.5}}
+    status = Status("a", 3, BehaviorState.FAILED, "ROUTE_BLOCKED", "a wall", "n1", outputs)
+    assert read_status(write_status(BehaviorStatus(), status, KeyValue)) == status
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "problem"),
+    [
+        ("speed", "{", "output 'speed' was left out: { is not JSON"),
+        ("speed", "NaN", "a number in it is not finite"),
+        ("speed", "[1, -Infinity]", "a number in it is not finite"),
+        ("speed", str(2**63), "needs more than 64 bits"),
+        ("speed", "[" * 30 + "]" * 30, "more than 20 levels deep"),
+        ("speed", "[" * 50_000, "is not JSON"),
+        ("speed", '"' + "a" * 100_001 + '"', "100000 are the most"),
+        ("", "1", "it has no name"),
+        ("good", "2", "it is there twice"),
+    ],
+)
+def test_an_end_counts_also_with_an_output_that_cannot_be(
+    name: str, value: str, problem: str
+) -> None:
+    message = BehaviorStatus(id="a", number=3, state=BehaviorStatus.SUCCEEDED)
+    pairs = [("good", "1"), (name, value), ("also.good", '"yes"')]
+    message.outputs = [KeyValue(key=key, value=text) for key, text in pairs]
+    status = read_status(message)
+    assert status.state is BehaviorState.SUCCEEDED
+    assert status.outputs == {"good": 1, "also.good": "yes"}
+    assert problem in status.reason
+
+
+def test_what_has_not_ended_has_no_outputs() -> None:
+    message = BehaviorStatus(id="a", number=2, state=BehaviorStatus.RUNNING)
+    message.outputs = [KeyValue(key="good", value="1")]
+    assert read_status(message).outputs == {}
 
 
 @pytest.mark.parametrize(

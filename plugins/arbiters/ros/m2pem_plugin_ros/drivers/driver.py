@@ -5,11 +5,18 @@ return at once or soon: what becomes of an order is told later, and as often as 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 from uuid import UUID
 
-from m2pem.api import ArbiterContext, BehaviorRequest, BehaviorState, Connection, ResolvedValue
+from m2pem.api import (
+    ArbiterContext,
+    BehaviorRequest,
+    BehaviorState,
+    Connection,
+    ResolvedValue,
+    Value,
+)
 from m2pem_plugin_ros.localization import Localization
 from m2pem_plugin_ros.settings import Settings
 
@@ -30,11 +37,13 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a goal stands on the vehicle. UNKNOWN: the vehicle knows nothing of it."""
+    """How a goal stands on the vehicle. UNKNOWN: the vehicle knows nothing of it. `outputs`: of one
+    that has ended; what the mission's data store gets."""
 
     state: BehaviorState
     code: str = ""
     reason: str = ""
+    outputs: Mapping[str, Value] = field(default_factory=dict)
 
     @property
     def is_end(self) -> bool:

@@ -62,7 +62,7 @@ def read_parameters(message: Any) -> dict[str, ResolvedValue]:
 
 
 def read_request(message: Any, vehicle: str) -> BehaviorRequest:
-    """What a START asks for.
+    """What a START asks for. `vehicle`: or the payload, such as evsg2/ptz, whose node this is.
 
     Raises:
         WireError: a parameter cannot be understood, or it is for another vehicle.
@@ -72,7 +72,8 @@ def read_request(message: Any, vehicle: str) -> BehaviorRequest:
         for allocation in message.allocation
     }
     resources = tuple(dict.fromkeys(resource for role in roles.values() for resource in role))
-    if resources and not any(resource.partition("/")[0] == vehicle for resource in resources):
+    ours = {vehicle, *(each for each in resources if each.startswith(f"{vehicle}/"))}
+    if resources and ours.isdisjoint(resources):
         raise WireError(f"it is for {', '.join(resources)}, and this is {vehicle}")
     return BehaviorRequest(
         message.id,

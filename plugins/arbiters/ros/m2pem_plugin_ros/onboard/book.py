@@ -1,8 +1,8 @@
 """Which behaviors a vehicle was given, and what was said of them; needs neither ROS nor a clock."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
-from m2pem.api import BehaviorState
+from m2pem.api import BehaviorState, Value
 from m2pem_plugin_ros.statuses import Status
 
 REMEMBERED = 10_000
@@ -64,11 +64,19 @@ class Book:
         if id_ == self._current and self._last[id_].state is BehaviorState.ACCEPTED:
             self._note(Status(id_, 2, BehaviorState.RUNNING))
 
-    def end(self, id_: str, state: BehaviorState, code: str = "", reason: str = "") -> None:
+    def end(
+        self,
+        id_: str,
+        state: BehaviorState,
+        code: str = "",
+        reason: str = "",
+        outputs: Mapping[str, Value] | None = None,
+    ) -> None:
         """It has ended; nothing happens if it is not what goes on."""
         if id_ and id_ == self._current:
             self._current = ""
-            self._note(Status(id_, self._last[id_].number + 1, state, code, reason))
+            number = self._last[id_].number + 1
+            self._note(Status(id_, number, state, code, reason, outputs=outputs or {}))
 
     def _note(self, status: Status) -> None:
         self._last.pop(status.id, None)

@@ -94,7 +94,7 @@ class Goals:
 
     async def _follow(self, handle: Any, queue: asyncio.Queue[Status]) -> Status:
         while (status := await queue.get()).state not in ENDS:
-            feedback = write_status(interfaces.BehaviorStatus(), status)
+            feedback = _written(status)
             handle.publish_feedback(ExecuteBehavior.Feedback(status=feedback))
         if status.state is BehaviorState.SUCCEEDED:
             handle.succeed()
@@ -118,5 +118,9 @@ def _key(handle: Any) -> bytes:
     return bytes(handle.goal_id.uuid)
 
 
+def _written(status: Status) -> Any:
+    return write_status(interfaces.BehaviorStatus(), status, interfaces.KeyValue)
+
+
 def _result(status: Status) -> Any:
-    return ExecuteBehavior.Result(status=write_status(interfaces.BehaviorStatus(), status))
+    return ExecuteBehavior.Result(status=_written(status))

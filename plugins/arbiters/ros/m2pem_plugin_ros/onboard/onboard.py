@@ -9,7 +9,14 @@ from uuid import UUID, uuid5
 
 from m2pem_interfaces import msg as interfaces
 
-from m2pem.api import BehaviorRequest, BehaviorSpec, BehaviorState, Clock, FleetBus
+from m2pem.api import (
+    BehaviorRequest,
+    BehaviorSpec,
+    BehaviorState,
+    Clock,
+    FleetBus,
+    PayloadState,
+)
 from m2pem_plugin_ros.catalogue import LEVEL
 from m2pem_plugin_ros.complaints import Complaints
 from m2pem_plugin_ros.drivers.driver import Driver, Order, Outcome, Told
@@ -44,11 +51,12 @@ SAID_WITHIN_S = 1.0
 
 class Onboard:
     """Serves `command`, `behavior_status`, `vehicle_status` and `execute_behavior` in the vehicle's
-    namespace (docs/ros.md, "Write your own node").
+    namespace (docs/ros.md, "Write your own node"), and of a payload `payload_status`.
 
-    `vehicle`: its name in the fleet. `make_driver`: of what is on board, and what it tells comes
-    here. `bus`: gets what is heard on `target`; it is to be the one that the driver's context has.
-    `catalogue`: what the driver can do.
+    `vehicle`: its name in the fleet, or that of the payload. `make_driver`: of what is on board,
+    and what it tells comes here. `bus`: gets what is heard on `target`; it is to be the one that
+    the driver's context has. `catalogue`: what the driver can do. `sight`: of a payload, where it
+    looks.
     """
 
     def __init__(
@@ -61,6 +69,7 @@ class Onboard:
         clock: Clock,
         bus: FleetBus | None = None,
         catalogue: Sequence[BehaviorSpec] = LEVEL,
+        sight: Callable[[], PayloadState | None] | None = None,
         logger: logging.Logger = LOGGER,
     ) -> None:
         self._ros = ros
@@ -72,7 +81,7 @@ class Onboard:
         self._logger = logger
         self._complaints = Complaints(logger, vehicle)
         self._book = Book(self._say)
-        self._voice = Voice(clock, self._about_vehicle)
+        self._voice = Voice(clock, self._about_vehicle, sight)
         self._held = False
         self._ending = False
         self._heard_us: int | None = None
@@ -257,7 +266,7 @@ class Onboard:
         """It has ended."""
         if goal in self._ids:
             reason = outcome.reason or (ENDED if self._ending else "")
-            self._book.end(self._ids[goal], outcome.state, outcome.code, reason)
+            self._book.end(self._ids[goal], outcome.state, outcome.code, reason, outcome.outputs)
 
     # --- what is said ---------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""What an m2pem node says: `behavior_status` and `vehicle_status`."""
+"""What an m2pem node says: `behavior_status`, `vehicle_status` and `payload_status`."""
 
 import asyncio
 import math
@@ -10,8 +10,9 @@ from m2pem_interfaces import msg as interfaces
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from m2pem.api import Clock
+from m2pem.api import Clock, PayloadState
 from m2pem_plugin_ros.drivers.driver import Health
+from m2pem_plugin_ros.payload_status import write_payload_status
 from m2pem_plugin_ros.runtime import qos
 from m2pem_plugin_ros.stamps import stamp
 from m2pem_plugin_ros.statuses import Status, write_status
@@ -40,27 +41,36 @@ class About:
 class Voice:
     """Publishes; before `open` and after `close` nothing is said."""
 
-    def __init__(self, clock: Clock, look: Callable[[], About]) -> None:
+    def __init__(
+        self,
+        clock: Clock,
+        look: Callable[[], About],
+        sight: Callable[[], PayloadState | None] | None = None,
+    ) -> None:
         self._clock = clock
         self._look = look
+        self._sight = sight
         self._behaviors: Any = None
         self._vehicle: Any = None
+        self._payload: Any = None
 
     def open(self, node: Node) -> None:
         """Publish from this node."""
         create = node.create_publisher
         self._behaviors = create(interfaces.BehaviorStatus, "behavior_status", qos.BEHAVIOR_STATUS)
         self._vehicle = create(interfaces.VehicleStatus, "vehicle_status", qos.STATUS)
+        if self._sight is not None:
+            self._payload = create(interfaces.PayloadStatus, "payload_status", qos.TELEMETRY)
 
     def close(self) -> None:
         """Say nothing more."""
-        self._behaviors = self._vehicle = None
+        self._behaviors = self._vehicle = self._payload = None
 
     def behavior(self, status: Status) -> None:
         """Say a status."""
         if self._behaviors is not None:
             message = interfaces.BehaviorStatus(stamp=stamp(self._clock.now_us()))
-            self._behaviors.publish(write_status(message, status))
+            self._behaviors.publish(write_status(message, status, interfaces.KeyValue))
 
     def vehicle(self) -> None:
         """Say how the vehicle is."""
@@ -81,10 +91,19 @@ class Voice:
             )
         )
 
+    def payload(self) -> None:
+        """Say where the payload looks, if that is known."""
+        state = self._sight() if self._sight is not None else None
+        if state is not None and self._payload is not None:
+            message = write_payload_status(interfaces, state)
+            message.stamp = stamp(self._clock.now_us())
+            self._payload.publish(message)
+
     async def keep_telling(self) -> None:
-        """Say how the vehicle is, at a steady rate."""
+        """Say how the vehicle or payload is, at a steady rate."""
         while True:
             self.vehicle()
+            self.payload()
             async with asyncio.TaskGroup() as both:
                 both.create_task(self._clock.sleep(STATUS_EVERY_S))
                 both.create_task(asyncio.sleep(FASTEST_S))

@@ -8,7 +8,7 @@ from sensor_msgs.msg import CompressedImage, JointState
 from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory
 
-from m2pem.api import Clock
+from m2pem.api import Clock, Connection
 from m2pem_plugin_ptz.drivers.ros.joints import Axis
 from m2pem_plugin_ptz.drivers.ros.settings import Command, RosSettings
 from m2pem_plugin_ptz.head import Reach
@@ -23,12 +23,23 @@ FAULTS = ("silent", "stuck", "blind", "garbled", "well")
 
 
 @dataclass(frozen=True, slots=True)
+class NodeSpec:
+    """`connection`: how the arbiter on board reaches the head. `origin`: as in `ArbiterContext`."""
+
+    connection: Connection
+    namespace: str
+    origin: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class CameraSpec:
-    """`name`: of the payload, such as evsg1/ptz; `settings` as an executive has them."""
+    """`name`: of the payload, such as evsg1/ptz; `settings` as an executive has them. `node`: the
+    m2pem node that it has of its own, if any."""
 
     name: str
     settings: RosSettings
     reach: Reach
+    node: NodeSpec | None = None
 
 
 class SimulatedCamera:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     "fleet_file",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     required=True,
-    help="Simulate the cameras of this fleet file: of arbiter ptz and driver ros, on vehicles "
-    "marked `sitl: true`.",
+    help="Simulate the cameras of this fleet file on vehicles marked `sitl: true`: of arbiter ptz "
+    "and driver ros, and those of arbiter ros that have an m2pem node of their own.",
 )
 @click.option(
     "--speed",
@@ -56,7 +56,7 @@ def ros_cameras(fleet_file: Path, speed: float, domain_id: int | None) -> None:
     if not specs:
         raise click.UsageError(
             f"{fleet_file} has nothing to simulate: no payload of a vehicle with `sitl: true` has "
-            "`arbiter: ptz` and `driver: ros`"
+            "`arbiter: ptz` and `driver: ros`, or `arbiter: ros` and a node of its own"
         )
     asyncio.run(_run(specs, speed, domain_id))
 
@@ -74,7 +74,8 @@ async def _run(specs: "Sequence[CameraSpec]", speed: float, domain_id: int | Non
     await asyncio.wait((going, started), return_when=asyncio.FIRST_COMPLETED)
     if ready.is_set():
         for spec in specs:
-            click.echo(f"{spec.name}: {spec.settings.joint_states}, {spec.settings.image}")
+            node = "" if spec.node is None else ", an m2pem node"
+            click.echo(f"{spec.name}: {spec.settings.joint_states}, {spec.settings.image}{node}")
         click.echo("ready")
         await asyncio.wait((going, stopped), return_when=asyncio.FIRST_COMPLETED)
     started.cancel()

@@ -294,7 +294,7 @@ class ByAction:
         try:
             status = read_status(message)
             if status.id == str(goal) and status.state in ENDS:
-                return Outcome(status.state, status.code, status.reason)
+                return Outcome(status.state, status.code, status.reason, status.outputs)
             wrong = f"the result of {goal} is a status of {status.id} that is {status.state}"
         except WireError as error:
             wrong = str(error)

@@ -258,4 +258,4 @@ class ByTopics:
 
 
 def _outcome(status: Status) -> Outcome:
-    return Outcome(status.state, status.code, status.reason)
+    return Outcome(status.state, status.code, status.reason, status.outputs)

@@ -1,0 +1,71 @@
+"""An m2pem node of one camera: what it is asked for over ROS, the arbiter `ptz` on board does."""
+
+import logging
+from typing import TYPE_CHECKING
+
+from m2pem_plugin_ros.onboard import ArbiterDriver, Onboard, Targets
+
+from m2pem.api import ArbiterContext, Clock, Connection, PayloadState
+from m2pem_plugin_ptz.arbiter import PtzArbiter
+
+if TYPE_CHECKING:
+    from m2pem_plugin_ros.drivers.driver import Told
+    from m2pem_plugin_ros.runtime import RosRuntime
+
+LOGGER = logging.getLogger("m2pem.onboard")
+
+
+class CameraNode:
+    """Serves what docs/ros.md, "Payloads", says, in `namespace`. Where the vehicle is that carries
+    the camera, and others that it looks at, the executive tells it.
+
+    `connection`: of the camera, as a fleet has it for the arbiter `ptz`. `origin`: of the fleet's
+    local frame (latitude and longitude in degrees, altitude in metres).
+
+    Raises:
+        PluginError: the connection cannot be used; the text names the resource and the key.
+    """
+
+    def __init__(
+        self,
+        ros: "RosRuntime",
+        connection: Connection,
+        namespace: str,
+        clock: Clock,
+        origin: tuple[float, float, float],
+    ) -> None:
+        targets, camera = Targets(), connection.resource
+        context = ArbiterContext(clock, targets, LOGGER, origin)
+        arbiter = PtzArbiter({camera: connection}, context)
+        drivers: list[ArbiterDriver] = []
+
+        def make(told: "Told") -> ArbiterDriver:
+            drivers.append(ArbiterDriver(arbiter, camera, told, targets, LOGGER))
+            return drivers[0]
+
+        def sight() -> PayloadState | None:
+            return drivers[0].state
+
+        self._node = Onboard(
+            ros,
+            camera,
+            namespace,
+            make,
+            clock=clock,
+            bus=targets,
+            catalogue=arbiter.catalogue(camera),
+            sight=sight,
+            logger=LOGGER,
+        )
+
+    async def open(self) -> None:
+        """Reach the camera, and be there for commands.
+
+        Raises:
+            PluginError: what its driver needs is not installed, or its settings cannot be.
+        """
+        await self._node.open()
+
+    async def close(self) -> None:
+        """Stop the camera, say so, and let go."""
+        await self._node.close()

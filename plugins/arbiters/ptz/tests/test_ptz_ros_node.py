@@ -1,0 +1,110 @@
+"""What a mission gets of a payload with an m2pem node, over real DDS."""
+
+import asyncio
+import math
+from pathlib import Path
+
+import pytest
+from m2pem_plugin_ros.arbiter import RosArbiter
+from ptz_ros_node_world import CAMERA, connection, world
+
+from m2pem.api import BehaviorState, LinkState, Point
+from m2pem.executive.clock import SystemClock
+from m2pem.testing.contracts.bench import ArbiterBench, context
+
+VIAS = ("topics", "action")
+
+
+@pytest.mark.parametrize("via", VIAS)
+async def test_pictures_come_back_to_the_mission(via: str, tmp_path: Path, ros_domain: int) -> None:
+    async with world(ros_domain, tmp_path, via=via) as it:
+        await it.bench.start("r1.b1", "take_picture", CAMERA, count=2, interval=0.1)
+        report = await it.bench.ended("r1.b1", 20.0)
+        assert report.state is BehaviorState.SUCCEEDED, report.reason
+        files = report.outputs["picture.files"]
+        assert isinstance(files, list)
+        assert len(files) == 2
+        pictures = [await asyncio.to_thread(Path(str(each)).read_bytes) for each in files]
+        assert all(each.startswith(b"\xff\xd8") for each in pictures)
+        assert report.outputs["picture.file"] == files[-1]
+        assert "picture.time" in report.outputs
+
+
+async def test_it_points_zooms_and_tells_where_it_looks(tmp_path: Path, ros_domain: int) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        east = Point((38.1075, -77.3180, 60.0), "amsl")
+        await it.bench.start("r1.b1", "ptz_point_at", CAMERA, target=east)
+        report = await it.bench.ended("r1.b1", 20.0)
+        assert report.state is BehaviorState.SUCCEEDED, report.reason
+        await it.bench.start("r1.b2", "zoom", CAMERA, level=4.0)
+        report = await it.bench.ended("r1.b2", 20.0)
+        assert report.state is BehaviorState.SUCCEEDED, report.reason
+
+        def looks_east() -> bool:
+            state = it.state
+            return (
+                state is not None
+                and state.pan_rad is not None
+                and abs(state.pan_rad - math.pi / 2) < 0.02
+                and state.zoom == pytest.approx(4.0, abs=0.05)
+                and len(state.footprint) >= 3
+            )
+
+        assert await it.bench.until(looks_east, 10.0), it.state
+        state = it.state
+        assert state is not None
+        assert state.tilt_rad is not None
+        assert state.tilt_rad < 0.0, "the ground is below"
+        assert all(corner.longitude_deg > -77.3192 for corner in state.footprint), "all east of it"
+
+
+async def test_what_it_does_is_told_by_name_and_can_be_held(
+    tmp_path: Path, ros_domain: int
+) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        slow = {"heading": 0.0, "sector": math.radians(170), "speed": math.radians(8)}
+        await it.bench.start("r1.b1", "ptz_scan_sector", CAMERA, **slow)
+        await it.bench.running("r1.b1")
+        assert await it.bench.until(lambda: it.state.behavior == "ptz_scan_sector", 5.0)
+        await it.bench.arbiter.hold(CAMERA)
+        pans: list[float] = []
+
+        def stands() -> bool:
+            pans.append(it.state.pan_rad)
+            recent = pans[-8:]
+            return len(recent) == 8 and max(recent) - min(recent) < 1e-6
+
+        assert await it.bench.until(stands, 10.0)
+        await it.bench.arbiter.resume(CAMERA)
+        stood = it.state.pan_rad
+        assert await it.bench.until(lambda: abs(it.state.pan_rad - stood) > 0.05, 10.0)
+        assert it.bench.states_of("r1.b1") == [BehaviorState.ACCEPTED, BehaviorState.RUNNING]
+
+
+async def test_what_the_camera_itself_refuses_fails_with_its_reason(
+    tmp_path: Path, ros_domain: int
+) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        far = Point((39.5, -77.3192, 60_000.0), "amsl")
+        await it.bench.start("r1.b1", "ptz_point_at", CAMERA, bearing=math.pi, elevation=0.0)
+        report = await it.bench.ended("r1.b1", 20.0)
+        assert report.state is BehaviorState.FAILED
+        assert report.code == "REJECTED"
+        assert "180" in report.reason, "pan ends at 160 degrees"
+        await it.bench.start("r1.b2", "ptz_point_at", CAMERA, target=far)
+        assert (await it.bench.ended("r1.b2", 20.0)).state.terminal, "it goes on to serve"
+
+
+async def test_a_payload_that_nobody_has_heard_is_lost_and_says_nothing(ros_domain: int) -> None:
+    clock = SystemClock()
+    arbiter = RosArbiter({CAMERA: connection(CAMERA, ros_domain)}, context(clock))
+    async with ArbiterBench(arbiter, clock) as bench:
+
+        def is_lost() -> bool:
+            state = bench.latest(CAMERA)
+            return state is not None and state.link is LinkState.LOST
+
+        assert await bench.until(is_lost, 10.0)
+        await bench.start("r1.b1", "zoom", CAMERA, level=2.0)
+        report = await asyncio.wait_for(bench.ended("r1.b1", 15.0), 20.0)
+        assert report.state is BehaviorState.LOST
