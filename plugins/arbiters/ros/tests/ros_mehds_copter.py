@@ -1,0 +1,25 @@
+"""A simulated copter over MAVLink: `port speed`. Faults are lines of standard input."""
+
+import asyncio
+import sys
+
+from m2pem_plugin_mavlink.sim.faults import parse
+from m2pem_plugin_mavlink.sim.geometry import Location
+from m2pem_plugin_mavlink.sim.simulator import Simulator
+from m2pem_plugin_mavlink.sim.specification import VehicleSpec
+from m2pem_plugin_ros.sim.stdin_lines import hear_lines
+
+HOME = Location(38.107162, -77.319941, 60.0)
+PARAMETERS = {"FS_GCS_ENABLE": 1.0, "FS_GCS_TIMEOUT": 20.0, "BATT_FS_LOW_ACT": 2.0}
+
+
+async def main(port: int, speed: float) -> None:
+    spec = VehicleSpec(home=HOME, parameters=PARAMETERS)
+    async with Simulator([spec], speed=speed, to=("127.0.0.1", port)) as vehicles:
+        hear_lines(lambda line: parse(line).plan(vehicles[1].faults))
+        print("ready", flush=True)
+        await vehicles.stopped()
+
+
+if __name__ == "__main__":
+    asyncio.run(main(int(sys.argv[1]), float(sys.argv[2])))
