@@ -22,13 +22,13 @@ from m2pem.teams.plan import Plan, Setting, Stand, TeamRefusedError
 from m2pem.teams.plane import Plane
 from m2pem.teams.planning import PLANS
 from m2pem.teams.reference import Reference, read_reference
+from m2pem.teams.shapes import slot
 
 from .carts import PLANE
 from .conftest import area, route
 
 OFFERED = ("single_vehicle_routing", "goto", "follow")
 FIELD = area((0, 0), (120, 0), (120, 60), (0, 60))
-from m2pem.teams.shapes import slot
 
 
 def setting(
