@@ -88,9 +88,13 @@ class Rehearsed:
 
 
 class _Plugins(PluginManager):
-    def __init__(self, told: Callable[[Any], None]) -> None:
+    def __init__(self, told: Callable[[Any], None], kind: type[SimArbiter]) -> None:
         super().__init__(block=("all",))
         self._told = told
+        self._kind = kind
+
+    def arbiter(self, name: str) -> Callable[..., Any]:
+        return self._kind if name == "sim" else super().arbiter(name)
 
     def records_committed(self, run_id: str, records: Any) -> None:
         self._told(records)
@@ -100,8 +104,12 @@ def rehearsed(
     fleet: Fleet,
     story: Callable[[Rehearsed], Awaitable[Any]],
     settings: Mapping[str, Any] = SETTINGS,
+    kind: type[SimArbiter] = SimArbiter,
 ) -> Any:
-    """Run a story in virtual time, with telemetry as a rehearsal has it: of changes alone."""
+    """Run a story in virtual time, with telemetry as a rehearsal has it: of changes alone.
+
+    `kind`: of the arbiter of all.
+    """
 
     async def main(clock: VirtualClock) -> Any:
         seen: list[Record] = []
@@ -114,7 +122,7 @@ def rehearsed(
         executive = Executive(
             fleet,
             MemoryJournal(),
-            _Plugins(told),
+            _Plugins(told, kind),
             clock,
             simulated=True,
             settings=settings,
