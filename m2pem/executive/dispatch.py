@@ -63,6 +63,7 @@ class Dispatcher:
         self._clearance = clearance
         self._active: dict[str, _Active] = {}
         self._tails: dict[str, asyncio.Task[None]] = {}
+        self._starts: dict[str, asyncio.Task[None]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._unscriptable: set[str] = set()
 
@@ -70,11 +71,21 @@ class Dispatcher:
 
     def start(self, command: StartBehavior) -> None:
         """Start a behavior, when its resources are free and its parameters make sense."""
-        self._enqueue(command.resources, lambda: self._start(command))
+        task = self._enqueue(command.resources, lambda: self._start(command))
+        self._starts[command.behavior] = task
+        task.add_done_callback(lambda _: self._starts.pop(command.behavior, None))
 
     def cancel(self, command: CancelBehavior) -> None:
-        """End a behavior; if it has not within its arbiter's limit, it is given up as LOST."""
-        self._enqueue(command.resources, lambda: self._cancel(command))
+        """End a behavior; if it has not within its arbiter's limit, it is given up as LOST.
+
+        One of several resources waits for its own start alone: a resource that hangs in what it was
+        told must not keep the others from stopping.
+        """
+        after = None
+        if len(command.resources) > 1:
+            start = self._starts.get(command.behavior)
+            after = set() if start is None else {start}
+        self._enqueue(command.resources, lambda: self._cancel(command), after)
 
     def hold(self, resource: str) -> None:
         """Bring a resource to its safe state."""
@@ -137,21 +148,32 @@ class Dispatcher:
 
     # --- inside ---------------------------------------------------------------------------------
 
-    def _enqueue(self, resources: Iterable[str], job: Callable[[], Awaitable[object]]) -> None:
+    def _enqueue(
+        self,
+        resources: Iterable[str],
+        job: Callable[[], Awaitable[object]],
+        after: set[asyncio.Task[None]] | None = None,
+    ) -> asyncio.Task[None]:
+        """`after`: what the job waits for; None: all that its resources were told before. What
+        comes next waits for both."""
         names = tuple(resources)
         before = {self._tails[name] for name in names if name in self._tails}
-        task = asyncio.create_task(self._in_turn(before, job))
-        self._tasks.add(task)
+        task = tail = asyncio.create_task(self._in_turn(before if after is None else after, job))
+        if after is not None and before - after:
+            tail = asyncio.create_task(self._in_turn({task, *before}, _nothing))
+        self._tasks |= {task, tail}
         for name in names:
-            self._tails[name] = task
+            self._tails[name] = tail
 
         def done(_: asyncio.Task[None]) -> None:
-            self._tasks.discard(task)
+            self._tasks.discard(tail)
             for name in names:
-                if self._tails.get(name) is task:
+                if self._tails.get(name) is tail:
                     del self._tails[name]
 
-        task.add_done_callback(done)
+        task.add_done_callback(self._tasks.discard)
+        tail.add_done_callback(done)
+        return task
 
     async def _in_turn(
         self, before: set[asyncio.Task[None]], job: Callable[[], Awaitable[object]]
@@ -290,6 +312,10 @@ class Dispatcher:
     def _refuse(self, behavior: str, code: str, reason: str) -> None:
         number = self._active[behavior].last_number + 1
         self._post(BehaviorReport(behavior, number, BehaviorState.REJECTED, code, reason))
+
+
+async def _nothing() -> None:
+    """What is queued only to be waited for."""
 
 
 def _ids(names: Iterable[str]) -> tuple[ResourceId, ...]:

@@ -113,12 +113,16 @@ class TeamBehavior:
         return self._over
 
     async def hold(self, member: ResourceId) -> None:
-        """A run holds a member."""
-        await self.members[member].hold()
+        """A run holds a member; one that is not held fails the team."""
+        wrong = await self.members[member].hold()
+        if wrong:
+            self._disobeyed(member, f"it was not held: {wrong}")
 
     async def resume(self, member: ResourceId) -> None:
-        """A run lets a member go on."""
-        await self.members[member].resume()
+        """A run lets a member go on; one that does not fails the team."""
+        wrong = await self.members[member].resume()
+        if wrong:
+            self._disobeyed(member, f"it was not let go on: {wrong}")
         self._review()
 
     @property
@@ -165,6 +169,10 @@ class TeamBehavior:
             failed.state = BehaviorState.REJECTED
             self._end_all(BehaviorState.FAILED, "REJECTED", f"{member}: {reason}")
             self._review()
+
+    def _disobeyed(self, member: ResourceId, reason: str) -> None:
+        if self.members[member].active:
+            self._end_all(BehaviorState.FAILED, "FAILED", f"{member}: {reason}")
 
     def found(self, reports: Mapping[str, BehaviorReport], kept: Reference) -> None:
         """After a restart, before `start`: what the arbiters know of the parts."""

@@ -18,6 +18,9 @@ from m2pem.teams.plan import Leg
 CALL_TIMEOUT_S = 10.0
 """As the dispatcher's: an arbiter only hands over, and one that hangs is a fault."""
 
+TURN_TIMEOUT_S = 8.0
+"""Of a hold or resume by the run: the team must know before the dispatcher gives it up."""
+
 SPEED_STEP_SHARE = 0.05
 """Of the speed that was said last: smaller changes are not worth a command."""
 
@@ -25,7 +28,8 @@ _log = logging.getLogger("m2pem.teams")
 
 
 class Member:
-    """Commands go out one after the other; a hold by the run, which must not wait, at once.
+    """The marshal's words go out one after the other. A hold and a resume by the run, and a cancel,
+    go at once, and what the marshal said last is then left unsaid if it has not gone out.
 
     `part`: the id of its part, "" before and between them. `state`: where that is; None: no word of
     it yet. `paused`: a run holds it. `halted`: the marshal does. `lost`: why the team goes on
@@ -54,6 +58,7 @@ class Member:
         self._adjusting = arbiter if isinstance(arbiter, AdjustingArbiter) else None
         self._speed_m_s: float | None = None
         self._cancelled = ""
+        self._starting: asyncio.Task[None] | None = None
         self._tail: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -109,8 +114,10 @@ class Member:
             except Exception as error:  # an arbiter's fault is the member's, not the team's
                 _log.exception("start %s: the arbiter raised", part)
                 self._failed(self.id, f"its arbiter raised {type(error).__name__}: {error}")
+            if self.paused:  # the run has held it meanwhile, which the start may have undone
+                await self._call(f"hold {self.id}", self._arbiter.hold(self.id))
 
-        self._enqueue(start)
+        self._starting = self._enqueue(start)
 
     def adopt(self, part: str, report: BehaviorReport, native_ref: str | None) -> None:
         """After a restart: it was found doing a part, or at its end."""
@@ -127,7 +134,10 @@ class Member:
         part = self.part
         if self.active and self._cancelled != part:
             self._cancelled = part
-            self._enqueue(lambda: self._call(f"cancel {part}", self._arbiter.cancel(part, epoch)))
+            starting = self._starting  # an arbiter cannot end what it has not begun
+            self._task(
+                lambda: self._call(f"cancel {part}", self._arbiter.cancel(part, epoch)), starting
+            )
 
     def go(self, speed_m_s: float, epoch: int) -> None:
         """Let it go at a speed, or (0) not at all; nothing while an earlier word is on its way."""
@@ -136,7 +146,7 @@ class Member:
         if speed_m_s == 0.0:
             if not self.halted:
                 self.halted = True
-                self._enqueue(lambda: self._call(f"halt {self.id}", self._arbiter.hold(self.id)))
+                self._enqueue(self._halt)
             return
         if self.adjustable and self._worth(speed_m_s):
             self._enqueue(lambda: self._adjust(speed_m_s, epoch))
@@ -144,16 +154,17 @@ class Member:
             self.halted = False
             self._enqueue(self._go_on)
 
-    async def hold(self) -> None:
-        """A run holds it."""
+    async def hold(self) -> str:
+        """A run holds it. Returns "", or why it is not held."""
         self.paused = True
-        await self._arbiter.hold(self.id)
+        return await self._turn(f"hold {self.id}", self._arbiter.hold(self.id))
 
-    async def resume(self) -> None:
-        """The run lets it go; it stands on if the marshal wants it to."""
+    async def resume(self) -> str:
+        """The run lets it go; it stands on if the marshal wants it to. Returns as `hold`."""
         self.paused = False
-        if not self.halted:
-            await self._arbiter.resume(self.id)
+        if self.halted:
+            return ""
+        return await self._turn(f"resume {self.id}", self._arbiter.resume(self.id))
 
     async def query(self, part: str, native_ref: str | None) -> BehaviorReport:
         """What its arbiter knows of a part."""
@@ -171,35 +182,58 @@ class Member:
         return last is None or abs(speed_m_s - last) > SPEED_STEP_SHARE * last
 
     async def _adjust(self, speed_m_s: float, epoch: int) -> None:
-        if self._adjusting is not None and self.active and not self.paused:
+        if self._adjusting is not None and self._obeys:
             self._speed_m_s = speed_m_s
             wished = self._adjusting.adjust(self.part, epoch, {"speed": speed_m_s})
             await self._call(f"adjust {self.part}", wished)
 
+    @property
+    def _obeys(self) -> bool:
+        """Whether the marshal may still tell it something."""
+        return self.active and not self.paused and self._cancelled != self.part
+
+    async def _halt(self) -> None:
+        if self._obeys:
+            await self._call(f"halt {self.id}", self._arbiter.hold(self.id))
+
     async def _go_on(self) -> None:
-        if self.paused:
+        if not self._obeys:
             return
         await self._call(f"go on {self.id}", self._arbiter.resume(self.id))
         if self.paused:  # a run has held it meanwhile, and the last word is the run's
             await self._call(f"hold {self.id}", self._arbiter.hold(self.id))
 
-    def _enqueue(self, job: Callable[[], Awaitable[None]]) -> None:
-        before = self._tail
+    def _enqueue(self, job: Callable[[], Awaitable[None]]) -> asyncio.Task[None]:
+        self._tail = self._task(job, self._tail)
+        return self._tail
 
+    def _task(
+        self, job: Callable[[], Awaitable[None]], before: asyncio.Task[None] | None
+    ) -> asyncio.Task[None]:
         async def in_turn() -> None:
-            if before is not None:
+            if before is not None and not before.done():
                 await asyncio.wait([before])
             await job()
 
-        self._tail = task = asyncio.get_running_loop().create_task(in_turn())
+        task = asyncio.get_running_loop().create_task(in_turn())
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+        return task
 
     async def _call(self, what: str, call: Awaitable[None]) -> None:
+        await self._turn(what, call, CALL_TIMEOUT_S)
+
+    async def _turn(
+        self, what: str, call: Awaitable[None], timeout_s: float = TURN_TIMEOUT_S
+    ) -> str:
+        """Await an arbiter's call within its bound. Returns "", or what went wrong."""
         try:
-            async with asyncio.timeout(CALL_TIMEOUT_S):
+            async with asyncio.timeout(timeout_s):
                 await call
         except TimeoutError:
-            _log.error("%s: the arbiter did not return within %g s", what, CALL_TIMEOUT_S)
-        except Exception:  # an arbiter's fault must not end the team
+            _log.error("%s: the arbiter did not return within %g s", what, timeout_s)
+            return f"its arbiter did not return within {timeout_s:g} s"
+        except Exception as error:  # an arbiter's fault must not end the team
             _log.exception("%s: the arbiter raised", what)
+            return f"its arbiter raised {type(error).__name__}: {error}"
+        return ""
