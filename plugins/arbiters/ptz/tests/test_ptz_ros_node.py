@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 from m2pem_plugin_ros.arbiter import RosArbiter
-from ptz_ros_node_world import CAMERA, connection, world
+from ptz_ros_node_world import CAMERA, connection, peer, world
 
-from m2pem.api import BehaviorState, LinkState, Point
+from m2pem.api import BehaviorState, LinkState, Point, RunStatus
 from m2pem.executive.clock import SystemClock
+from m2pem.testing import play, scenarios
 from m2pem.testing.contracts.bench import ArbiterBench, context
 
 VIAS = ("topics", "action")
@@ -108,3 +109,22 @@ async def test_a_payload_that_nobody_has_heard_is_lost_and_says_nothing(ros_doma
         await bench.start("r1.b1", "zoom", CAMERA, level=2.0)
         report = await asyncio.wait_for(bench.ended("r1.b1", 15.0), 20.0)
         assert report.state is BehaviorState.LOST
+
+
+def test_a_mission_gets_the_pictures_that_a_payload_with_a_node_took(
+    tmp_path: Path, ros_domain: int
+) -> None:
+    own = connection(CAMERA, ros_domain).settings
+    fleet = scenarios.fleet(
+        "ros", {"ugv1": {"namespace": "/ugv1", "domain_id": ros_domain}, CAMERA: own}
+    )
+    with peer(ros_domain, CAMERA, tmp_path):
+        played = play(
+            scenarios.one_behavior("take_picture", CAMERA, count=2, interval="0.1 s"),
+            fleet,
+            arbiters={"ros": RosArbiter},
+        )
+    assert played.summary.status is RunStatus.COMPLETED, played.records
+    written = {record.key: record.value for record in played.of("DataWritten")}
+    assert len(written["picture.files"]) == 2
+    assert Path(written["picture.file"]).is_file()

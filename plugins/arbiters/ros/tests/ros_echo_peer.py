@@ -33,7 +33,9 @@ def main() -> None:
     def accept(command: Any) -> None:
         said = " ".join(f"{each.key}={each.value}" for each in command.parameters)
         state = BehaviorStatus.ACCEPTED
-        accepted.publish(BehaviorStatus(id=command.id, number=1, state=state, native_ref=said))
+        status = BehaviorStatus(id=command.id, number=1, state=state, native_ref=said)
+        status.outputs = command.parameters
+        accepted.publish(status)
 
     node.create_subscription(BehaviorCommand, "command", accept, 10)
 

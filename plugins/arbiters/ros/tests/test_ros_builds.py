@@ -115,6 +115,7 @@ async def exchange(domain: int) -> None:
         status = heard.get_nowait()
         assert (status.id, status.state) == ("b1", BehaviorStatus.ACCEPTED)
         assert status.native_ref == "speed=5.0"
+        assert list(status.outputs) == list(command.parameters)
 
         client = ros.client(AnswerPrompt, "answer")
         request = AnswerPrompt.Request(prompt="p1", decision="continue")

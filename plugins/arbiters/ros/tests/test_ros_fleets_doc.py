@@ -5,7 +5,9 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
-from m2pem_plugin_ros.catalogue import LEVEL
+from m2pem_plugin_ros.arbiter import RosArbiter
+from m2pem_plugin_ros.catalogue import LEVEL, PAYLOAD
+from m2pem_plugin_ros.payload_settings import read_payloads
 from m2pem_plugin_ros.settings import (
     BOUNDS,
     DetectorMessage,
@@ -21,6 +23,8 @@ from m2pem_plugin_ros.settings import (
 
 import m2pem
 from m2pem.api import Connection, Fleet, ResourceId
+from m2pem.executive.clock import SystemClock
+from m2pem.testing.contracts.bench import context
 
 TEXT = (Path(__file__).parents[4] / "docs" / "ros.md").read_text(encoding="utf-8")
 FLEETS = [block for block in re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL) if "ros" in block]
@@ -35,7 +39,11 @@ def connections(fleet: Fleet) -> dict[ResourceId, Connection]:
     }
     payloads = {
         p.id: Connection(
-            p.id, fleet.vehicles[p.vehicle].domain.value, p.settings, detector=p.detector
+            p.id,
+            fleet.vehicles[p.vehicle].domain.value,
+            p.settings,
+            p.behaviors,
+            p.detector,
         )
         for p in fleet.payloads.values()
         if p.arbiter == "ros"
@@ -48,7 +56,13 @@ def test_the_fleets_can_be_used(block: str, tmp_path: Path) -> None:
     path = tmp_path / "fleet.yaml"
     path.write_text(block, encoding="utf-8")
     made = connections(m2pem.load_fleet(path))
-    assert len(read_settings(made)) + len(read_detectors(made)) == len(made) > 0
+    vehicles = read_settings(made)
+    payloads = read_payloads(made, vehicles)
+    assert {*vehicles, *payloads, *read_detectors(made, payloads)} == set(made) != set()
+    allowed = {each: made[each].behaviors or () for each in payloads}
+    arbiter = RosArbiter(made, context(SystemClock()))
+    for payload, names in allowed.items():
+        assert set(names) <= {spec.name for spec in arbiter.catalogue(payload)}
 
 
 def test_there_are_fleets() -> None:
@@ -69,4 +83,5 @@ def test_every_bound_is_explained_and_no_other() -> None:
 
 
 def test_every_behavior_is_named() -> None:
-    assert {spec.name for spec in LEVEL if f"`{spec.name}`" not in TEXT} == set()
+    offered = (*LEVEL, *PAYLOAD)
+    assert {spec.name for spec in offered if f"`{spec.name}`" not in TEXT} == set()

@@ -1,5 +1,6 @@
 """What /diagnostics says of the executive, its journal and its vehicles (diagnostic_msgs)."""
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -68,6 +69,8 @@ class Vehicles:
         if isinstance(state, VehicleState):
             values |= _of_vehicle(state)
             problems = _problems(state)
+        else:
+            values |= _of_payload(state)
         level = DiagnosticStatus.WARN if problems else DiagnosticStatus.OK
         if state.link is LinkState.DEGRADED:
             level, problems = DiagnosticStatus.WARN, ["link degraded", *problems]
@@ -91,6 +94,14 @@ def _of_vehicle(state: VehicleState) -> dict[str, str]:
         said["longitude_deg"] = f"{state.position.longitude_deg:.7f}"
         said["altitude_m"] = f"{state.position.altitude_m:.1f}"
     return {key: str(value) for key, value in said.items() if value is not None and value != ""}
+
+
+def _of_payload(state: PayloadState) -> dict[str, str]:
+    said = {"pan_deg": state.pan_rad, "tilt_deg": state.tilt_rad}
+    values = {key: f"{math.degrees(angle):.1f}" for key, angle in said.items() if angle is not None}
+    if state.zoom is not None:
+        values["zoom"] = f"{state.zoom:.2f}"
+    return values
 
 
 def _problems(state: VehicleState) -> list[str]:

@@ -61,6 +61,7 @@ class MocuOcu:
         from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415  # rclpy
 
         from m2pem_plugin_mocu.examiner import Examiner  # noqa: PLC0415
+        from m2pem_plugin_mocu.fleet_view import FleetView  # noqa: PLC0415
         from m2pem_plugin_mocu.services import Services  # noqa: PLC0415
         from m2pem_plugin_mocu.topics import Topics, now_us  # noqa: PLC0415
 
@@ -68,11 +69,14 @@ class MocuOcu:
             topics = Topics(ros, self._control, self._feed)
             services = Services(ros, self._control, self._feed, topics)
             examiner = Examiner(ros, self._control, self._feed, topics, services)
+            fleet = FleetView(ros, self._control, now_us)
             following = asyncio.create_task(self._feed.follow(topics, now_us))
             speaking = [
                 asyncio.create_task(topics.run()),
                 asyncio.create_task(examiner.run()),
                 asyncio.create_task(examiner.listen()),
+                asyncio.create_task(fleet.run()),
+                asyncio.create_task(fleet.listen()),
             ]
             log.info("operators are served over ROS in %s", self.namespace)
             try:

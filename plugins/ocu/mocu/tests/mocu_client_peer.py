@@ -15,6 +15,7 @@ from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PolygonStamped
 from m2pem_interfaces import msg, srv
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -28,6 +29,9 @@ TOPICS = {
     "status": (msg.MissionStatus, LATCHED),
     "active_elements": (msg.ActiveElements, LATCHED),
     "events": (msg.MissionEvent, QoSProfile(depth=1000)),
+    "payloads": (msg.PayloadStatuses, LATCHED),
+    "teams": (msg.TeamStatuses, LATCHED),
+    "footprints/ugv2/camera": (PolygonStamped, LATCHED),
 }
 
 

@@ -15,6 +15,7 @@ from m2pem.api.telemetry import (
     Telemetry,
     VehicleState,
 )
+from m2pem_plugin_terminal.payloads import payload_words
 from m2pem_plugin_terminal.words import shortened
 
 if TYPE_CHECKING:
@@ -139,16 +140,20 @@ def _vehicle(
     if state.position is not None:
         lines.append(Text(f"  {_position(state)}", DETAIL))
     doing = [named(state.behavior)] if state.behavior else []
+    looking: list[Text] = []
     for payload in payloads:
-        if payload.behavior:
-            doing.append(f"{payload.resource.rpartition('/')[2]}: {named(payload.behavior)}")
+        words = payload_words(payload, named) if isinstance(payload, PayloadState) else ""
+        if isinstance(payload, PayloadState) and payload.pan_rad is not None and words:
+            looking.append(Text(f"  {shortened(words, width - 2)}", "#7fc8a9"))
+        elif words:
+            doing.append(words)
     if doing:
         lines.append(Text(shortened(f"{', '.join(doing)}", width - 2), "#7fc8a9"))
         lines[-1] = Text("  ").append_text(lines[-1])
     elif state.not_ready_reasons:
         text = shortened("; ".join(state.not_ready_reasons), width - 2)
         lines.append(Text(f"  {text}", "#e8c468"))
-    return lines
+    return [*lines, *looking]
 
 
 def _position(state: VehicleState) -> str:

@@ -116,6 +116,17 @@ async def test_vehicles_are_shown_with_all_that_matters(world: World) -> None:
         assert terminal.screen.count("drive_stop") == 3  # tree, log and vehicle
 
 
+async def test_a_camera_is_shown_with_what_it_does_and_where_it_looks(world: World) -> None:
+    async with world.terminal() as terminal:
+        await world.start()
+        uav, eye = ResourceId("uav"), ResourceId("uav/eye")
+        world.fake.say(VehicleState(uav, 0, GeoPosition(38.2, -77.4, 100.0)))
+        world.fake.say(PayloadState(eye, 0, 0.5, -0.25, 4.0, behavior="zoom"))
+        await terminal.until_shown("eye: 29°→ 14°↓ x4 zoom")
+        world.fake.say(PayloadState(eye, 0, link=LinkState.LOST))
+        await terminal.until_shown("eye: not heard")
+
+
 async def test_a_member_of_a_march_is_shown_with_its_place(world: World) -> None:
     async with world.terminal() as terminal:
         await world.start()
