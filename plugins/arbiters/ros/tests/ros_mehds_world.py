@@ -32,12 +32,11 @@ REPOSITORY = Path(__file__).parents[4]
 FLEETS = REPOSITORY / "fleet_configs"
 MISSIONS = REPOSITORY / "missions"
 COPTER = Path(__file__).with_name("ros_mehds_copter.py")
-SPEED = 8.0
-LOST_AFTER_S = 40
-"""Longer than in the fleet: at this speed, it is for five seconds that a busy computer may leave a
-program alone."""
+SPEED = 4.0
+LOST_AFTER_S = 20
+"""Longer than in the fleet: so long may a busy computer leave a program alone."""
 
-SILENT = "silent for 36 s"
+SILENT = "silent for 18 s"
 """Longer than the arbiter listens (0.8 of that), and shorter than an operator takes."""
 
 STUCK = "wheels stuck for 25 s"
