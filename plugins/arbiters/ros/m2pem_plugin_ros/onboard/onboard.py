@@ -31,6 +31,7 @@ from m2pem_plugin_ros.onboard.asked import (
 from m2pem_plugin_ros.onboard.book import Book
 from m2pem_plugin_ros.onboard.goals import Goals
 from m2pem_plugin_ros.onboard.targets import Targets, read_target
+from m2pem_plugin_ros.onboard.vigil import rounds
 from m2pem_plugin_ros.onboard.voice import About, Voice
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.statuses import Status
@@ -287,8 +288,7 @@ class Onboard:
 
     async def _watch(self) -> None:
         """Give up on a vehicle that is not heard any more."""
-        while True:
-            await self._clock.sleep(SILENT_AFTER_S / 5)
+        async for _ in rounds(self._clock, SILENT_AFTER_S / 5):
             if (reason := self._silence()) and (id_ := self._book.current):
                 self._driver.forget()
                 self._book.end(id_, BehaviorState.LOST, "LINK_LOST", reason)
