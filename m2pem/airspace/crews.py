@@ -17,6 +17,7 @@ from m2pem.airspace.planning import (
 from m2pem.airspace.shapes import Place, grown, hull
 from m2pem.airspace.volume import Piece, Volume
 from m2pem.airspace.wishes import Wishes
+from m2pem.resources.offsets import read_offsets
 from m2pem.teams.shapes import SPACING_M, Vector, shifted, slot, trimmed
 
 _SHAPES = {
@@ -42,6 +43,9 @@ def _march(behavior: str, wishes: Wishes, lead: Craft | None, index: int) -> Vol
     spacing_m = wishes.number("spacing") or SPACING_M
     back, left = slot(shape if isinstance(shape, str) else _SHAPES[behavior], index)
     back_m, left_m = back * spacing_m, left * spacing_m
+    offsets = wishes.parameters.get("offsets")
+    if index and isinstance(offsets, str) and len(given := read_offsets(offsets)) >= index:
+        back_m, left_m = given[index - 1]
     route = wishes.route
     if route is None or not route.waypoints:
         # To a place beside the lead, whichever way that looks.

@@ -49,7 +49,7 @@ def _problem(spec: ParameterSpec, value: ResolvedValue) -> str:
         return f"{value!r} is not the {spec.kind.value} that is expected"
     if spec.kind is ParameterKind.BOOLEAN:
         return "" if isinstance(value, bool) else f"{value!r} is neither true nor false"
-    if spec.kind is ParameterKind.TEXT:
+    if spec.kind in (ParameterKind.TEXT, ParameterKind.OFFSETS):
         if not isinstance(value, str):
             return f"{value!r} is not a text"
         if spec.choices and value not in spec.choices:

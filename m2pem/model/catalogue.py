@@ -24,6 +24,7 @@ class ParameterKind(StrEnum):
     COUNT = "count"  # a whole number, 0 or more
     BOOLEAN = "boolean"
     TEXT = "text"
+    OFFSETS = "offsets"  # [[metres behind, metres left], ...] of members after a team's lead
     ROUTE = "route"  # name of a LineString or MultiPoint
     AREA = "area"  # name of a Polygon
     POSITION = "position"  # name of a point or of a vehicle, or [lat, lon, altitude]

@@ -210,7 +210,18 @@ def _team_behaviors() -> tuple[BehaviorSpec, ...]:
     return (
         _area_survey(team),
         _area_observe(team),
-        _behavior(team, "formation", "Move in formation.", _ROUTE, *common),
+        _behavior(
+            team,
+            "formation",
+            "Move in formation.",
+            _ROUTE,
+            *common,
+            ParameterSpec(
+                "offsets",
+                ParameterKind.OFFSETS,
+                doc="In place of shape and spacing: metres behind the lead and to its left.",
+            ),
+        ),
         _behavior(
             team, "road_following_formation", "Move in formation along a road.", _ROUTE, *common
         ),

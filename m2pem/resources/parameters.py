@@ -17,6 +17,7 @@ from m2pem.resources.behaviors import ALTITUDE_FRAME, takes_altitude
 from m2pem.resources.geojson import GeometryError, coordinate, kind_of
 from m2pem.resources.local_positions import NO_ORIGIN, Origin, is_local, local_point
 from m2pem.resources.nearmiss import did_you_mean, suggest
+from m2pem.resources.offsets import REMEDY, read_offsets
 from m2pem.resources.units import UNITS, Dimension, UnitError, article, plain_number, quantity
 
 ResolvedValue: TypeAlias = float | int | bool | str | Geometry | None
@@ -167,6 +168,8 @@ class _Reader:
                 return self._vehicle(value)
             case ParameterKind.TEXT:
                 return _text(spec, value)
+            case ParameterKind.OFFSETS:
+                return _offsets(value)
             case ParameterKind.BOOLEAN:
                 return _boolean(value)
             case _:
@@ -241,6 +244,13 @@ def _text(spec: ParameterSpec, value: Value) -> str:
         message = f"{value!r} is not one of {', '.join(spec.choices)}"
         raise _ProblemError("bad-value", message, did_you_mean(value, spec.choices))
     return value
+
+
+def _offsets(value: Value) -> str:
+    try:
+        return json.dumps(read_offsets(value))
+    except ValueError as error:
+        raise _ProblemError("bad-value", str(error), REMEDY) from None
 
 
 def _boolean(value: Value) -> bool:

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from itertools import accumulate, pairwise
+from itertools import accumulate, combinations, pairwise
 
 from m2pem.model.catalogue import ResourceId
 from m2pem.model.geometry import Route
+from m2pem.resources.offsets import read_offsets
 from m2pem.teams.path import Path
 from m2pem.teams.plan import Leg, March, Marcher, Plan, Setting, TeamRefusedError
 from m2pem.teams.shapes import SPACING_M, Vector, beside, shifted, slot, trimmed
@@ -23,13 +24,17 @@ def march(setting: Setting, default_shape: str) -> Plan:
     """All move together and keep their places; without a route they form up on the lead."""
     shape, spacing = _shape(setting, default_shape)
     route = setting.route()
+    places = _places(setting, shape, spacing)
+    if setting.text("offsets", ""):
+        shape, spacing = "", min(math.dist(a, b) for a, b in combinations(places, 2))
     if route is None:
-        return Plan(_forming_up(setting, shape, spacing, chained=False))
-    ways = _ways(setting, route, shape, spacing)
+        return Plan(_forming_up(setting, places, chained=False))
+    ways = _ways(setting, route, places)
     marchers = tuple(
         Marcher(way.member, way.path, way.back_m, way.left_m, setting.motion(way.member))
         for way in ways
     )
+    _refuse_wrong_order(marchers, spacing)
     speed = _march_speed(setting, marchers, spacing)
     legs = tuple(way.leg(setting, speed, None) for way in ways)
     return Plan(legs, March(marchers, spacing, speed, closes=shape == "column"))
@@ -39,9 +44,10 @@ def one_by_one(setting: Setting) -> Plan:
     """Each sets off when the one before it has arrived, and stops behind it."""
     shape, spacing = _shape(setting, "column")
     route = setting.route()
+    places = _places(setting, shape, spacing)
     if route is None:
-        return Plan(_forming_up(setting, shape, spacing, chained=True))
-    ways = _ways(setting, route, shape, spacing)
+        return Plan(_forming_up(setting, places, chained=True))
+    ways = _ways(setting, route, places)
     befores: list[ResourceId | None] = [None, *(way.member for way in ways)]
     wished = setting.number("speed")
     return Plan(
@@ -100,13 +106,41 @@ def _shape(setting: Setting, default: str) -> tuple[str, float]:
     return setting.text("shape", default), setting.number("spacing") or SPACING_M
 
 
-def _ways(setting: Setting, route: Route, shape: str, spacing_m: float) -> list[_Way]:
+def _places(setting: Setting, shape: str, spacing_m: float) -> list[tuple[float, float]]:
+    """Where each member is to be, in metres behind the lead and to its left."""
+    text = setting.text("offsets", "")
+    if not text:
+        slots = (slot(shape, index) for index in range(len(setting.members)))
+        return [(back * spacing_m, left * spacing_m) for back, left in slots]
+    doubled = [name for name in ("shape", "spacing") if name in setting.parameters]
+    if doubled:
+        raise TeamRefusedError(f"parameter 'offsets': it says what '{doubled[0]}' says, too")
+    places = [(0.0, 0.0), *read_offsets(text)]
+    if len(places) < len(setting.members) or len(places) < 2:
+        raise TeamRefusedError(
+            f"parameter 'offsets': there are {len(places) - 1} for {len(setting.members) - 1} "
+            "members after the lead"
+        )
+    return places[: max(2, len(setting.members))]
+
+
+def _refuse_wrong_order(marchers: Sequence[Marcher], spacing_m: float) -> None:
+    """Who comes later in a team looks out for those before it, not the other way round."""
+    for index, marcher in enumerate(marchers):
+        for other in marchers[:index]:
+            if lane_mates(marcher, other, spacing_m) and marcher.back_m < other.back_m:
+                raise TeamRefusedError(
+                    f"parameter 'offsets': {marcher.member} would be ahead of {other.member} in "
+                    "its lane; name first in the team who is ahead"
+                )
+
+
+def _ways(setting: Setting, route: Route, offsets: Sequence[tuple[float, float]]) -> list[_Way]:
     places = [(*setting.level(each), each[2] or 0.0) for each in _apart(setting, route)]
-    ways = []
-    for index, member in enumerate(setting.members):
-        back, left = (part * spacing_m for part in slot(shape, index))
-        ways.append(_Way(setting, member, places, (back, left)))
-    return ways
+    return [
+        _Way(setting, member, places, offset)
+        for member, offset in zip(setting.members, offsets, strict=False)
+    ]
 
 
 def _apart(setting: Setting, route: Route) -> list[tuple[float, float, float | None]]:
@@ -128,13 +162,16 @@ def _march_speed(setting: Setting, marchers: Sequence[Marcher], spacing_m: float
     """As wished, but so that each can stop before it comes too near to the one in its lane."""
     speed = setting.speed()
     for index, marcher in enumerate(marchers):
-        if any(lane_mates(marcher, other, spacing_m) for other in marchers[:index]):
-            speed = min(speed, marcher.motion.safe_m_s(HEADROOM_SHARE * spacing_m))
+        for other in marchers[:index]:
+            if lane_mates(marcher, other, spacing_m):
+                gap_m = marcher.back_m - other.back_m
+                headroom_m = gap_m - (1 - HEADROOM_SHARE) * spacing_m
+                speed = min(speed, marcher.motion.safe_m_s(headroom_m))
     return speed
 
 
 def _forming_up(
-    setting: Setting, shape: str, spacing_m: float, *, chained: bool
+    setting: Setting, places: Sequence[tuple[float, float]], *, chained: bool
 ) -> tuple[Leg, ...]:
     lead, *others = setting.members
     stand = setting.stands[lead]
@@ -142,7 +179,7 @@ def _forming_up(
         raise TeamRefusedError(f"the heading of {lead} is not known, on which the others form up")
     legs: list[Leg] = []
     for index, member in enumerate(others, 1):
-        back, left = (part * spacing_m for part in slot(shape, index))
+        back, left = places[index]
         place = beside(stand.place, stand.yaw_rad, back, left)
         after = others[index - 2] if chained and index > 1 else None
         legs.append(setting.to_place(member, place, after=after))

@@ -27,7 +27,7 @@ PUBLISHED = {
     ("teleop", VEHICLE): ("timeout", ""),
     ("set_speed", VEHICLE): ("speed", "speed"),
     ("deploy", VEHICLE): ("actuator value", "actuator"),
-    ("formation", TEAM): (TEAM_PARAMETERS, ""),
+    ("formation", TEAM): (f"{TEAM_PARAMETERS} offsets", ""),
     ("road_following_formation", TEAM): (TEAM_PARAMETERS, ""),
     ("road_sweep", TEAM): (TEAM_PARAMETERS, ""),
     ("bridge_crossing", TEAM): (TEAM_PARAMETERS, ""),

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from m2pem.api.control import RunStatus
+from m2pem.errors import MissionError
 from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.plugins import PluginManager
 from m2pem.resources.fleet import LostMemberPolicy
@@ -29,7 +30,7 @@ ROAD = {
 MARCH = one_task("road_following_formation", route="road", spacing="20 m", speed="5 m/s")
 GO_ON, STOP = LostMemberPolicy.CONTINUE, LostMemberPolicy.STOP
 QUICK = settings(
-    max_examples=25,
+    max_examples=15,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
     phases=(Phase.explicit, Phase.generate),  # shrinking would take minutes
@@ -221,3 +222,37 @@ def test_the_spacing_is_kept_on_any_route_whatever_the_members_can(
     gaps, ended = rehearsed(fleet, story)
     assert ended.state is BehaviorState.SUCCEEDED, ended
     assert min(gaps) >= spacing_m / 2 - 0.5
+
+
+def test_a_formation_takes_the_offsets_of_its_author() -> None:
+    async def story(world: Rehearsed) -> Any:
+        await world.executive.control.start(
+            one_task("formation", route="long", offsets="[[12, 8.5], [30, -4]]")
+        )
+        await world.until_ended()
+        return world.ended()[0], [world.place(name) for name in "abc"]
+
+    ended, ends = rehearsed(sim_fleet(COLUMN, {"long": route((50, 0), (250, 0))}), story)
+    assert ended.state is BehaviorState.SUCCEEDED, ended
+    for found, wanted in zip(ends, [(250, 0), (238, 8.5), (220, -4)], strict=True):
+        assert math.dist(found, wanted) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("wished", "why"),
+    [
+        ({"offsets": "[[10, 5]]"}, "there are 1 for 2 members after the lead"),
+        ({"offsets": "[[10, 0], [-10, 0]]"}, "c would be ahead of a in its lane"),
+        ({"offsets": "[[10, 0], [10, 5]]", "shape": "line"}, "it says what 'shape' says, too"),
+    ],
+)
+def test_offsets_that_make_no_formation_are_refused(wished: dict[str, str], why: str) -> None:
+    result = rehearsal(one_task("formation", route="road", **wished))
+    assert result.summary.status is RunStatus.FAILED
+    assert why in str(result.records)
+
+
+@pytest.mark.parametrize("offsets", ["behind", "[]", "[[1]]", "[[0, 0], [5, 5]]", "[[1, true]]"])
+def test_offsets_that_cannot_be_read_are_found_before_the_mission_starts(offsets: str) -> None:
+    with pytest.raises(MissionError, match="parameter 'offsets'"):
+        rehearsal(one_task("formation", route="road", offsets=offsets))
