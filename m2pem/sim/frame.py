@@ -5,6 +5,7 @@ ground is flat: below a plane that touches the Earth, "up" of ENU would sink by 
 """
 
 import math
+from collections.abc import Iterable
 
 from m2pem.api.telemetry import GeoPosition
 from m2pem.sim.phases import Vector
@@ -13,6 +14,7 @@ MAX_RANGE_M = 500_000.0
 """Farther from the origin the plane is no longer a picture of the Earth."""
 
 _MEAN_RADIUS_M = 6_371_000.0
+_EQUATOR_M, _ECCENTRICITY_2 = 6_378_137.0, 6.694_379_990_141e-3
 
 
 class Frame:
@@ -51,3 +53,24 @@ class Frame:
         sunk = -(east * east + north * north) / (2 * _MEAN_RADIUS_M)
         latitude, longitude, _ = pymap3d.enu2geodetic(east, north, sunk, *self.origin)
         return GeoPosition(float(latitude), float(longitude), self.origin[2] + up)
+
+    def geo_near(self, middle: Vector, places: Iterable[Vector]) -> tuple[GeoPosition, ...]:
+        """The WGS-84 positions of places that are at most some kilometres from `middle`.
+
+        One `geo` for all of them, and a metre in latitude and longitude from there: telemetry has
+        many, and they need not be exact to the millimetre.
+        """
+        around = self.geo(middle)
+        sin = math.sin(math.radians(around.latitude_deg))
+        squared = 1 - _ECCENTRICITY_2 * sin * sin
+        across_m = _EQUATOR_M / math.sqrt(squared)
+        along_m = across_m * (1 - _ECCENTRICITY_2) / squared
+        parallel_m = across_m * math.sqrt(1 - sin * sin)
+        return tuple(
+            GeoPosition(
+                around.latitude_deg + math.degrees((north - middle[1]) / along_m),
+                around.longitude_deg + math.degrees((east - middle[0]) / parallel_m),
+                self.origin[2] + up,
+            )
+            for east, north, up in places
+        )
