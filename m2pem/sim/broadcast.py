@@ -9,6 +9,7 @@ from m2pem.sim.agenda import Agenda, Entry
 from m2pem.sim.executions import Body
 from m2pem.sim.frame import Frame
 from m2pem.sim.payloads import SimPayload
+from m2pem.sim.phases import Look, Vector
 from m2pem.sim.track import US_PER_S
 from m2pem.sim.vehicles import SimVehicle
 
@@ -41,6 +42,8 @@ class Broadcast:
         self._audible = audible
         self._next: dict[ResourceId, Entry] = {}
         self._begun = False
+        self._seen_from: dict[ResourceId, tuple[Vector, float, Look]] = {}
+        self._seen: dict[ResourceId, tuple[GeoPosition, ...]] = {}
 
     def begin(self, now_us: int) -> None:
         """Tell of everybody, now and from now on."""
@@ -77,5 +80,10 @@ class Broadcast:
         carrier = self._bodies.get(payload.carrier)
         if not isinstance(carrier, SimVehicle):
             return ()
-        corners = payload.ground(now_us, carrier.pose(now_us), carrier.home[2])
-        return tuple(self._frame.geo(corner) for corner in corners)
+        pose, look = carrier.pose(now_us), payload.look(now_us)
+        seen_from = (pose.place, pose.yaw, look)
+        if self._seen_from.get(payload.id) != seen_from:
+            self._seen_from[payload.id] = seen_from
+            corners = payload.ground(now_us, pose, carrier.home[2])
+            self._seen[payload.id] = tuple(self._frame.geo(corner) for corner in corners)
+        return self._seen[payload.id]
