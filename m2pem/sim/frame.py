@@ -57,8 +57,8 @@ class Frame:
     def geo_near(self, middle: Vector, places: Iterable[Vector]) -> tuple[GeoPosition, ...]:
         """The WGS-84 positions of places that are at most some kilometres from `middle`.
 
-        One `geo` for all of them, and a metre in latitude and longitude from there: telemetry has
-        many, and they need not be exact to the millimetre.
+        One `geo` for all of them, and metres of latitude and longitude from there: telemetry has
+        many of them. 20 km from the origin they are off by 0.3 % of their distance from `middle`.
         """
         around = self.geo(middle)
         sin = math.sin(math.radians(around.latitude_deg))

@@ -29,5 +29,5 @@ def test_places_that_are_near_each_other_are_where_each_alone_is() -> None:
     for near, place in zip(FRAME.geo_near(middle, places), places, strict=True):
         east, north = FRAME.level(near.latitude_deg, near.longitude_deg)
         off = math.dist((east, north), place[:2])
-        assert off < 2e-3 * math.dist(middle[:2], place[:2])
+        assert off < 4e-3 * math.dist(middle[:2], place[:2])
         assert near.altitude_m == 60.0 + place[2]
