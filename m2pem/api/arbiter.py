@@ -35,7 +35,8 @@ class Connection:
     `behaviors`: the names that the fleet allows; None means all that the arbiter offers.
     `failsafe`: the fleet's word for what the vehicle does by itself when its link is lost, or "".
     `fence`: the area that the vehicle may not leave; None: the fleet has none. `sitl`: software in
-    the loop: what answers is a simulation on this machine.
+    the loop: what answers is a simulation on this machine. `cruise_speed_m_s`, `endurance_s`: how
+    fast a vehicle goes when nobody says, and how long it can with a full battery; None: not said.
     """
 
     resource: ResourceId
@@ -47,6 +48,8 @@ class Connection:
     failsafe: str = ""
     fence: Area | None = None
     sitl: bool = False
+    cruise_speed_m_s: float | None = None
+    endurance_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

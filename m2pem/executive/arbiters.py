@@ -62,6 +62,8 @@ class FleetArbiters:
                 failsafe=vehicle.failsafe,
                 fence=fence,
                 sitl=vehicle.sitl,
+                cruise_speed_m_s=vehicle.cruise_speed_m_s,
+                endurance_s=vehicle.endurance_s,
             )
         for payload in fleet.payloads.values():
             name = SIMULATED if simulated else payload.arbiter

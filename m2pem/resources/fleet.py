@@ -44,7 +44,8 @@ class Payload:
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """A vehicle. `payloads`: the ids of what is mounted on it."""
+    """A vehicle. `payloads`: the ids of what is mounted on it. `cruise_speed_m_s`: how fast it goes
+    when nobody says; `endurance_s`: how long it can, with a full battery. None: not said."""
 
     id: ResourceId
     domain: Domain
@@ -56,6 +57,8 @@ class Vehicle:
     sitl: bool = False
     lost_after_s: float | None = None
     failsafe: str = ""
+    cruise_speed_m_s: float | None = None
+    endurance_s: float | None = None
     line: int = 0
 
 

@@ -134,6 +134,8 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
             sitl=vehicle.sitl,
             lost_after_s=vehicle.lost_after,
             failsafe=vehicle.failsafe or "",
+            cruise_speed_m_s=vehicle.cruise_speed,
+            endurance_s=vehicle.endurance,
             line=source.line(("vehicles", name)),
         )
     teams = {

@@ -45,6 +45,11 @@ Distance = Annotated[
     BeforeValidator(_reader(Dimension.DISTANCE)),
     WithJsonSchema(_quantity_schema(Dimension.DISTANCE)),
 ]
+Speed = Annotated[
+    float,
+    BeforeValidator(_reader(Dimension.SPEED)),
+    WithJsonSchema(_quantity_schema(Dimension.SPEED)),
+]
 Name = Annotated[str, StringConstraints(pattern=r"^[^\s/]+$")]
 """What missions call something: no white space, no "/"."""
 
@@ -105,6 +110,14 @@ class VehicleModel(_Model):
     ] = None
     failsafe: Annotated[
         Text | None, Field(description="What the vehicle does by itself when its link is lost.")
+    ] = None
+    cruise_speed: Annotated[
+        Annotated[Speed, Field(gt=0)] | None,
+        Field(description="How fast it goes when nobody says."),
+    ] = None
+    endurance: Annotated[
+        Annotated[Duration, Field(gt=0)] | None,
+        Field(description="How long it can go at that speed, with a full battery."),
     ] = None
 
 

@@ -105,6 +105,8 @@ def read_settings(connection: Connection) -> Settings:
     """
     reader = _Reader(connection)
     default = DEFAULTS.get(connection.domain, DEFAULTS["ground"])
+    said = {"cruise_speed_m_s": connection.cruise_speed_m_s, "endurance_s": connection.endurance_s}
+    default = dataclasses.replace(default, **{key: v for key, v in said.items() if v is not None})
     settings = Settings(
         kinematics=dataclasses.replace(default, **reader.numbers(_KINEMATICS)),
         gimbal=dataclasses.replace(Gimbal(), **reader.numbers(_GIMBAL)),

@@ -156,11 +156,11 @@ class Teams:
         if known.state is not BehaviorState.UNKNOWN or request is None:
             return known
         await self._scene.until_seen(request, self._context.clock)
+        kept = read_reference(native_ref)
         try:
-            scheme = self._scene.scheme(request, begun=True)
+            scheme = self._scene.scheme(request, begun=True, split=kept.split)
         except TeamRefusedError as error:
             return replace(known, reason=f"it cannot be gone on with: {error}")
-        kept = read_reference(native_ref)
         found = await look_for_parts(request, scheme.plan, kept, self._arbiter_of)
         if found.gap:
             self._remains[behavior] = _Remains(request, scheme, found, found.trimmed(kept))

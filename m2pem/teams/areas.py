@@ -10,6 +10,7 @@ from m2pem.resources.parameters import accepted
 from m2pem.teams.bands import Pass, bands, strips, turned
 from m2pem.teams.plan import Leg, Plan, Setting, TeamRefusedError
 from m2pem.teams.shapes import SPACING_M
+from m2pem.teams.split import reach_m, split
 
 SURVEY_SPACING_M = 20.0
 STANDOFF_M = 20.0
@@ -18,7 +19,8 @@ FLYING_STANDOFF_M = 30.0
 
 
 def survey(setting: Setting) -> Plan:
-    """The passes over the area in as many bands as there are members, the faster the wider.
+    """The passes over the area in as many bands as there are members, the faster the wider, and
+    none longer than its member lasts.
 
     Where all can survey an area themselves, with cameras that their arbiters trigger perhaps, each
     is given the area of its band; else each moves along the passes.
@@ -35,15 +37,13 @@ def survey(setting: Setting) -> Plan:
     except ValueError as error:
         raise TeamRefusedError(f"parameter 'spacing': {error}") from None
     wished = setting.number("speed")
-    weights = [
-        setting.motion(member).nominal_m_s if wished is None else 1.0 for member in setting.members
-    ]
     passes = [tracks[index : index + 2] for index in range(0, len(tracks), 2)]
+    shares = setting.split or _shares(setting, rings[0], passes, wished)
     themselves = all("area_survey" in setting.offered[member] for member in setting.members)
     behavior = "area_survey" if themselves else "single_vehicle_routing"
     legs: list[Leg] = []
     if themselves:
-        parts = strips(rings, passes, yaw, weights)
+        parts = strips(rings, passes, yaw, shares)
         for member, ring in zip(setting.members, parts, strict=True):
             if ring:
                 own = {
@@ -54,7 +54,7 @@ def survey(setting: Setting) -> Plan:
                 }
                 legs.append(setting.leg(member, behavior, own))
     else:
-        for member, band in zip(setting.members, bands(passes, weights), strict=True):
+        for member, band in zip(setting.members, bands(passes, shares), strict=True):
             if band:
                 places = (setting.coordinate(place, None) for each in band for place in each)
                 parameters = {"route": Route(tuple(places)), "speed": wished}
@@ -62,7 +62,40 @@ def survey(setting: Setting) -> Plan:
     takes = {
         member: frozenset(accepted(setting.offered[member][behavior])) for member in setting.members
     }
-    return Plan(tuple(legs), shared=True, takes=takes)
+    return Plan(tuple(legs), shared=True, takes=takes, split=tuple(shares))
+
+
+def _shares(
+    setting: Setting, ring: Pass, passes: Sequence[Pass], wished_m_s: float | None
+) -> list[float]:
+    """How many metres of the passes each member is to do: as its speed, within its endurance.
+
+    Raises:
+        TeamRefusedError: together they do not last long enough.
+    """
+    lengths = [math.dist(*each) for each in passes]
+    corners = ring[:-1]
+    middle = tuple(sum(axis) / len(corners) for axis in zip(*corners, strict=True))
+    weights, reaches = [], []
+    for member in setting.members:
+        nominal_m_s = setting.motion(member).nominal_m_s
+        speed_m_s = nominal_m_s if wished_m_s is None else wished_m_s
+        way_s = 2 * math.dist(setting.stands[member].place, middle) / nominal_m_s
+        reach = reach_m(setting.lasts_s.get(member), way_s, speed_m_s)
+        weights.append(speed_m_s)
+        # A band ends with a pass: it may be longer than its share by the longest one.
+        reaches.append(max(0.0, reach - max(lengths, default=0.0)))
+    shares = split(sum(lengths), weights, reaches)
+    if shares is None:
+        last = ", ".join(
+            f"{member} {reach:.0f} m"
+            for member, reach in zip(setting.members, reaches, strict=True)
+        )
+        raise TeamRefusedError(
+            f"the area has {sum(lengths):.0f} m of passes, and its members last for less: {last}; "
+            "take more of them, a wider `spacing`, or full batteries"
+        )
+    return shares
 
 
 def _band_area(setting: Setting, area: Area, rings: Sequence[Pass]) -> Area:

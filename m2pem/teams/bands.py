@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import TypeAlias
 
+from m2pem.teams.split import owners
+
 Place: TypeAlias = tuple[float, float]
 """East and north in metres."""
 
@@ -11,32 +13,17 @@ Pass: TypeAlias = Sequence[Place]
 """Its two ends; or the corners of a ring, the first of them again at the end."""
 
 
-def bands(passes: Sequence[Pass], weights: Sequence[float]) -> list[list[Pass]]:
-    """The passes in their order, cut so that the ways over the area are as the weights."""
-    bands: list[list[Pass]] = [[] for _ in weights]
-    owners = _owners([math.dist(*each) for each in passes], weights)
-    for each, index in zip(passes, owners, strict=True):
+def bands(passes: Sequence[Pass], shares: Sequence[float]) -> list[list[Pass]]:
+    """The passes in their order, cut so that the ways over the area are as the shares."""
+    bands: list[list[Pass]] = [[] for _ in shares]
+    lengths = [math.dist(*each) for each in passes]
+    for each, index in zip(passes, owners(lengths, shares), strict=True):
         bands[index].append(each)
     return bands
 
 
-def _owners(lengths: Sequence[float], weights: Sequence[float]) -> list[int]:
-    """Whose each of some lengths in a row is."""
-    whole = sum(lengths) or 1.0
-    owners = []
-    done = 0.0
-    bounds = [sum(weights[: index + 1]) / sum(weights) for index in range(len(weights))]
-    for length in lengths:
-        middle = (done + length / 2) / whole
-        owners.append(
-            next((i for i, bound in enumerate(bounds) if middle <= bound), len(bounds) - 1)
-        )
-        done += length
-    return owners
-
-
 def strips(
-    rings: Sequence[Pass], passes: Sequence[Pass], yaw_rad: float, weights: Sequence[float]
+    rings: Sequence[Pass], passes: Sequence[Pass], yaw_rad: float, shares: Sequence[float]
 ) -> list[list[list[Place]]]:
     """The parts of an area between passes, as rings; nothing for whom there is no pass."""
     level = [[turned(corner, (0.0, 0.0), yaw_rad) for corner in ring] for ring in rings]
@@ -46,11 +33,11 @@ def strips(
     for each in passes:
         y = round(turned(each[0], (0.0, 0.0), yaw_rad)[1], 6)
         lengths[y] = lengths.get(y, 0.0) + math.dist(*each)
-    owners = _owners(list(lengths.values()), weights)
+    whose = owners(list(lengths.values()), shares)
     middles = list(lengths)
     parts: list[list[list[Place]]] = []
-    for member in range(len(weights)):
-        mine = [y for y, owner in zip(middles, owners, strict=True) if owner == member]
+    for member in range(len(shares)):
+        mine = [y for y, owner in zip(middles, whose, strict=True) if owner == member]
         if not mine:
             parts.append([])
             continue

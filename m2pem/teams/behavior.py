@@ -275,7 +275,7 @@ class TeamBehavior:
             return
         lost = {member.id: member.lost for member in self.members.values() if member.lost}
         self._reference = Reference(
-            self._parts(), self._shares.done, lost, self._reference.version + 1
+            self._parts(), self._shares.done, lost, self._reference.version + 1, self._plan.split
         )
         self._refer(self._reference)
         self._tell(BehaviorState.RUNNING, "", "")

@@ -1,7 +1,7 @@
 """What each member of a team does, and what the team keeps to meanwhile: the words of planning."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
@@ -57,7 +57,7 @@ class March:
 class Plan:
     """`legs`: at most one a member. `stays`: it goes on when all have ended, for `duration_s` if
     that is given. `shared`: what a lost member has not done is done by another one; `takes`: the
-    parameters that each takes then."""
+    parameters that each takes then. `split`: what share of it each member has."""
 
     legs: tuple[Leg, ...]
     march: March | None = None
@@ -65,6 +65,7 @@ class Plan:
     duration_s: float | None = None
     shared: bool = False
     takes: Mapping[ResourceId, frozenset[str]] = field(default_factory=dict)
+    split: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,9 @@ class Setting:
     """What a plan is made from. `offered`: each member's own vehicle behaviors, by name.
 
     `stands`: where each member is. `target`: where the vehicle is that `target` names. `begun`: the
-    members are under way already (after a restart), not on their way to the route's start.
+    members are under way already (after a restart), not on their way to the route's start; what
+    was split among them then was as `split` says. `cruises_m_s`: how fast members go that the fleet
+    says it of. `lasts_s`: how long those can go on that it says that of.
     """
 
     members: tuple[ResourceId, ...]
@@ -91,6 +94,9 @@ class Setting:
     stands: Mapping[ResourceId, Stand] = field(default_factory=dict)
     target: Stand | None = None
     begun: bool = False
+    cruises_m_s: Mapping[ResourceId, float] = field(default_factory=dict)
+    lasts_s: Mapping[ResourceId, float] = field(default_factory=dict)
+    split: tuple[float, ...] = ()
 
     def number(self, name: str) -> float | None:
         """A parameter in SI; None if it is not given."""
@@ -145,7 +151,8 @@ class Setting:
 
     def motion(self, member: ResourceId) -> Motion:
         """How a member moves."""
-        return MOTIONS.get(self.domains[member], MOTIONS["ground"])
+        motion = MOTIONS.get(self.domains[member], MOTIONS["ground"])
+        return replace(motion, nominal_m_s=self.cruises_m_s.get(member, motion.nominal_m_s))
 
     def speed(self) -> float:
         """The speed of all together: as wished, else what the slowest is taken to go.

@@ -16,12 +16,14 @@ from m2pem.model.catalogue import ResourceId
 class Reference:
     """`begun`: the arbiters' own references of parts that have begun. `done`: parts that have ended
     well. `lost`: members that the team goes on without, and why. `version`: how often it changed.
+    `split`: the shares of the members in what they divide.
     """
 
     begun: Mapping[str, str | None] = field(default_factory=dict)
     done: tuple[str, ...] = ()
     lost: Mapping[ResourceId, str] = field(default_factory=dict)
     version: int = 0
+    split: tuple[float, ...] = ()
 
     def text(self) -> str:
         """As the journal keeps it."""
@@ -31,6 +33,7 @@ class Reference:
                 "done": list(self.done),
                 "lost": dict(self.lost),
                 "version": self.version,
+                "split": list(self.split),
             },
             separators=(",", ":"),
         )
@@ -45,6 +48,7 @@ def read_reference(text: str | None) -> Reference:
             tuple(data.get("done", ())),
             {ResourceId(name): str(why) for name, why in data.get("lost", {}).items()},
             int(data.get("version", 0)),
+            tuple(float(share) for share in data.get("split", ())),
         )
     except (ValueError, TypeError, AttributeError):
         return Reference()

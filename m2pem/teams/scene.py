@@ -17,6 +17,8 @@ from m2pem.teams.planning import PLANS, alike
 
 SEEN_WITHIN_S = 1.5
 LOOK_EVERY_S = 0.1
+LEFT_OVER = 0.2
+"""Of a full battery: below it a member counts as one with a low battery, soon."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +49,10 @@ class Scene:
             if isinstance(arbiter, SightedArbiter)
         }
 
-    def scheme(self, request: BehaviorRequest, *, begun: bool) -> Scheme:
-        """What each member of a request does.
+    def scheme(
+        self, request: BehaviorRequest, *, begun: bool, split: tuple[float, ...] = ()
+    ) -> Scheme:
+        """What each member of a request does. `split`: the shares that they have, if they have.
 
         Raises:
             TeamRefusedError: it cannot be done; the text says why.
@@ -69,15 +73,23 @@ class Scene:
         seen = None
         if isinstance(target, VehiclePosition):
             seen = self.look(ResourceId(target.vehicle), plane)
+        vehicles = {each: self._fleet.vehicles[each] for each in request.resources}
         setting = Setting(
             request.resources,
-            {each: self._fleet.vehicles[each].domain.value for each in request.resources},
+            {each: vehicle.domain.value for each, vehicle in vehicles.items()},
             {each: self._offers.alone(each) for each in request.resources},
             request.parameters,
             plane,
             {each: stand_of(plane, state) for each, state in states.items() if state is not None},
             seen,
             begun,
+            {each: v.cruise_speed_m_s for each, v in vehicles.items() if v.cruise_speed_m_s},
+            {
+                each: lasts_s(vehicle.endurance_s, states[each])
+                for each, vehicle in vehicles.items()
+                if vehicle.endurance_s
+            },
+            split,
         )
         return Scheme(PLANS[request.behavior](setting), plane)
 
@@ -103,6 +115,12 @@ class Scene:
     def _heard(self, vehicle: ResourceId) -> VehicleState | None:
         state = self._bus.latest(vehicle)
         return state if isinstance(state, VehicleState) else None
+
+
+def lasts_s(endurance_s: float, state: VehicleState | None) -> float:
+    """How long a vehicle can go on, until its battery is at what is to be left over."""
+    charged = state.battery_fraction if state is not None else None
+    return endurance_s * max(0.0, (1.0 if charged is None else charged) - LEFT_OVER)
 
 
 def stand_of(plane: Plane, state: VehicleState) -> Stand:

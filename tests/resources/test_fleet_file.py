@@ -26,6 +26,8 @@ vehicles:
     connection: {namespace: /evsg1, domain_id: 42}
     behaviors: [single_vehicle_routing, drive_stop]
     lost_after: 1500 ms
+    cruise_speed: 18 km/h
+    endurance: 25 min
     payloads:
       ptz: {arbiter: ptz, connection: {driver: onvif, domain_id: 43}, behaviors: [zoom]}
       gpr: {detector: true}
@@ -57,6 +59,7 @@ def test_every_key_of_a_fleet_file_arrives_in_si(tmp_path: Path) -> None:
     assert evsg1.settings == {"namespace": "/evsg1", "domain_id": 42}
     assert evsg1.behaviors == ("single_vehicle_routing", "drive_stop")
     assert evsg1.lost_after_s == 1.5
+    assert (evsg1.cruise_speed_m_s, evsg1.endurance_s) == (5.0, 1500.0)
     assert evsg1.payloads == ("evsg1/ptz", "evsg1/gpr")
     assert evsg1.line == 6
     assert not evsg1.manned

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -21,6 +22,14 @@ def test_units_are_read_and_the_rest_is_the_domains_own() -> None:
     assert settings.kinematics.endurance_s == 7200
     assert settings.kinematics.deceleration_m_s2 == 3.0
     assert settings.battery == 0.8
+
+
+def test_what_the_fleet_says_of_a_vehicle_holds_unless_its_simulation_says_otherwise() -> None:
+    said = Connection(ResourceId("v"), "ground", cruise_speed_m_s=2.0, endurance_s=600.0)
+    kinematics = read_settings(said).kinematics
+    assert (kinematics.cruise_speed_m_s, kinematics.endurance_s) == (2.0, 600.0)
+    own = read_settings(replace(said, settings={"cruise_speed": 3.0})).kinematics
+    assert (own.cruise_speed_m_s, own.endurance_s) == (3.0, 600.0)
 
 
 def test_settings_of_other_arbiters_are_left_alone() -> None:
