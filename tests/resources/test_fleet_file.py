@@ -69,7 +69,7 @@ def test_every_key_of_a_fleet_file_arrives_in_si(tmp_path: Path) -> None:
     section = fleet.teams["section"]
     assert (section.members, section.lead) == (("uav1", "evsg1"), "evsg1")
     assert section.on_lost_member is LostMemberPolicy.CONTINUE
-    assert section.line == 18
+    assert section.line == 20
     assert fleet.detectors == ("evsg1/gpr",)
 
 
@@ -79,7 +79,7 @@ def test_a_payload_inherits_its_vehicles_connection_and_arbiter(tmp_path: Path) 
     assert ptz.arbiter == "ptz"
     assert ptz.settings == {"namespace": "/evsg1", "domain_id": 43, "driver": "onvif"}
     assert ptz.behaviors == ("zoom",)
-    assert (ptz.vehicle, ptz.line) == ("evsg1", 13)
+    assert (ptz.vehicle, ptz.line) == ("evsg1", 15)
     assert gpr.arbiter == "ros"
     assert gpr.settings == {"namespace": "/evsg1", "domain_id": 42}
 
