@@ -54,14 +54,19 @@ class World:
     joints: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float]] = field(default_factory=list)
     heard: list[float] = field(default_factory=list)
+    fault_is: str = "well"
 
     def open(self) -> None:
         self.ros.subscribe(JointState, "/evsg2/joint_states", self._hear, qos.TELEMETRY)
+        self.ros.subscribe(String, "/evsg2/sim_fault_is", self._hear_fault, qos.STATUS)
         self._faults = self.ros.node.create_publisher(String, "/evsg2/sim_fault", qos.COMMANDS)
 
     def _hear(self, message: Any) -> None:
         self.joints = dict(zip(message.name, message.position, strict=True))
         self.history.append(self.joints)
+
+    def _hear_fault(self, message: Any) -> None:
+        self.fault_is = message.data
 
     async def ready(self) -> None:
         await until(lambda: self.driver.refusal("ptz_point_at") == "" and self.joints)
@@ -69,6 +74,7 @@ class World:
     async def fault(self, name: str) -> None:
         await until(self._faults.get_subscription_count)
         self._faults.publish(String(data=name))
+        await until(lambda: self.fault_is == name)
 
     def point(self, pan_deg: float, tilt_deg: float, rate_deg_s: float | None = None) -> None:
         rate = None if rate_deg_s is None else math.radians(rate_deg_s)

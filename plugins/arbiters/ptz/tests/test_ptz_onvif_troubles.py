@@ -5,7 +5,7 @@ import sys
 
 import pytest
 from m2pem_plugin_ptz.drivers.driver import CameraError
-from m2pem_plugin_ptz.drivers.onvif import library, steering
+from m2pem_plugin_ptz.drivers.onvif import onvif_zeep, steering
 from m2pem_plugin_ptz.sim.onvif.server import OnvifServer
 from m2pem_plugin_ptz.sim.onvif.specification import CameraSpec
 from onvif_bench import ACCOUNT, ANSWERS_S, camera, driven, until, write_credentials
@@ -202,4 +202,4 @@ def test_a_library_that_is_not_there_is_asked_for(monkeypatch):
     monkeypatch.setitem(sys.modules, "onvif", None)
     monkeypatch.setitem(sys.modules, "onvif.client", None)
     with pytest.raises(PluginError, match=r"pip install 'm2pem-plugin-ptz\[onvif\]'"):
-        library.require()
+        onvif_zeep.require()

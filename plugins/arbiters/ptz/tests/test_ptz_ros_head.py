@@ -98,7 +98,6 @@ async def test_a_head_that_was_deaf_is_told_again(ros_domain, tmp_path) -> None:
     async with world(ros_domain, tmp_path) as it:
         await it.ready()
         await it.fault("stuck")
-        await asyncio.sleep(0.2)
         it.point(30.0, 0.0)
         await asyncio.sleep(0.5)
         assert it.joints_are(pan_joint=0.0)

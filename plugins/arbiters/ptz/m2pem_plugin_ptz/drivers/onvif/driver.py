@@ -8,8 +8,8 @@ from m2pem.errors import PluginError
 from m2pem_plugin_ptz.drivers.driver import CameraError, Seat
 from m2pem_plugin_ptz.drivers.onvif.abilities import Abilities, read_abilities
 from m2pem_plugin_ptz.drivers.onvif.credentials import Credentials, read_credentials
-from m2pem_plugin_ptz.drivers.onvif.library import require
 from m2pem_plugin_ptz.drivers.onvif.mover import Mover
+from m2pem_plugin_ptz.drivers.onvif.onvif_zeep import require
 from m2pem_plugin_ptz.drivers.onvif.recording import Recording, start_recording, stop_recording
 from m2pem_plugin_ptz.drivers.onvif.session import Session
 from m2pem_plugin_ptz.drivers.onvif.settings import read_onvif

@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
 from m2pem_plugin_ptz.drivers.onvif.credentials import Credentials
-from m2pem_plugin_ptz.drivers.onvif.library import kept_environment, require
+from m2pem_plugin_ptz.drivers.onvif.onvif_zeep import kept_environment, require
 from m2pem_plugin_ptz.drivers.onvif.settings import OnvifSettings
 from m2pem_plugin_ptz.drivers.onvif.troubles import RefusedError, camera, translated
 

@@ -3,7 +3,7 @@
 from typing import Any
 
 from m2pem_plugin_ptz.drivers.driver import CameraError
-from m2pem_plugin_ptz.drivers.onvif.library import require
+from m2pem_plugin_ptz.drivers.onvif.onvif_zeep import require
 from m2pem_plugin_ptz.drivers.onvif.settings import OnvifSettings
 
 

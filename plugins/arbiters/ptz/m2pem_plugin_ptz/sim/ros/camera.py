@@ -43,7 +43,8 @@ class CameraSpec:
 
 
 class SimulatedCamera:
-    """Faults are switched by a std_msgs/String on the topic `sim_fault` beside its joint states."""
+    """Faults are switched by a std_msgs/String on `sim_fault` beside its joint states, and
+    `sim_fault_is` says which one there is."""
 
     def __init__(self, ros: RosRuntime, spec: CameraSpec, clock: Clock) -> None:
         self.spec = spec
@@ -60,6 +61,7 @@ class SimulatedCamera:
             ros.subscribe(Float64MultiArray, own.command_topic, self._go, qos.COMMANDS)
         switch = f"{own.joint_states.rpartition('/')[0]}/sim_fault"
         ros.subscribe(String, switch, self._switch, qos.COMMANDS)
+        self._fault_is = create(String, f"{switch}_is", qos.STATUS)
         self._now_us = clock.now_us()
         self._joints_us = self._images_us = self._now_us
 
@@ -99,6 +101,7 @@ class SimulatedCamera:
     def _switch(self, message: Any) -> None:
         if message.data in FAULTS:
             self.fault = message.data
+            self._fault_is.publish(message)
 
     # --- what it says ---------------------------------------------------------------------------
 
