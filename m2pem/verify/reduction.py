@@ -124,6 +124,7 @@ class _Bound:
                 self.seeing |= 1 << number
         self.readers = self._readers()
         self.entangled = self._entangled()
+        self._join_rules = [r.index for r in self.rules if r.kind is Kind.JOIN]
         self._internal_rules = [r.index for r in self.rules if r.kind is Kind.INTERNAL]
 
     def _masks(self, number: int) -> None:
@@ -310,7 +311,7 @@ class _Bound:
         waiting = [(after, self.clears[number] | self.sets[number])]
         while waiting:
             now, changed = waiting.pop()
-            for each in self._caused(now, changed):
+            for each in self._caused(now, changed) or self._joining(now):
                 self._add(macro, each)
                 following, _ = self.encoding.fire(each, now)
                 if following not in seen:
@@ -331,6 +332,9 @@ class _Bound:
         for low in bits_of(changed):
             asked.update(self.readers.get(low, ()))
         return [n for n in asked if self.encoding.enabled(n, state)]
+
+    def _joining(self, state: int) -> list[int]:
+        return [n for n in self._join_rules if self.encoding.enabled(n, state)]
 
     def _add(self, macro: _Macro, number: int) -> None:
         macro.needs |= self.needs[number]
