@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from m2pem.model.mission import Mission
 from m2pem.resources.fleet import Fleet
+from m2pem.resources.madeup import fleet_for
 from m2pem.verify.derive import Options, derive
 from m2pem.verify.explore import Exploration, Limits, Progress, Stopped, explore
 from m2pem.verify.interruption import watch_interruptions
@@ -56,10 +57,11 @@ def check(
         KeyError: the mission has no such process.
     """
     limits = limits or Limits(tokens=3)
+    fleet = fleet or fleet_for(mission)
     system = simplify(derive(mission, fleet, process=process, options=options))
     found = search(system, limits, progress)
     searched = Searched(mission, system, found)
-    watched = watch_interruptions(system)
+    watched = watch_interruptions(system, fleet.vehicles)
     if watched is not None and found.stopped is not Stopped.INTERRUPTED:
         searched.resources = watched[1]
         searched.watched = search(watched[0], limits, progress)

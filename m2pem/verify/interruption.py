@@ -4,18 +4,27 @@ A place for each resource gets a token when a behavior that holds it is ended by
 than its own report, and loses it when another behavior begins on that resource.
 """
 
+from collections.abc import Collection
 from dataclasses import replace
 
 from m2pem.verify.system import Place, Role, Rule, System, Trigger
 
 
-def watch_interruptions(system: System) -> tuple[System, dict[int, str]] | None:
-    """The same system, and by place the resource; None: nothing can be interrupted."""
-    holders = [p for p in system.places if p.resources]
-    held = {p.index: p.resources for p in holders}
+def watch_interruptions(
+    system: System, vehicles: Collection[str]
+) -> tuple[System, dict[int, str]] | None:
+    """The same system, and by place the vehicle; None: no vehicle can be interrupted.
+
+    Payloads are not looked at: a camera that is left alone does no harm.
+    """
+    held = {
+        p.index: mine
+        for p in system.places
+        if (mine := tuple(each for each in p.resources if each in vehicles))
+    }
     if not any(_interrupts(system, rule, held) for rule in system.rules):
         return None
-    resources = sorted({r for p in holders for r in p.resources})
+    resources = sorted({r for each in held.values() for r in each})
     first = len(system.places)
     number = {resource: first + n for n, resource in enumerate(resources)}
     places = [
