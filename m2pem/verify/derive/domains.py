@@ -218,7 +218,7 @@ class Domains:
     def _results(self, write: Write) -> list[Value | Unknown]:
         if write.source is None:
             return [UNKNOWN]
-        names = [name for name in write.source.names]
+        names = list(write.source.names)
         if any(name in write.hidden or name not in self.of for name in names):
             return [UNKNOWN]
         results: list[Value | Unknown] = []

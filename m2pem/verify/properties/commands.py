@@ -32,9 +32,7 @@ def _thrower(steps: "tuple[object, ...]") -> str:
 def _held_by(searched: Searched, rule: int, element: str) -> tuple[str, ...]:
     """The element, and those that hold what it wants."""
     places = searched.system.places
-    others = [
-        places[p].element for p in searched.system.rules[rule].read if places[p].resources
-    ]
+    others = [places[p].element for p in searched.system.rules[rule].read if places[p].resources]
     return tuple(dict.fromkeys((element, *others)))
 
 

@@ -57,13 +57,11 @@ def _lost(searched: Searched, *, ends_only: bool) -> list[int]:
             (
                 n
                 for n in range(len(found.states))
-                if found.edge_start is not None
-                and n not in ()
-                and found.edge_start[n + 1] == found.edge_start[n]
+                if found.edge_start is not None and found.edge_start[n + 1] == found.edge_start[n]
             ),
             done,
         )
-        goals += [s for s in range(last, len(found.states))]
+        goals += range(last, len(found.states))
     marked = _reaching(searched, goals)
     return [state for state in range(len(found.states)) if not marked[state]]
 
@@ -80,9 +78,7 @@ def can_complete(searched: Searched) -> Result:
         if last:
             message += f" (since {searched.label(last)})"
         violations.append(Violation(message, stuck, run))
-    return searched.result(
-        "can-complete", "From everywhere, the end can be reached.", violations
-    )
+    return searched.result("can-complete", "From everywhere, the end can be reached.", violations)
 
 
 def completes_if_fair(searched: Searched) -> Result:
@@ -104,9 +100,7 @@ def no_livelock(searched: Searched) -> Result:
         first = lost[0]
         run = tuple(found.run_to(first))
         cycle = _cycle(searched, first)
-        elements = tuple(
-            dict.fromkeys(searched.system.rules[rule].element for rule in cycle)
-        )
+        elements = tuple(dict.fromkeys(searched.system.rules[rule].element for rule in cycle))
         violations.append(
             Violation(
                 f"goes round {searched.labels(elements)} for ever, with no way out",
@@ -115,9 +109,7 @@ def no_livelock(searched: Searched) -> Result:
                 tuple(cycle),
             )
         )
-    return searched.result(
-        "no-livelock", "Nothing goes on for ever without a way out.", violations
-    )
+    return searched.result("no-livelock", "Nothing goes on for ever without a way out.", violations)
 
 
 def _cycle(searched: Searched, start: int) -> list[int]:
@@ -135,12 +127,8 @@ def _cycle(searched: Searched, start: int) -> list[int]:
 def no_dead_element(searched: Searched) -> Result:
     """Every element is reached in some run."""
     system, found = searched.system, searched.found
-    reached = {
-        step.element for rule in found.fired for step in system.rules[rule].steps
-    }
-    unknown = {
-        a.element for a in system.approximations if a.exactness is Exactness.BOUNDED
-    }
+    reached = {step.element for rule in found.fired for step in system.rules[rule].steps}
+    unknown = {a.element for a in system.approximations if a.exactness is Exactness.BOUNDED}
     violations = [
         Violation(f"{searched.label(element)} is never reached", (element,))
         for element in system.elements
@@ -150,9 +138,7 @@ def no_dead_element(searched: Searched) -> Result:
     ]
     if not found.complete:
         violations = []
-    return searched.result(
-        "no-dead-element", "Every element is reached in some run.", violations
-    )
+    return searched.result("no-dead-element", "Every element is reached in some run.", violations)
 
 
 def _undoes(element: object) -> bool:

@@ -1,7 +1,7 @@
 """Can what is awaited come, and is what is thrown heard?"""
 
 from m2pem.model import elements as e
-from m2pem.model.events import MessageEventDefinition, SignalEventDefinition
+from m2pem.model.events import MessageEventDefinition, RootElement, SignalEventDefinition
 from m2pem.verify.derive.derive import messages_from_strangers
 from m2pem.verify.derive.events import awaited
 from m2pem.verify.derive.throwing import thrown_by
@@ -29,7 +29,7 @@ def can_be_triggered(searched: Searched) -> Result:
         if isinstance(node, e.EndEvent | e.IntermediateThrowEvent):
             continue
         for definition in awaited(node):
-            root = None
+            root: RootElement | None = None
             if isinstance(definition, SignalEventDefinition):
                 root = definition.signal
             elif isinstance(definition, MessageEventDefinition):

@@ -28,9 +28,7 @@ def decisions_handled(searched: Searched) -> Result:
         if not thrown:
             continue
         run = (*found.run_to(state), rule)
-        asked = next(
-            (rules[r] for r in reversed(run) if rules[r].trigger is Trigger.ANSWER), None
-        )
+        asked = next((rules[r] for r in reversed(run) if rules[r].trigger is Trigger.ANSWER), None)
         if asked is None or (asked.element, thrown[0].element) in seen:
             continue
         seen.add((asked.element, thrown[0].element))
