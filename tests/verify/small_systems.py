@@ -19,12 +19,16 @@ class SmallSystem:
     of_rules: tuple[int, ...]
     propositions: Sequence[Proposition] = ATOMS
     reduced: bool = False
+    open_at: int = -1
 
     def initial(self) -> Sequence[int]:
         return (0,)
 
     def successors(self, state: int) -> Sequence[tuple[int, int]]:
         return self.steps[state]
+
+    def is_open(self, state: int) -> bool:
+        return state == self.open_at
 
     def true_in(self, state: int) -> int:
         return self.of_states[state]

@@ -45,6 +45,7 @@ def derive(
     root = mission.process(process)
     making = Making(mission, root, fleet or fleet_for(mission), options or Options())
     making.root = making.net.area(root, making.everything, step=root.id, frame=(root.id,))
+    making.data.follow(making.root.frame)
     build(making, root, making.root)
     others = _others(making)
     for other in others:

@@ -5,7 +5,7 @@ to has no operator of the future in it. `Next` is no word of the language: only 
 at single steps use it (`needs_steps`).
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeAlias, Union
 
@@ -206,14 +206,14 @@ TRUE = Constant(True)
 FALSE = Constant(False)
 
 
-def conjunction(operands: "list[Formula] | tuple[Formula, ...]") -> Formula:
+def conjunction(operands: "Sequence[Formula]") -> Formula:
     """All of them; true of none."""
     if not operands:
         return TRUE
     return operands[0] if len(operands) == 1 else And(tuple(operands))
 
 
-def disjunction(operands: "list[Formula] | tuple[Formula, ...]") -> Formula:
+def disjunction(operands: "Sequence[Formula]") -> Formula:
     """One of them; false of none."""
     if not operands:
         return FALSE

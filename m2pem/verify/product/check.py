@@ -58,6 +58,8 @@ def check(
         run, stopped = None, Stopped.INTERRUPTED
     if run is not None and not breaks(system, formula, run, steps=steps):
         raise InternalError("the search found a run that does not break the formula")
+    if run is not None and stopped is Stopped.SYSTEM:
+        stopped = None
     result = Result.VIOLATED if run is not None else Result.UNDECIDED if stopped else Result.HOLDS
     seconds = time.monotonic() - began
     return Verdict(result, run, len(product), product.number_of_moves, seconds, stopped)
@@ -92,7 +94,7 @@ class _Search:
             product.expand()
         if product.broken >= 0:
             return run_to(product, product.broken), None
-        return self._round(), None
+        return self._round(), Stopped.SYSTEM if product.open else None
 
     def _beyond(self, limits: Limits, seconds: float) -> Stopped | None:
         if len(self.product) > limits.states:

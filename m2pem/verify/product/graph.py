@@ -32,6 +32,8 @@ class Product:
         self._pending = bytearray()
         self._true: dict[int, int] = {}
         self._successors: dict[int, Sequence[tuple[int, int]]] = {}
+        self.open = False
+        """Whether a state was met of which what follows is not known."""
         self.broken = -1
         """The first node from which on the observer accepts whatever comes; -1 if none."""
         for state in system.initial():
@@ -73,6 +75,8 @@ class Product:
             self._move(found, node, QUIET, state, self.true_in(state), False)
         else:
             steps = self.successors(state)
+            open_ = not steps and self.system.is_open(state)
+            self.open |= open_
             for rule, after in steps:
                 now = self.system.true_when(rule)
                 letter = self.true_in(after) | now
@@ -80,7 +84,7 @@ class Product:
                 for target, postponed in self.observer.step(observed, letter):
                     number = self._node(after, target, pending, node, rule)
                     found.append((rule, number, postponed))
-            if not steps:
+            if not steps and not open_:
                 self._move(found, node, STUTTER, state, self.true_in(state), False)
         self.number_of_moves += len(found)
         self.moves.append(found)

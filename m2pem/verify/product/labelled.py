@@ -36,6 +36,10 @@ class LabelledSystem(Protocol):
         """The states in which runs begin."""
         ...
 
+    def is_open(self, state: int) -> bool:
+        """Whether what follows a state is not known: runs may go on, but not where to."""
+        ...
+
     def successors(self, state: int) -> Sequence[tuple[int, int]]:
         """The rules that can fire in a state, each with the state after it."""
         ...

@@ -19,6 +19,7 @@ class Stopped(StrEnum):
     STATES = "the limit of states"
     TIME = "the limit of time"
     MEMORY = "the limit of memory"
+    SYSTEM = "states beyond which the mission was not searched"
     INTERRUPTED = "an interruption by hand"
 
 

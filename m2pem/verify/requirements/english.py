@@ -41,6 +41,15 @@ _BOUNDS = {
     "!=": "not exactly {} times",
 }
 
+_STARTS = frozenset(
+    {
+        *("after", "again", "always", "at", "before", "each", "exactly", "fewer"),
+        *("from", "if", "in", "more", "never", "not", "nothing", "of"),
+        *("on", "once", "the", "until", "whatever", "whenever"),
+    }
+)
+"""Words of sentences that begin with a capital letter; names of vehicles and data do not."""
+
 
 class English:
     """Says formulas; `names` is what elements are called, by id."""
@@ -153,5 +162,5 @@ def sentence(clause: str) -> str:
     """A clause as a sentence."""
     if clause.startswith("(") and clause.endswith(")") and clause.count("(") == 1:
         clause = clause[1:-1]
-    start = clause[:1].upper() if clause[:1].isalpha() and clause[:1].islower() else clause[:1]
-    return f"{start}{clause[1:]}."
+    begins = clause.partition(" ")[0] in _STARTS
+    return f"{clause[:1].upper() if begins else clause[:1]}{clause[1:]}."

@@ -1,5 +1,7 @@
 """Patterns of missions with several robots and an operator."""
 
+import itertools
+
 from m2pem.model.expression import parse as parse_expression
 from m2pem.verify.ltl.formula import (
     FALSE,
@@ -51,10 +53,7 @@ def _say_visits(a: Arguments, words: Words) -> str:
 
 def _mutual_exclusion(a: Arguments, _: Surroundings) -> Formula:
     active = [Active(each) for each in a["elements"]]
-    pairs: list[Formula] = [
-        Not(And((one, other))) for n, one in enumerate(active) for other in active[n + 1 :]
-    ]
-    return Always(conjunction(pairs))
+    return Always(conjunction([Not(And(pair)) for pair in itertools.combinations(active, 2)]))
 
 
 def _decided(a: Arguments, around: Surroundings) -> Formula:
