@@ -70,7 +70,7 @@ class Names:
             raise UnknownNameError(f"several elements are called '{name}': {', '.join(found)}")
         if name in self.mission.elements:
             raise UnknownNameError(f"'{name}' is a sequence flow; name an element that it leads to")
-        known = [*self.labels, *self._by_name]
+        known = [*self._by_name, *self.labels]
         raise UnknownNameError(
             f"the mission has no element '{name}'; {suggest(name, known, 'elements')}"
         )
