@@ -14,7 +14,7 @@ from m2pem.verify.labels import Labels, UnknownDataError
 from m2pem.verify.ltl import propositions
 from m2pem.verify.ltl.formula import Data
 from m2pem.verify.mission_runs import MissionRuns
-from m2pem.verify.product import Limits, Progress, Result, Run, Verdict, check
+from m2pem.verify.product import Limits, Progress, Result, Run, Stopped, Verdict, check
 from m2pem.verify.requirements.requirement import Requirement
 from m2pem.verify.system import Rule, System
 
@@ -97,7 +97,8 @@ def _answer(
 ) -> Answer:
     why = ""
     if verdict.result is Result.UNDECIDED:
-        why = f"the search stopped at {verdict.stopped or exploration.stopped}"
+        own = verdict.stopped is not Stopped.SYSTEM
+        why = f"the search stopped at {verdict.stopped if own else exploration.stopped}"
     run = verdict.run
     return Answer(
         requirement,
