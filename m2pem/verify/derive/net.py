@@ -227,6 +227,7 @@ class Net:
             draft.detail,
             effect.flag,
             effect.flagged,
+            bool(effect.quiet_scopes),
             draft.due_us,
         )
 
