@@ -5,6 +5,7 @@ from m2pem.verify.ltl import show
 from m2pem.verify.requirements import (
     Names,
     RequirementsError,
+    gather,
     parse_spec,
     read_mission_requirements,
 )
@@ -171,3 +172,18 @@ def test_what_is_wrong_in_a_mission_is_told_with_its_line() -> None:
         read_mission_requirements(names(mission))
     told = [(each.file, each.line, each.element) for each in refused.value.findings]
     assert told == [("m.bpmn", 3, "a"), ("m.bpmn", 4, "a"), ("m.bpmn", 5, "b"), ("m.bpmn", 5, "b")]
+
+
+def test_requirements_of_the_mission_and_beside_it_are_gathered(tmp_path) -> None:
+    mission = in_a_row(
+        survey("North", "uav1", "north"),
+        requirements='<m2pem:requirement id="end" ltl="&lt;&gt; ended"/>',
+    )
+    beside = tmp_path / "spec.yaml"
+    beside.write_text("requirements: [{id: north, ltl: '<> completed(North)'}]")
+    assert [each.id for each in gather(names(mission), beside)] == ["end", "north"]
+    beside.write_text("requirements: [{id: end, ltl: '<> completed(North)'}]")
+    with pytest.raises(RequirementsError, match="m.bpmn has a requirement of this id too"):
+        gather(names(mission), beside)
+    with pytest.raises(RequirementsError, match="cannot be read"):
+        gather(names(mission), tmp_path / "absent.yaml")

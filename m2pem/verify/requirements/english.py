@@ -1,5 +1,6 @@
 """Formulas in plain English."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from m2pem.verify.ltl.formula import (
@@ -56,6 +57,8 @@ class English:
 
     def __init__(self, names: Mapping[str, str]) -> None:
         self._names = names
+        counts = Counter(names.values())
+        self._shared = {name for name, count in counts.items() if count > 1}
 
     def sentence(self, formula: Formula) -> str:
         """The whole formula as a sentence."""
@@ -63,7 +66,8 @@ class English:
 
     def element(self, element: str) -> str:
         """What an element is called."""
-        return f"'{self._names.get(element) or element}'"
+        name = self._names.get(element) or element
+        return f"'{name}' ({element})" if name in self._shared else f"'{name}'"
 
     def each(self, formulas: Sequence[Formula], word: str = "and") -> str:
         """Several clauses, one after the other."""
