@@ -254,7 +254,15 @@ class Data:
 
     # --- the mission's own ----------------------------------------------------------------------
 
+    def follow(self, frame: tuple[str, ...]) -> None:
+        """Make the variables that the options' conditions read, of one process instance."""
+        for condition in self._options.conditions:
+            for name in sorted(condition.names):
+                if self._follows(name, frozenset()):
+                    self.variable(name, frame)
+
     def _conditions(self) -> Iterator[tuple[Expression, frozenset[str]]]:
+        yield from ((condition, frozenset()) for condition in self._options.conditions)
         for flow in self._mission.flows:
             if flow.condition is not None:
                 yield flow.condition, self.hidden(flow.source)

@@ -48,6 +48,7 @@ def derive(
     making = Making(mission, root, fleet or fleet_for(mission), options or Options())
     making.build_node = build_node
     making.root = making.net.area(root, making.everything, step=root.id, frame=(root.id,))
+    making.data.follow(making.root.frame)
     build(making, root, making.root)
     others = _others(making)
     for other in others:

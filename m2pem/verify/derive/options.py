@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from m2pem.model.expression import Expression
 from m2pem.model.values import Value
 
 
@@ -26,5 +27,7 @@ class Options:
     calls: int = 1
     failures: bool = True
     timers_in_order: bool = False
+    conditions: Sequence[Expression] = ()
+    """What else is asked of the data of the process that the run begins with: by requirements."""
     most_instances: int = 8
     """Of a number that the mission says; above, `instances` are checked."""
