@@ -222,7 +222,7 @@ class _Search:
         found.seconds = time.monotonic() - self.began
         return found
 
-    def _loop(
+    def _loop(  # noqa: PLR0915 (one loop, kept flat for its speed)
         self,
         found: Exploration,
         states: list[int],
@@ -239,9 +239,7 @@ class _Search:
         edge_start, edge_rule, edge_state = found.edge_start, found.edge_rule, found.edge_state
         enabled_now, fire = encoding.enabled, encoding.fire
         fast = [(keep, put) if plain else None for _, _, keep, put, plain in masks]
-        tests = [
-            [(n, masks[n][0], masks[n][1], masks[n][4]) for n in each] for each in affected
-        ]
+        tests = [[(n, masks[n][0], masks[n][1], masks[n][4]) for n in each] for each in affected]
         unfired = [True] * len(masks)
         add_state, add_parent, add_via = states.append, parents.append, via.append
         wait, setdefault = waiting.append, index.setdefault
@@ -265,7 +263,7 @@ class _Search:
                 at += 1
                 continue
             usable: Sequence[int] = enabled
-            if not all([outside[n] for n in enabled]):
+            if not all([outside[n] for n in enabled]):  # noqa: C419 (a list is faster)
                 best = min([rank[n] for n in enabled])
                 usable = [n for n in enabled if rank[n] == best]
             whole = usable

@@ -76,9 +76,7 @@ class _Macro:
 
 
 class _Bound:
-    def __init__(
-        self, encoding: Encoding, visible: frozenset[int], safe: frozenset[int]
-    ) -> None:
+    def __init__(self, encoding: Encoding, visible: frozenset[int], safe: frozenset[int]) -> None:
         self.encoding = encoding
         system = encoding.system
         self.rules = system.rules
@@ -114,9 +112,7 @@ class _Bound:
             ):
                 for low in bits_of(mask):
                     register[low] = register.get(low, 0) | 1 << number
-        self.unsafe = encoding.places_mask(
-            p.index for p in system.places if p.index not in safe
-        )
+        self.unsafe = encoding.places_mask(p.index for p in system.places if p.index not in safe)
         self.visible = encoding.places_mask(visible)
         self.seeing = 0
         for number in range(count):
@@ -124,6 +120,7 @@ class _Bound:
                 self.seeing |= 1 << number
         self.readers = self._readers()
         self.entangled = self._entangled()
+        self._join_rules = [r.index for r in self.rules if r.kind is Kind.JOIN]
         self._internal_rules = [r.index for r in self.rules if r.kind is Kind.INTERNAL]
 
     def _masks(self, number: int) -> None:
@@ -207,9 +204,7 @@ class _Bound:
                     break
         return best
 
-    def _close(
-        self, state: int, seed: int, usable: int, candidates: int, most: int
-    ) -> int | None:
+    def _close(self, state: int, seed: int, usable: int, candidates: int, most: int) -> int | None:
         """The stubborn set of a rule; None: it is not smaller than `most`.
 
         Interruptions that absorb all that is tried are left out of account: what was put off
@@ -259,9 +254,7 @@ class _Bound:
     def _enabled(self, number: int, state: int) -> bool:
         return self.encoding.enabled(number, state)
 
-    def _enabling(
-        self, number: int, state: int, closed: int, own: int, candidates: int
-    ) -> int:
+    def _enabling(self, number: int, state: int, closed: int, own: int, candidates: int) -> int:
         """Rules one of which must fire before a disabled one can: few that are not in already.
 
         `own`: bits that the rules that are in already clear.
@@ -310,16 +303,14 @@ class _Bound:
         waiting = [(after, self.clears[number] | self.sets[number])]
         while waiting:
             now, changed = waiting.pop()
-            for each in self._caused(now, changed):
+            for each in self._caused(now, changed) or self._joining(now):
                 self._add(macro, each)
                 following, _ = self.encoding.fire(each, now)
                 if following not in seen:
                     if len(seen) > _MOST_INTERNAL_STATES:
                         return None
                     seen.add(following)
-                    waiting.append(
-                        (following, changed | self.clears[each] | self.sets[each])
-                    )
+                    waiting.append((following, changed | self.clears[each] | self.sets[each]))
         if macro.sets & self.entangled:
             return None
         return macro
@@ -331,6 +322,9 @@ class _Bound:
         for low in bits_of(changed):
             asked.update(self.readers.get(low, ()))
         return [n for n in asked if self.encoding.enabled(n, state)]
+
+    def _joining(self, state: int) -> list[int]:
+        return [n for n in self._join_rules if self.encoding.enabled(n, state)]
 
     def _add(self, macro: _Macro, number: int) -> None:
         macro.needs |= self.needs[number]

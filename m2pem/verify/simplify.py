@@ -1,4 +1,4 @@
-"""A smaller system that does the same: rules that cannot fire, and places only passed, are left out.
+"""A smaller system that does the same: without rules that cannot fire and places only passed.
 
 A token on a passed place has one thing to do, which nothing can keep it from and nobody sees:
 what comes to the place goes straight to what follows it. The places that remain keep their names.
@@ -37,8 +37,7 @@ def _trim(rule: Rule, concurrency: Concurrency) -> Rule:
     kill = tuple(
         p
         for p in rule.kill
-        if p not in absent
-        and (possible(p) or any(p == t for _, t in (*rule.moves, *rule.copies)))
+        if p not in absent and (possible(p) or any(p == t for _, t in (*rule.moves, *rule.copies)))
     )
     return replace(rule, inhibit=inhibit, kill=kill)
 
@@ -94,7 +93,7 @@ def _fused(system: System, rules: list[Rule]) -> list[Rule]:
             if any(rule.read) or rule.moves:
                 watched |= {p for p, _ in rule.consume}
     initial = {place for place, _ in system.initial}
-    alive: dict[int, Rule] = {n: rule for n, rule in enumerate(rules)}
+    alive: dict[int, Rule] = dict(enumerate(rules))
     producers: dict[int, set[int]] = {}
     consumers: dict[int, set[int]] = {}
     following = len(rules)
@@ -163,6 +162,4 @@ def _joined(maker: Rule, eater: Rule, place: int) -> Rule:
     produce = Counter(dict(maker.produce))
     del produce[place]
     produce.update(dict(eater.produce))
-    return replace(
-        maker, steps=maker.steps + eater.steps, produce=tuple(sorted(produce.items()))
-    )
+    return replace(maker, steps=maker.steps + eater.steps, produce=tuple(sorted(produce.items())))
