@@ -1,0 +1,3 @@
+"""What formulas look at, in PROMELA."""
+
+class Watch: ...
