@@ -44,6 +44,8 @@ class Stopped(StrEnum):
     TIME = "the limit of time"
     MEMORY = "the limit of memory"
     TOKENS = "a place that gets more and more tokens"
+    DEPTH = "the limit of depth"
+    BITSTATE = "a table that may take a new state for a known one"
     INTERRUPTED = "an interruption by hand"
 
 

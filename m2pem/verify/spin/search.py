@@ -1,0 +1,218 @@
+"""All that a system's rules can lead to, as Spin sees it.
+
+    found = search(system)
+    found.states, found.fired, found.overflow_runs, found.flag_runs, found.stuck_runs
+
+Spin sees all once, which tells the rules that ever fire; for each that should not, and for what
+else is wrong, it is asked again for a run that leads there. Every run is fired again, rule by rule,
+before it is believed.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from m2pem.errors import InternalError
+from m2pem.verify.encoding import Encoding
+from m2pem.verify.explore import Limits, Progress, Stopped
+from m2pem.verify.spin.asking import Asking, Storage, Told
+from m2pem.verify.spin.naming import identifiers
+from m2pem.verify.spin.programs import Workshop
+from m2pem.verify.spin.promela import Asks, Model, text_of
+from m2pem.verify.spin.trail import read as read_trail
+from m2pem.verify.spin.trail import replay
+from m2pem.verify.system import System
+
+_MOST_SHORTEST = 200_000
+"""States up to which a shortest run is asked for: searching nearest first takes more memory."""
+_SHORTEST_S = 20.0
+_STUCK_RUNS = 5
+
+Run = tuple[int, ...]
+"""Rules, one after the other."""
+
+
+@dataclass(slots=True)
+class Found:
+    """What Spin saw. Runs are rules from the beginning.
+
+    `fired`: rules that ever fire, if all was seen. `flag_runs`: to each rule with a flag that
+    fires, which is the run's last. `overflow_runs`: to a second token on a place where one is
+    meant. `beyond`: places that get more tokens than the limit. `stuck_runs`: to states in which
+    nothing can fire and the run is not over, one or a few.
+    """
+
+    system: System
+    encoding: Encoding
+    states: int = 0
+    transitions: int = 0
+    seconds: float = 0.0
+    stopped: Stopped | None = None
+    fired: frozenset[int] = frozenset()
+    flag_runs: dict[int, Run] = field(default_factory=dict)
+    overflow_runs: dict[int, Run] = field(default_factory=dict)
+    beyond: set[int] = field(default_factory=set)
+    stuck_runs: list[Run] = field(default_factory=list)
+    gets_stuck: bool = False
+
+
+def search(
+    system: System,
+    limits: Limits | None = None,
+    *,
+    storage: Storage = Storage.EXACT,
+    progress: Callable[[Progress], None] | None = None,
+) -> Found:
+    """Have Spin search a system.
+
+    Raises:
+        SpinMissingError: Spin or a compiler is not installed.
+        InternalError: Spin says something that is not so.
+    """
+    limits = limits or Limits()
+    with Workshop() as shop:
+        return _Search(system, Asking(shop, limits, storage, time.monotonic(), progress)).run()
+
+
+class _Search:
+    def __init__(self, system: System, asking: Asking) -> None:
+        self.system = system
+        self.asking = asking
+        self.encoding = Encoding(system)
+        self.found = Found(system, self.encoding)
+        self._by_name = {
+            name: place.index
+            for place, name in zip(
+                system.places,
+                identifiers("at_", [place.name for place in system.places]),
+                strict=True,
+            )
+        }
+
+    def run(self) -> Found:
+        found = self.found
+        told, model = self._see_all()
+        found.stopped = told.stopped
+        found.states, found.transitions = told.report.states, told.report.transitions
+        complete = told.stopped in (None, Stopped.BITSTATE)
+        if complete:
+            reached = set(model.rule_at) - told.report.unreached
+            found.fired = frozenset(model.rule_at[line] for line in reached)
+            found.gets_stuck = self._gets_stuck()
+            for rule in sorted(found.fired):
+                if self.system.rules[rule].flag is not None:
+                    self._lead_to(rule)
+        elif told.stopped is not Stopped.INTERRUPTED:
+            self._anything()
+        if found.beyond and found.stopped is None:
+            found.stopped = Stopped.TOKENS
+        found.seconds = self.asking.began_ago()
+        return found
+
+    # --- all there is ---------------------------------------------------------------------------
+
+    def _see_all(self) -> tuple[Told, Model]:
+        """Give places more room until none gets more tokens than it has room for."""
+        limits, found = self.asking.limits, self.found
+        most_bits = max((limits.tokens + 1).bit_length() - 1, 1)
+        wider: dict[int, int] = {}
+        while True:
+            self.encoding = found.encoding = Encoding(self.system, wider)
+            asked = frozenset(p.index for p in self.system.places) - found.beyond
+            model = self._model(Asks(full=asked))
+            told = self.asking.ask(model)
+            if told.report.found is None:
+                return told, model
+            place = self._place_of(told.report.assertion)
+            run = self._runs(model)[0]
+            if not self.system.places[place].several and place not in found.overflow_runs:
+                asks = Asks(full=frozenset({place}))
+                found.overflow_runs[place] = self._short(asks, told) or run
+            if self.encoding.width[place] < most_bits:
+                wider[place] = most_bits
+            else:
+                found.beyond.add(place)
+
+    def _place_of(self, assertion: str) -> int:
+        words = assertion.strip("( )").replace("<=", " ").split()
+        if not words or words[0] not in self._by_name:
+            raise InternalError(f"Spin names an assertion that nobody made: {assertion}")
+        return self._by_name[words[0]]
+
+    # --- what is wrong --------------------------------------------------------------------------
+
+    def _gets_stuck(self) -> bool:
+        model = self._model(Asks(stuck=True))
+        told = self._ask_nearest(model, _STUCK_RUNS)
+        self.found.stuck_runs = self._runs(model) if told.report.found is not None else []
+        for run in self.found.stuck_runs:
+            self._see_stuck(run)
+        return bool(self.found.stuck_runs)
+
+    def _see_stuck(self, run: Run) -> None:
+        state = replay(self.encoding, run)[-1]
+        ends = self.encoding.places_mask(self.system.ends)
+        if state & ends or any(
+            self.encoding.enabled(rule.index, state) for rule in self.system.rules
+        ):
+            raise InternalError("Spin says that a run is stuck that can go on")
+
+    def _lead_to(self, rule: int) -> None:
+        model = self._model(Asks(rules=frozenset({rule})))
+        told = self._ask_nearest(model)
+        if told.report.found is None:
+            if told.stopped is None:
+                raise InternalError(f"Spin finds no run to rule {rule}, which it says can fire")
+            return
+        run = self._runs(model)[0]
+        if run[-1] != rule:
+            raise InternalError(f"Spin's run to rule {rule} does not end with it")
+        self.found.flag_runs[rule] = run
+
+    def _anything(self) -> None:
+        """After a search that did not see all: the first thing that is wrong, if it is found."""
+        flagged = frozenset(r.index for r in self.system.rules if r.flag is not None)
+        model = self._model(Asks(rules=flagged, stuck=True))
+        told = self.asking.ask(model, seconds=_SHORTEST_S)
+        if told.report.found is None:
+            return
+        run = self._runs(model)[0]
+        if run and run[-1] in flagged:
+            self.found.flag_runs[run[-1]] = run
+            self.found.fired = frozenset(run)
+        else:
+            self._see_stuck(run)
+            self.found.stuck_runs = [run]
+            self.found.gets_stuck = True
+
+    # --- runs -----------------------------------------------------------------------------------
+
+    def _model(self, asks: Asks) -> Model:
+        return text_of(self.system, self.encoding, asks)
+
+    def _ask_nearest(self, model: Model, errors: int = 1) -> Told:
+        """A shortest run if that does not take too much, else any."""
+        if self.found.states <= _MOST_SHORTEST:
+            told = self.asking.ask(model, shortest=True, errors=errors, seconds=_SHORTEST_S)
+            if told.stopped is None:
+                return told
+        return self.asking.ask(model, errors=errors)
+
+    def _short(self, asks: Asks, told: Told) -> Run | None:
+        """A shortest run to what `told` found, if it is not too far."""
+        if told.report.states > _MOST_SHORTEST:
+            return None
+        model = self._model(asks)
+        again = self.asking.ask(model, shortest=True, seconds=_SHORTEST_S)
+        return self._runs(model)[0] if again.report.found is not None else None
+
+    def _runs(self, model: Model) -> list[Run]:
+        """The runs that Spin has left, fired again."""
+        shop = self.asking.shop
+        texts: Sequence[str] = [shop.trail(n) for n in range(_STUCK_RUNS + 1)]
+        runs = [read_trail(text, model.rule_at).prefix for text in texts if text]
+        if not runs:
+            raise InternalError("Spin found an error, and left no trail to it")
+        for run in runs:
+            replay(self.encoding, run)
+        return runs
