@@ -35,6 +35,10 @@ class SpinMissingError(M2pemError):
     exit_status = 2
 
 
+class TooLongError(M2pemError):
+    """Spin, or a compiler, takes too long over a model."""
+
+
 @dataclass(frozen=True, slots=True)
 class Tools:
     """The programs. One of the compilers may be missing."""
@@ -183,16 +187,20 @@ class Workshop:
             raise InternalError(f"{compiler} does not compile what Spin wrote: {said[-500:]}")
 
     def _run(self, command: Sequence[str]) -> str:
-        done = subprocess.run(
-            command,
-            cwd=self.folder,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            timeout=_COMPILE_S,
-            check=False,
-            start_new_session=True,
-        )
+        try:
+            done = subprocess.run(
+                command,
+                cwd=self.folder,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                timeout=_COMPILE_S,
+                check=False,
+                start_new_session=True,
+            )
+        except subprocess.TimeoutExpired:
+            name = Path(command[0]).name
+            raise TooLongError(f"{name} takes longer than {_COMPILE_S:.0f} s") from None
         return done.stdout.decode(errors="replace")
 
     def _start(self, command: Sequence[str], printed: Path) -> "subprocess.Popen[bytes]":

@@ -104,13 +104,11 @@ class Writer:
             out.add(*self.watch.declarations(self.places, self.variables))
         self._shared_clears()
         out.add("active proctype mission()", "{", "end:", "  do")
-        if self.watch is not None and self.watch.needs_quiet:
-            out.add(self.watch.quiet_line())
         out.add("  :: atomic {")
         rule_at, stuck_line = self._rules()
         out.add("  } od", "}")
         if self.watch is not None:
-            out.add("", *self.watch.claim(self.places, self.variables))
+            out.add("", self.watch.claim())
         return Model("\n".join(out.lines) + "\n", rule_at, stuck_line, self._size_bytes())
 
     def _size_bytes(self) -> int:
@@ -161,6 +159,9 @@ class Writer:
         out = self._out
         rule_at: dict[int, int] = {}
         depth = 0
+        if self.watch is not None and self.watch.needs_quiet:
+            out.add("    if", f"    {self.watch.quiet_line()}", "    :: else ->")
+            depth += 1
         for kind in Kind:
             rules = [rule for rule in self.system.rules if rule.kind is kind]
             if not rules:

@@ -54,6 +54,14 @@ def read(text: str, rule_at: Mapping[int, int]) -> Trail:
     return Trail(tuple(fired[:back_to]), tuple(fired[back_to:]))
 
 
+def may_fire(encoding: Encoding, state: int) -> list[int]:
+    """The rules that may fire in a state: of the first kind that has any."""
+    rules = encoding.system.rules
+    enabled = [rule.index for rule in rules if encoding.enabled(rule.index, state)]
+    first = min((_RANK[rules[each].kind] for each in enabled), default=0)
+    return [each for each in enabled if _RANK[rules[each].kind] == first]
+
+
 def replay(encoding: Encoding, rules: Sequence[int], start: int | None = None) -> list[int]:
     """The states that rules lead through, the first one included.
 
@@ -64,15 +72,7 @@ def replay(encoding: Encoding, rules: Sequence[int], start: int | None = None) -
     states = [state]
     for number in rules:
         rule = encoding.system.rules[number]
-        first = min(
-            (
-                _RANK[each.kind]
-                for each in encoding.system.rules
-                if _RANK[each.kind] <= _RANK[rule.kind] and encoding.enabled(each.index, state)
-            ),
-            default=-1,
-        )
-        if not encoding.enabled(number, state) or first != _RANK[rule.kind]:
+        if number not in may_fire(encoding, state):
             raise InternalError(
                 f"Spin lets rule {number} ({rule.name}) fire where it cannot: "
                 f"after {len(states) - 1} steps"
