@@ -30,18 +30,19 @@ _HEADINGS = {
 @dataclass(frozen=True, slots=True)
 class Asks:
     """What is asserted: that places are not `full` when a token comes, that `rules` never fire,
-    that no run gets `stuck`.
+    that no run gets `stuck`, that nothing is `left` on places where a run stops, unless it failed.
     """
 
     full: frozenset[int] = frozenset()
     rules: frozenset[int] = frozenset()
     stuck: bool = False
+    left: frozenset[int] = frozenset()
 
     @classmethod
     def all_of(cls, system: System) -> "Asks":
         """What a reader of the model would ask: everything but what is only a warning."""
         return cls(
-            frozenset(place.index for place in system.places),
+            frozenset(place.index for place in system.places if not place.several),
             frozenset(r.index for r in system.rules if r.flag and r.flag not in _WARNINGS),
             True,
         )
@@ -173,8 +174,10 @@ class Writer:
             out.add("    :: else ->")
             depth += 1
         ends = " || ".join(self.places[p] for p in sorted(self.system.ends))
-        out.add("    if", f"    :: {ends} -> skip {comment('the run is over')}")
-        stuck = "assert(false)" if self.asks.stuck else "skip"
+        left = " || ".join(self.places[p] for p in sorted(self.asks.left))
+        over = f"assert({self.places[self.system.failed]} || !({left}))" if left else "skip"
+        out.add("    if", f"    :: {ends} -> {over} {comment('the run is over')}")
+        stuck = "assert(false)" if self.asks.stuck else over
         out.add(f"    :: else -> {stuck} {comment('the run is stuck')}")
         stuck_line = out.last
         out.add("    fi " + "fi " * depth)

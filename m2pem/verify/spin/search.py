@@ -1,7 +1,7 @@
 """All that a system's rules can lead to, as Spin sees it.
 
     found = search(system)
-    found.states, found.fired, found.overflow_runs, found.flag_runs, found.stuck_runs
+    found.states, found.fired, found.overflow_runs, found.rule_runs, found.stuck_runs
 
 Spin sees all once, which tells the rules that ever fire; for each that should not, and for what
 else is wrong, it is asked again for a run that leads there. Every run is fired again, rule by rule,
@@ -20,13 +20,14 @@ from m2pem.verify.spin.naming import identifiers
 from m2pem.verify.spin.programs import Workshop
 from m2pem.verify.spin.promela import Asks, Model, text_of
 from m2pem.verify.spin.trail import read as read_trail
-from m2pem.verify.spin.trail import replay
-from m2pem.verify.system import System
+from m2pem.verify.spin.trail import may_fire, replay
+from m2pem.verify.system import Action, System
 
 _MOST_SHORTEST = 200_000
 """States up to which a shortest run is asked for: searching nearest first takes more memory."""
 _SHORTEST_S = 20.0
 _STUCK_RUNS = 5
+_NO_FLOW = "NO_FLOW"
 
 Run = tuple[int, ...]
 """Rules, one after the other."""
@@ -36,10 +37,11 @@ Run = tuple[int, ...]
 class Found:
     """What Spin saw. Runs are rules from the beginning.
 
-    `fired`: rules that ever fire, if all was seen. `flag_runs`: to each rule with a flag that
-    fires, which is the run's last. `overflow_runs`: to a second token on a place where one is
-    meant. `beyond`: places that get more tokens than the limit. `stuck_runs`: to states in which
-    nothing can fire and the run is not over, one or a few.
+    `fired`: rules that ever fire, if all was seen. `rule_runs`: to each of the rules that runs
+    were wanted to, if it fires; it is the run's last. `overflow_runs`: to a second token on a place
+    where one is meant. `beyond`: places that get more tokens than the limit. `stuck_runs`: to
+    states in which nothing can fire and the run is not over, one or a few. `left_runs`: to where a
+    run stops with a token on the place.
     """
 
     system: System
@@ -49,21 +51,43 @@ class Found:
     seconds: float = 0.0
     stopped: Stopped | None = None
     fired: frozenset[int] = frozenset()
-    flag_runs: dict[int, Run] = field(default_factory=dict)
+    rule_runs: dict[int, Run] = field(default_factory=dict)
     overflow_runs: dict[int, Run] = field(default_factory=dict)
     beyond: set[int] = field(default_factory=set)
     stuck_runs: list[Run] = field(default_factory=list)
-    gets_stuck: bool = False
+    left_runs: dict[int, Run] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What runs are wanted to: rules, states in which a run is stuck, places where it leaves one."""
+
+    rules: frozenset[int]
+    stuck: bool = True
+    left: tuple[int, ...] = ()
+
+    @classmethod
+    def of(cls, system: System) -> "Wanted":
+        """To what can be a violation: rules with a flag, and gateways without a way on."""
+        return cls(
+            frozenset(
+                rule.index
+                for rule in system.rules
+                if rule.flag is not None
+                or any(s.action is Action.THROWN and s.detail == _NO_FLOW for s in rule.steps)
+            )
+        )
 
 
 def search(
     system: System,
     limits: Limits | None = None,
     *,
+    wanted: Wanted | None = None,
     storage: Storage = Storage.EXACT,
     progress: Callable[[Progress], None] | None = None,
 ) -> Found:
-    """Have Spin search a system.
+    """Have Spin search a system. `wanted`: by default, what can be a violation.
 
     Raises:
         SpinMissingError: Spin or a compiler is not installed.
@@ -71,12 +95,14 @@ def search(
     """
     limits = limits or Limits()
     with Workshop() as shop:
-        return _Search(system, Asking(shop, limits, storage, time.monotonic(), progress)).run()
+        asking = Asking(shop, limits, storage, time.monotonic(), progress)
+        return _Search(system, wanted or Wanted.of(system), asking).run()
 
 
 class _Search:
-    def __init__(self, system: System, asking: Asking) -> None:
+    def __init__(self, system: System, wanted: Wanted, asking: Asking) -> None:
         self.system = system
+        self.wanted = wanted
         self.asking = asking
         self.encoding = Encoding(system)
         self.found = Found(system, self.encoding)
@@ -98,10 +124,12 @@ class _Search:
         if complete:
             reached = set(model.rule_at) - told.report.unreached
             found.fired = frozenset(model.rule_at[line] for line in reached)
-            found.gets_stuck = self._gets_stuck()
-            for rule in sorted(found.fired):
-                if self.system.rules[rule].flag is not None:
-                    self._lead_to(rule)
+            if self.wanted.stuck:
+                self._get_stuck()
+            for rule in sorted(found.fired & self.wanted.rules):
+                self._lead_to(rule)
+            for place in self.wanted.left:
+                self._leave(place)
         elif told.stopped is not Stopped.INTERRUPTED:
             self._anything()
         if found.beyond and found.stopped is None:
@@ -141,20 +169,26 @@ class _Search:
 
     # --- what is wrong --------------------------------------------------------------------------
 
-    def _gets_stuck(self) -> bool:
+    def _get_stuck(self) -> None:
         model = self._model(Asks(stuck=True))
-        told = self._ask_nearest(model, _STUCK_RUNS)
-        self.found.stuck_runs = self._runs(model) if told.report.found is not None else []
-        for run in self.found.stuck_runs:
-            self._see_stuck(run)
-        return bool(self.found.stuck_runs)
+        if self._ask_nearest(model, _STUCK_RUNS).report.found is not None:
+            self.found.stuck_runs = self._runs(model)
+            for run in self.found.stuck_runs:
+                self._see_stuck(run)
+
+    def _leave(self, place: int) -> None:
+        model = self._model(Asks(left=frozenset({place})))
+        if self._ask_nearest(model).report.found is None:
+            return
+        run = self.found.left_runs[place] = self._runs(model)[0]
+        state = replay(self.encoding, run)[-1]
+        if not state & self.encoding.mask[place] or may_fire(self.encoding, state):
+            raise InternalError("Spin says that a run stops with a token left where it does not")
 
     def _see_stuck(self, run: Run) -> None:
         state = replay(self.encoding, run)[-1]
         ends = self.encoding.places_mask(self.system.ends)
-        if state & ends or any(
-            self.encoding.enabled(rule.index, state) for rule in self.system.rules
-        ):
+        if state & ends or may_fire(self.encoding, state):
             raise InternalError("Spin says that a run is stuck that can go on")
 
     def _lead_to(self, rule: int) -> None:
@@ -167,23 +201,22 @@ class _Search:
         run = self._runs(model)[0]
         if run[-1] != rule:
             raise InternalError(f"Spin's run to rule {rule} does not end with it")
-        self.found.flag_runs[rule] = run
+        self.found.rule_runs[rule] = run
 
     def _anything(self) -> None:
         """After a search that did not see all: the first thing that is wrong, if it is found."""
-        flagged = frozenset(r.index for r in self.system.rules if r.flag is not None)
-        model = self._model(Asks(rules=flagged, stuck=True))
+        flagged = self.wanted.rules
+        model = self._model(Asks(rules=flagged, stuck=self.wanted.stuck))
         told = self.asking.ask(model, seconds=_SHORTEST_S)
         if told.report.found is None:
             return
         run = self._runs(model)[0]
         if run and run[-1] in flagged:
-            self.found.flag_runs[run[-1]] = run
+            self.found.rule_runs[run[-1]] = run
             self.found.fired = frozenset(run)
         else:
             self._see_stuck(run)
             self.found.stuck_runs = [run]
-            self.found.gets_stuck = True
 
     # --- runs -----------------------------------------------------------------------------------
 
