@@ -82,6 +82,8 @@ def _also(
     progress: Callable[[Progress], None] | None,
 ) -> Exploration:
     """The built-in search of the same; both must have seen as many states."""
+    if found.stopped is Stopped.INTERRUPTED:
+        limits = replace(limits, seconds=0.0)
     other = search_built_in(system, limits, progress)
     both = other.complete and not other.reduced and found.stopped is None
     if both and len(other.states) != found.states:
@@ -118,7 +120,8 @@ def as_exploration(found: Found) -> Exploration:
             at = after
         return at
 
-    fired = dict.fromkeys(found.fired - found.rule_runs.keys(), 0)
+    # A rule that fires, and to which a run was wanted and not found, is left undecided.
+    fired = dict.fromkeys(found.fired - found.wanted.rules, 0)
     # Properties take what was found first to be nearest.
     for rule, run in sorted(found.rule_runs.items(), key=lambda each: len(each[1])):
         fired[rule] = walk(run[:-1])

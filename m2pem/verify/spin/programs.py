@@ -25,6 +25,8 @@ _COMPILE_S = 120.0
 _QUICK = "tcc"
 _THOROUGH = ("gcc", "cc", "clang")
 _POLL_S = 0.02
+_AS_WRITTEN = ("-o1", "-o2")
+"""No variable is left out of states for never being read: they are counted as they are."""
 _ENDING_S = 10.0
 """How long a checker may take to sum up when it is told to end."""
 
@@ -108,7 +110,7 @@ class Workshop:
         for old in self.folder.iterdir():
             old.unlink()
         (self.folder / self.MODEL).write_text(text, encoding="utf-8")
-        done = self._run([self.tools.spin, "-a", self.MODEL])
+        done = self._run([self.tools.spin, "-a", *_AS_WRITTEN, self.MODEL])
         if not (self.folder / "pan.c").exists() or "Error" in done:
             raise InternalError(f"Spin does not take the model: {done.strip()[-500:]}")
 

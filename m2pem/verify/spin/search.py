@@ -46,6 +46,7 @@ class Found:
 
     system: System
     encoding: Encoding
+    wanted: "Wanted"
     states: int = 0
     transitions: int = 0
     seconds: float = 0.0
@@ -96,7 +97,13 @@ def search(
     limits = limits or Limits()
     with Workshop() as shop:
         asking = Asking(shop, limits, storage, time.monotonic(), progress)
-        return _Search(system, wanted or Wanted.of(system), asking).run()
+        searching = _Search(system, wanted or Wanted.of(system), asking)
+        try:
+            searching.run()
+        except KeyboardInterrupt:
+            searching.found.stopped = Stopped.INTERRUPTED
+        searching.found.seconds = asking.began_ago()
+        return searching.found
 
 
 class _Search:
@@ -105,7 +112,7 @@ class _Search:
         self.wanted = wanted
         self.asking = asking
         self.encoding = Encoding(system)
-        self.found = Found(system, self.encoding)
+        self.found = Found(system, self.encoding, wanted)
         self._by_name = {
             name: place.index
             for place, name in zip(
@@ -115,7 +122,7 @@ class _Search:
             )
         }
 
-    def run(self) -> Found:
+    def run(self) -> None:
         found = self.found
         told, model = self._see_all()
         found.stopped = told.stopped
@@ -134,8 +141,6 @@ class _Search:
             self._anything()
         if found.beyond and found.stopped is None:
             found.stopped = Stopped.TOKENS
-        found.seconds = self.asking.began_ago()
-        return found
 
     # --- all there is ---------------------------------------------------------------------------
 
@@ -224,12 +229,23 @@ class _Search:
         return text_of(self.system, self.encoding, asks)
 
     def _ask_nearest(self, model: Model, errors: int = 1) -> Told:
-        """A shortest run if that does not take too much, else any."""
+        """A shortest run if that does not take too much, else any.
+
+        One that was not found, and not shown to be missing, leaves the whole undecided.
+        """
         if self.found.states <= _MOST_SHORTEST:
             told = self.asking.ask(model, shortest=True, errors=errors, seconds=_SHORTEST_S)
             if told.stopped is None:
                 return told
-        return self.asking.ask(model, errors=errors)
+            self._go_on(told)
+        told = self.asking.ask(model, errors=errors)
+        self._go_on(told)
+        self.found.stopped = self.found.stopped or told.stopped
+        return told
+
+    def _go_on(self, told: Told) -> None:
+        if told.stopped is Stopped.INTERRUPTED:
+            raise KeyboardInterrupt
 
     def _short(self, asks: Asks, told: Told) -> Run | None:
         """A shortest run to what `told` found, if it is not too far."""
