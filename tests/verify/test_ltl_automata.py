@@ -7,7 +7,7 @@ from tests.verify import formulas
 from tests.verify.acceptance import accepts
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(formulas.formulas, formulas.prefixes, formulas.cycles)
 def test_an_observer_accepts_just_the_runs_of_which_the_formula_holds(
     formula: Formula, prefix: list[Moment], cycle: list[Moment]

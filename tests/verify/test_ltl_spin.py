@@ -15,7 +15,7 @@ pytestmark = pytest.mark.skipif(never_claim.SPIN is None, reason="needs Spin (De
 runs = st.lists(st.tuples(formulas.prefixes, formulas.cycles), min_size=10, max_size=30)
 
 
-@settings(max_examples=120, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
 @given(formulas.future, runs)
 def test_spin_accepts_the_same_runs(
     formula: Formula, runs: list[tuple[list[Moment], list[Moment]]]

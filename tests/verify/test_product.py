@@ -21,7 +21,7 @@ def chain(*of_states: int, back_to: int | None = None) -> SmallSystem:
     return SmallSystem(tuple(steps), of_states, (0,) * len(of_states))
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(systems(), formulas.formulas)
 def test_a_formula_holds_just_when_no_run_breaks_it(system: SmallSystem, formula: Formula) -> None:
     verdict = check(system, formula)
@@ -31,7 +31,7 @@ def test_a_formula_holds_just_when_no_run_breaks_it(system: SmallSystem, formula
         assert breaks(system, formula, verdict.run, steps=False)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(systems(), formulas.formulas)
 def test_with_fairness_only_fair_runs_count(system: SmallSystem, formula: Formula) -> None:
     verdict = check(system, formula, fair={rule: rule for rule in range(3)})

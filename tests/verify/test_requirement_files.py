@@ -183,7 +183,7 @@ def test_requirements_of_the_mission_and_beside_it_are_gathered(tmp_path) -> Non
     beside.write_text("requirements: [{id: north, ltl: '<> completed(North)'}]")
     assert [each.id for each in gather(names(mission), beside)] == ["end", "north"]
     beside.write_text("requirements: [{id: end, ltl: '<> completed(North)'}]")
-    with pytest.raises(RequirementsError, match="m.bpmn has a requirement of this id too"):
+    with pytest.raises(RequirementsError, match=r"m\.bpmn has a requirement of this id too"):
         gather(names(mission), beside)
     with pytest.raises(RequirementsError, match="cannot be read"):
         gather(names(mission), tmp_path / "absent.yaml")

@@ -11,10 +11,11 @@ from m2pem.verify.explore import Exploration, explore
 from m2pem.verify.explore import Limits as ExploreLimits
 from m2pem.verify.explore import Stopped as ExploreStopped
 from m2pem.verify.labels import Labels, UnknownDataError
-from m2pem.verify.ltl import propositions
-from m2pem.verify.ltl.formula import Data
+from m2pem.verify.ltl import Observer, negated, propositions
+from m2pem.verify.ltl.formula import Data, needs_steps
 from m2pem.verify.mission_runs import MissionRuns
 from m2pem.verify.product import Limits, Progress, Result, Run, Stopped, Verdict, check
+from m2pem.verify.reduction import Reduction, StubbornSets
 from m2pem.verify.requirements.requirement import Requirement
 from m2pem.verify.system import Rule, System
 
@@ -56,12 +57,44 @@ def check_mission(
     process: str | None = None,
     options: Options | None = None,
     limits: ExploreLimits | None = None,
+    reduce: bool = False,
 ) -> list[Answer]:
-    """Derive, search and check, in one go."""
+    """Derive, search and check, in one go.
+
+    With `reduce`, orders that make no difference to a requirement are left out where they can be.
+    """
     options = replace(options or Options(), conditions=conditions(requirements))
     system = derive(mission, fleet, process=process, options=options)
-    found = explore(system, limits)
-    return [check_requirement(found, mission, fleet, each) for each in requirements]
+    whole: Exploration | None = None
+    answers = []
+    for each in requirements:
+        reduction = reduction_for(system, mission, fleet, each) if reduce else None
+        if reduction is not None:
+            found = explore(system, limits, reduction=reduction)
+        else:
+            found = whole = whole or explore(system, limits)
+        answers.append(check_requirement(found, mission, fleet, each))
+    return answers
+
+
+def reduction_for(
+    system: System, mission: Mission, fleet: Fleet, requirement: Requirement
+) -> Reduction | None:
+    """What may be left out of the search for one requirement; None: nothing.
+
+    Only what is broken once and for all, if at all, can do with less: runs that go round for ever
+    in one part of the mission, and leave another where it is, may be missing then.
+    """
+    formula = requirement.formula
+    if requirement.fair or needs_steps(formula):
+        return None
+    if Observer(negated(formula)).automaton.needs_rounds:
+        return None
+    try:
+        places = Labels(system, mission, fleet, propositions(formula)).visible_places()
+    except UnknownDataError:
+        return None
+    return StubbornSets(system, places) if places is not None else None
 
 
 def check_requirement(
