@@ -14,6 +14,7 @@ from m2pem.model.mission import Mission
 from m2pem.resources.madeup import fleet_for
 from m2pem.verify.check import check
 from m2pem.verify.derive import Options, derive
+from m2pem.verify.encoding import Marking
 from m2pem.verify.explore import Exploration, Limits, explore
 from m2pem.verify.labels import Labels
 from m2pem.verify.ltl import Formula, propositions
@@ -44,9 +45,10 @@ SMALL = Limits(states=3_000, tokens=3)
 FEW, MANY = 12, 600
 
 
-def stuck(found: Exploration) -> set[int]:
-    ends = found.encoding.places_mask(found.system.ends)
-    return {each for n in found.terminals if not (each := found.states[n]) & ends}
+def stuck(found: Exploration) -> list[Marking]:
+    ends = found.system.ends
+    markings = [found.marking(n) for n in found.terminals]
+    return [each for each in markings if not ends & each.tokens.keys()]
 
 
 def same(system: System, limits: Limits = SMALL) -> tuple[Exploration, Found]:
@@ -64,8 +66,9 @@ def same(system: System, limits: Limits = SMALL) -> tuple[Exploration, Found]:
     assert spins.overflow_runs.keys() >= ours.overflows.keys()
     if ours.complete:
         assert spins.overflow_runs.keys() == ours.overflows.keys()
-    assert {replay(spins.encoding, run)[-1] for run in spins.stuck_runs} <= stuck(ours)
     assert bool(spins.stuck_runs) == bool(stuck(ours))
+    for run in spins.stuck_runs:
+        assert spins.encoding.marking(replay(spins.encoding, run)[-1]) in stuck(ours)
     for rule, state in ours.flagged.items():
         assert len(spins.rule_runs[rule]) == len(ours.run_to(state)) + 1
     return ours, spins

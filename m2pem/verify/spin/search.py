@@ -149,9 +149,10 @@ class _Search:
         limits, found = self.asking.limits, self.found
         most_bits = max((limits.tokens + 1).bit_length() - 1, 1)
         wider: dict[int, int] = {}
+        told_once: set[int] = set()
         while True:
             self.encoding = found.encoding = Encoding(self.system, wider)
-            asked = frozenset(p.index for p in self.system.places) - found.beyond
+            asked = frozenset(p.index for p in self.system.places) - found.beyond - told_once
             model = self._model(Asks(full=asked))
             told = self.asking.ask(model)
             if told.report.found is None:
@@ -161,7 +162,9 @@ class _Search:
             if not self.system.places[place].several and place not in found.overflow_runs:
                 asks = Asks(full=frozenset({place}))
                 found.overflow_runs[place] = self._short(asks, told) or run
-            if self.encoding.width[place] < most_bits:
+            if self.system.places[place].once:
+                told_once.add(place)
+            elif self.encoding.width[place] < most_bits:
                 wider[place] = most_bits
             else:
                 found.beyond.add(place)
@@ -253,6 +256,7 @@ class _Search:
             return None
         model = self._model(asks)
         again = self.asking.ask(model, shortest=True, seconds=_SHORTEST_S)
+        self._go_on(again)
         return self._runs(model)[0] if again.report.found is not None else None
 
     def _runs(self, model: Model) -> list[Run]:
