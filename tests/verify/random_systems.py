@@ -69,7 +69,9 @@ def _rule(dice: Random, number: int, tokens: range, variables: tuple[Variable, .
         copies=(pairs[1],) if dice.random() < 0.15 else (),  # type: ignore[arg-type]
         kill=tuple(tokens) if ends else tuple(some(4, 0.2)),
         produce=tuple((p, dice.choice((1, 1, 1, 2)) if not ends else 1) for p in made),
-        assign=tuple((v.index, dice.randrange(len(v.values))) for v in variables if dice.random() < 0.3),
+        assign=tuple(
+            (v.index, dice.randrange(len(v.values))) for v in variables if dice.random() < 0.3
+        ),
         flag=Flag.CONFLICT if dice.random() < 0.1 else None,
         flagged="uav1",
     )

@@ -199,9 +199,7 @@ def _on_elements(formula: Formula, names: dict[str, str]) -> Formula:
 
 
 @given(formulas.formulas, st.integers(0, 10_000))
-@settings(
-    max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True
-)
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 def test_random_formulas_have_one_answer(formula: Formula, seed: int) -> None:
     assume(not needs_steps(formula))
     dice = Random(seed)

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from m2pem.errors import InternalError
+from m2pem.verify.derive import derive
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.explore import Limits, Progress, Stopped
-from m2pem.verify.derive import derive
 from m2pem.verify.simplify import simplify
 from m2pem.verify.spin import asking, programs
 from m2pem.verify.spin.asking import Storage
@@ -56,7 +56,8 @@ def rows(count: int) -> System:
 def test_a_whole_search_is_read() -> None:
     report = read(WHOLE)
     assert (report.states, report.transitions, report.errors) == (35, 47, 0)
-    assert report.found is report.cut is None
+    assert report.found is None
+    assert report.cut is None
     assert report.unreached == {54, 69}
 
 
@@ -202,9 +203,9 @@ def test_ctrl_c_ends_the_checker_and_tells_what_was_seen(folders: Path) -> None:
     assert found.states > 100
     assert time.monotonic() - began < 20
     assert not list(folders.iterdir())
-    assert not [
-        each for each in Path("/proc").glob("[0-9]*/cwd") if _leads_to(each, folders)
-    ], "a checker still runs"
+    assert not [each for each in Path("/proc").glob("[0-9]*/cwd") if _leads_to(each, folders)], (
+        "a checker still runs"
+    )
 
 
 def _leads_to(link: Path, folder: Path) -> bool:
@@ -216,12 +217,12 @@ def _leads_to(link: Path, folder: Path) -> bool:
 
 def test_what_is_missing_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(SpinMissingError, match="Spin is not installed.*apt-get install spin tcc"):
+    with pytest.raises(SpinMissingError, match=r"Spin is not installed.*apt-get install spin tcc"):
         Tools.find()
     spin = tmp_path / "spin"
     spin.write_text("#!/bin/sh\n")
     spin.chmod(0o755)
-    with pytest.raises(SpinMissingError, match="C compiler.*apt-get install tcc"):
+    with pytest.raises(SpinMissingError, match=r"C compiler.*apt-get install tcc"):
         Tools.find()
     tcc = tmp_path / "tcc"
     tcc.write_text("#!/bin/sh\n")

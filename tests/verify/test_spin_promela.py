@@ -77,7 +77,9 @@ def test_only_what_is_asked_is_asserted(vignette: System) -> None:
 
 
 def test_names_are_told_apart_and_are_no_words_of_promela_or_c() -> None:
-    names = identifiers("at_", ["a-b", "a_b", "a.b", "int", "do", "Überflug!", "x" * 200, "x" * 201])
+    names = identifiers(
+        "at_", ["a-b", "a_b", "a.b", "int", "do", "Überflug!", "x" * 200, "x" * 201]
+    )
     assert len(set(names)) == len(names)
     assert all(re.fullmatch(r"at_[A-Za-z0-9_]+", name) for name in names)
     assert names[:3] == ["at_a_b", "at_a_b_2", "at_a_b_3"]

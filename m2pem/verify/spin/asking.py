@@ -91,10 +91,10 @@ class Asking:
             arguments += ["-e"] if errors != 1 else []
             told = self.shop.search(defines, arguments, self._watch(seconds))
             report = read(told.text)
-            if report.found is None and report.cut is Cut.DEPTH and not told.ended:
-                if depth < _MOST_DEPTH:
-                    depth *= 10
-                    continue
+            too_deep = report.found is None and report.cut is Cut.DEPTH and not told.ended
+            if too_deep and depth < _MOST_DEPTH:
+                depth *= 10
+                continue
             return Told(report, self._stopped(report, told.ended, shortest=shortest))
 
     def _watch(self, seconds: float | None) -> Callable[[str, float], str]:

@@ -12,6 +12,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -61,8 +62,8 @@ class Tools:
         thorough = next((path for each in _THOROUGH if (path := shutil.which(each))), None)
         if spin is None:
             raise SpinMissingError(
-                "Spin is not installed: install it (Debian and Ubuntu: `apt-get install spin tcc`), "
-                "or leave out --engine spin"
+                "Spin is not installed: install it (Debian and Ubuntu: `apt-get install spin tcc`),"
+                " or leave out --engine spin"
             )
         if quick is None and thorough is None:
             raise SpinMissingError(
@@ -167,10 +168,8 @@ class Workshop:
     def _sum_up(self, checker: "subprocess.Popen[bytes]", printed: Path, why: str) -> Told:
         """On an interrupt, a checker prints what it has seen."""
         checker.send_signal(signal.SIGINT)
-        try:
+        with suppress(subprocess.TimeoutExpired):
             checker.wait(_ENDING_S)
-        except subprocess.TimeoutExpired:
-            pass
         return Told(_read(printed), why)
 
     def trail(self, number: int = 0) -> str:

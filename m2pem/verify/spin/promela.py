@@ -219,7 +219,9 @@ class Writer:
         if rule.index in self.asks.rules:
             effects.append("assert(false)")
         for p, n in rule.consume:
-            effects.append(f"{places[p]} = 0" if most[p] == 1 else f"{places[p]} = {places[p]} - {n}")
+            effects.append(
+                f"{places[p]} = 0" if most[p] == 1 else f"{places[p]} = {places[p]} - {n}"
+            )
         for pairs, gone in ((rule.moves, True), (rule.copies, False)):
             for source, target in pairs:
                 then = f"{places[source]} = 0; " if gone else ""

@@ -90,7 +90,11 @@ class _Asker:
                 return self._answer(Result.UNDECIDED, states, seconds, why)
             trail = read_trail(shop.trail(), model.rule_at)
         run = self._run(trail, whatever=told.report.found is Kind.ASSERTION)
-        if self.requirement.fair and run.cycle and not Walking(self.encoding, self.labels).fair(run):
+        if (
+            self.requirement.fair
+            and run.cycle
+            and not Walking(self.encoding, self.labels).fair(run)
+        ):
             return self._answer(Result.UNDECIDED, states, seconds, _FAIRNESS)
         return self._answer(Result.VIOLATED, states, seconds, run=run)
 
@@ -123,4 +127,3 @@ class _Asker:
             states,
             seconds,
         )
-

@@ -19,8 +19,8 @@ from m2pem.verify.spin.asking import Asking, Storage, Told
 from m2pem.verify.spin.naming import identifiers
 from m2pem.verify.spin.programs import Workshop
 from m2pem.verify.spin.promela import Asks, Model, text_of
-from m2pem.verify.spin.trail import read as read_trail
 from m2pem.verify.spin.trail import may_fire, replay
+from m2pem.verify.spin.trail import read as read_trail
 from m2pem.verify.system import Action, System
 
 _MOST_SHORTEST = 200_000
@@ -61,7 +61,7 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What runs are wanted to: rules, states in which a run is stuck, places where it leaves one."""
+    """What runs are wanted to: rules, being stuck, places where a token is left at the end."""
 
     rules: frozenset[int]
     stuck: bool = True
