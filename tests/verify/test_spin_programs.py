@@ -59,6 +59,7 @@ def test_a_whole_search_is_read() -> None:
     assert report.found is None
     assert report.cut is None
     assert report.unreached == {54, 69}
+    assert report.unreached_skips == {105}
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,11 @@ class Cut(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What was printed. `assertion`: the first one violated. `unreached`: lines of rules."""
+    """What was printed. `assertion`: the first one violated.
+
+    `unreached`: lines of rules that never fire; `unreached_skips`: lines that do nothing, and that
+    no run comes to. Both are told of whole searches only.
+    """
 
     states: int
     transitions: int
@@ -37,6 +41,7 @@ class Report:
     assertion: str
     cut: Cut | None
     unreached: frozenset[int]
+    unreached_skips: frozenset[int]
 
 
 _COUNT = r"^\s*([\d.e+]+) "
@@ -46,6 +51,7 @@ _NOMINAL = re.compile(_COUNT + r"nominal states", re.M)
 _TRANSITIONS = re.compile(_COUNT + r"transitions", re.M)
 _PROBLEM = re.compile(r"^pan(?:: ?\d+)?: (?:error, )?(.*)$", re.M)
 _UNREACHED = re.compile(r':(\d+), state \d+, "D_STEP\d+"')
+_UNREACHED_SKIP = re.compile(r':(\d+), state \d+, "\(1\)"')
 _STATES = re.compile(r"States=\s*([\d.e+]+)")
 _HARMLESS = ("elapsed time", "rate ", "wrote ", "resizing hashtable", "aborting", "avg transition")
 
@@ -86,6 +92,7 @@ def read(text: str) -> Report:
         # A search ends at its error, and calls that not completed.
         cut if found is None or cut is not Cut.UNFINISHED else None,
         frozenset(int(line) for line in _UNREACHED.findall(text)),
+        frozenset(int(line) for line in _UNREACHED_SKIP.findall(text)),
     )
 
 

@@ -131,7 +131,7 @@ class _Search:
         if complete:
             reached = set(model.rule_at) - told.report.unreached
             found.fired = frozenset(model.rule_at[line] for line in reached)
-            if self.wanted.stuck:
+            if self.wanted.stuck and model.stuck_line not in told.report.unreached_skips:
                 self._get_stuck()
             for rule in sorted(found.fired & self.wanted.rules):
                 self._lead_to(rule)
@@ -179,10 +179,14 @@ class _Search:
 
     def _get_stuck(self) -> None:
         model = self._model(Asks(stuck=True))
-        if self._ask_nearest(model, _STUCK_RUNS).report.found is not None:
-            self.found.stuck_runs = self._runs(model)
-            for run in self.found.stuck_runs:
-                self._see_stuck(run)
+        told = self._ask_nearest(model, _STUCK_RUNS)
+        if told.report.found is None:
+            if told.stopped is None:
+                raise InternalError("Spin finds no run that is stuck, and says that there is one")
+            return
+        self.found.stuck_runs = self._runs(model)
+        for run in self.found.stuck_runs:
+            self._see_stuck(run)
 
     def _leave(self, place: int) -> None:
         model = self._model(Asks(left=frozenset({place})))
