@@ -78,7 +78,7 @@ def verify(
     max_states: int,
     output: str,
 ) -> int:
-    """Prove properties of a mission, or show the run that violates one.
+    """Prove a mission before it moves anything.
 
     Looks at every order in which answers, reports, timers and signals can come. Ends with 0 if all
     holds, with 1 if something is violated, with 2 if the mission cannot be used, and with 3 if

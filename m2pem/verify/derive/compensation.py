@@ -159,9 +159,10 @@ def _candidates(
         area = waiting.pop()
         waiting += area.children
         for node in _nodes(area):
-            if isinstance(node, e.Activity) and node.compensation is not None:
-                if not name or node.id == name or name in area.path:
-                    (direct if area is scope else nested).append((area, node))
+            if not isinstance(node, e.Activity) or node.compensation is None:
+                continue
+            if not name or node.id == name or name in area.path:
+                (direct if area is scope else nested).append((area, node))
     return direct, nested
 
 

@@ -294,9 +294,9 @@ class Data:
         if isinstance(node, e.Activity | e.Event):
             for mapping in node.data_flow.outputs:
                 yield Write(mapping.target, None)
-        if isinstance(node, e.Activity) and isinstance(node.loop, MultiInstance):
-            if node.loop.output_collection:
-                yield Write(node.loop.output_collection, None)
+        loop = node.loop if isinstance(node, e.Activity) else None
+        if isinstance(loop, MultiInstance) and loop.output_collection:
+            yield Write(loop.output_collection, None)
         for key in self.written_anyhow(node):
             yield Write(key, None)
         match node:

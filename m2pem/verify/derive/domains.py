@@ -70,12 +70,15 @@ def constants(expression: Expression) -> dict[str, set[tuple[str, Value]]]:
                 if isinstance(one, t.Name) and isinstance(other, t.Literal):
                     kind = type(other.value).__name__
                     found.setdefault(one.name, set()).add((kind, other.value))
-        elif isinstance(node, t.In) and isinstance(node.item, t.Name):
-            if isinstance(node.container, t.ListOf):
-                for item in node.container.items:
-                    if isinstance(item, t.Literal):
-                        kind = type(item.value).__name__
-                        found.setdefault(node.item.name, set()).add((kind, item.value))
+        elif (
+            isinstance(node, t.In)
+            and isinstance(node.item, t.Name)
+            and isinstance(node.container, t.ListOf)
+        ):
+            for item in node.container.items:
+                if isinstance(item, t.Literal):
+                    kind = type(item.value).__name__
+                    found.setdefault(node.item.name, set()).add((kind, item.value))
     return found
 
 

@@ -168,9 +168,10 @@ def forks(node: e.FlowNode) -> bool:
     """Whether one token can become several there."""
     if isinstance(node, e.ExclusiveGateway | e.EventBasedGateway):
         return False
-    if isinstance(node, e.Activity):
-        if node.completion_quantity > 1 or any(not b.interrupting for b in node.boundary):
-            return True
+    if isinstance(node, e.Activity) and (
+        node.completion_quantity > 1 or any(not b.interrupting for b in node.boundary)
+    ):
+        return True
     if isinstance(node, e.StartEvent) and len(node.container.entries) > 1:
         return True
     return len(node.outgoing) > 1
