@@ -143,6 +143,8 @@ def explore(
         found = search.run(reduction, progress)
         again = False
         for place, (state, rule) in found.overflows.items():
+            if not _exact(found, found.run_to(state), limits):
+                continue
             if place not in overflows and not system.places[place].several:
                 overflows[place] = (state, rule)
                 runs[place] = (*found.run_to(state), rule)
@@ -161,6 +163,21 @@ def explore(
             found.overflows = overflows
             found.overflow_runs = runs
             return found
+
+
+def _exact(found: Exploration, run: Sequence[int], limits: Limits) -> bool:
+    """Whether no token was lost on a run for want of room that the next search will have.
+
+    What comes after such a loss need not be a run: it may miss a step that had to come first.
+    """
+    encoding = found.encoding
+    state = encoding.initial
+    for rule in run:
+        state, full = encoding.fire(rule, state)
+        if full >= 0 and not found.system.places[full].once:
+            if (1 << (encoding.width[full] + 1)) - 1 <= limits.tokens:
+                return False
+    return True
 
 
 class _Search:
