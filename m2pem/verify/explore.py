@@ -141,6 +141,8 @@ def explore(
     while True:
         search = _Search(system, Encoding(system, wider), limits, began, keep_edges)
         found = search.run(reduction, progress)
+        while search.closed_circle and found.stopped is None:
+            found = search.run(reduction, progress)
         again = False
         for place, (state, rule) in found.overflows.items():
             if not _exact(found, found.run_to(state), limits):
@@ -189,6 +191,9 @@ class _Search:
         self.limits = limits
         self.began = began
         self.keep_edges = keep_edges
+        self.whole: set[int] = set()
+        """States that are on a circle: there, nothing may be put off, or it would be for ever."""
+        self.closed_circle = False
         rules = encoding.rules
         self.affected = affected_rules(encoding)
         self.affected_sets = [frozenset(each) for each in self.affected]
@@ -264,6 +269,8 @@ class _Search:
         wait, setdefault = waiting.append, index.setdefault
         outside = [each == 2 for each in rank]
         transitions = 0
+        partly: set[int] = set()
+        self.closed_circle = False
         at = 0
         count = len(states)
         while at < count:
@@ -286,8 +293,10 @@ class _Search:
                 best = min([rank[n] for n in enabled])
                 usable = [n for n in enabled if rank[n] == best]
             whole = usable
-            if choose is not None and len(usable) > 1:
+            if choose is not None and len(usable) > 1 and state not in self.whole:
                 usable = choose(state, usable)
+                if len(usable) < len(whole):
+                    partly.add(at)
             before = transitions
             transitions += len(usable)
             while True:
@@ -324,6 +333,9 @@ class _Search:
                         wait(tuple(new))
                     elif known > at:
                         fresh = True
+                    elif known in partly:
+                        self.whole.add(states[known])
+                        self.closed_circle = True
                     if edge_rule is not None:
                         edge_rule.append(number)
                         edge_state.append(known)  # type: ignore[union-attr]
