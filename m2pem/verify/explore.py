@@ -176,9 +176,9 @@ def _exact(found: Exploration, run: Sequence[int], limits: Limits) -> bool:
     state = encoding.initial
     for rule in run:
         state, full = encoding.fire(rule, state)
-        if full >= 0 and not found.system.places[full].once:
-            if (1 << (encoding.width[full] + 1)) - 1 <= limits.tokens:
-                return False
+        widest = full < 0 or (1 << (encoding.width[full] + 1)) - 1 > limits.tokens
+        if not widest and not found.system.places[full].once:
+            return False
     return True
 
 
