@@ -21,12 +21,19 @@ _FULL_STATES = 30_000
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """All that a check found. `system` is what `Violation.run` numbers the rules of."""
+    """All that a check found. `system` is what `Violation.run` numbers the rules of.
+
+    `states`: how many states were seen; `found` may hold fewer, if another engine saw the rest.
+    `notes`: what else is to be told of the answers.
+    """
 
     system: System
     found: Exploration
     results: tuple[Result, ...]
     watched: System | None = None
+    engine: str = "builtin"
+    states: int = 0
+    notes: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -66,7 +73,13 @@ def check(
         searched.resources = watched[1]
         searched.watched = search(watched[0], limits, progress)
     results = tuple(each(searched) for each in ALL)
-    return Report(system, found, results, watched[0] if watched is not None else None)
+    return Report(
+        system,
+        found,
+        results,
+        watched[0] if watched is not None else None,
+        states=len(found.states),
+    )
 
 
 def search(

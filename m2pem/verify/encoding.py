@@ -24,11 +24,15 @@ class Marking:
 
 @dataclass(slots=True)
 class Compiled:
-    """One rule as masks. `plain`: they say it all; else the lists do what they cannot."""
+    """One rule as masks. `plain`: they say it all; else the lists do what they cannot.
+
+    `erase`: of what is cleared, what goes after tokens have moved; the rest is consumed before.
+    """
 
     test: int = 0
     need: int = 0
     clear: int = 0
+    erase: int = 0
     put: int = 0
     plain: bool = True
     any_of: list[int] = field(default_factory=list)
@@ -111,7 +115,7 @@ class Encoding:
             elif len(values) < len(self.system.variables[variable].values):
                 c.any_of.append(mask)
         for place in rule.kill:
-            c.clear |= self.mask[place]
+            c.erase |= self.mask[place]
         for pairs, gone in ((rule.moves, True), (rule.copies, False)):
             for source, target in pairs:
                 c.moves.append((self.mask[source], self.mask[target], self.offset[target], gone))
@@ -130,8 +134,9 @@ class Encoding:
                 )
         for variable, value in rule.assign:
             all_of = self._values_mask(variable, range(len(self.system.variables[variable].values)))
-            c.clear |= all_of
+            c.erase |= all_of
             c.put |= 1 << (self.value_bit[variable] + value)
+        c.clear |= c.erase
         c.plain = not (c.any_of or c.at_least or c.takes or c.moves or c.gives)
         c.reads = c.test
         for mask in c.any_of:
@@ -189,7 +194,7 @@ class Encoding:
                     state &= ~source
                 if state & target != target:
                     state += 1 << offset
-        state &= ~c.clear
+        state &= ~c.erase
         full = -1
         if state & c.put:
             full = self._full(number, state & c.put)

@@ -44,6 +44,8 @@ class Stopped(StrEnum):
     TIME = "the limit of time"
     MEMORY = "the limit of memory"
     TOKENS = "a place that gets more and more tokens"
+    DEPTH = "the limit of depth"
+    BITSTATE = "a table that may take a new state for a known one"
     INTERRUPTED = "an interruption by hand"
 
 
@@ -139,8 +141,12 @@ def explore(
     while True:
         search = _Search(system, Encoding(system, wider), limits, began, keep_edges)
         found = search.run(reduction, progress)
+        while search.closed_circle and found.stopped is None:
+            found = search.run(reduction, progress)
         again = False
         for place, (state, rule) in found.overflows.items():
+            if not _exact(found, found.run_to(state), limits):
+                continue
             if place not in overflows and not system.places[place].several:
                 overflows[place] = (state, rule)
                 runs[place] = (*found.run_to(state), rule)
@@ -161,6 +167,21 @@ def explore(
             return found
 
 
+def _exact(found: Exploration, run: Sequence[int], limits: Limits) -> bool:
+    """Whether no token was lost on a run for want of room that the next search will have.
+
+    What comes after such a loss need not be a run: it may miss a step that had to come first.
+    """
+    encoding = found.encoding
+    state = encoding.initial
+    for rule in run:
+        state, full = encoding.fire(rule, state)
+        widest = full < 0 or (1 << (encoding.width[full] + 1)) - 1 > limits.tokens
+        if not widest and not found.system.places[full].once:
+            return False
+    return True
+
+
 class _Search:
     def __init__(
         self, system: System, encoding: Encoding, limits: Limits, began: float, keep_edges: bool
@@ -170,6 +191,9 @@ class _Search:
         self.limits = limits
         self.began = began
         self.keep_edges = keep_edges
+        self.whole: set[int] = set()
+        """States that are on a circle: there, nothing may be put off, or it would be for ever."""
+        self.closed_circle = False
         rules = encoding.rules
         self.affected = affected_rules(encoding)
         self.affected_sets = [frozenset(each) for each in self.affected]
@@ -245,6 +269,8 @@ class _Search:
         wait, setdefault = waiting.append, index.setdefault
         outside = [each == 2 for each in rank]
         transitions = 0
+        partly: set[int] = set()
+        self.closed_circle = False
         at = 0
         count = len(states)
         while at < count:
@@ -267,8 +293,10 @@ class _Search:
                 best = min([rank[n] for n in enabled])
                 usable = [n for n in enabled if rank[n] == best]
             whole = usable
-            if choose is not None and len(usable) > 1:
+            if choose is not None and len(usable) > 1 and state not in self.whole:
                 usable = choose(state, usable)
+                if len(usable) < len(whole):
+                    partly.add(at)
             before = transitions
             transitions += len(usable)
             while True:
@@ -305,6 +333,9 @@ class _Search:
                         wait(tuple(new))
                     elif known > at:
                         fresh = True
+                    elif known in partly:
+                        self.whole.add(states[known])
+                        self.closed_circle = True
                     if edge_rule is not None:
                         edge_rule.append(number)
                         edge_state.append(known)  # type: ignore[union-attr]

@@ -70,6 +70,17 @@ class Labels:
 
         return true_in
 
+    def places_of(self, number: int) -> frozenset[int]:
+        """The places of which one has a token where a proposition is true, if it is about places.
+
+        `number`: of the proposition, in `propositions`.
+        """
+        return self._places[number]
+
+    def variables_of(self, number: int) -> frozenset[int]:
+        """The variables that a proposition is about."""
+        return self._variables[number]
+
     def visible_rules(self) -> frozenset[int]:
         """The rules that may change what is true, or in whose moment something is."""
         places = frozenset[int]().union(*self._places)

@@ -19,7 +19,8 @@ join -> e
 """
 TWO_ON_ONE = """
 <process id="MAIN"><startEvent id="s"/><parallelGateway id="fork"/><parallelGateway id="join"/>
-<scriptTask id="a">do drive_stop evsg1</scriptTask><scriptTask id="b">do drive_stop evsg1</scriptTask>
+<scriptTask id="a">do drive_stop evsg1</scriptTask>
+<scriptTask id="b">do drive_stop evsg1</scriptTask>
 <endEvent id="e"/>
 s -> fork
 fork -> a
@@ -43,7 +44,8 @@ c -> e
 </process>
 """
 UNSENT = """
-<process id="MAIN"><startEvent id="s"/><intermediateCatchEvent id="wait">signal gone</intermediateCatchEvent>
+<process id="MAIN"><startEvent id="s"/>
+<intermediateCatchEvent id="wait">signal gone</intermediateCatchEvent>
 <endEvent id="e"/>
 s -> wait
 wait -> e
