@@ -1,0 +1,71 @@
+"""Every vehicle that is interrupted is commanded again: the model says what it does next."""
+
+from collections.abc import Iterator
+
+from m2pem.verify.answers import Alarm
+from m2pem.verify.judging.case import Case
+from m2pem.verify.system import Trigger
+
+_OWN_ENDS = (Trigger.SUCCEEDS, Trigger.FAILS)
+
+
+def abandoned(case: Case) -> Iterator[Alarm]:
+    """A vehicle's task is interrupted, and a good end is reached without commanding it again."""
+    resources = sorted({each for place in case.system.places for each in place.resources})
+    for resource in resources:
+        holding = {p.index for p in case.system.places if resource in p.resources}
+        held = [bool(holding & case.places(n)) for n in range(len(case.found.states))]
+        alarm = _of(case, resource, held)
+        if alarm is not None:
+            yield alarm
+
+
+def _of(case: Case, resource: str, held: list[bool]) -> Alarm | None:
+    came: dict[int, tuple[int, int]] = {}
+    waiting: list[int] = []
+    for number in range(len(case.found.states)):
+        if held[number]:
+            for rule, after in case.found.successors(number):
+                own = case.system.rules[rule].trigger in _OWN_ENDS
+                # What ends the whole run ends it for every vehicle, and needs no other command.
+                if not held[after] and not own and after not in case.good and after not in came:
+                    came[after] = (number, rule)
+                    waiting.append(after)
+    first = set(came)
+    while waiting:
+        number = waiting.pop(0)
+        if number in case.good:
+            return _alarm(case, resource, number, came, first)
+        for rule, after in case.found.successors(number):
+            if not held[after] and after not in came:
+                came[after] = (number, rule)
+                waiting.append(after)
+    return None
+
+
+def _alarm(
+    case: Case, resource: str, end: int, came: dict[int, tuple[int, int]], first: set[int]
+) -> Alarm:
+    rules: list[int] = []
+    number = end
+    while True:
+        interrupted = number in first
+        number, rule = came[number]
+        rules.append(rule)
+        if interrupted:
+            break
+    by = case.system.rules[rules[-1]].element
+    before = case.places(number)
+    tasks = [
+        place.element
+        for place in case.system.places
+        if place.index in before and resource in place.resources
+    ]
+    run = (*case.found.run_to(number), *reversed(rules))
+    return Alarm(
+        f"{case.words.name(by)} interrupts {case.words.all_of(tasks)}, and nothing tells {resource} "
+        "what to do then",
+        (*dict.fromkeys(tasks), by),
+        run,
+        reason=resource,
+    )
