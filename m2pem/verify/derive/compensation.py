@@ -16,10 +16,8 @@ from m2pem.verify.system import Action, Exactness, Role, Step
 
 
 def home(making: Making, area: Area) -> Area:
-    """The area of the process instance that an area is in: what was done is noted there."""
+    """Where what was done in an area is noted: outside of all that may be over by then."""
     while area.parent is not None and area.parent is not making.everything:
-        if isinstance(area.element, e.CallActivity) and area.frame == area.path:
-            break
         area = area.parent
     return area
 
@@ -72,7 +70,8 @@ def compensate(
     name = definition.activity
     if name and node.qualifier:
         name = f"{node.qualifier}:{name}"
-    waiting = making.net.place(node, area, Role.ACTIVE, ":undoes")
+    role = Role.ACTIVE if definition.wait else Role.TRIGGERED
+    waiting = making.net.place(node, area, role, ":undoes")
     _undo(making, node, scope, area, waiting, name, ways if definition.wait else [Effect()])
     thrown = Effect(steps=(Step(node.id, Action.THROWN, "compensation"),), produce=(waiting,))
     both = product(begun, [thrown])
@@ -83,7 +82,7 @@ def cancel(making: Making, node: e.EndEvent, area: Area) -> list[Effect]:
     """A transaction is cancelled: all in it ends, what was done is undone, and it is left."""
     host = area.host
     assert isinstance(host, Host)
-    waiting = making.net.place(node, area, Role.ACTIVE, ":undoes")
+    waiting = making.net.place(node, area, Role.TRIGGERED, ":undoes")
     left = host.leave()
     for boundary in host.node.boundary:
         if any(isinstance(d, CancelEventDefinition) for d in boundary.definitions):

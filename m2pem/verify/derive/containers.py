@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from m2pem.model import elements as e
+from m2pem.model.events import CompensateEventDefinition
 from m2pem.verify.derive.compensation import forget
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.making import Host, Making
@@ -69,6 +70,8 @@ def event_subprocess(making: Making, container: e.SubProcess, area: Area) -> Non
     build(making, container, host.inside)
     ends_with_its_inside(making, host)
     for start in container.starts:
+        if any(isinstance(d, CompensateEventDefinition) for d in start.definitions):
+            making.net.approximate(container, Exactness.BOUNDED, "when it undoes is not followed")
         arm_handler(making, area, start)
 
 

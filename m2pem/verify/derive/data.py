@@ -146,6 +146,12 @@ class Data:
         hidden = self.hidden(node)
         return all(self._follows(name, hidden) for c in conditions for name in c.names)
 
+    def may_change(self, condition: Expression) -> bool:
+        """Whether anything in the mission may write what a condition reads."""
+        return any(
+            name in self.domains.of or self.domains.is_written(name) for name in condition.names
+        )
+
     # --- writing --------------------------------------------------------------------------------
 
     def write(

@@ -69,9 +69,52 @@ def _wait(making: Making, node: e.Event, area: Area) -> None:
     assert come is not None
     net.rule(come)
     if node.parallel_multiple and len(node.definitions) > 1:
-        net.approximate(node, Exactness.MORE, "one of its triggers is enough, not all of them")
+        _wait_for_all(making, node, area, waiting)
+        return
     for number, definition in enumerate(node.definitions):
         _trigger(making, node, area, definition, waiting, _leave(making, node, area), number)
+
+
+def _wait_for_all(making: Making, node: e.Event, area: Area, waiting: int) -> None:
+    """All of its triggers must come, in any order."""
+    net = making.net
+    came: list[int] = []
+    for number, definition in enumerate(node.definitions):
+        awaited_place = net.place(node, area, Role.CONTROL, f":awaits{number}")
+        told = net.place(node, area, Role.CONTROL, f":came{number}")
+        came.append(told)
+        seen = Effect(
+            steps=(Step(node.id, Action.TRIGGERED, "one of several"),),
+            consume=(awaited_place,),
+            produce=(told,),
+        )
+        match definition:
+            case TimerEventDefinition():
+                net.rule(seen, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+            case SignalEventDefinition() | MessageEventDefinition():
+                what, ref = what_and_ref(definition)
+                catching(making, what, ref, awaited_place, told, False, node)
+            case ConditionalEventDefinition(condition=condition):
+                if making.data.is_followed([condition], node):
+                    for guard, truth in making.data.cases(
+                        [condition], area, node, lambda t: t[0]
+                    ):
+                        if truth is True:
+                            making.rules(product([seen], [Effect(guard=guard)]))
+                else:
+                    net.rule(seen, Kind.OUTSIDE, Trigger.CONDITION)
+            case _:
+                net.rule(seen)
+        net.rule(
+            Effect(
+                steps=(Step(node.id, Action.ENTERED, "waits"),),
+                read=frozenset({waiting}),
+                inhibit=frozenset({awaited_place, told}),
+                produce=(awaited_place,),
+            )
+        )
+    done = Effect(steps=(Step(node.id, Action.COMPLETED),), consume=(waiting, *came))
+    making.rules(product([done], _leave(making, node, area)))
 
 
 def _trigger(
@@ -107,6 +150,14 @@ def _trigger(
                     making.rules(product(product([came], [Effect(guard=guard)]), ways))
         case _:
             making.rules(product([came], ways))
+
+
+def _true_or_never(
+    making: Making, node: e.FlowNode, area: Area, ways: list[Effect]
+) -> None:
+    """A condition on what nothing in the mission writes: it is true at once, or never."""
+    come = _come(making, node, area, Action.TRIGGERED)
+    making.rules(product([come], ways))
 
 
 def event_based(making: Making, node: e.FlowNode, area: Area) -> None:

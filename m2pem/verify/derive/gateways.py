@@ -10,7 +10,7 @@ from m2pem.verify.derive.leaving import any_of, is_free_choice, leave
 from m2pem.verify.derive.making import Making
 from m2pem.verify.derive.net import Area, arrival, at
 from m2pem.verify.derive.throwing import throw_error
-from m2pem.verify.system import Action, Exactness, Kind, Role, Step
+from m2pem.verify.system import Action, Exactness, Kind, Role, Step, Trigger
 
 MOST_INCOMING = 8
 """Flows of an inclusive or complex join whose every combination is looked at."""
@@ -155,7 +155,8 @@ def complex_gateway(making: Making, node: e.FlowNode, area: Area) -> None:
         if len(places) > MOST_INCOMING:
             subsets = [*((n,) for n in range(len(places))), tuple(range(len(places)))]
         for chosen in subsets:
-            if not _may_activate(node, chosen):
+            active = _activates(node, chosen)
+            if active is False:
                 continue
             whole = len(chosen) == len(places)
             used = [making.net.place(node, area, Role.CONTROL, f":used{n}") for n in chosen]
@@ -167,14 +168,19 @@ def complex_gateway(making: Making, node: e.FlowNode, area: Area) -> None:
                 ),
                 produce=() if whole else (resetting, *used),
             )
-            making.rules(product([come], ways))
+            for effect in product([come], ways):
+                if active is None:
+                    making.net.rule(effect, Kind.OUTSIDE, Trigger.CONDITION)
+                else:
+                    making.net.rule(effect)
         if len(places) > 1:
             _reset(making, node, area, places, resetting)
 
     making.later.append(spell_out)
 
 
-def _may_activate(node: e.ComplexGateway, chosen: tuple[int, ...]) -> bool:
+def _activates(node: e.ComplexGateway, chosen: tuple[int, ...]) -> bool | None:
+    """Whether the tokens of some flows activate it; None: that depends on more than them."""
     if node.activation is None:
         return True
     counts = {flow.local_id: 0 for flow in node.incoming}
@@ -182,11 +188,11 @@ def _may_activate(node: e.ComplexGateway, chosen: tuple[int, ...]) -> bool:
         counts[node.incoming[number].local_id] = 1
     known: dict[str, object] = {"activationCount": len(chosen), "waitingForStart": True, **counts}
     if any(name not in known for name in node.activation.names):
-        return True
+        return None
     try:
         return node.activation.holds(known.get)  # type: ignore[arg-type]
     except ExpressionError:
-        return True
+        return None
 
 
 def _reset(

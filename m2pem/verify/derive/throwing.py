@@ -170,14 +170,19 @@ def _go_up(
 
 def begin_handler(making: Making, area: Area, start: e.StartEvent) -> list[Effect]:
     """An event subprocess begins in an area; an interrupting one ends all else there first."""
-    from m2pem.verify.derive.containers import handler_host
+    from m2pem.verify.derive.containers import begin, handler_host
 
     container = start.container
     assert isinstance(container, e.SubProcess)
     host = handler_host(making, area, container)
+    inside = begin(making, container, host.inside)
+    entries = {at(making.net, entry, host.inside) for entry in container.entries}
     begun = Effect(
         steps=(Step(start.id, Action.TRIGGERED),),
-        produce=(at(making.net, start, host.inside),),
+        produce=(
+            at(making.net, start, host.inside),
+            *(place for place in inside.produce if place not in entries),
+        ),
     ).then(host.begin())
     assert begun is not None
     if start.interrupting:

@@ -264,32 +264,35 @@ def arm_handler(making: Making, area: Area, start: e.StartEvent) -> None:
             case TimerEventDefinition():
                 if not start.interrupting:
                     if definition.kind is TimerKind.CYCLE:
-                        net.approximate(
-                            start, Exactness.BOUNDED, "it comes again only when it has ended"
-                        )
-                        host = _host_of(making, area, start)
-                        when = when.then(Effect(inhibit=frozenset({host.active}))) or when
+                        when = when.then(_once_at_a_time(making, area, start)) or when
                     else:
                         armed = net.place(start, area, Role.CONTROL, f":armed{number}")
                         when = when.then(Effect(consume=(armed,))) or when
                 for effect in product([when], begun):
-                    net.rule(
-                        _named(effect), Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition)
-                    )
+                    net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
             case SignalEventDefinition() | MessageEventDefinition():
                 told = net.place(start, area, Role.TRIGGERED, f":told{number}")
                 what, ref = what_and_ref(definition)
                 catching(making, what, ref, area.open, told, not start.interrupting, start)
-                for effect in product([Effect(consume=(told,))], begun):
-                    net.rule(_named(effect))
+                come = Effect(steps=(Step(start.id, Action.TRIGGERED),), consume=(told,))
+                if not start.interrupting:
+                    come = come.then(_once_at_a_time(making, area, start)) or come
+                    host = _host_of(making, area, start)
+                    net.rule(
+                        Effect(
+                            steps=come.steps, consume=(told,), read=frozenset({host.active})
+                        )
+                    )
+                making.rules(product([come], begun))
             case ConditionalEventDefinition(condition=condition):
                 _handler_condition(making, area, start, condition, when, begun, number)
             case _:
                 pass
 
 
-def _named(effect: Effect) -> Effect:
-    return effect
+def _once_at_a_time(making: Making, area: Area, start: e.StartEvent) -> Effect:
+    making.net.approximate(start, Exactness.BOUNDED, "it begins again only when it has ended")
+    return Effect(inhibit=frozenset({_host_of(making, area, start).active}))
 
 
 def _host_of(making: Making, area: Area, start: e.StartEvent) -> Host:
@@ -313,8 +316,7 @@ def _handler_condition(
     if not making.data.is_followed([condition], start):
         net.approximate(start, Exactness.MORE, "its condition may become true at any time")
         if not start.interrupting:
-            host = _host_of(making, area, start)
-            when = when.then(Effect(inhibit=frozenset({host.active}))) or when
+            when = when.then(_once_at_a_time(making, area, start)) or when
         for effect in product([when], begun):
             net.rule(effect, Kind.OUTSIDE, Trigger.CONDITION)
         return
@@ -324,6 +326,8 @@ def _handler_condition(
         if truth is True:
             if not start.interrupting:
                 asked = asked.then(Effect(consume=(armed,)))
+                assert asked is not None
+                asked = asked.then(_once_at_a_time(making, area, start))
                 assert asked is not None
             making.rules(product([asked], begun))
         elif not start.interrupting and truth != ERROR:
