@@ -1,4 +1,4 @@
-"""What verification says of a mission: an answer for each property, with the runs that violate it."""
+"""What verification says of a mission: an answer a property, with the runs that violate it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

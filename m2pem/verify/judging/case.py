@@ -4,15 +4,23 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
+from m2pem.model import elements as e
+from m2pem.model.events import CompensateEventDefinition
 from m2pem.model.mission import Mission
 from m2pem.verify.explore import Exploration
 from m2pem.verify.report.stuck import Stuck, why_stuck
-from m2pem.verify.report.telling import Told, Token, encoding_of, tell, tokens_of
+from m2pem.verify.report.telling import Token, Told, encoding_of, tell, tokens_of
 from m2pem.verify.report.words import Words
 from m2pem.verify.system import Action, Rule, System
 
 MOST_ALARMS = 5
 """Told of one property; more of them say nothing new."""
+
+
+def compensates(node: e.FlowNode) -> bool:
+    """Whether an event only says how its activity is undone: it is never triggered by itself."""
+    kinds = [type(each) for each in node.definitions] if isinstance(node, e.Event) else []
+    return CompensateEventDefinition in kinds
 
 
 @dataclass

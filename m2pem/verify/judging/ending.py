@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from m2pem.model import elements as e
 from m2pem.verify.answers import Alarm
-from m2pem.verify.judging.case import MOST_ALARMS, Case
+from m2pem.verify.judging.case import MOST_ALARMS, Case, compensates
 from m2pem.verify.system import Flag, Role, Rule
 
 _FAILURES = (Flag.UNCAUGHT_FAILURE, Flag.CONFLICT)
@@ -27,20 +27,27 @@ def deadlocks(case: Case) -> Iterator[Alarm]:
 def livelocks(case: Case) -> Iterator[Alarm]:
     """Something can always happen, but never an end, as long as nothing fails."""
     ends = {*case.good, *case.stuck}
-    ends |= {at for rule, at in case.found.fired.items() if case.system.rules[rule].flag is Flag.UNCAUGHT}
+    ends |= {
+        at for rule, at in case.found.fired.items() if case.system.rules[rule].flag is Flag.UNCAUGHT
+    }
     hopeful = case.reaching(ends, _not_failing)
-    trapped = [n for n in range(len(case.found.states)) if n not in hopeful and n not in case.failed]
+    trapped = [
+        n for n in range(len(case.found.states)) if n not in hopeful and n not in case.failed
+    ]
     for number in trapped:
         loop = _circle(case, number)
         if loop:
             elements = tuple(
                 dict.fromkeys(
-                    case.system.rules[each].element for each in loop if case.system.rules[each].steps
+                    case.system.rules[each].element
+                    for each in loop
+                    if case.system.rules[each].steps
                 )
             )
             tasks = [each for each in elements if isinstance(_node(case, each), e.Activity)]
+            names = case.words.all_of(tasks or elements)
             yield Alarm(
-                f"{case.words.all_of(tasks or elements)} can go on for ever, and no end can be reached",
+                f"{names} can go on for ever, and no end can be reached",
                 elements,
                 tuple(case.found.run_to(number)),
                 loop,
@@ -56,7 +63,9 @@ def without_completion(case: Case) -> Iterator[Alarm]:
         if number not in hopeful and number not in dead_ends:
             run = tuple(case.found.run_to(number))
             told, tokens = case.story(run)
-            since = f"after step {told[-1].number} ({told[-1].text})" if told else "from the beginning"
+            since = (
+                f"after step {told[-1].number} ({told[-1].text})" if told else "from the beginning"
+            )
             yield Alarm(
                 f"{since} no good end can be reached any more",
                 tuple(dict.fromkeys([*(token.flow or token.element for token in tokens)])),
@@ -109,6 +118,7 @@ def dead(case: Case) -> Iterator[Alarm]:
     for node in case.mission.nodes:
         if (
             isinstance(node, e.BoundaryEvent)
+            and not compensates(node)
             and node.id in case.unreached
             and node.attached_to.id in case.reached
         ):
@@ -155,8 +165,8 @@ def _circle(case: Case, start: int) -> tuple[int, ...]:
             if after == start:
                 rules = [rule]
                 while number != start:
-                    number, rule = came[number]
-                    rules.append(rule)
+                    number, before = came[number]
+                    rules.append(before)
                 return tuple(reversed(rules))
             if after not in came:
                 came[after] = (number, rule)

@@ -1,10 +1,11 @@
-"""Properties that a single step violates: a resource wanted twice, an error that nothing catches."""
+"""Properties that one step violates: a resource wanted twice, an error that nothing catches."""
 
 from collections.abc import Iterable, Iterator
 
 from m2pem.model import elements as e
+from m2pem.model.events import SignalEventDefinition
 from m2pem.verify.answers import Alarm
-from m2pem.verify.judging.case import MOST_ALARMS, Case
+from m2pem.verify.judging.case import MOST_ALARMS, Case, compensates
 from m2pem.verify.system import Flag, Rule
 
 _NO_FLOW = "NO_FLOW"
@@ -68,8 +69,9 @@ def unanswered(case: Case) -> Iterator[Alarm]:
 def failures(case: Case) -> Iterator[Alarm]:
     """A behavior, service or prompt may fail, and nothing catches that."""
     for rule, run in _runs(case, Flag.UNCAUGHT_FAILURE):
+        name = case.words.name(rule.element)
         yield Alarm(
-            f"when {case.words.name(rule.element)} fails, nothing catches it, and the mission fails",
+            f"when {name} fails, nothing catches it, and the mission fails",
             (rule.element,),
             run,
             reason=rule.flagged,
@@ -86,17 +88,33 @@ def unheard(case: Case) -> Iterator[Alarm]:
             run,
             reason=rule.flagged,
         )
+    yield from _signals_to_nobody(case)
     for node in case.mission.nodes:
         waits = isinstance(node, e.BoundaryEvent | e.IntermediateCatchEvent) and node.definitions
-        if not waits or node.id not in case.unreached:
+        if not waits or compensates(node) or node.id not in case.unreached:
             continue
         host = node.attached_to.id if isinstance(node, e.BoundaryEvent) else ""
         if host and host in case.unreached:
             continue
         if host or all(flow.id not in case.unreached for flow in node.incoming):
-            yield Alarm(
-                f"{case.words.with_id(node.id)} waits for what can never come", (node.id,)
-            )
+            yield Alarm(f"{case.words.with_id(node.id)} waits for what can never come", (node.id,))
+
+
+def _signals_to_nobody(case: Case) -> Iterator[Alarm]:
+    """Signals that tokens throw and no element of the file catches."""
+    events = [node for node in case.mission.nodes if isinstance(node, e.Event)]
+    throwing = [node for node in events if isinstance(node, e.EndEvent | e.IntermediateThrowEvent)]
+    caught = {ref for node in events if node not in throwing for ref in _signals(node)}
+    for node in throwing:
+        for ref in _signals(node):
+            if ref not in caught and node.id in case.reached:
+                thrown = case.words.thrown(ref)
+                name = case.words.with_id(node.id)
+                yield Alarm(f"{name} throws {thrown}, which nobody can catch", (node.id,))
+
+
+def _signals(node: e.Event) -> list[str]:
+    return [d.signal.id for d in node.definitions if isinstance(d, SignalEventDefinition)]
 
 
 def _runs(case: Case, flag: Flag) -> Iterator[tuple[Rule, tuple[int, ...]]]:

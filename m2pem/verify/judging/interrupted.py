@@ -1,23 +1,36 @@
 """Every vehicle that is interrupted is commanded again: the model says what it does next."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from m2pem.verify.answers import Alarm
 from m2pem.verify.judging.case import Case
 from m2pem.verify.system import Trigger
 
+_PAYLOAD = "/"  # in the id of a resource: of a vehicle
 _OWN_ENDS = (Trigger.SUCCEEDS, Trigger.FAILS)
 
 
 def abandoned(case: Case) -> Iterator[Alarm]:
-    """A vehicle's task is interrupted, and a good end is reached without commanding it again."""
+    """A vehicle's task is interrupted, and a good end is reached without commanding it again.
+
+    A payload that is not told anything stands still, and is no danger: it is left out.
+    """
     resources = sorted({each for place in case.system.places for each in place.resources})
+    found: dict[tuple[str, ...], list[Alarm]] = {}
     for resource in resources:
+        if _PAYLOAD in resource:
+            continue
         holding = {p.index for p in case.system.places if resource in p.resources}
         held = [bool(holding & case.places(n)) for n in range(len(case.found.states))]
         alarm = _of(case, resource, held)
         if alarm is not None:
-            yield alarm
+            found.setdefault(alarm.elements, []).append(alarm)
+    for together in found.values():
+        first = together[0]
+        names = [each.reason for each in together]
+        who = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
+        yield replace(first, text=f"{first.text} {who} what to do then", reason=", ".join(names))
 
 
 def _of(case: Case, resource: str, held: list[bool]) -> Alarm | None:
@@ -63,8 +76,7 @@ def _alarm(
     ]
     run = (*case.found.run_to(number), *reversed(rules))
     return Alarm(
-        f"{case.words.name(by)} interrupts {case.words.all_of(tasks)}, and nothing tells {resource} "
-        "what to do then",
+        f"{case.words.name(by)} interrupts {case.words.all_of(tasks)}, and nothing tells",
         (*dict.fromkeys(tasks), by),
         run,
         reason=resource,

@@ -23,7 +23,10 @@ PROPERTIES: dict[str, tuple[str, Judge]] = {
     "errors_caught": ("every error of the model is caught", flagged.uncaught),
     "decisions_handled": ("every decision has a flow", flagged.unanswered),
     "everything_heard": ("what is thrown can be caught, and the other way round", flagged.unheard),
-    "failures_caught": ("every failure of a vehicle, service or prompt is caught", flagged.failures),
+    "failures_caught": (
+        "every failure of a vehicle, service or prompt is caught",
+        flagged.failures,
+    ),
 }
 """By name, what each says and who judges it."""
 
@@ -38,9 +41,7 @@ def judge(mission: Mission, system: System, found: Exploration) -> Answers:
     """Answers for all properties, from a search without reduction that kept its steps."""
     case = Case(mission, system, found)
     stopped = found.stopped.value if found.stopped is not None else ""
-    answers = [
-        _answer(name, says, ask, case, stopped) for name, (says, ask) in PROPERTIES.items()
-    ]
+    answers = [_answer(name, says, ask, case, stopped) for name, (says, ask) in PROPERTIES.items()]
     coverage = Coverage(len(found.states), found.transitions, found.seconds, stopped)
     return Answers(answers, coverage, frozenset() if stopped else case.unreached)
 

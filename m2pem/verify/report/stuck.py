@@ -96,7 +96,7 @@ def _source(words: Words, flow: str) -> str:
 
 
 def _reason(words: Words, story: Sequence[Told], flow: str) -> str:
-    """What happened upstream of a flow that no token came by: the nearest of it, told as a cause."""
+    """What happened upstream of a flow that no token came by: the nearest, told as a cause."""
     start = words.mission.elements[flow]
     assert isinstance(start, e.SequenceFlow)
     seen: set[str] = set()

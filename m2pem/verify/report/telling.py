@@ -131,9 +131,7 @@ def _same_step(rule: Rule, following: Rule) -> bool:
     return again and following.trigger is None
 
 
-def _told(
-    number: int, rules: Sequence[Rule], words: Words, encoding: Encoding, state: int
-) -> Told:
+def _told(number: int, rules: Sequence[Rule], words: Words, encoding: Encoding, state: int) -> Told:
     rule = next((each for each in rules if each.trigger is not None), rules[-1])
     actions = tuple(dict.fromkeys(step for each in rules for step in each.steps))
     element = next(each for each in rules if each.steps).element

@@ -1,10 +1,10 @@
 """Calls elements of a mission what their author calls them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from m2pem.model import elements as e
 from m2pem.model.behavior import Behavior
-from m2pem.model.events import Error
+from m2pem.model.events import RootElement
 from m2pem.model.mission import Mission
 
 
@@ -40,7 +40,7 @@ class Words:
     def thrown(self, ref: str) -> str:
         """A signal, message, error or escalation, by its id or code."""
         mission = self.mission
-        groups = (
+        groups: tuple[tuple[str, Mapping[str, RootElement]], ...] = (
             ("signal", mission.signals),
             ("message", mission.messages),
             ("escalation", mission.escalations),
@@ -49,10 +49,12 @@ class Words:
         for what, known in groups:
             if ref in known:
                 return f"the {what} '{_one_line(known[ref].name) or ref}'"
-        for root in (*mission.errors.values(), *mission.escalations.values()):
-            if root.code == ref:
-                what = "error" if isinstance(root, Error) else "escalation"
-                return f"the {what} '{_one_line(root.name) or ref}'"
+        for error in mission.errors.values():
+            if error.code == ref:
+                return f"the error '{_one_line(error.name) or ref}'"
+        for escalation in mission.escalations.values():
+            if escalation.code == ref:
+                return f"the escalation '{_one_line(escalation.name) or ref}'"
         return f"'{ref}'" if ref else ""
 
     def behavior(self, element: str) -> str:

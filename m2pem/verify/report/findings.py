@@ -1,0 +1,89 @@
+"""Everything that a report says, worked out once, whatever it is written as."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from m2pem.drawing import Marks
+from m2pem.model.mission import Mission
+from m2pem.verify.answers import Alarm, Answer, Answers, Verdict
+from m2pem.verify.report.stuck import why_stuck
+from m2pem.verify.report.telling import Token, Told, encoding_of, tell, tokens_of
+from m2pem.verify.report.words import Words
+from m2pem.verify.system import System
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """One way in which a property is violated, with its run told.
+
+    `story`: the run; `loop`: what can then follow again and again. `tokens`: where they are at
+    the end. `missing`: flows by which a token is waited for that never comes.
+    """
+
+    answer: Answer
+    alarm: Alarm
+    story: tuple[Told, ...]
+    loop: tuple[Told, ...]
+    tokens: tuple[Token, ...]
+    missing: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What was found about a mission. `violations`: those that count, then warnings."""
+
+    mission: Mission
+    system: System
+    answers: Answers
+    violations: tuple[Violation, ...]
+    strict: bool = False
+
+    def counts(self, answer: Answer) -> bool:
+        """Whether a violation of this property is one, and not a warning."""
+        return self.strict or not answer.warning
+
+    @property
+    def exit_status(self) -> int:
+        """Of the command line."""
+        return self.answers.exit_status(strict=self.strict)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Of the mission as a whole."""
+        by_status = {0: Verdict.HOLDS, 1: Verdict.VIOLATED, 3: Verdict.UNDECIDED}
+        return by_status[self.exit_status]
+
+
+def findings_of(
+    mission: Mission, system: System, answers: Answers, *, strict: bool = False
+) -> Findings:
+    """Tells the runs of all that is violated."""
+    words = Words(mission)
+    told = [
+        _told(system, words, answer, alarm) for answer in answers.answers for alarm in answer.alarms
+    ]
+    told.sort(key=lambda each: each.answer.warning)
+    return Findings(mission, system, answers, tuple(told), strict)
+
+
+def marks_of(violation: Violation, unreached: frozenset[str] = frozenset()) -> Marks:
+    """What a drawing shows of it."""
+    steps: Sequence[Sequence[str]] = [told.passes for told in (*violation.story, *violation.loop)]
+    wrong = dict.fromkeys(violation.alarm.elements, violation.alarm.text)
+    waiting = {
+        token.flow or token.element: f"{token.count} token{'s' if token.count > 1 else ''} here"
+        for token in violation.tokens
+        if token.element not in wrong and not token.flow
+    }
+    return Marks(steps, wrong, waiting, frozenset(violation.missing), unreached)
+
+
+def _told(system: System, words: Words, answer: Answer, alarm: Alarm) -> Violation:
+    if not alarm.run and not alarm.loop:
+        return Violation(answer, alarm, (), (), ())
+    story, state = tell(system, words, alarm.run)
+    loop, state = tell(system, words, alarm.loop, begin=len(story), at=state)
+    tokens = tokens_of(encoding_of(system), state)
+    stuck = why_stuck(words, story, tokens) if answer.property == "no_deadlock" else []
+    missing = tuple(flow for each in stuck for flow in each.missing)
+    return Violation(answer, alarm, story, loop, tokens, missing)

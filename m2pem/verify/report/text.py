@@ -1,0 +1,94 @@
+"""The report for a terminal: a line a property, then each violation with its run."""
+
+from collections.abc import Callable, Iterator
+
+from m2pem.verify.answers import Answer, Coverage, Verdict
+from m2pem.verify.report.findings import Findings, Violation
+from m2pem.verify.report.telling import Told
+
+Paint = Callable[[str, str], str]
+"""A text in a colour (`green`, `red`, `yellow`, `cyan`)."""
+
+_MARK = {Verdict.HOLDS: ("holds", "green"), Verdict.UNDECIDED: ("undecided", "yellow")}
+_MOST_STEPS = 40
+"""Of a run; the beginning of a longer one is left out."""
+
+
+def as_text(findings: Findings, paint: Paint = lambda text, _: text) -> str:
+    """The whole report."""
+    lines = [*_properties(findings, paint)]
+    for violation in findings.violations:
+        if violation.answer.warning and not findings.strict:
+            continue
+        lines += ["", *_violation(violation, paint)]
+    warnings = [v for v in findings.violations if v.answer.warning and not findings.strict]
+    if warnings:
+        lines.append("")
+        lines += [f"{paint('warning', 'yellow')}: {_shown(v.alarm.text)}" for v in warnings]
+    lines += ["", _summary(findings, paint)]
+    return "\n".join(lines)
+
+
+def _properties(findings: Findings, paint: Paint) -> Iterator[str]:
+    width = max(len(answer.property) for answer in findings.answers.answers)
+    for answer in findings.answers.answers:
+        word, colour = _verdict(findings, answer)
+        note = f" ({answer.note})" if answer.note else ""
+        yield f"{paint(f'{word:<9}', colour)}  {answer.property:<{width}}  {answer.says}{note}"
+
+
+def _verdict(findings: Findings, answer: Answer) -> tuple[str, str]:
+    if answer.verdict is Verdict.VIOLATED:
+        return ("violated", "red") if findings.counts(answer) else ("warning", "yellow")
+    return _MARK[answer.verdict]
+
+
+def _violation(violation: Violation, paint: Paint) -> Iterator[str]:
+    yield f"{paint(violation.answer.property, 'red')}: {_shown(violation.alarm.text)}"
+    if violation.alarm.elements:
+        yield f"  at {_shown(', '.join(violation.alarm.elements))}"
+    if violation.story or violation.loop:
+        yield "  the run:"
+        yield from _steps(violation.story)
+    if violation.loop:
+        yield "  and then, again and again:"
+        yield from _steps(violation.loop)
+
+
+def _steps(story: tuple[Told, ...]) -> Iterator[str]:
+    if len(story) > _MOST_STEPS:
+        yield f"       ... {len(story) - _MOST_STEPS} steps before"
+    for told in story[-_MOST_STEPS:]:
+        yield f"  {told.number:>4}. {_shown(told.text)}"
+
+
+def _shown(text: str) -> str:
+    """Without what would steer a terminal: names come from strangers' files."""
+    return "".join(each if each.isprintable() else "?" for each in text)
+
+
+def covered(coverage: Coverage) -> str:
+    """How much was searched."""
+    found = f"{coverage.states:,} states and {coverage.transitions:,} steps"
+    took = f"in {coverage.seconds * 1000:.0f} ms"
+    if coverage.stopped:
+        return f"{found} were searched {took}; then {coverage.stopped} ended the search"
+    return f"{found}, all that there are, were searched {took}"
+
+
+def _summary(findings: Findings, paint: Paint) -> str:
+    verdict = findings.verdict
+    colour = {"holds": "green", "violated": "red", "undecided": "yellow"}[verdict.value]
+    said = {
+        Verdict.HOLDS: "everything holds",
+        Verdict.VIOLATED: "violated",
+        Verdict.UNDECIDED: "undecided",
+    }[verdict]
+    process = findings.system.process
+    summary = f"{_shown(findings.mission.file)}: {process}: {paint(said, colour)}"
+    text = f"{summary}; {covered(findings.answers.coverage)}"
+    rough = len(findings.system.approximations)
+    if rough:
+        places = "place" if rough == 1 else "places"
+        text += f"; at {rough} {places} the rules are not exactly the mission (see --report)"
+    return text
