@@ -133,7 +133,7 @@ def _findings(
     system = derive(mission, fleet, process=process, options=options)
     with _progress() as show:
         found = explore(system, limits, progress=show)
-    return findings_of(mission, system, judge(mission, system, found), strict=strict)
+    return findings_of(mission, system, judge(mission, system, found), strict=strict, given=data)
 
 
 @contextmanager

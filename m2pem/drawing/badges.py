@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from m2pem.drawing.ink import PAPER, Ink
+from m2pem.drawing.ink import PAPER, WAITS, Ink
 from m2pem.drawing.lines import along
 from m2pem.drawing.marks import Marks, numbered
 from m2pem.drawing.picture import Bounds, Point, Shape
@@ -14,6 +14,7 @@ _HEIGHT = 16.0
 _TOKEN = 6.0
 _ON_LINES = (0.45, 0.3, 0.6, 0.75, 0.15)
 """Where on a flow a number may stand, as parts of its length, the best first."""
+_WAITING_ON_LINE = 0.85
 _AT_SHAPES = ((0.0, 0.0), (0.0, 1.0), (0.25, 0.0), (0.0, 0.4))
 """Where at a symbol, as parts of its width and height."""
 
@@ -30,12 +31,13 @@ class Badges:
     ) -> None:
         """All of them."""
         inks = marks.inks()
-        for name in [*marks.stuck, *marks.waiting]:
+        for name in marks.tokens:
+            ink = inks.get(name, WAITS)
             if name in shapes:
                 box = shapes[name].bounds
-                self._token((box.right - box.width * 0.08, box.y + 2), inks[name])
+                self._token((box.right - box.width * 0.08, box.y + 2), ink)
             elif name in points:
-                self._token(along(points[name], 0.85), inks[name])
+                self._token(along(points[name], _WAITING_ON_LINE), ink)
         for name, steps in marks.numbers().items():
             if name in shapes:
                 box = shapes[name].bounds

@@ -1,6 +1,7 @@
 """Draws the names that stand beside symbols and lines, and says where they are."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from m2pem.drawing.ink import PAPER, Ink
 from m2pem.drawing.lines import along
@@ -10,6 +11,7 @@ from m2pem.drawing.text import LINE_HEIGHT, width_of, wrapped
 
 SIZE = 11
 _WIDTH = 90.0
+_LEAST_ROOM = 24.0
 _BESIDE = (
     "Event",
     "Gateway",
@@ -40,19 +42,30 @@ def draw_label(to: Group, shape: Shape, ink: Ink) -> Bounds:
 
 
 def draw_line_label(to: Group, line: Line, points: Sequence[Point], ink: Ink) -> Bounds:
-    """A flow's name: where the diagram says, else above its first part that has room for it."""
+    """A flow's name: where the diagram says, else above its last level part."""
     if line.label is not None:
         width = max(line.label.width + 10, _WIDTH)
         return _put(to, line.name, (line.label.centre[0], line.label.y), width, ink)
-    start, end = points[0], points[1]
+    start, end = _level_part(points)
     if abs(start[0] - end[0]) >= abs(start[1] - end[1]):
         width = min(_WIDTH, max(abs(start[0] - end[0]) - 10, 40.0))
         lines = wrapped(line.name, width, SIZE)
-        x, y = (start[0] + end[0]) / 2, start[1] - 5 - len(lines) * SIZE * LINE_HEIGHT
+        x, y = (
+            (start[0] + end[0]) / 2,
+            (start[1] + end[1]) / 2 - 5 - len(lines) * SIZE * LINE_HEIGHT,
+        )
         return _put(to, line.name, (x, y), width, ink)
     x, y = along(points[:2], 0.5)
     half = min(width_of(line.name, SIZE), _WIDTH) / 2
     return _put(to, line.name, (x + half + 5, y - SIZE / 2), _WIDTH, ink)
+
+
+def _level_part(points: Sequence[Point]) -> tuple[Point, Point]:
+    """The last part that is level and has room; of flows that begin together, those differ."""
+    for start, end in reversed([*pairwise(points)]):
+        if start[1] == end[1] and abs(start[0] - end[0]) >= _LEAST_ROOM:
+            return start, end
+    return points[0], points[1]
 
 
 def _put(to: Group, text: str, top: Point, width: float, ink: Ink) -> Bounds:

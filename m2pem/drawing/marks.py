@@ -13,13 +13,15 @@ class Marks:
 
     `steps`: by step of a run, numbered from 1, what it passes; the number stands at the first of
     them. `stuck`: where something is wrong, and `waiting`: where else a token stands at the end,
-    both with a reason that is shown as a tooltip. `missing`: flows on which a token is waited for
+    both with a reason that is shown as a tooltip. `tokens`: where a token is
+    drawn. `missing`: flows on which a token is waited for
     that never comes. `unreached`: what no run gets to.
     """
 
     steps: Sequence[Sequence[str]] = ()
     stuck: Mapping[str, str] = field(default_factory=dict)
     waiting: Mapping[str, str] = field(default_factory=dict)
+    tokens: frozenset[str] = frozenset()
     missing: frozenset[str] = frozenset()
     unreached: frozenset[str] = frozenset()
 
@@ -42,6 +44,7 @@ class Marks:
             [list(dict.fromkeys(at(name) for name in step)) for step in self.steps],
             moved(self.stuck),
             moved(self.waiting),
+            frozenset(at(name) for name in self.tokens),
             self.missing & drawn,
             self.unreached & drawn,
         )

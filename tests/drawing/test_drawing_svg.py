@@ -76,7 +76,14 @@ def test_what_is_stuck_is_red_and_says_why() -> None:
 
 
 def test_other_tokens_and_what_is_never_reached_look_different() -> None:
-    shown = groups(draw(fork(), Marks(waiting={"A": "works"}, unreached=frozenset({"E", "f6"}))))
+    shown = groups(
+        draw(
+            fork(),
+            Marks(
+                waiting={"A": "works"}, tokens=frozenset({"A"}), unreached=frozenset({"E", "f6"})
+            ),
+        )
+    )
     assert WAITING in strokes(shown["A"])
     assert FAINT in strokes(shown["E"])
     assert FAINT in strokes(shown["f6"])

@@ -87,6 +87,18 @@ class Case:
         """What tokens wait for after a run, and why it does not come."""
         return why_stuck(self.words, *self.story(run))
 
+    def run_through(self, element: str) -> tuple[int, ...]:
+        """A run whose last rule is the first one to take a step at an element; () for none."""
+        ways = [
+            (state, rule)
+            for rule, state in self.found.fired.items()
+            if any(step.element == element for step in self.system.rules[rule].steps)
+        ]
+        if not ways:
+            return ()
+        state, rule = min(ways)
+        return (*self.found.run_to(state), rule)
+
     @cached_property
     def reached(self) -> frozenset[str]:
         """Elements and flows that a run gets to."""

@@ -110,7 +110,11 @@ def _signals_to_nobody(case: Case) -> Iterator[Alarm]:
             if ref not in caught and node.id in case.reached:
                 thrown = case.words.thrown(ref)
                 name = case.words.with_id(node.id)
-                yield Alarm(f"{name} throws {thrown}, which nobody can catch", (node.id,))
+                yield Alarm(
+                    f"{name} throws {thrown}, which nobody can catch",
+                    (node.id,),
+                    case.run_through(node.id),
+                )
 
 
 def _signals(node: e.Event) -> list[str]:

@@ -14,21 +14,21 @@ Judge = Callable[[Case], Iterator[Alarm]]
 PROPERTIES: dict[str, tuple[str, Judge]] = {
     "no_deadlock": ("no token is stuck", ending.deadlocks),
     "no_livelock": ("no run goes on for ever without a way to an end", ending.livelocks),
-    "can_always_complete": ("a good end can always be reached", ending.without_completion),
-    "proper_completion": ("no end is reached twice", ending.twice),
-    "one_token_per_place": ("branches are joined before they meet", ending.overfull),
-    "no_dead_element": ("every element can be reached", ending.dead),
     "exclusive_resources": ("no vehicle or payload is commanded twice at once", flagged.conflicts),
     "commanded_again": ("every interrupted vehicle is told what to do next", interrupted.abandoned),
     "errors_caught": ("every error of the model is caught", flagged.uncaught),
     "decisions_handled": ("every decision has a flow", flagged.unanswered),
+    "proper_completion": ("no end is reached twice", ending.twice),
+    "one_token_per_place": ("branches are joined before they meet", ending.overfull),
     "everything_heard": ("what is thrown can be caught, and the other way round", flagged.unheard),
+    "no_dead_element": ("every element can be reached", ending.dead),
+    "can_always_complete": ("a good end can always be reached", ending.without_completion),
     "failures_caught": (
         "every failure of a vehicle, service or prompt is caught",
         flagged.failures,
     ),
 }
-"""By name, what each says and who judges it."""
+"""By name, what each says and who judges it; causes come before what follows from them."""
 
 WARNINGS = frozenset({"failures_caught"})
 """Properties whose violations are warnings."""

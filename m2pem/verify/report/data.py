@@ -22,6 +22,7 @@ def as_data(findings: Findings) -> dict[str, Any]:
         "mission": findings.mission.file,
         "sha256": sha256(findings.mission.source).hexdigest(),
         "process": findings.system.process,
+        "data": dict(findings.given),
         "verdict": findings.verdict.value,
         "strict": findings.strict,
         "engine": coverage.engine,
@@ -78,6 +79,7 @@ def _step(told: Told) -> dict[str, Any]:
         ],
         "tokens": _tokens(told.tokens),
         "data": dict(told.data),
+        "writes": dict(told.writes),
         "rules": [*told.rules],
     }
 

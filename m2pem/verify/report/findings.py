@@ -1,10 +1,11 @@
 """Everything that a report says, worked out once, whatever it is written as."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from m2pem.drawing import Marks
 from m2pem.model.mission import Mission
+from m2pem.model.values import Value
 from m2pem.verify.answers import Alarm, Answer, Answers, Verdict
 from m2pem.verify.report.stuck import why_stuck
 from m2pem.verify.report.telling import Token, Told, encoding_of, tell, tokens_of
@@ -30,13 +31,17 @@ class Violation:
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """What was found about a mission. `violations`: those that count, then warnings."""
+    """What was found about a mission. `violations`: those that count, then warnings.
+
+    `given`: the data that the run begins with.
+    """
 
     mission: Mission
     system: System
     answers: Answers
     violations: tuple[Violation, ...]
     strict: bool = False
+    given: Mapping[str, Value] = field(default_factory=dict)
 
     def counts(self, answer: Answer) -> bool:
         """Whether a violation of this property is one, and not a warning."""
@@ -55,7 +60,12 @@ class Findings:
 
 
 def findings_of(
-    mission: Mission, system: System, answers: Answers, *, strict: bool = False
+    mission: Mission,
+    system: System,
+    answers: Answers,
+    *,
+    strict: bool = False,
+    given: Mapping[str, Value] | None = None,
 ) -> Findings:
     """Tells the runs of all that is violated."""
     words = Words(mission)
@@ -63,7 +73,7 @@ def findings_of(
         _told(system, words, answer, alarm) for answer in answers.answers for alarm in answer.alarms
     ]
     told.sort(key=lambda each: each.answer.warning)
-    return Findings(mission, system, answers, tuple(told), strict)
+    return Findings(mission, system, answers, tuple(told), strict, given or {})
 
 
 def marks_of(violation: Violation, unreached: frozenset[str] = frozenset()) -> Marks:
@@ -75,7 +85,8 @@ def marks_of(violation: Violation, unreached: frozenset[str] = frozenset()) -> M
         for token in violation.tokens
         if token.element not in wrong and not token.flow
     }
-    return Marks(steps, wrong, waiting, frozenset(violation.missing), unreached)
+    tokens = frozenset(token.flow or token.element for token in violation.tokens)
+    return Marks(steps, wrong, waiting, tokens, frozenset(violation.missing), unreached)
 
 
 def _told(system: System, words: Words, answer: Answer, alarm: Alarm) -> Violation:

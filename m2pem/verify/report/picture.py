@@ -18,7 +18,7 @@ def picture(findings: Findings, violation: Violation | None = None, *, about: st
     return draw(
         findings.mission.source,
         marks_of(violation, unreached),
-        title=f"{violation.answer.property}: {violation.answer.verdict.value}",
+        title=f"{violation.answer.verdict.value.capitalize()}: {violation.answer.says}",
         note=violation.alarm.text,
         about=about,
     )

@@ -1,15 +1,18 @@
 """A run of the rules as a story: numbered steps in the words of the diagram."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from m2pem.model import elements as e
+from m2pem.model.values import Value
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.report.words import Words
 from m2pem.verify.system import Action, Rule, Step, System, Trigger
 
 COMMANDS = "commands"
 """Detail of the step in which a task's behavior is asked for, after the task was entered."""
+_NUMBERED = re.compile(r"(#\d+|\[\d+\])$")
 _PASSED = (Action.TAKEN,)
 
 
@@ -29,6 +32,8 @@ class Told:
     `passes`: elements and flows that it passes; its number stands at the first. `element`: whose
     step it is. `rules`: those that it is made of. `trigger`: what came from outside, "" for
     nothing. `actions`: what happens to elements. `tokens`: where they are after it.
+    `data`: what names have then, with the calls that they are in before them; `writes`: what came
+    with the trigger, under the names that the mission knows.
     """
 
     number: int
@@ -40,7 +45,8 @@ class Told:
     detail: str
     actions: tuple[Step, ...]
     tokens: tuple[Token, ...]
-    data: Mapping[str, object]
+    data: Mapping[str, Value]
+    writes: Mapping[str, Value]
 
 
 def tell(
@@ -111,7 +117,7 @@ def tokens_of(encoding: Encoding, state: int) -> tuple[Token, ...]:
     return tuple(Token(element, count, flow) for (element, flow), count in found.items())
 
 
-def data_of(encoding: Encoding, state: int) -> dict[str, object]:
+def data_of(encoding: Encoding, state: int) -> dict[str, Value]:
     """What the names have that the rules know of."""
     values = encoding.marking(state).values
     return {
@@ -137,9 +143,10 @@ def _told(number: int, rules: Sequence[Rule], words: Words, encoding: Encoding, 
     element = next(each for each in rules if each.steps).element
     taken = [step.element for step in actions if step.action in _PASSED]
     others = [step.element for step in actions if step.action not in _PASSED]
+    writes = _writes(rule, words, encoding.system)
     return Told(
         number,
-        _sentence(rule, actions, words),
+        _sentence(rule, actions, words, writes),
         element,
         tuple(dict.fromkeys([*taken, *others])),
         tuple(each.index for each in rules),
@@ -148,18 +155,42 @@ def _told(number: int, rules: Sequence[Rule], words: Words, encoding: Encoding, 
         actions,
         tokens_of(encoding, state),
         data_of(encoding, state),
+        writes,
     )
+
+
+def _writes(rule: Rule, words: Words, system: System) -> dict[str, Value]:
+    """What came with a trigger."""
+    if rule.trigger is None:
+        return {}
+    return {
+        _local(words, system.variables[variable].name): system.variables[variable].values[value]
+        for variable, value in rule.assign
+    }
+
+
+def _local(words: Words, name: str) -> str:
+    """A variable's name without the calls and processes that it is in."""
+    parts = name.split(".")
+    while len(parts) > 1 and _NUMBERED.sub("", parts[0]) in words.mission.elements:
+        parts = parts[1:]
+    return ".".join(parts)
 
 
 # --- sentences ------------------------------------------------------------------------------------
 
 
-def _sentence(rule: Rule, actions: Sequence[Step], words: Words) -> str:
+def _sentence(
+    rule: Rule, actions: Sequence[Step], words: Words, writes: Mapping[str, Value]
+) -> str:
     element = actions[0].element
     name = words.with_id(element)
     failed = rule.trigger is Trigger.FAILS
     if rule.trigger is not None:
         said = _from_outside(rule, name, words)
+        if rule.trigger is not Trigger.ANSWER and writes:
+            values = " and ".join(f"{key} = {value!r}" for key, value in writes.items())
+            said += f", with {values}"
     else:
         said = _internal(actions[0], actions, words)
     parts = [said, *_besides(element, actions, words, failed=failed)]
