@@ -203,10 +203,10 @@ def _write_markdown(file: Path, findings: "Findings") -> None:
 
 
 def _picture(findings: "Findings", violation: object) -> str:
-    from m2pem.verify.report.findings import Violation
+    from m2pem.verify.report.findings import Violated
     from m2pem.verify.report.picture import picture
 
-    assert violation is None or isinstance(violation, Violation)
+    assert violation is None or isinstance(violation, Violated)
     try:
         return picture(findings, violation)
     except ValueError as error:

@@ -2,48 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 
-
-class Verdict(StrEnum):
-    """What is known of a property."""
-
-    HOLDS = "holds"
-    VIOLATED = "violated"
-    UNDECIDED = "undecided"
-
-
-@dataclass(frozen=True, slots=True)
-class Alarm:
-    """One way in which a property is violated.
-
-    `text`: what is wrong, with names. `elements`: where, by id. `run`: the rules that lead there
-    (empty: it can be seen without one); with `loop`, those that can then follow again and again.
-    `reason`: a code for programs, "" if the property says it all.
-    """
-
-    text: str
-    elements: tuple[str, ...] = ()
-    run: tuple[int, ...] = ()
-    loop: tuple[int, ...] = ()
-    reason: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """What is known of one property.
-
-    `property`: its name for programs, such as `no_deadlock`; `says`: it in a sentence. `warning`:
-    its violations are warnings, unless they are told to be errors. `note`: of one that is
-    undecided, what was covered.
-    """
-
-    property: str
-    says: str
-    verdict: Verdict
-    alarms: tuple[Alarm, ...] = ()
-    warning: bool = False
-    note: str = ""
+from m2pem.verify.results import Result, Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +21,7 @@ class Coverage:
 class Answers:
     """All of it. `unreached`: elements that no run gets to."""
 
-    answers: Sequence[Answer]
+    answers: Sequence[Result]
     coverage: Coverage
     unreached: frozenset[str] = field(default_factory=frozenset)
 

@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 
 from m2pem.model import elements as e
-from m2pem.verify.answers import Alarm
 from m2pem.verify.judging.case import MOST_ALARMS, Case, compensates
+from m2pem.verify.results import Violation
 from m2pem.verify.system import Flag, Role, Rule
 
 _FAILURES = (Flag.UNCAUGHT_FAILURE, Flag.CONFLICT)
 
 
-def deadlocks(case: Case) -> Iterator[Alarm]:
+def deadlocks(case: Case) -> Iterator[Violation]:
     """Nothing can happen any more, and the run is not over."""
     seen: set[frozenset[str]] = set()
     for number in case.stuck:
@@ -21,10 +21,10 @@ def deadlocks(case: Case) -> Iterator[Alarm]:
             continue
         seen.add(where)
         text = "; ".join(each.text for each in stuck) or "nothing can happen any more"
-        yield Alarm(text, tuple(each.element for each in stuck), run)
+        yield Violation(text, tuple(each.element for each in stuck), run)
 
 
-def livelocks(case: Case) -> Iterator[Alarm]:
+def livelocks(case: Case) -> Iterator[Violation]:
     """Something can always happen, but never an end, as long as nothing fails."""
     ends = {*case.good, *case.stuck}
     ends |= {
@@ -46,7 +46,7 @@ def livelocks(case: Case) -> Iterator[Alarm]:
             )
             tasks = [each for each in elements if isinstance(_node(case, each), e.Activity)]
             names = case.words.all_of(tasks or elements)
-            yield Alarm(
+            yield Violation(
                 f"{names} can go on for ever, and no end can be reached",
                 elements,
                 tuple(case.found.run_to(number)),
@@ -55,7 +55,7 @@ def livelocks(case: Case) -> Iterator[Alarm]:
             return
 
 
-def without_completion(case: Case) -> Iterator[Alarm]:
+def without_completion(case: Case) -> Iterator[Violation]:
     """From some state no good end can be reached any more."""
     hopeful = case.reaching(case.good)
     dead_ends = {*case.failed, *case.stuck}
@@ -66,7 +66,7 @@ def without_completion(case: Case) -> Iterator[Alarm]:
             since = (
                 f"after step {told[-1].number} ({told[-1].text})" if told else "from the beginning"
             )
-            yield Alarm(
+            yield Violation(
                 f"{since} no good end can be reached any more",
                 tuple(dict.fromkeys([*(token.flow or token.element for token in tokens)])),
                 run,
@@ -74,25 +74,25 @@ def without_completion(case: Case) -> Iterator[Alarm]:
             return
 
 
-def twice(case: Case) -> Iterator[Alarm]:
+def twice(case: Case) -> Iterator[Violation]:
     """An end event is reached twice in one instance of its scope."""
     for place, run in case.found.overflow_runs.items():
         known = case.system.places[place]
         if known.role is Role.CONTROL:
-            yield Alarm(
+            yield Violation(
                 f"{case.words.name(known.element)} is reached twice in one run",
                 (known.element,),
                 run,
             )
 
 
-def overfull(case: Case) -> Iterator[Alarm]:
+def overfull(case: Case) -> Iterator[Violation]:
     """A second token comes where one is meant."""
     for place, run in case.found.overflow_runs.items():
         known = case.system.places[place]
         if known.role is not Role.CONTROL:
             more = " and more and more of them" if place in case.found.beyond else ""
-            yield Alarm(
+            yield Violation(
                 f"a second token{more} can come to {case.words.name(known.element)}: "
                 "branches that run side by side are not joined before it",
                 (known.element,),
@@ -100,7 +100,7 @@ def overfull(case: Case) -> Iterator[Alarm]:
             )
 
 
-def dead(case: Case) -> Iterator[Alarm]:
+def dead(case: Case) -> Iterator[Violation]:
     """Elements that no run gets to; told where they begin."""
     for flow in case.mission.flows:
         if flow.id not in case.unreached or flow.source.id in case.unreached:
@@ -111,7 +111,7 @@ def dead(case: Case) -> Iterator[Alarm]:
         beyond = case.words.all_of([each for each in behind if _named(case, each)])
         what = f"{beyond} can never be reached: " if beyond else ""
         source = case.words.name(flow.source.id)
-        yield Alarm(
+        yield Violation(
             f"{what}flow '{name}' out of {source} is never taken{condition}",
             (*behind, flow.id),
         )
@@ -126,7 +126,7 @@ def dead(case: Case) -> Iterator[Alarm]:
             tasks = case.words.all_of([each for each in behind if _named(case, each)])
             also = f", and {tasks} can never be reached" if tasks else ""
             name = case.words.with_id(node.id)
-            yield Alarm(f"{name} is never triggered{also}", (node.id, *behind))
+            yield Violation(f"{name} is never triggered{also}", (node.id, *behind))
 
 
 def _behind(case: Case, flow: e.SequenceFlow) -> list[str]:

@@ -4,14 +4,14 @@ from collections.abc import Iterable, Iterator
 
 from m2pem.model import elements as e
 from m2pem.model.events import SignalEventDefinition
-from m2pem.verify.answers import Alarm
 from m2pem.verify.judging.case import MOST_ALARMS, Case, compensates
+from m2pem.verify.results import Violation
 from m2pem.verify.system import Flag, Rule
 
 _NO_FLOW = "NO_FLOW"
 
 
-def conflicts(case: Case) -> Iterator[Alarm]:
+def conflicts(case: Case) -> Iterator[Violation]:
     """A task wants a vehicle or payload that another one has."""
     told: set[frozenset[str]] = set()
     for rule, run in _runs(case, Flag.CONFLICT):
@@ -26,30 +26,28 @@ def conflicts(case: Case) -> Iterator[Alarm]:
         if both in told:
             continue
         told.add(both)
-        yield Alarm(
+        yield Violation(
             f"{case.words.name(rule.element)} wants {rule.flagged} while "
             f"{case.words.all_of(who)} still has it",
             tuple(dict.fromkeys([rule.element, *who])),
             run,
-            reason=rule.flagged,
         )
 
 
-def uncaught(case: Case) -> Iterator[Alarm]:
+def uncaught(case: Case) -> Iterator[Violation]:
     """An error that the model throws leaves the process."""
     for rule, run in _runs(case, Flag.UNCAUGHT):
         if not _undecided(case, rule):
             what = case.words.thrown(rule.flagged)
             at = case.words.name(rule.element)
-            yield Alarm(
+            yield Violation(
                 f"{at} throws {what}, nothing catches it, and the mission fails",
                 (rule.element,),
                 run,
-                reason=rule.flagged,
             )
 
 
-def unanswered(case: Case) -> Iterator[Alarm]:
+def unanswered(case: Case) -> Iterator[Violation]:
     """No flow of a gateway is there for what was decided."""
     for rule, run in _runs(case, Flag.UNCAUGHT):
         if _undecided(case, rule):
@@ -57,38 +55,39 @@ def unanswered(case: Case) -> Iterator[Alarm]:
             said = [told for told in story if told.trigger == "answer"]
             asked = f", after '{said[-1].detail}' was answered at " if said else ""
             where = case.words.name(said[-1].element) if said else ""
-            yield Alarm(
+            yield Violation(
                 f"no flow out of {case.words.name(rule.element)} is true{asked}{where}, and it has "
                 "no default flow: the mission fails",
                 (rule.element,),
                 run,
-                reason=said[-1].detail if said else "",
             )
 
 
-def failures(case: Case) -> Iterator[Alarm]:
+def failures(case: Case) -> Iterator[Violation]:
     """A behavior, service or prompt may fail, and nothing catches that."""
     for rule, run in _runs(case, Flag.UNCAUGHT_FAILURE):
         name = case.words.name(rule.element)
-        yield Alarm(
+        yield Violation(
             f"when {name} fails, nothing catches it, and the mission fails",
             (rule.element,),
             run,
-            reason=rule.flagged,
         )
 
 
-def unheard(case: Case) -> Iterator[Alarm]:
-    """What is thrown reaches nobody; who waits, waits for what nobody throws."""
+def unheard(case: Case) -> Iterator[Violation]:
+    """What is thrown reaches nobody."""
     for rule, run in _runs(case, Flag.UNHEARD):
         thrown = case.words.thrown(rule.flagged)
-        yield Alarm(
+        yield Violation(
             f"{case.words.name(rule.element)} throws {thrown}, which nobody can catch",
             (rule.element,),
             run,
-            reason=rule.flagged,
         )
     yield from _signals_to_nobody(case)
+
+
+def untriggered(case: Case) -> Iterator[Violation]:
+    """What waits for something that never comes."""
     for node in case.mission.nodes:
         waits = isinstance(node, e.BoundaryEvent | e.IntermediateCatchEvent) and node.definitions
         if not waits or compensates(node) or node.id not in case.unreached:
@@ -97,10 +96,12 @@ def unheard(case: Case) -> Iterator[Alarm]:
         if host and host in case.unreached:
             continue
         if host or all(flow.id not in case.unreached for flow in node.incoming):
-            yield Alarm(f"{case.words.with_id(node.id)} waits for what can never come", (node.id,))
+            yield Violation(
+                f"{case.words.with_id(node.id)} waits for what can never come", (node.id,)
+            )
 
 
-def _signals_to_nobody(case: Case) -> Iterator[Alarm]:
+def _signals_to_nobody(case: Case) -> Iterator[Violation]:
     """Signals that tokens throw and no element of the file catches."""
     events = [node for node in case.mission.nodes if isinstance(node, e.Event)]
     throwing = [node for node in events if isinstance(node, e.EndEvent | e.IntermediateThrowEvent)]
@@ -110,7 +111,7 @@ def _signals_to_nobody(case: Case) -> Iterator[Alarm]:
             if ref not in caught and node.id in case.reached:
                 thrown = case.words.thrown(ref)
                 name = case.words.with_id(node.id)
-                yield Alarm(
+                yield Violation(
                     f"{name} throws {thrown}, which nobody can catch",
                     (node.id,),
                     case.run_through(node.id),

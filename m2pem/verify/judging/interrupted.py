@@ -3,37 +3,37 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from m2pem.verify.answers import Alarm
 from m2pem.verify.judging.case import Case
+from m2pem.verify.results import Violation
 from m2pem.verify.system import Trigger
 
 _PAYLOAD = "/"  # in the id of a resource: of a vehicle
 _OWN_ENDS = (Trigger.SUCCEEDS, Trigger.FAILS)
 
 
-def abandoned(case: Case) -> Iterator[Alarm]:
+def abandoned(case: Case) -> Iterator[Violation]:
     """A vehicle's task is interrupted, and a good end is reached without commanding it again.
 
     A payload that is not told anything stands still, and is no danger: it is left out.
     """
     resources = sorted({each for place in case.system.places for each in place.resources})
-    found: dict[tuple[str, ...], list[Alarm]] = {}
+    found: dict[tuple[str, ...], list[tuple[str, Violation]]] = {}
     for resource in resources:
         if _PAYLOAD in resource:
             continue
         holding = {p.index for p in case.system.places if resource in p.resources}
         held = [bool(holding & case.places(n)) for n in range(len(case.found.states))]
-        alarm = _of(case, resource, held)
-        if alarm is not None:
-            found.setdefault(alarm.elements, []).append(alarm)
+        violation = _of(case, resource, held)
+        if violation is not None:
+            found.setdefault(violation.elements, []).append((resource, violation))
     for together in found.values():
-        first = together[0]
-        names = [each.reason for each in together]
+        first = together[0][1]
+        names = [resource for resource, _ in together]
         who = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
-        yield replace(first, text=f"{first.text} {who} what to do then", reason=", ".join(names))
+        yield replace(first, message=f"{first.message} {who} what to do then")
 
 
-def _of(case: Case, resource: str, held: list[bool]) -> Alarm | None:
+def _of(case: Case, resource: str, held: list[bool]) -> Violation | None:
     came: dict[int, tuple[int, int]] = {}
     waiting: list[int] = []
     for number in range(len(case.found.states)):
@@ -48,7 +48,7 @@ def _of(case: Case, resource: str, held: list[bool]) -> Alarm | None:
     while waiting:
         number = waiting.pop(0)
         if number in case.good:
-            return _alarm(case, resource, number, came, first)
+            return _violation(case, resource, number, came, first)
         for rule, after in case.found.successors(number):
             if not held[after] and after not in came:
                 came[after] = (number, rule)
@@ -56,9 +56,9 @@ def _of(case: Case, resource: str, held: list[bool]) -> Alarm | None:
     return None
 
 
-def _alarm(
+def _violation(
     case: Case, resource: str, end: int, came: dict[int, tuple[int, int]], first: set[int]
-) -> Alarm:
+) -> Violation:
     rules: list[int] = []
     number = end
     while True:
@@ -75,9 +75,8 @@ def _alarm(
         if place.index in before and resource in place.resources
     ]
     run = (*case.found.run_to(number), *reversed(rules))
-    return Alarm(
+    return Violation(
         f"{case.words.name(by)} interrupts {case.words.all_of(tasks)}, and nothing tells",
         (*dict.fromkeys(tasks), by),
         run,
-        reason=resource,
     )

@@ -3,37 +3,48 @@
 from collections.abc import Callable, Iterator
 
 from m2pem.model.mission import Mission
-from m2pem.verify.answers import Alarm, Answer, Answers, Coverage, Verdict
+from m2pem.verify.answers import Answers, Coverage
 from m2pem.verify.explore import Exploration
 from m2pem.verify.judging import ending, flagged, interrupted
 from m2pem.verify.judging.case import Case
+from m2pem.verify.results import Result, Verdict, Violation
 from m2pem.verify.system import System
 
-Judge = Callable[[Case], Iterator[Alarm]]
+Judge = Callable[[Case], Iterator[Violation]]
 
 PROPERTIES: dict[str, tuple[str, Judge]] = {
-    "no_deadlock": ("no token is stuck", ending.deadlocks),
-    "no_livelock": ("no run goes on for ever without a way to an end", ending.livelocks),
-    "exclusive_resources": ("no vehicle or payload is commanded twice at once", flagged.conflicts),
-    "commanded_again": ("every interrupted vehicle is told what to do next", interrupted.abandoned),
-    "errors_caught": ("every error of the model is caught", flagged.uncaught),
-    "decisions_handled": ("every decision has a flow", flagged.unanswered),
-    "proper_completion": ("no end is reached twice", ending.twice),
-    "one_token_per_place": ("branches are joined before they meet", ending.overfull),
-    "everything_heard": ("what is thrown can be caught, and the other way round", flagged.unheard),
-    "no_dead_element": ("every element can be reached", ending.dead),
-    "can_always_complete": ("a good end can always be reached", ending.without_completion),
-    "failures_caught": (
-        "every failure of a vehicle, service or prompt is caught",
-        flagged.failures,
+    "no-deadlock": ("No token is stuck for ever.", ending.deadlocks),
+    "no-livelock": ("Nothing goes on for ever without a way out.", ending.livelocks),
+    "one-behavior": (
+        "No vehicle or payload is commanded by two behaviors at once.",
+        flagged.conflicts,
     ),
+    "commanded-again": (
+        "Every vehicle that is interrupted is commanded again.",
+        interrupted.abandoned,
+    ),
+    "errors-caught": ("Every error that the model throws is caught.", flagged.uncaught),
+    "decisions-handled": ("Every decision has a flow to take.", flagged.unanswered),
+    "proper-completion": (
+        "No end event is reached twice in one instance of its scope.",
+        ending.twice,
+    ),
+    "one-token": ("Tokens that were parted do not meet again unjoined.", ending.overfull),
+    "is-caught": (
+        "Every signal and escalation that is thrown can be caught.",
+        flagged.unheard,
+    ),
+    "can-be-triggered": ("Whatever waits can get what it waits for.", flagged.untriggered),
+    "no-dead-element": ("Every element is reached in some run.", ending.dead),
+    "can-complete": ("From everywhere, the end can be reached.", ending.without_completion),
+    "failures-handled": ("Work that may fail has an error boundary event.", flagged.failures),
 }
 """By name, what each says and who judges it; causes come before what follows from them."""
 
-WARNINGS = frozenset({"failures_caught"})
+WARNINGS = frozenset({"failures-handled"})
 """Properties whose violations are warnings."""
 
-NEED_ALL = frozenset({"no_livelock", "can_always_complete", "no_dead_element", "everything_heard"})
+NEED_ALL = frozenset({"no-livelock", "can-complete", "no-dead-element", "can-be-triggered"})
 """Properties of which nothing is known before all was searched."""
 
 
@@ -46,14 +57,14 @@ def judge(mission: Mission, system: System, found: Exploration) -> Answers:
     return Answers(answers, coverage, frozenset() if stopped else case.unreached)
 
 
-def _answer(name: str, says: str, ask: Judge, case: Case, stopped: str) -> Answer:
+def _answer(name: str, says: str, ask: Judge, case: Case, stopped: str) -> Result:
     warning = name in WARNINGS
     note = f"the search ended at {stopped}, after {len(case.found.states):,} states"
     if stopped and name in NEED_ALL:
-        return Answer(name, says, Verdict.UNDECIDED, (), warning, note)
-    alarms = tuple(ask(case))
-    if alarms:
-        return Answer(name, says, Verdict.VIOLATED, alarms, warning)
+        return Result(name, says, Verdict.UNDECIDED, (), warning, note)
+    violations = tuple(ask(case))
+    if violations:
+        return Result(name, says, Verdict.VIOLATED, violations, warning)
     if stopped:
-        return Answer(name, says, Verdict.UNDECIDED, (), warning, note)
-    return Answer(name, says, Verdict.HOLDS, (), warning)
+        return Result(name, says, Verdict.UNDECIDED, (), warning, note)
+    return Result(name, says, Verdict.HOLDS, (), warning)

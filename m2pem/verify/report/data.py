@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from hashlib import sha256
 from typing import Any
 
-from m2pem.verify.report.findings import Findings, Violation
+from m2pem.verify.report.findings import Findings, Violated
 from m2pem.verify.report.telling import Token, Told
 
 VERSION = 1
@@ -35,10 +35,10 @@ def as_data(findings: Findings) -> dict[str, Any]:
         "properties": [
             {
                 "property": answer.property,
-                "says": answer.says,
+                "says": answer.text,
                 "verdict": answer.verdict.value,
                 "warning": answer.warning,
-                "note": answer.note,
+                "note": answer.covered,
             }
             for answer in findings.answers.answers
         ],
@@ -51,13 +51,12 @@ def as_data(findings: Findings) -> dict[str, Any]:
     }
 
 
-def _violation(violation: Violation) -> dict[str, Any]:
+def _violation(violation: Violated) -> dict[str, Any]:
     return {
         "property": violation.answer.property,
         "warning": violation.answer.warning,
-        "text": violation.alarm.text,
-        "reason": violation.alarm.reason,
-        "elements": [*violation.alarm.elements],
+        "text": violation.found.message,
+        "elements": [*violation.found.elements],
         "missing": [*violation.missing],
         "steps": [_step(told) for told in violation.story],
         "loop": [_step(told) for told in violation.loop],

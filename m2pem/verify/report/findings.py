@@ -6,23 +6,24 @@ from dataclasses import dataclass, field
 from m2pem.drawing import Marks
 from m2pem.model.mission import Mission
 from m2pem.model.values import Value
-from m2pem.verify.answers import Alarm, Answer, Answers, Verdict
+from m2pem.verify.answers import Answers
 from m2pem.verify.report.stuck import why_stuck
 from m2pem.verify.report.telling import Token, Told, encoding_of, tell, tokens_of
 from m2pem.verify.report.words import Words
+from m2pem.verify.results import Result, Verdict, Violation
 from m2pem.verify.system import System
 
 
 @dataclass(frozen=True, slots=True)
-class Violation:
+class Violated:
     """One way in which a property is violated, with its run told.
 
     `story`: the run; `loop`: what can then follow again and again. `tokens`: where they are at
     the end. `missing`: flows by which a token is waited for that never comes.
     """
 
-    answer: Answer
-    alarm: Alarm
+    answer: Result
+    found: Violation
     story: tuple[Told, ...]
     loop: tuple[Told, ...]
     tokens: tuple[Token, ...]
@@ -39,11 +40,11 @@ class Findings:
     mission: Mission
     system: System
     answers: Answers
-    violations: tuple[Violation, ...]
+    violations: tuple[Violated, ...]
     strict: bool = False
     given: Mapping[str, Value] = field(default_factory=dict)
 
-    def counts(self, answer: Answer) -> bool:
+    def counts(self, answer: Result) -> bool:
         """Whether a violation of this property is one, and not a warning."""
         return self.strict or not answer.warning
 
@@ -70,16 +71,18 @@ def findings_of(
     """Tells the runs of all that is violated."""
     words = Words(mission)
     told = [
-        _told(system, words, answer, alarm) for answer in answers.answers for alarm in answer.alarms
+        _told(system, words, answer, each)
+        for answer in answers.answers
+        for each in answer.violations
     ]
     told.sort(key=lambda each: each.answer.warning)
     return Findings(mission, system, answers, tuple(told), strict, given or {})
 
 
-def marks_of(violation: Violation, unreached: frozenset[str] = frozenset()) -> Marks:
+def marks_of(violation: Violated, unreached: frozenset[str] = frozenset()) -> Marks:
     """What a drawing shows of it."""
     steps: Sequence[Sequence[str]] = [told.passes for told in (*violation.story, *violation.loop)]
-    wrong = dict.fromkeys(violation.alarm.elements, violation.alarm.text)
+    wrong = dict.fromkeys(violation.found.elements, violation.found.message)
     waiting = {
         token.flow or token.element: f"{token.count} token{'s' if token.count > 1 else ''} here"
         for token in violation.tokens
@@ -89,12 +92,12 @@ def marks_of(violation: Violation, unreached: frozenset[str] = frozenset()) -> M
     return Marks(steps, wrong, waiting, tokens, frozenset(violation.missing), unreached)
 
 
-def _told(system: System, words: Words, answer: Answer, alarm: Alarm) -> Violation:
-    if not alarm.run and not alarm.loop:
-        return Violation(answer, alarm, (), (), ())
-    story, state = tell(system, words, alarm.run)
-    loop, state = tell(system, words, alarm.loop, begin=len(story), at=state)
+def _told(system: System, words: Words, answer: Result, found: Violation) -> Violated:
+    if not found.run and not found.cycle:
+        return Violated(answer, found, (), (), ())
+    story, state = tell(system, words, found.run)
+    loop, state = tell(system, words, found.cycle, begin=len(story), at=state)
     tokens = tokens_of(encoding_of(system), state)
-    stuck = why_stuck(words, story, tokens) if answer.property == "no_deadlock" else []
+    stuck = why_stuck(words, story, tokens) if answer.property == "no-deadlock" else []
     missing = tuple(flow for each in stuck for flow in each.missing)
-    return Violation(answer, alarm, story, loop, tokens, missing)
+    return Violated(answer, found, story, loop, tokens, missing)

@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Mapping
 from xml.sax.saxutils import escape
 
-from m2pem.verify.answers import Verdict
-from m2pem.verify.report.findings import Findings, Violation
+from m2pem.verify.report.findings import Findings, Violated
 from m2pem.verify.report.telling import Told
 from m2pem.verify.report.text import covered
+from m2pem.verify.results import Verdict
 
 
 def as_markdown(findings: Findings, pictures: Mapping[int, str]) -> str:
@@ -25,8 +25,8 @@ def _lines(findings: Findings, pictures: Mapping[int, str]) -> Iterator[str]:
         verdict = answer.verdict.value
         if answer.verdict is Verdict.VIOLATED and not findings.counts(answer):
             verdict = "warning"
-        note = f" ({answer.note})" if answer.note else ""
-        yield f"| `{answer.property}` | {verdict} | {answer.says}{note} |"
+        note = f" ({answer.covered})" if answer.covered else ""
+        yield f"| `{answer.property}` | {verdict} | {answer.text}{note} |"
     for number, violation in enumerate(findings.violations):
         yield ""
         yield from _violation(violation, pictures.get(number, ""))
@@ -39,14 +39,14 @@ def _lines(findings: Findings, pictures: Mapping[int, str]) -> Iterator[str]:
             yield f"- `{each.element}` ({each.exactness.value}): {_plain(each.what)}"
 
 
-def _violation(violation: Violation, picture: str) -> Iterator[str]:
+def _violation(violation: Violated, picture: str) -> Iterator[str]:
     kind = "warning" if violation.answer.warning else "violated"
     yield f"## {violation.answer.property}: {kind}"
     yield ""
-    yield _plain(_sentence(violation.alarm.text))
-    if violation.alarm.elements:
+    yield _plain(_sentence(violation.found.message))
+    if violation.found.elements:
         yield ""
-        yield f"At {', '.join(f'`{each}`' for each in violation.alarm.elements)}."
+        yield f"At {', '.join(f'`{each}`' for each in violation.found.elements)}."
     if picture:
         yield ""
         yield f"![{violation.answer.property}]({picture})"

@@ -1,10 +1,10 @@
 """The diagram with what a report says marked on it."""
 
 from m2pem.drawing import Marks, draw
-from m2pem.verify.report.findings import Findings, Violation, marks_of
+from m2pem.verify.report.findings import Findings, Violated, marks_of
 
 
-def picture(findings: Findings, violation: Violation | None = None, *, about: str = "") -> str:
+def picture(findings: Findings, violation: Violated | None = None, *, about: str = "") -> str:
     """The mission's diagram as SVG: a violation, or (None) what is never reached.
 
     Raises:
@@ -18,7 +18,7 @@ def picture(findings: Findings, violation: Violation | None = None, *, about: st
     return draw(
         findings.mission.source,
         marks_of(violation, unreached),
-        title=f"{violation.answer.verdict.value.capitalize()}: {violation.answer.says}",
-        note=violation.alarm.text,
+        title=f"Violated: {violation.answer.text.rstrip('.')}",
+        note=violation.found.message,
         about=about,
     )

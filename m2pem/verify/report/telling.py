@@ -2,17 +2,19 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from m2pem.model import elements as e
 from m2pem.model.values import Value
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.report.words import Words
-from m2pem.verify.system import Action, Rule, Step, System, Trigger
+from m2pem.verify.system import Action, Kind, Rule, Step, System, Trigger
 
 COMMANDS = "commands"
 """Detail of the step in which a task's behavior is asked for, after the task was entered."""
 _NUMBERED = re.compile(r"(#\d+|\[\d+\])$")
+_SAME = -1
+"""Index of what belongs to the rule before it."""
 _PASSED = (Action.TAKEN,)
 
 
@@ -60,10 +62,11 @@ def tell(
     state = encoding.initial if at is None else at
     told: list[Told] = []
     waiting: list[Rule] = []
-    rules = [system.rules[index] for index in run]
+    rules = [part for index in run for part in _parts(system.rules[index])]
     commanded = _commanded_later(rules)
     for number, rule in enumerate(rules):
-        state, _ = encoding.fire(rule.index, state)
+        if rule.index != _SAME:
+            state, _ = encoding.fire(rule.index, state)
         if number in commanded.values():
             continue
         if number in commanded:
@@ -75,6 +78,25 @@ def tell(
             told.append(_told(begin + len(told) + 1, waiting, words, encoding, state))
             waiting = []
     return tuple(told), state
+
+
+def _parts(rule: Rule) -> list[Rule]:
+    """What of a rule are steps of their own: one that several were made one of has several."""
+    groups: list[list[Step]] = []
+    for step in rule.steps:
+        moved_on = groups and groups[-1][-1].action is Action.TAKEN
+        again = step.action in (Action.COMPLETED, Action.ENTERED)
+        if not groups or (moved_on and again):
+            groups.append([])
+        groups[-1].append(step)
+    if len(groups) < 2:
+        return [rule]
+    first = replace(rule, steps=tuple(groups[0]))
+    later = [
+        replace(rule, index=_SAME, steps=tuple(group), kind=Kind.INTERNAL, trigger=None, assign=())
+        for group in groups[1:]
+    ]
+    return [first, *later]
 
 
 def _commanded_later(rules: Sequence[Rule]) -> dict[int, int]:
@@ -149,7 +171,7 @@ def _told(number: int, rules: Sequence[Rule], words: Words, encoding: Encoding, 
         _sentence(rule, actions, words, writes),
         element,
         tuple(dict.fromkeys([*taken, *others])),
-        tuple(each.index for each in rules),
+        tuple(each.index for each in rules if each.index != _SAME),
         rule.trigger.value if rule.trigger is not None else "",
         rule.detail,
         actions,

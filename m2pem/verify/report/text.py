@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Iterator
 
-from m2pem.verify.answers import Answer, Coverage, Verdict
-from m2pem.verify.report.findings import Findings, Violation
+from m2pem.verify.answers import Coverage
+from m2pem.verify.report.findings import Findings, Violated
 from m2pem.verify.report.telling import Told
+from m2pem.verify.results import Result, Verdict
 
 Paint = Callable[[str, str], str]
 """A text in a colour (`green`, `red`, `yellow`, `cyan`)."""
@@ -24,7 +25,7 @@ def as_text(findings: Findings, paint: Paint = lambda text, _: text) -> str:
     warnings = [v for v in findings.violations if v.answer.warning and not findings.strict]
     if warnings:
         lines.append("")
-        lines += [f"{paint('warning', 'yellow')}: {_shown(v.alarm.text)}" for v in warnings]
+        lines += [f"{paint('warning', 'yellow')}: {_shown(v.found.message)}" for v in warnings]
     lines += ["", _summary(findings, paint)]
     return "\n".join(lines)
 
@@ -33,20 +34,20 @@ def _properties(findings: Findings, paint: Paint) -> Iterator[str]:
     width = max(len(answer.property) for answer in findings.answers.answers)
     for answer in findings.answers.answers:
         word, colour = _verdict(findings, answer)
-        note = f" ({answer.note})" if answer.note else ""
-        yield f"{paint(f'{word:<9}', colour)}  {answer.property:<{width}}  {answer.says}{note}"
+        note = f" ({answer.covered})" if answer.covered else ""
+        yield f"{paint(f'{word:<9}', colour)}  {answer.property:<{width}}  {answer.text}{note}"
 
 
-def _verdict(findings: Findings, answer: Answer) -> tuple[str, str]:
+def _verdict(findings: Findings, answer: Result) -> tuple[str, str]:
     if answer.verdict is Verdict.VIOLATED:
         return ("violated", "red") if findings.counts(answer) else ("warning", "yellow")
     return _MARK[answer.verdict]
 
 
-def _violation(violation: Violation, paint: Paint) -> Iterator[str]:
-    yield f"{paint(violation.answer.property, 'red')}: {_shown(violation.alarm.text)}"
-    if violation.alarm.elements:
-        yield f"  at {_shown(', '.join(violation.alarm.elements))}"
+def _violation(violation: Violated, paint: Paint) -> Iterator[str]:
+    yield f"{paint(violation.answer.property, 'red')}: {_shown(violation.found.message)}"
+    if violation.found.elements:
+        yield f"  at {_shown(', '.join(violation.found.elements))}"
     if violation.story or violation.loop:
         yield "  the run:"
         yield from _steps(violation.story)
