@@ -31,7 +31,7 @@ class Badges:
     ) -> None:
         """All of them."""
         inks = marks.inks()
-        for name in marks.tokens:
+        for name in sorted(marks.tokens):
             ink = inks.get(name, WAITS)
             if name in shapes:
                 box = shapes[name].bounds

@@ -1,0 +1,152 @@
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from m2pem.verify.answers import Answers, Coverage
+from m2pem.verify.results import Result, Verdict
+from tests.cli.conftest import Invoke
+from tests.command_line import FLEET, MISSION, REPOSITORY, CommandLine
+
+BROKEN = REPOSITORY / "docs" / "broken"
+
+
+def test_a_mission_that_holds_ends_with_0(invoke: Invoke) -> None:
+    status, out, _ = invoke("verify", MISSION, "--fleet", FLEET)
+    assert status == 0
+    assert "holds      no-deadlock" in out
+    assert "everything holds" in out
+
+
+def test_strict_makes_violations_of_warnings(invoke: Invoke) -> None:
+    assert invoke("verify", MISSION, "--fleet", FLEET, "--strict")[0] == 1
+
+
+def test_a_search_that_is_cut_short_ends_with_3_and_says_what_it_saw(invoke: Invoke) -> None:
+    mission = REPOSITORY / "missions" / "mehds_vignette_4.bpmn"
+    fleet = REPOSITORY / "fleet_configs" / "mehds.yaml"
+    status, out, _ = invoke("verify", mission, "--fleet", fleet, "--max-states", "2000")
+    assert status == 3
+    assert "undecided  no-deadlock" in out
+    assert "the limit of states" in out
+
+
+def test_a_violation_counts_more_than_what_is_undecided() -> None:
+    found = [Result("a", "A.", Verdict.UNDECIDED), Result("b", "B.", Verdict.VIOLATED)]
+    assert Answers(found, Coverage(1, 1, 0.0, "the limit of states")).exit_status() == 1
+    assert Answers(found[:1], Coverage(1, 1, 0.0, "the limit of states")).exit_status() == 3
+
+
+def test_a_mission_with_errors_is_unusable(invoke: Invoke) -> None:
+    mission = REPOSITORY / "missions" / "mehds_vignette_1.bpmn"
+    status, _, err = invoke("verify", mission, "--fleet", FLEET)
+    assert status == 2
+    assert "`m2pem check` finds errors" in err
+
+
+def test_an_unknown_process_is_unusable(invoke: Invoke) -> None:
+    status, _, err = invoke("verify", MISSION, "--process", "NOPE")
+    assert status == 2
+    assert "NOPE" in err
+
+
+def test_a_report_of_an_unknown_kind_is_refused_before_anything_is_done(invoke: Invoke) -> None:
+    status, _, err = invoke("verify", MISSION, "--report", "report.pdf")
+    assert status == 2
+    assert ".md, .json, .svg" in err
+
+
+def test_json_on_standard_output_is_the_report(invoke: Invoke) -> None:
+    status, out, _ = invoke("verify", BROKEN / "dead_task.bpmn", "--format", "json")
+    assert status == 1
+    assert json.loads(out)["verdict"] == "violated"
+
+
+def test_a_markdown_report_has_a_picture_beside_it_for_each_violation(
+    invoke: Invoke, tmp_path: Path
+) -> None:
+    invoke("verify", BROKEN / "unanswered_decision.bpmn", "--report", tmp_path / "found.md")
+    text = (tmp_path / "found.md").read_text(encoding="utf-8")
+    assert "![decisions-handled](found-1.svg)" in text
+    assert (tmp_path / "found-1.svg").read_text(encoding="utf-8").startswith("<svg")
+    assert "3. WHAT TO DO? (AskOperator): the operator answers 'nothing'" in text
+
+
+def test_names_cannot_steer_a_terminal_or_a_page(invoke: Invoke, tmp_path: Path) -> None:
+    source = (BROKEN / "dead_task.bpmn").read_text(encoding="utf-8")
+    nasty = source.replace('name="SURVEY FIELD"', 'name="&lt;b&gt;*x*&#x85;[y](z)"')
+    file = tmp_path / "nasty.bpmn"
+    file.write_text(nasty, encoding="utf-8")
+    _, out, _ = invoke("verify", file, "--report", tmp_path / "nasty.md")
+    assert "\x85" not in out
+    text = (tmp_path / "nasty.md").read_text(encoding="utf-8")
+    assert "<b>" not in text
+    assert "&lt;b&gt;\\*x\\*" in text
+
+
+def test_a_report_that_cannot_be_written_is_told(invoke: Invoke, tmp_path: Path) -> None:
+    status, _, err = invoke("verify", MISSION, "--report", tmp_path / "none" / "x.json")
+    assert status == 2
+    assert "cannot be written" in err
+
+
+@pytest.fixture
+def report(invoke: Invoke, tmp_path: Path) -> Path:
+    file = tmp_path / "report.json"
+    mission = tmp_path / "mission.bpmn"
+    shutil.copy(BROKEN / "join_fed_by_one_branch.bpmn", mission)
+    invoke("verify", mission, "--report", file)
+    return file
+
+
+def test_a_counterexample_is_played_as_records(invoke: Invoke, report: Path) -> None:
+    status, out, _ = invoke("replay", "--counterexample", report, "--format", "json")
+    assert status == 0
+    records = [json.loads(line) for line in out.splitlines()]
+    assert records[-1]["record"] == "RunEnded"
+    assert records[-1]["outcome"] == "failed"
+    assert "JoinDetection" in records[-1]["detail"]
+
+
+def test_a_counterexample_of_a_mission_that_was_changed_is_refused(
+    invoke: Invoke, report: Path
+) -> None:
+    mission = report.with_name("mission.bpmn")
+    mission.write_bytes(mission.read_bytes() + b"\n")
+    status, _, err = invoke("replay", "--counterexample", report)
+    assert status == 2
+    assert "verify it again" in err
+
+
+def test_a_run_that_the_engine_does_not_follow_ends_with_1(invoke: Invoke, report: Path) -> None:
+    told = json.loads(report.read_bytes())
+    steps = told["violations"][0]["steps"]
+    answer = next(step for step in steps if step["trigger"] == "answer")
+    answer["detail"] = "abort"
+    report.write_text(json.dumps(told), encoding="utf-8")
+    status, _, err = invoke("replay", "--counterexample", report)
+    assert status == 1
+    assert "the engine does not follow" in err
+
+
+@pytest.mark.parametrize(("text", "why"), [("[]", "no report"), ("{", "no JSON")])
+def test_a_file_that_is_no_report_is_refused(
+    invoke: Invoke, tmp_path: Path, text: str, why: str
+) -> None:
+    file = tmp_path / "x.json"
+    file.write_text(text, encoding="utf-8")
+    status, _, err = invoke("replay", "--counterexample", file)
+    assert status == 2
+    assert why in err
+
+
+def test_a_report_and_a_run_do_not_go_together(invoke: Invoke, report: Path) -> None:
+    assert invoke("replay", "r1", "--counterexample", report)[0] == 2
+    assert invoke("replay")[0] == 2
+
+
+def test_starting_it_loads_no_more_than_it_needs(m2pem: CommandLine) -> None:
+    status, out, _ = m2pem.run("verify", "--help")
+    assert status == 0
+    assert "Ctrl-C" in out
