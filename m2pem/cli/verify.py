@@ -93,7 +93,7 @@ def verify(
         if file.suffix not in KINDS:
             raise click.UsageError(f"--report {file}: end its name with {', '.join(KINDS)}")
     loaded = load_source(mission, search_path)
-    limits = Limits(states=max_states, seconds=max_seconds)
+    limits = Limits(states=max_states, seconds=max_seconds, tokens=3)
     findings = _findings(loaded, fleet_file, process, data, limits, strict=strict)
     for file in reports:
         _write(file, findings)
@@ -117,10 +117,8 @@ def _findings(
     from m2pem.cli.given import get_fleet
     from m2pem.executive.loading import findings_for, refuse_errors
     from m2pem.plugins import PluginManager
-    from m2pem.verify.derive import derive
+    from m2pem.verify.check import check
     from m2pem.verify.derive.options import Options
-    from m2pem.verify.explore import explore
-    from m2pem.verify.judging import judge
     from m2pem.verify.report.findings import findings_of
 
     plugins = PluginManager()
@@ -130,10 +128,11 @@ def _findings(
     refuse_errors(f"{mission.file} cannot be verified: `m2pem check` finds errors", wrong)
     writes = {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
     options = Options(data=data, service_writes=writes)
-    system = derive(mission, fleet, process=process, options=options)
     with _progress() as show:
-        found = explore(system, limits, progress=show)
-    return findings_of(mission, system, judge(mission, system, found), strict=strict, given=data)
+        report = check(
+            mission, fleet, process=process, options=options, limits=limits, progress=show
+        )
+    return findings_of(mission, report, strict=strict, given=data)
 
 
 @contextmanager

@@ -9,6 +9,7 @@
 is noted (`overflows`), and the search begins anew with more room for it, up to `Limits.tokens`.
 """
 
+import gc
 import time
 from array import array
 from collections.abc import Callable, Iterator, Sequence
@@ -206,17 +207,22 @@ class _Search:
         waiting: list[tuple[int, ...] | None] = [
             tuple(n for n in range(len(self.masks)) if encoding.enabled(n, encoding.initial))
         ]
+        collecting = gc.isenabled()
+        gc.disable()  # nothing here is cyclic, and looking for cycles among millions takes long
         try:
             self._loop(found, states, index, parents, via, waiting, choose, progress)
         except KeyboardInterrupt:
             found.stopped = Stopped.INTERRUPTED
+        finally:
+            if collecting:
+                gc.enable()
         if self.keep_edges:
             while len(edge_start) <= len(states):
                 edge_start.append(len(edge_rule))
         found.seconds = time.monotonic() - self.began
         return found
 
-    def _loop(
+    def _loop(  # noqa: PLR0915 (one loop, kept flat for its speed)
         self,
         found: Exploration,
         states: list[int],
@@ -232,59 +238,86 @@ class _Search:
         fired, overflows, terminals = found.fired, found.overflows, found.terminals
         edge_start, edge_rule, edge_state = found.edge_start, found.edge_rule, found.edge_state
         enabled_now, fire = encoding.enabled, encoding.fire
+        fast = [(keep, put) if plain else None for _, _, keep, put, plain in masks]
+        tests = [[(n, masks[n][0], masks[n][1], masks[n][4]) for n in each] for each in affected]
+        unfired = [True] * len(masks)
+        add_state, add_parent, add_via = states.append, parents.append, via.append
+        wait, setdefault = waiting.append, index.setdefault
+        outside = [each == 2 for each in rank]
+        transitions = 0
         at = 0
-        while at < len(states):
-            if at % _LOOK_EVERY == 0 and self._stop(found, len(states), at, progress):
-                return
+        count = len(states)
+        while at < count:
+            if at % _LOOK_EVERY == 0:
+                found.transitions = transitions
+                if self._stop(found, count, at, progress):
+                    return
             state = states[at]
             enabled = waiting[at]
             waiting[at] = None
             assert enabled is not None
             if edge_start is not None:
-                edge_start.append(len(edge_rule))  # type: ignore[arg-type]
+                edge_start.append(transitions)
             if not enabled:
                 terminals.append(at)
                 at += 1
                 continue
-            best = min([rank[n] for n in enabled])
-            usable: Sequence[int] = (
-                enabled if best == 2 else [n for n in enabled if rank[n] == best]
-            )
+            usable: Sequence[int] = enabled
+            if not all([outside[n] for n in enabled]):  # noqa: C419 (a list is faster)
+                best = min([rank[n] for n in enabled])
+                usable = [n for n in enabled if rank[n] == best]
+            whole = usable
             if choose is not None and len(usable) > 1:
                 usable = choose(state, usable)
-            for number in usable:
-                _, _, keep, put, plain = masks[number]
-                if plain:
-                    after = state & keep
-                    if after & put:
-                        after, full = fire(number, state)
-                        overflows.setdefault(full, (at, number))
+            before = transitions
+            transitions += len(usable)
+            while True:
+                fresh = False
+                for number in usable:
+                    masks_of = fast[number]
+                    if masks_of is not None:
+                        after = state & masks_of[0]
+                        put = masks_of[1]
+                        if after & put:
+                            after, full = fire(number, state)
+                            overflows.setdefault(full, (at, number))
+                        else:
+                            after |= put
                     else:
-                        after |= put
-                else:
-                    after, full = fire(number, state)
-                    if full >= 0:
-                        overflows.setdefault(full, (at, number))
-                if number not in fired:
-                    fired[number] = at
-                known = index.get(after)
-                if known is None:
-                    known = index[after] = len(states)
-                    states.append(after)
-                    parents.append(at)
-                    via.append(number)
-                    touched = affected_sets[number]
-                    new = [n for n in enabled if n not in touched]
-                    for n in affected[number]:
-                        test, need, _, _, plain = masks[n]
-                        if after & test == need and (plain or enabled_now(n, after)):
-                            new.append(n)
-                    waiting.append(tuple(new))
-                found.transitions += 1
+                        after, full = fire(number, state)
+                        if full >= 0:
+                            overflows.setdefault(full, (at, number))
+                    if unfired[number]:
+                        unfired[number] = False
+                        fired[number] = at
+                    known = setdefault(after, count)
+                    if known == count:
+                        count += 1
+                        fresh = True
+                        add_state(after)
+                        add_parent(at)
+                        add_via(number)
+                        touched = affected_sets[number]
+                        new = [n for n in enabled if n not in touched]
+                        for n, test, need, plain in tests[number]:
+                            if after & test == need and (plain or enabled_now(n, after)):
+                                new.append(n)
+                        wait(tuple(new))
+                    elif known > at:
+                        fresh = True
+                    if edge_rule is not None:
+                        edge_rule.append(number)
+                        edge_state.append(known)  # type: ignore[union-attr]
+                if fresh or len(usable) == len(whole):
+                    break
+                # Round a circle what was put off would be put off for ever: now it is tried.
                 if edge_rule is not None:
-                    edge_rule.append(number)
-                    edge_state.append(known)  # type: ignore[union-attr]
+                    del edge_rule[before:]
+                    del edge_state[before:]  # type: ignore[union-attr]
+                usable = whole
+                transitions = before + len(whole)
             at += 1
+        found.transitions = transitions
 
     def _stop(
         self,

@@ -58,8 +58,9 @@ class Follower:
         """`tokens`: room on each place."""
         self.system = system
         bits = tokens.bit_length()
-        self.encoding = Encoding(system, {p.index: bits for p in system.places if p.role not in
-                                          (Role.END,)})
+        self.encoding = Encoding(
+            system, {p.index: bits for p in system.places if p.role not in (Role.END,)}
+        )
         self._affected = affected_rules(self.encoding)
         self._outside = [r.index for r in system.rules if r.kind is Kind.OUTSIDE]
         self._joins = [r.index for r in system.rules if r.kind is Kind.JOIN]

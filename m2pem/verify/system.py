@@ -184,6 +184,8 @@ class Rule:
     flag: Flag | None = None
     flagged: str = ""
     """What the flag is about: a resource, an error's code, a signal's id."""
+    quiet: bool = False
+    """It inhibits because its scope must be empty: all of the scope's places are in `inhibit`."""
     due_us: int | None = None
     """Of a timer whose duration is written in the mission: microseconds after it is armed."""
 
@@ -197,7 +199,7 @@ class Exactness(StrEnum):
     """How the rules of an element differ from what the engine does."""
 
     MORE = "more"
-    """They can do all that the engine can, and more: what is proved holds, an alarm may be false."""
+    """They can do all that the engine can, and more: a proof holds, an alarm may be false."""
     BOUNDED = "bounded"
     """They stop short of the engine, at a bound: what is proved holds up to that bound."""
 

@@ -4,10 +4,8 @@ from hashlib import sha256
 
 from m2pem.executive.loading import load_source
 from m2pem.plugins import PluginManager
-from m2pem.verify.derive import derive
+from m2pem.verify.check import check
 from m2pem.verify.derive.options import Options
-from m2pem.verify.explore import explore
-from m2pem.verify.judging import judge
 from m2pem.verify.report.findings import findings_of
 from m2pem.verify.report.picture import picture
 from tests.broken.expected import EXPECTED, Expected
@@ -18,8 +16,7 @@ def drawn(expected: Expected) -> str:
     mission = load_source(str(expected.mission))
     plugins = PluginManager()
     writes = {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
-    system = derive(mission, options=Options(service_writes=writes))
-    findings = findings_of(mission, system, judge(mission, system, explore(system)))
+    findings = findings_of(mission, check(mission, options=Options(service_writes=writes)))
     violation = next(each for each in findings.violations if each.answer.property == expected.asked)
     hashed = sha256(expected.mission.read_bytes()).hexdigest()
     about = f"Drawn from {expected.mission.name}, SHA-256 {hashed}"

@@ -4,8 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.verify.answers import Answers, Coverage
-from m2pem.verify.results import Result, Verdict
 from tests.cli.conftest import Invoke
 from tests.command_line import FLEET, MISSION, REPOSITORY, CommandLine
 
@@ -24,18 +22,12 @@ def test_strict_makes_violations_of_warnings(invoke: Invoke) -> None:
 
 
 def test_a_search_that_is_cut_short_ends_with_3_and_says_what_it_saw(invoke: Invoke) -> None:
-    mission = REPOSITORY / "missions" / "mehds_vignette_4.bpmn"
-    fleet = REPOSITORY / "fleet_configs" / "mehds.yaml"
-    status, out, _ = invoke("verify", mission, "--fleet", fleet, "--max-states", "2000")
+    mission = REPOSITORY / "missions" / "survey_pair.bpmn"
+    fleet = REPOSITORY / "fleet_configs" / "survey_pair.yaml"
+    status, out, _ = invoke("verify", mission, "--fleet", fleet, "--max-states", "20")
     assert status == 3
     assert "undecided  no-deadlock" in out
     assert "the limit of states" in out
-
-
-def test_a_violation_counts_more_than_what_is_undecided() -> None:
-    found = [Result("a", "A.", Verdict.UNDECIDED), Result("b", "B.", Verdict.VIOLATED)]
-    assert Answers(found, Coverage(1, 1, 0.0, "the limit of states")).exit_status() == 1
-    assert Answers(found[:1], Coverage(1, 1, 0.0, "the limit of states")).exit_status() == 3
 
 
 def test_a_mission_with_errors_is_unusable(invoke: Invoke) -> None:
@@ -68,7 +60,7 @@ def test_a_markdown_report_has_a_picture_beside_it_for_each_violation(
 ) -> None:
     invoke("verify", BROKEN / "unanswered_decision.bpmn", "--report", tmp_path / "found.md")
     text = (tmp_path / "found.md").read_text(encoding="utf-8")
-    assert "![decisions-handled](found-1.svg)" in text
+    assert "![decisions-handled](found-" in text
     assert (tmp_path / "found-1.svg").read_text(encoding="utf-8").startswith("<svg")
     assert "3. WHAT TO DO? (AskOperator): the operator answers 'nothing'" in text
 

@@ -2,9 +2,12 @@
 
 from m2pem.model import elements as e
 from m2pem.model.behavior import Assignment, Behavior
-from m2pem.resources.allocation import AllocationError, allocate
+from m2pem.model.expression.expression import literal
+from m2pem.resources.units import Dimension, UnitError, quantity
 from m2pem.verify.derive import containers
+from m2pem.verify.derive.compensation import undoable, undone
 from m2pem.verify.derive.effect import Effect, product
+from m2pem.verify.derive.holding import behavior_of, held_by, resources
 from m2pem.verify.derive.leaving import leave
 from m2pem.verify.derive.loops import looped
 from m2pem.verify.derive.making import Host, Making
@@ -20,9 +23,9 @@ def activity(making: Making, node: e.FlowNode, area: Area) -> None:
     net = making.net
     inside = net.area(node, area)
     inside.several = area.several or node in making.repeated
-    active = net.place(
-        node, area, Role.ACTIVE, several=node in making.repeated, **_holding(making, node)
-    )
+    held, behavior = held_by(making, node)
+    repeated = node in making.repeated
+    active = net.place(node, area, Role.ACTIVE, several=repeated, resources=held, behavior=behavior)
     host = Host(node, area, inside, active, lambda: [])
     host.done = lambda: pass_on(making, host)
     inside.host = host
@@ -39,38 +42,15 @@ def activity(making: Making, node: e.FlowNode, area: Area) -> None:
         net.rule(effect)
 
 
-def _holding(making: Making, node: e.Activity) -> "dict[str, object]":
-    behavior = behavior_of(node)
-    if behavior is None or node.loop is not None:
-        return {}
-    held = resources(making, behavior)
-    return {"resources": held or (), "behavior": behavior.name if held else ""}
-
-
-def behavior_of(node: e.Activity) -> Behavior | None:
-    """The behavior that an activity commands."""
-    if isinstance(node, e.ScriptTask | e.ServiceTask | e.SendTask):
-        return node.behavior
-    return None
-
-
-def resources(making: Making, behavior: Behavior) -> tuple[str, ...] | None:
-    """What a behavior holds; None: the fleet lacks it."""
-    try:
-        return tuple(allocate(behavior, making.fleet).resources)
-    except AllocationError:
-        return None
-
-
 def pass_on(making: Making, host: Host) -> list[Effect]:
     """An activity is done: it leaves by its flows. Its token is taken off already."""
     node = host.node
-    undoable = making.undoable(host)
-    ways = [undoable] if undoable is not None else [Effect()]
+    noted = undoable(making, host)
+    ways = [noted] if noted is not None else [Effect()]
     for mapping in node.data_flow.outputs:
         ways = making.data.write(ways, mapping.target, None, host.outer, node)
     if node.for_compensation:
-        return product(ways, [making.undone(host)])
+        return product(ways, [undone(making, host)])
     out = leave(
         making,
         host.outer,
@@ -172,8 +152,6 @@ def contend(making: Making) -> None:
 
 
 def _hold_us(behavior: Behavior) -> int | None:
-    from m2pem.resources.units import Dimension, UnitError, quantity
-
     for parameter in behavior.parameters:
         if parameter.name == "duration" and isinstance(parameter.value, str):
             try:
@@ -211,8 +189,6 @@ def _user_task(making: Making, host: Host, node: e.UserTask) -> list[Effect]:
     assert node.prompt is not None
     prompt = node.prompt
     for decision in prompt.decisions:
-        from m2pem.model.expression.expression import literal
-
         answered = [_ended(host, host.leave())]
         answered = making.data.write(
             answered, prompt.store, literal(decision.value), host.outer, node

@@ -1,42 +1,27 @@
 """Processes, subprocesses, event subprocesses and calls: where tokens are together."""
 
 from dataclasses import replace
+from itertools import combinations
 
 from m2pem.model import elements as e
 from m2pem.model.events import CompensateEventDefinition
+from m2pem.verify.derive.areas import begin, handler_host, quiet
 from m2pem.verify.derive.compensation import forget
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
+from m2pem.verify.derive.waiting import arm_handler
 from m2pem.verify.system import Action, Exactness, Kind, Place, Role, Step, Trigger
 
 
 def build(making: Making, container: e.Container, area: Area) -> None:
     """Make the rules of all that is in a container."""
-    from m2pem.verify.derive.nodes import build_node
-
     if container.event_subprocesses:
         area.open = making.net.place(area.element, area, Role.CONTROL, ":open")
     for node in container.nodes:
-        build_node(making, node, area)
+        making.build_node(making, node, area)
     if area.open is not None:
         making.later.append(lambda: _completing(making, container, area))
-
-
-def begin(making: Making, container: e.Container, area: Area) -> Effect:
-    """A token for each of its start events."""
-    produce = [at(making.net, entry, area) for entry in container.entries]
-    if container.event_subprocesses:
-        produce.append(making.net.place(area.element, area, Role.CONTROL, ":open"))
-        from m2pem.verify.derive.waiting import armed_handlers
-
-        produce += armed_handlers(making, container, area)
-    return Effect(produce=tuple(produce))
-
-
-def quiet(area: Area) -> Effect:
-    """Only when no token is left in it."""
-    return Effect(quiet_scopes=frozenset({area.index}))
 
 
 def ends_with_its_inside(making: Making, host: Host) -> None:
@@ -47,22 +32,8 @@ def ends_with_its_inside(making: Making, host: Host) -> None:
     making.rules(product([over], host.done()))
 
 
-def handler_host(making: Making, area: Area, container: e.SubProcess) -> Host:
-    """The event subprocess of an area, as an activity in it; made when it is first asked for."""
-    place = making.net.place(container, area, Role.ACTIVE)
-    for child in area.children:
-        if child.element is container and isinstance(child.host, Host):
-            return child.host
-    inside = making.net.area(container, area)
-    host = Host(container, area, inside, place, lambda: [Effect()])
-    inside.host = host
-    return host
-
-
 def event_subprocess(making: Making, container: e.SubProcess, area: Area) -> None:
     """Its inside, and how it begins."""
-    from m2pem.verify.derive.waiting import arm_handler
-
     host = handler_host(making, area, container)
     host.inside.several = area.several or any(not s.interrupting for s in container.starts)
     if host.inside.several:
@@ -175,8 +146,6 @@ def ad_hoc(making: Making, host: Host) -> list[Effect]:
 
 
 def _some(nodes: tuple[e.FlowNode, ...]) -> list[tuple[e.FlowNode, ...]]:
-    from itertools import combinations
-
     if len(nodes) > 6:
         return [*((n,) for n in nodes), nodes]
     return [c for size in range(1, len(nodes) + 1) for c in combinations(nodes, size)]

@@ -12,11 +12,13 @@ from m2pem.model.mission import Mission
 from m2pem.resources.fleet import Fleet
 from m2pem.resources.madeup import fleet_for
 from m2pem.verify.derive.activities import contend
-from m2pem.verify.derive.containers import begin, build, choose
+from m2pem.verify.derive.areas import begin
+from m2pem.verify.derive.containers import build, choose
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.events import after, awaited
 from m2pem.verify.derive.making import Catcher, Making
 from m2pem.verify.derive.net import Area, at
+from m2pem.verify.derive.nodes import build_node
 from m2pem.verify.derive.options import Options
 from m2pem.verify.derive.throwing import (
     deliver_kept,
@@ -44,6 +46,7 @@ def derive(
     """
     root = mission.process(process)
     making = Making(mission, root, fleet or fleet_for(mission), options or Options())
+    making.build_node = build_node
     making.root = making.net.area(root, making.everything, step=root.id, frame=(root.id,))
     build(making, root, making.root)
     others = _others(making)
@@ -102,8 +105,7 @@ def _instances(making: Making, process: e.Process) -> None:
         step = f"{process.id}#{number + 1}"
         area = making.net.area(process, making.everything, step=step, frame=(process.id, step))
         build(making, process, area)
-        alive = making.net.place(process, area, Role.ENTERING, ":alive")
-        making.net.places[alive] = _control(making, alive)
+        alive = making.net.place(process, area, Role.CONTROL, ":alive")
         over = Effect(
             steps=(Step(process.id, Action.COMPLETED),),
             consume=(alive,),
@@ -115,12 +117,6 @@ def _instances(making: Making, process: e.Process) -> None:
     for start in starts:
         for definition in awaited(start):
             _begun_by(making, process, start, definition, areas)
-
-
-def _control(making: Making, place: int) -> "object":  # type: ignore[misc]
-    from dataclasses import replace
-
-    return replace(making.net.places[place], role=Role.CONTROL)
 
 
 def _triggered(entry: e.FlowNode) -> list[e.FlowNode]:
@@ -160,7 +156,6 @@ def _begun_by(
         case TimerEventDefinition() | ConditionalEventDefinition():
             timer = isinstance(definition, TimerEventDefinition)
             due = timer_us(definition) if isinstance(definition, TimerEventDefinition) else None
-            once = making.net.place(start, making.everything, Role.CONTROL, ":awaited")
             for effect in product([Effect(read=frozenset({making.running}))], ways):
                 making.net.rule(
                     effect,
@@ -168,7 +163,6 @@ def _begun_by(
                     Trigger.TIMER if timer else Trigger.CONDITION,
                     due_us=due,
                 )
-            del once
         case _:
             pass
 

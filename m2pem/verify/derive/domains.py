@@ -103,17 +103,24 @@ def tells_apart(node: t.Node) -> bool:
 
 
 def representatives(compared: Iterable[tuple[str, Value]]) -> list[tuple[Value, bool]]:
-    """A value of each kind that comparisons with these can tell apart; whether it is exact."""
+    """A value of each kind that comparisons with these can tell apart; whether it is exact.
+
+    One that is not exact stands for all that are neither equal to, nor between, those compared.
+    """
+    compared = list(compared)
     texts = {v for k, v in compared if k == "str"}
     numbers = sorted({v for k, v in compared if k in ("int", "float")})  # type: ignore[type-var]
-    found: list[tuple[Value, bool]] = [(None, True), (True, True), (False, True)]
+    found: list[tuple[Value, bool]] = []
+    for kind, value in sorted(compared, key=str):
+        if kind in ("NoneType", "bool"):
+            found.append((value, True))
+    if not texts and not numbers:
+        found = [(None, True), (True, True), (False, True)]
     found += [(text, True) for text in sorted(texts, key=str)]
     other = "something else"
     while other in texts:
         other += "!"
     found.append((other, False))
-    if any(isinstance(text, str) for text in texts):
-        found.append(("", "" in texts))
     for place, number in enumerate(numbers):
         assert isinstance(number, int | float)
         found.append((number, True))
@@ -126,8 +133,6 @@ def representatives(compared: Iterable[tuple[str, Value]]) -> list[tuple[Value, 
         assert isinstance(first, int | float)
         assert isinstance(last, int | float)
         found += [(first - 1, False), (last + 1, False)]
-    else:
-        found.append((1, False))
     return found
 
 
@@ -213,7 +218,7 @@ class Domains:
     def _results(self, write: Write) -> list[Value | Unknown]:
         if write.source is None:
             return [UNKNOWN]
-        names = [name for name in write.source.names]
+        names = list(write.source.names)
         if any(name in write.hidden or name not in self.of for name in names):
             return [UNKNOWN]
         results: list[Value | Unknown] = []

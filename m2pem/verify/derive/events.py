@@ -96,9 +96,7 @@ def _wait_for_all(making: Making, node: e.Event, area: Area, waiting: int) -> No
                 catching(making, what, ref, awaited_place, told, False, node)
             case ConditionalEventDefinition(condition=condition):
                 if making.data.is_followed([condition], node):
-                    for guard, truth in making.data.cases(
-                        [condition], area, node, lambda t: t[0]
-                    ):
+                    for guard, truth in making.data.cases([condition], area, node, lambda t: t[0]):
                         if truth is True:
                             making.rules(product([seen], [Effect(guard=guard)]))
                 else:
@@ -152,9 +150,7 @@ def _trigger(
             making.rules(product([came], ways))
 
 
-def _true_or_never(
-    making: Making, node: e.FlowNode, area: Area, ways: list[Effect]
-) -> None:
+def _true_or_never(making: Making, node: e.FlowNode, area: Area, ways: list[Effect]) -> None:
     """A condition on what nothing in the mission writes: it is true at once, or never."""
     come = _come(making, node, area, Action.TRIGGERED)
     making.rules(product([come], ways))

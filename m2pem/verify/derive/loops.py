@@ -3,11 +3,12 @@
 from collections.abc import Callable, Sequence
 
 from m2pem.errors import ExpressionError
-from m2pem.model import elements as e
 from m2pem.model.loops import InstanceBehavior, MultiInstance, StandardLoop
 from m2pem.verify.derive.data import ERROR, Truth
 from m2pem.verify.derive.effect import Effect, product
+from m2pem.verify.derive.holding import behavior_of, resources
 from m2pem.verify.derive.making import Host, Making
+from m2pem.verify.derive.throwing import throw_error
 from m2pem.verify.system import Action, Exactness, Flag, Role, Step
 
 Work = Callable[[Making, Host], list[Effect]]
@@ -47,8 +48,6 @@ def _count(loop: MultiInstance) -> int | None:
 
 def _instance(making: Making, whole: Host, number: int, several: bool = False) -> Host:
     """One instance: its token is in the area of the whole."""
-    from m2pem.verify.derive.activities import behavior_of, resources
-
     node, net = whole.node, making.net
     behavior = behavior_of(node)
     held = resources(making, behavior) if behavior is not None else None
@@ -109,8 +108,6 @@ def _rounds(making: Making, whole: Host, loop: StandardLoop, work: Work) -> list
     for guard, goes_on in _asked(making, whole, loop):
         when = Effect(guard=guard)
         if goes_on == ERROR:
-            from m2pem.verify.derive.throwing import throw_error
-
             ways = throw_error(making, whole.outer, node, whole, "EXPRESSION", Flag.UNCAUGHT)
             ways = product(
                 [
@@ -141,8 +138,6 @@ def _rounds(making: Making, whole: Host, loop: StandardLoop, work: Work) -> list
     for guard, goes_on in _asked(making, whole, loop):
         ways = [begun] if goes_on is True else whole.done()
         if goes_on == ERROR:
-            from m2pem.verify.derive.throwing import throw_error
-
             ways = throw_error(making, whole.outer, node, whole, "EXPRESSION", Flag.UNCAUGHT)
         found += product([Effect(guard=guard)], ways)
     return found

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from m2pem.model import elements as e
 from m2pem.model.mission import Mission
+from m2pem.model.reach import following
 from m2pem.resources.fleet import Fleet
 from m2pem.verify.derive.data import Data
 from m2pem.verify.derive.effect import Effect
@@ -72,6 +73,7 @@ class Making:
         self.failed = self.net.place(process, self.world, Role.END, ":failed")
         self.everything = self.net.area(process, self.world, "everything")
         self.everything.path = ()
+        self.build_node: Callable[[Making, e.FlowNode, Area], None] = _nothing
         self.signals: dict[str, list[Catcher]] = {}
         self.messages: dict[str, list[Catcher]] = {}
         self.begins: dict[tuple[str, str], list[list[Effect]]] = {}
@@ -91,18 +93,6 @@ class Making:
             produce=(place,),
         )
 
-    def undoable(self, host: Host) -> Effect | None:
-        """See `compensation.undoable`."""
-        from m2pem.verify.derive import compensation
-
-        return compensation.undoable(self, host)
-
-    def undone(self, host: Host) -> Effect:
-        """See `compensation.undone`."""
-        from m2pem.verify.derive import compensation
-
-        return compensation.undone(self, host)
-
     def reached(self, node: e.EndEvent, area: Area) -> Effect:
         """An end event is reached: twice in one instance of its scope is a finding."""
         if node not in self.again:
@@ -116,10 +106,12 @@ class Making:
             self.net.rule(effect, kind)
 
 
+def _nothing(making: Making, node: e.FlowNode, area: Area) -> None:
+    """Until it is said how nodes are built."""
+
+
 def _repeated_nodes(mission: Mission) -> frozenset[e.FlowNode]:
     """Nodes that only what does not interrupt, and can come again, leads to."""
-    from m2pem.model.reach import following
-
     begun: set[e.FlowNode] = set()
     waiting: list[e.FlowNode] = []
     for node in mission.nodes:
@@ -156,8 +148,6 @@ def _repeated_nodes(mission: Mission) -> frozenset[e.FlowNode]:
 
 def _ends_reached_again(mission: Mission) -> frozenset[e.FlowNode]:
     """End events that two tokens of one scope might come to."""
-    from m2pem.model.reach import following
-
     found: set[e.FlowNode] = set()
     for node in mission.nodes:
         if not forks(node):

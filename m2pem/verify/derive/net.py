@@ -3,7 +3,15 @@
 from collections import Counter
 from dataclasses import dataclass, field
 
-from m2pem.model.elements import Element, FlowNode, SequenceFlow
+from m2pem.model.elements import (
+    Activity,
+    ComplexGateway,
+    Element,
+    FlowNode,
+    InclusiveGateway,
+    ParallelGateway,
+    SequenceFlow,
+)
 from m2pem.verify.derive.effect import Effect
 from m2pem.verify.system import (
     Approximation,
@@ -227,14 +235,13 @@ class Net:
             draft.detail,
             effect.flag,
             effect.flagged,
+            bool(effect.quiet_scopes),
             draft.due_us,
         )
 
 
 def is_join(node: FlowNode) -> bool:
     """Whether tokens wait at it by the flow that they came by."""
-    from m2pem.model.elements import ComplexGateway, InclusiveGateway, ParallelGateway
-
     if isinstance(node, ComplexGateway):
         return True
     return isinstance(node, ParallelGateway | InclusiveGateway) and len(node.incoming) > 1
@@ -249,7 +256,5 @@ def arrival(net: Net, flow: SequenceFlow, area: Area) -> int:
 
 def at(net: Net, node: FlowNode, area: Area) -> int:
     """The place of a token that a node is to be executed on."""
-    from m2pem.model.elements import Activity
-
     many = isinstance(node, Activity) and node.start_quantity > 1
     return net.place(node, area, Role.ENTERING, several=many)

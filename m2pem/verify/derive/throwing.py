@@ -11,10 +11,11 @@ from m2pem.model.events import (
     MessageEventDefinition,
     SignalEventDefinition,
 )
+from m2pem.verify.derive.areas import begin, handler_host
 from m2pem.verify.derive.effect import Effect
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
-from m2pem.verify.system import Action, Flag, Kind, Step
+from m2pem.verify.system import Action, Flag, Kind, Role, Step
 
 Catching = TypeVar("Catching", bound=e.Event)
 
@@ -170,8 +171,6 @@ def _go_up(
 
 def begin_handler(making: Making, area: Area, start: e.StartEvent) -> list[Effect]:
     """An event subprocess begins in an area; an interrupting one ends all else there first."""
-    from m2pem.verify.derive.containers import begin, handler_host
-
     container = start.container
     assert isinstance(container, e.SubProcess)
     host = handler_host(making, area, container)
@@ -259,21 +258,16 @@ def message_effects(making: Making, message: str, *, kept: bool = True) -> list[
         return [Effect()]
     if kept:
         letter = making.net.place(
-            making.process, making.everything, _LETTER, f":{message}", several=True
+            making.process, making.everything, Role.CONTROL, f":{message}", several=True
         )
         nobody = nobody.then(Effect(produce=(letter,))) or nobody
     return [*found, nobody]
 
 
-from m2pem.verify.system import Role  # noqa: E402
-
-_LETTER = Role.CONTROL
-
-
 def deliver_kept(making: Making, message: str) -> None:
     """Who waits for a message gets one that was kept."""
     letter = making.net.place(
-        making.process, making.everything, _LETTER, f":{message}", several=True
+        making.process, making.everything, Role.CONTROL, f":{message}", several=True
     )
     for catcher in making.messages.get(message, ()):
         taken = Effect(

@@ -16,11 +16,12 @@ from m2pem.model.events import (
     TimerKind,
 )
 from m2pem.model.expression import Expression
+from m2pem.verify.derive.areas import handler_host
 from m2pem.verify.derive.data import ERROR, Truth
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.leaving import leave
 from m2pem.verify.derive.making import Catcher, Host, Making
-from m2pem.verify.derive.net import Area, at
+from m2pem.verify.derive.net import Area, at, is_join
 from m2pem.verify.derive.throwing import begin_handler, throw_error
 from m2pem.verify.system import Action, Exactness, Kind, Role, Step, Trigger
 
@@ -174,13 +175,7 @@ def handled(event: e.BoundaryEvent) -> frozenset[e.FlowNode]:
             if node not in found and all(f.source in found for f in node.incoming):
                 found.add(node)
                 waiting.append(node)
-    return frozenset(node for node in found if not _is_a_join(node))
-
-
-def _is_a_join(node: e.FlowNode) -> bool:
-    from m2pem.verify.derive.net import is_join
-
-    return is_join(node)
+    return frozenset(node for node in found if not is_join(node))
 
 
 def _boundary_condition(
@@ -234,23 +229,6 @@ def what_and_ref(definition: EventDefinition) -> tuple[str, str]:
 # --- event subprocesses -------------------------------------------------------------------------
 
 
-def armed_handlers(making: Making, container: e.Container, area: Area) -> list[int]:
-    """Places that get a token when an area begins, for its event subprocesses."""
-    armed: list[int] = []
-    for each in container.event_subprocesses:
-        for start in each.starts:
-            if start.interrupting:
-                continue
-            for number, definition in enumerate(start.definitions):
-                once = (
-                    isinstance(definition, TimerEventDefinition)
-                    and definition.kind is not TimerKind.CYCLE
-                )
-                if once or isinstance(definition, ConditionalEventDefinition):
-                    armed.append(making.net.place(start, area, Role.CONTROL, f":armed{number}"))
-    return armed
-
-
 def arm_handler(making: Making, area: Area, start: e.StartEvent) -> None:
     """What begins an event subprocess from outside of its area."""
     net = making.net
@@ -279,9 +257,7 @@ def arm_handler(making: Making, area: Area, start: e.StartEvent) -> None:
                     come = come.then(_once_at_a_time(making, area, start)) or come
                     host = _host_of(making, area, start)
                     net.rule(
-                        Effect(
-                            steps=come.steps, consume=(told,), read=frozenset({host.active})
-                        )
+                        Effect(steps=come.steps, consume=(told,), read=frozenset({host.active}))
                     )
                 making.rules(product([come], begun))
             case ConditionalEventDefinition(condition=condition):
@@ -296,8 +272,6 @@ def _once_at_a_time(making: Making, area: Area, start: e.StartEvent) -> Effect:
 
 
 def _host_of(making: Making, area: Area, start: e.StartEvent) -> Host:
-    from m2pem.verify.derive.containers import handler_host
-
     assert isinstance(start.container, e.SubProcess)
     return handler_host(making, area, start.container)
 

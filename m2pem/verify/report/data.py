@@ -16,7 +16,7 @@ VERSION = 1
 
 def as_data(findings: Findings) -> dict[str, Any]:
     """The whole report."""
-    coverage = findings.answers.coverage
+    coverage = findings.coverage
     return {
         "version": VERSION,
         "mission": findings.mission.file,
@@ -40,10 +40,10 @@ def as_data(findings: Findings) -> dict[str, Any]:
                 "warning": answer.warning,
                 "note": answer.covered,
             }
-            for answer in findings.answers.answers
+            for answer in findings.results
         ],
         "violations": [_violation(each) for each in findings.violations],
-        "unreached": sorted(findings.answers.unreached),
+        "unreached": sorted(findings.unreached),
         "approximations": [
             {"element": each.element, "exactness": each.exactness.value, "what": each.what}
             for each in findings.system.approximations

@@ -1,17 +1,24 @@
 """Everything that a report says, worked out once, whatever it is written as."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from m2pem.drawing import Marks
+from m2pem.model import elements as e
+from m2pem.model.events import CompensateEventDefinition
 from m2pem.model.mission import Mission
 from m2pem.model.values import Value
-from m2pem.verify.answers import Answers
+from m2pem.verify.check import Report
 from m2pem.verify.report.stuck import why_stuck
 from m2pem.verify.report.telling import Token, Told, encoding_of, tell, tokens_of
 from m2pem.verify.report.words import Words
 from m2pem.verify.results import Result, Verdict, Violation
-from m2pem.verify.system import System
+from m2pem.verify.system import Action, System
+
+DEADLOCK = "no-deadlock"
+INTERRUPTED = "interrupted-commanded-again"
+FOLLOWING = frozenset({"no-dead-element", "can-complete", "completes-if-fair"})
+"""Properties whose violations often follow from those of others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,16 +38,31 @@ class Violated:
 
 
 @dataclass(frozen=True, slots=True)
+class Coverage:
+    """How much was searched. `stopped`: why not all, "" if it was all."""
+
+    states: int
+    transitions: int
+    seconds: float
+    stopped: str = ""
+    engine: str = "builtin"
+
+
+@dataclass(frozen=True, slots=True)
 class Findings:
     """What was found about a mission. `violations`: those that count, then warnings.
 
-    `given`: the data that the run begins with.
+    `unreached`: what no run gets to, as far as that is known. `given`: the data that the run begins
+    with.
     """
 
     mission: Mission
     system: System
-    answers: Answers
+    results: tuple[Result, ...]
+    verdict: Verdict
+    coverage: Coverage
     violations: tuple[Violated, ...]
+    unreached: frozenset[str] = frozenset()
     strict: bool = False
     given: Mapping[str, Value] = field(default_factory=dict)
 
@@ -51,32 +73,59 @@ class Findings:
     @property
     def exit_status(self) -> int:
         """Of the command line."""
-        return self.answers.exit_status(strict=self.strict)
-
-    @property
-    def verdict(self) -> Verdict:
-        """Of the mission as a whole."""
-        by_status = {0: Verdict.HOLDS, 1: Verdict.VIOLATED, 3: Verdict.UNDECIDED}
-        return by_status[self.exit_status]
+        return {Verdict.HOLDS: 0, Verdict.VIOLATED: 1, Verdict.UNDECIDED: 3}[self.verdict]
 
 
 def findings_of(
     mission: Mission,
-    system: System,
-    answers: Answers,
+    report: Report,
     *,
     strict: bool = False,
     given: Mapping[str, Value] | None = None,
 ) -> Findings:
-    """Tells the runs of all that is violated."""
+    """Tells the runs of all that is violated: causes first, then what follows, then warnings."""
     words = Words(mission)
-    told = [
-        _told(system, words, answer, each)
-        for answer in answers.answers
-        for each in answer.violations
-    ]
-    told.sort(key=lambda each: each.answer.warning)
-    return Findings(mission, system, answers, tuple(told), strict, given or {})
+    told = []
+    for result in report.results:
+        watched = result.property == INTERRUPTED and report.watched is not None
+        system = report.watched if watched and report.watched is not None else report.system
+        told += [_told(system, words, result, each) for each in result.violations]
+    told.sort(key=lambda each: (each.answer.warning, each.answer.property in FOLLOWING))
+    found = report.found
+    stopped = found.stopped.value if found.stopped is not None else ""
+    return Findings(
+        mission,
+        report.system,
+        report.results,
+        report.judged(strict=strict),
+        Coverage(len(found.states), found.transitions, found.seconds, stopped),
+        tuple(told),
+        frozenset() if stopped else _unreached(mission, report),
+        strict,
+        given or {},
+    )
+
+
+def _unreached(mission: Mission, report: Report) -> frozenset[str]:
+    """Nodes and flows that no run gets to, of the processes that any run gets to."""
+    rules = report.system.rules
+    reached = {
+        step.element
+        for rule in report.found.fired
+        for step in rules[rule].steps
+        if step.action is not Action.INTERRUPTED
+    }
+    begun = {node.container.process.id for node in mission.nodes if node.id in reached}
+    nodes = {n.id for n in mission.nodes if n.container.process.id in begun}
+    flows = {f.id for f in mission.flows if f.source.container.process.id in begun}
+    undoing = {
+        flow
+        for node in mission.nodes
+        if isinstance(node, e.Event)
+        and any(isinstance(each, CompensateEventDefinition) for each in node.definitions)
+        for flow in (node.id,)
+    }
+    return frozenset(nodes | flows) - reached - undoing
 
 
 def marks_of(violation: Violated, unreached: frozenset[str] = frozenset()) -> Marks:
@@ -98,6 +147,8 @@ def _told(system: System, words: Words, answer: Result, found: Violation) -> Vio
     story, state = tell(system, words, found.run)
     loop, state = tell(system, words, found.cycle, begin=len(story), at=state)
     tokens = tokens_of(encoding_of(system), state)
-    stuck = why_stuck(words, story, tokens) if answer.property == "no-deadlock" else []
+    stuck = why_stuck(words, story, tokens) if answer.property == DEADLOCK else []
     missing = tuple(flow for each in stuck for flow in each.missing)
+    if stuck:
+        found = replace(found, message="; ".join(each.text for each in stuck))
     return Violated(answer, found, story, loop, tokens, missing)

@@ -17,11 +17,11 @@ def as_markdown(findings: Findings, pictures: Mapping[int, str]) -> str:
 def _lines(findings: Findings, pictures: Mapping[int, str]) -> Iterator[str]:
     yield f"# {_plain(findings.mission.file)}: {findings.verdict.value}"
     yield ""
-    yield f"Process `{findings.system.process}`. {_sentence(covered(findings.answers.coverage))}"
+    yield f"Process `{findings.system.process}`. {_sentence(covered(findings.coverage))}"
     yield ""
     yield "| property | verdict | what it says |"
     yield "|---|---|---|"
-    for answer in findings.answers.answers:
+    for answer in findings.results:
         verdict = answer.verdict.value
         if answer.verdict is Verdict.VIOLATED and not findings.counts(answer):
             verdict = "warning"

@@ -10,7 +10,7 @@ def picture(findings: Findings, violation: Violated | None = None, *, about: str
     Raises:
         ValueError: the file has no diagram, and cannot be laid out.
     """
-    unreached = findings.answers.unreached
+    unreached = findings.unreached
     if violation is None:
         marks = Marks(unreached=unreached)
         title = f"{findings.mission.file}: {findings.verdict.value}"

@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Iterator
 
-from m2pem.verify.answers import Coverage
-from m2pem.verify.report.findings import Findings, Violated
+from m2pem.verify.report.findings import Coverage, Findings, Violated
 from m2pem.verify.report.telling import Told
 from m2pem.verify.results import Result, Verdict
 
@@ -31,8 +30,8 @@ def as_text(findings: Findings, paint: Paint = lambda text, _: text) -> str:
 
 
 def _properties(findings: Findings, paint: Paint) -> Iterator[str]:
-    width = max(len(answer.property) for answer in findings.answers.answers)
-    for answer in findings.answers.answers:
+    width = max(len(answer.property) for answer in findings.results)
+    for answer in findings.results:
         word, colour = _verdict(findings, answer)
         note = f" ({answer.covered})" if answer.covered else ""
         yield f"{paint(f'{word:<9}', colour)}  {answer.property:<{width}}  {answer.text}{note}"
@@ -87,7 +86,7 @@ def _summary(findings: Findings, paint: Paint) -> str:
     }[verdict]
     process = findings.system.process
     summary = f"{_shown(findings.mission.file)}: {process}: {paint(said, colour)}"
-    text = f"{summary}; {covered(findings.answers.coverage)}"
+    text = f"{summary}; {covered(findings.coverage)}"
     rough = len(findings.system.approximations)
     if rough:
         places = "place" if rough == 1 else "places"
