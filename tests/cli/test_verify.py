@@ -21,13 +21,31 @@ def test_strict_makes_violations_of_warnings(invoke: Invoke) -> None:
     assert invoke("verify", MISSION, "--fleet", FLEET, "--strict")[0] == 1
 
 
-def test_a_search_that_is_cut_short_ends_with_3_and_says_what_it_saw(invoke: Invoke) -> None:
-    mission = REPOSITORY / "missions" / "survey_pair.bpmn"
-    fleet = REPOSITORY / "fleet_configs" / "survey_pair.yaml"
-    status, out, _ = invoke("verify", mission, "--fleet", fleet, "--max-states", "20")
+def wide(branches: int) -> str:
+    """A mission that asks many operators at once: 3^branches states."""
+    tasks = "".join(
+        f'<userTask id="Ask{n}"><extensionElements><m2pem:prompt>Go?</m2pem:prompt>'
+        f'<m2pem:decision value="go"/></extensionElements></userTask>'
+        f'<sequenceFlow id="in{n}" sourceRef="Fork" targetRef="Ask{n}"/>'
+        f'<sequenceFlow id="out{n}" sourceRef="Ask{n}" targetRef="Join"/>'
+        for n in range(branches)
+    )
+    return f"""<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
+      xmlns:m2pem="https://m2pem.org/schema/1" targetNamespace="wide"><process id="Wide">
+      <startEvent id="Start"/><parallelGateway id="Fork"/><parallelGateway id="Join"/>
+      <endEvent id="End"/><sequenceFlow id="begin" sourceRef="Start" targetRef="Fork"/>{tasks}
+      <sequenceFlow id="over" sourceRef="Join" targetRef="End"/></process></definitions>"""
+
+
+def test_a_search_that_is_cut_short_ends_with_3_and_says_what_it_saw(
+    invoke: Invoke, tmp_path: Path
+) -> None:
+    mission = tmp_path / "wide.bpmn"
+    mission.write_text(wide(12), encoding="utf-8")
+    status, out, _ = invoke("verify", mission, "--max-states", "1500")
     assert status == 3
     assert "undecided  no-deadlock" in out
-    assert "the limit of states" in out
+    assert "then the limit of states ended the search" in out
 
 
 def test_a_mission_with_errors_is_unusable(invoke: Invoke) -> None:
