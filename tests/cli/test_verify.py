@@ -1,9 +1,11 @@
 import json
 import shutil
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
+from m2pem.verify.explore import Progress
 from tests.cli.conftest import Invoke
 from tests.command_line import FLEET, MISSION, REPOSITORY, CommandLine
 
@@ -46,6 +48,21 @@ def test_a_search_that_is_cut_short_ends_with_3_and_says_what_it_saw(
     assert status == 3
     assert "undecided  no-deadlock" in out
     assert "then the limit of states ended the search" in out
+
+
+def test_ctrl_c_ends_the_search_and_what_was_seen_is_told(
+    invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def pressed(searched: Progress) -> None:
+        if searched.states > 1_000:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("m2pem.cli.verify._progress", lambda: nullcontext(pressed))
+    mission = tmp_path / "wide.bpmn"
+    mission.write_text(wide(12), encoding="utf-8")
+    status, out, _ = invoke("verify", mission)
+    assert status == 3
+    assert "then an interruption by hand ended the search" in out
 
 
 def test_a_mission_with_errors_is_unusable(invoke: Invoke) -> None:
