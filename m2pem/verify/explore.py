@@ -144,17 +144,17 @@ def explore(
             if place not in overflows and not system.places[place].several:
                 overflows[place] = (state, rule)
                 runs[place] = (*found.run_to(state), rule)
+            if system.places[place].once:
+                continue
             bits = found.encoding.width[place] + 1
             if found.stopped in (None, Stopped.TOKENS) and (1 << bits) - 1 <= limits.tokens:
                 wider[place] = bits
                 again = True
         if not again:
             found.beyond = frozenset(
-                place
-                for place in found.overflows
-                if not system.places[place].several or found.encoding.width[place] > 2
+                place for place in found.overflows if not system.places[place].once
             )
-            if found.overflows and found.stopped is None:
+            if found.beyond and found.stopped is None:
                 found.stopped = Stopped.TOKENS
             found.overflows = overflows
             found.overflow_runs = runs

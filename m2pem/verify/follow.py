@@ -20,7 +20,8 @@ Look = Counter[tuple[tuple[str, ...], str]]
 
 _MOST_AT_ONCE = 4
 """Timers that one tick may let fire."""
-_MOST_CANDIDATES = 2_000
+_MOST_CANDIDATES = 500
+_MOST_STATES = 4_000
 _NUMBERED = re.compile(r"(#\d+|\[\d+\])$")
 
 
@@ -49,6 +50,10 @@ def _path(scope: Scope) -> tuple[str, ...]:
     if scope.loop is None and isinstance(owner.node, CallActivity):
         return (*path, owner.node.called.id)
     return path
+
+
+class TooManyStatesError(Exception):
+    """The rules leave so much open that a run of the engine cannot be followed."""
 
 
 class Follower:
@@ -109,6 +114,8 @@ class Follower:
                 found.add(state)
             for each in after:
                 if each not in seen:
+                    if len(seen) > _MOST_STATES:
+                        raise TooManyStatesError
                     seen.add(each)
                     waiting.append(each)
         return found

@@ -116,6 +116,8 @@ class Place:
     several: bool = False
     resources: tuple[str, ...] = ()
     behavior: str = ""
+    once: bool = False
+    """A second token there is a finding, and changes nothing else."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +132,8 @@ class Variable:
     values: tuple[Value, ...]
     exact: tuple[bool, ...]
     initial: int
+    key: str = ""
+    """The name in the data store; `name` also says whose it is, in a called process."""
 
 
 class Action(StrEnum):

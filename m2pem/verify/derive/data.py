@@ -76,7 +76,7 @@ class Data:
             if initial is None:
                 initial = domain.add(None)
             self.variables.append(
-                Variable(known, name, tuple(domain.values), tuple(domain.exact), initial)
+                Variable(known, name, tuple(domain.values), tuple(domain.exact), initial, key)
             )
         return known
 

@@ -158,6 +158,10 @@ def complex_gateway(making: Making, node: e.FlowNode, area: Area) -> None:
             active = _activates(node, chosen)
             if active is False:
                 continue
+            if active is None:
+                making.net.approximate(
+                    node, Exactness.MORE, "its activation condition may become true at any time"
+                )
             whole = len(chosen) == len(places)
             used = [making.net.place(node, area, Role.CONTROL, f":used{n}") for n in chosen]
             come = Effect(

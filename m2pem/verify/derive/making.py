@@ -1,7 +1,7 @@
 """What all parts of a derivation share, and where a token's activity stands (`Host`)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from m2pem.model import elements as e
 from m2pem.model.mission import Mission
@@ -98,6 +98,7 @@ class Making:
         if node not in self.again:
             return Effect()
         seen = self.net.place(node, area, Role.CONTROL, ":reached")
+        self.net.places[seen] = replace(self.net.places[seen], once=True)
         return Effect(produce=(seen,))
 
     def rules(self, effects: list[Effect], kind: Kind = Kind.INTERNAL) -> None:

@@ -10,7 +10,7 @@ def proper_completion(searched: Searched) -> Result:
     found = searched.found
     for place in found.overflows:
         each = searched.system.places[place]
-        if each.name.endswith(":reached"):
+        if each.once:
             violations.append(
                 Violation(
                     f"{searched.label(each.element)} is reached twice in one instance of its scope",
@@ -31,7 +31,7 @@ def one_token_each(searched: Searched) -> Result:
     found = searched.found
     for place in found.overflows:
         each = searched.system.places[place]
-        if each.name.endswith(":reached"):
+        if each.once:
             continue
         more = " and more and more" if place in found.beyond else ""
         violations.append(
