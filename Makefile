@@ -207,9 +207,10 @@ fuzz: python-packages ## read and run strange files for FUZZ_S seconds (600)
 docs: python-packages ## build the documentation into site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
-pictures: npm-packages ## draw the missions and examples for the docs (needs Chromium)
+pictures: npm-packages python-packages ## draw the missions and examples for the docs (needs Chromium)
 	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn && \
 	for example in ../../examples/*/; do node draw_bpmn.mjs "$$example" "$$example"*.bpmn; done
+	@$(BIN)/python -m tests.broken
 
 PEERS := .conformance
 

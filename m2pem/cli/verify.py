@@ -1,7 +1,8 @@
-"""`m2pem verify`: prove a mission before it moves anything."""
+"""`m2pem verify`: properties of a mission, proved before anything moves."""
 
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,20 +17,18 @@ from m2pem.cli.options import (
     path_option,
     process_option,
 )
+from m2pem.cli.report_files import KINDS, write
 
 if TYPE_CHECKING:
-    from m2pem.model.mission import Mission
     from m2pem.model.values import Value
-    from m2pem.resources.fleet import Fleet
-    from m2pem.verify.check import Report
-    from m2pem.verify.derive import Options
-    from m2pem.verify.results import Result, Violation
-
-STATUS = {"holds": 0, "violated": 1, "undecided": 3}
+    from m2pem.verify.report.findings import Findings
 
 
 @click.command(
-    epilog=example("m2pem verify missions/vignette1.bpmn --fleet fleet_configs/vignette1.yaml")
+    epilog=example(
+        "m2pem verify missions/vignette1.bpmn --fleet fleet_configs/vignette1.yaml "
+        "--report vignette1.md"
+    )
 )
 @mission_argument
 @fleet_option(required=False)
@@ -58,11 +57,27 @@ STATUS = {"holds": 0, "violated": 1, "undecided": 3}
     help="Check nothing: print what Spin would be given, or write it to FILE.",
 )
 @click.option(
+    "--report",
+    "reports",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    multiple=True,
+    help="Write a report: FILE.md with pictures beside it, FILE.json for programs, or FILE.svg "
+    "with the first violation. Can be given again.",
+)
+@click.option(
     "--max-states",
     type=click.IntRange(min=1),
     default=2_000_000,
     show_default=True,
-    help="States after which it is given up, undecided.",
+    help="States after which the search ends undecided.",
+)
+@click.option(
+    "--max-seconds",
+    type=click.FloatRange(min=0, min_open=True),
+    default=600.0,
+    show_default=True,
+    help="Time after which the search ends undecided.",
 )
 @format_option
 def verify(
@@ -75,166 +90,66 @@ def verify(
     engine: str,
     storage: str,
     emit: str | None,
+    reports: tuple[Path, ...],
     max_states: int,
+    max_seconds: float,
     output: str,
 ) -> int:
-    """Prove a mission before it moves anything.
+    """Prove properties of a mission, or show a run that violates them.
 
-    Looks at every order in which answers, reports, timers and signals can come. Ends with 0 if all
-    holds, with 1 if something is violated, with 2 if the mission cannot be used, and with 3 if
-    the search was cut short and saw no violation.
+    Ends with 0 if all holds, with 1 if something is violated, with 2 if the mission or the fleet
+    cannot be used, and with 3 if something is undecided. Ctrl-C ends the search: what was seen
+    until then is told.
     """
+    _refuse_what_does_not_go_together(engine, storage, emit, reports)
+    from m2pem.cli.proving import Engine, asked_of, findings, promela
+    from m2pem.executive.loading import load_source
+    from m2pem.verify.explore import Limits
+    from m2pem.verify.report.data import as_data
+
+    asked = asked_of(load_source(mission, search_path), fleet_file, process, data)
+    if emit is not None:
+        _emit(promela(asked), emit.partition("=")[2])
+        return 0
+    limits = Limits(states=max_states, seconds=max_seconds, tokens=3)
+    found = findings(asked, Engine(engine, storage, limits), strict=strict)
+    for file in reports:
+        write(file, found)
+    if output == "json":
+        click.echo(as_json(as_data(found)))
+    else:
+        click.echo(_text(found))
+    return found.exit_status
+
+
+def _refuse_what_does_not_go_together(
+    engine: str, storage: str, emit: str | None, reports: tuple[Path, ...]
+) -> None:
     if storage != "exact" and engine != "spin":
         raise click.UsageError(f"--storage {storage} says how Spin searches: add --engine spin")
     if emit is not None and emit.partition("=")[0] != "promela":
         raise click.UsageError(f"--emit {emit}: 'promela' or 'promela=FILE' can be written")
-    from m2pem.cli.given import get_fleet
-    from m2pem.executive.loading import load_source
-    from m2pem.plugins import PluginManager
-    from m2pem.verify.check import check
-    from m2pem.verify.derive import Options
-    from m2pem.verify.explore import Limits
-
-    loaded = load_source(mission, search_path)
-    fleet = get_fleet(fleet_file, loaded) if fleet_file is not None else None
-    plugins = PluginManager()
-    writes = {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
-    options = Options(data=data, service_writes=writes)
-    limits = Limits(states=max_states, tokens=3)
-    try:
-        if emit is not None:
-            return _emit(emit, loaded, fleet, process, options)
-        if engine == "spin":
-            from m2pem.verify.spin.asking import Storage
-            from m2pem.verify.spin.checking import check_with_spin
-
-            report = check_with_spin(
-                loaded,
-                fleet,
-                process=process,
-                options=options,
-                limits=limits,
-                storage=Storage(storage),
-            )
-        else:
-            report = check(loaded, fleet, process=process, options=options, limits=limits)
-    except KeyError:
-        raise UnusableError(f"{mission} has no process {process!r}") from None
-    verdict = report.judged(strict=strict).value
-    if output == "json":
-        click.echo(as_json(_as_data(mission, report, verdict)))
-    else:
-        for line in _lines(mission, report, verdict):
-            click.echo(line)
-    return STATUS[verdict]
+    if emit is not None and reports:
+        raise click.UsageError("--emit checks nothing: there is no --report to write")
+    for file in reports:
+        if file.suffix not in KINDS:
+            raise click.UsageError(f"--report {file}: end its name with {', '.join(KINDS)}")
 
 
-def _emit(
-    emit: str,
-    mission: "Mission",
-    fleet: "Fleet | None",
-    process: str | None,
-    options: "Options",
-) -> int:
-    """Write the model that Spin would be given."""
-    from m2pem.verify.derive import derive
-    from m2pem.verify.simplify import simplify
-    from m2pem.verify.spin.promela import text_of
-
-    text = text_of(simplify(derive(mission, fleet, process=process, options=options))).text
-    file = emit.partition("=")[2]
+def _emit(text: str, file: str) -> None:
     if not file:
         click.echo(text, nl=False)
-        return 0
+        return
     try:
         Path(file).write_text(text, encoding="utf-8")
     except OSError as error:
         raise UnusableError(f"{file} cannot be written: {error.strerror}") from error
-    return 0
 
 
-def _lines(mission: str, report: "Report", verdict: str) -> list[str]:
-    lines: list[str] = []
-    for result in report.results:
-        word = result.verdict.value
-        if word == "violated" and result.warning:
-            word = "warning"
-        lines.append(f"{word:>9}  {result.text} [{result.property}]")
-        if result.covered:
-            lines.append(f"{'':>11}seen: {result.covered}")
-        for violation in result.violations:
-            lines.append(f"{'':>11}{violation.message}")
-            path = _path(report, result, violation)
-            if path:
-                lines.append(f"{'':>13}run: {' -> '.join(path)}")
-    for each in report.system.approximations:
-        lines.append(f"{'note':>9}  {each.element}: {each.what} [{each.exactness.value}]")
-    lines += [f"{'note':>9}  {each}" for each in report.notes]
-    seconds = report.found.seconds
-    lines.append(f"{mission}: {verdict} ({report.states:,} states, {seconds * 1e3:.0f} ms)")
-    return lines
+def _text(found: "Findings") -> str:
+    from m2pem.cli.output import wants_colour
+    from m2pem.verify.report.text import as_text
 
-
-def _steps(report: "Report", result: "Result", violation: "Violation") -> list[dict[str, Any]]:
-    """What happens in the run to a violation, step by step."""
-    system = report.system
-    if result.property == "interrupted-commanded-again" and report.watched is not None:
-        system = report.watched
-    return [
-        {
-            "rule": system.rules[number].name,
-            "kind": system.rules[number].kind.value,
-            "trigger": trigger.value if (trigger := system.rules[number].trigger) else None,
-            "detail": system.rules[number].detail,
-            "steps": [
-                {"element": s.element, "action": s.action.value, "detail": s.detail}
-                for s in system.rules[number].steps
-            ],
-        }
-        for number in violation.run
-    ]
-
-
-def _path(report: "Report", result: "Result", violation: "Violation") -> list[str]:
-    """The elements that the run comes to, each once in a row."""
-    path: list[str] = []
-    for each in _steps(report, result, violation):
-        for step in each["steps"]:
-            element = str(step["element"])
-            if step["action"] != "taken" and (not path or path[-1] != element):
-                path.append(element)
-    return path
-
-
-def _as_data(mission: str, report: "Report", verdict: str) -> dict[str, Any]:
-    return {
-        "mission": mission,
-        "verdict": verdict,
-        "engine": report.engine,
-        "states": report.states,
-        "seconds": report.found.seconds,
-        "stopped": report.found.stopped.value if report.found.stopped else None,
-        "notes": list(report.notes),
-        "properties": [
-            {
-                "property": result.property,
-                "text": result.text,
-                "verdict": result.verdict.value,
-                "warning": result.warning,
-                "covered": result.covered,
-                "violations": [
-                    {
-                        "message": violation.message,
-                        "elements": list(violation.elements),
-                        "run": _steps(report, result, violation),
-                    }
-                    for violation in result.violations
-                ],
-            }
-            for result in report.results
-        ],
-        "approximations": [
-            {"element": a.element, "exactness": a.exactness.value, "what": a.what}
-            for a in report.system.approximations
-        ],
-    }
+    if wants_colour(sys.stdout):
+        return as_text(found, lambda text, colour: click.style(text, fg=colour))
+    return as_text(found)

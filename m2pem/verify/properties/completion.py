@@ -4,7 +4,7 @@ from m2pem.model import elements as e
 from m2pem.model.events import CompensateEventDefinition
 from m2pem.verify.properties.searched import Searched
 from m2pem.verify.results import Result, Violation
-from m2pem.verify.system import Exactness
+from m2pem.verify.system import Exactness, Flag
 
 
 def no_deadlock(searched: Searched) -> Result:
@@ -26,15 +26,20 @@ def no_deadlock(searched: Searched) -> Result:
 
 
 def _reaching(searched: Searched, goals: list[int]) -> bytearray:
-    """Which states some of the goals can be reached from."""
+    """Which states some of the goals can be reached from, if no work fails uncaught.
+
+    That a vehicle may fail, and end the run so, is no way out.
+    """
     found = searched.found
     assert found.edge_start is not None
+    assert found.edge_rule is not None
     assert found.edge_state is not None
     count = len(found.states)
     before: list[list[int]] = [[] for _ in range(count)]
     for state in range(count):
         for at in range(found.edge_start[state], found.edge_start[state + 1]):
-            before[found.edge_state[at]].append(state)
+            if not _fails(searched, found.edge_rule[at]):
+                before[found.edge_state[at]].append(state)
     marked = bytearray(count)
     waiting = list(goals)
     for state in waiting:
@@ -45,6 +50,10 @@ def _reaching(searched: Searched, goals: list[int]) -> bytearray:
                 marked[each] = 1
                 waiting.append(each)
     return marked
+
+
+def _fails(searched: Searched, rule: int) -> bool:
+    return searched.system.rules[rule].flag is Flag.UNCAUGHT_FAILURE
 
 
 def _lost(searched: Searched, *, ends_only: bool) -> list[int]:
@@ -119,7 +128,9 @@ def _cycle(searched: Searched, start: int) -> list[int]:
     state = start
     while state not in seen:
         seen[state] = len(rules)
-        rule, state = next(iter(searched.found.successors(state)))
+        rule, state = next(
+            each for each in searched.found.successors(state) if not _fails(searched, each[0])
+        )
         rules.append(rule)
     return rules[seen[state] :]
 

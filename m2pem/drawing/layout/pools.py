@@ -1,9 +1,9 @@
 """Lays out a whole file: one process, or a collaboration's pools one below the other."""
 
-from tests.drawing import model
-from tests.drawing.block import Block, Box, Point
-from tests.drawing.model import Element, name_of, tag
-from tests.drawing.place import lay_out
+from m2pem.drawing.layout import model
+from m2pem.drawing.layout.block import Block, Box, Point
+from m2pem.drawing.layout.model import Element, local, name_of, tag
+from m2pem.drawing.layout.place import lay_out
 
 _HEADER = 30
 _CLOSED = 60  # the height of a pool that shows no process
@@ -16,23 +16,34 @@ def lay_out_file(definitions: Element) -> Block:
     """Everything, with the corner of the paper at 0, 0.
 
     Raises:
-        ValueError: the file has no process, several and no collaboration, or dangling references.
+        ValueError: the file has no process, or dangling references.
     """
     processes = {name_of(p): p for p in model.children(definitions, "process")}
     collaboration = next(model.children(definitions, "collaboration"), None)
     if collaboration is None:
-        if len(processes) != 1:
-            raise ValueError(f"{len(processes)} processes need a collaboration to be drawn")
-        return lay_out(next(iter(processes.values())))
+        return _stacked(processes)
     return _pools(collaboration, processes)
+
+
+def _stacked(processes: dict[str, Element]) -> Block:
+    """Processes without pools, one below the other."""
+    if not processes:
+        raise ValueError("there is no process to be drawn")
+    block = Block()
+    for process in processes.values():
+        inside = lay_out(process)
+        block.put(inside, 0, block.height)
+        block.width = max(block.width, inside.width)
+        block.height += inside.height
+    return block
 
 
 def _pools(collaboration: Element, processes: dict[str, Element]) -> Block:
     pools = [*model.children(collaboration, "participant")]
     insides = {
-        name_of(pool): lay_out(processes[pool.get("processRef", "")])
+        name_of(pool): lay_out(processes[local(pool.get("processRef"))])
         for pool in pools
-        if pool.get("processRef")
+        if local(pool.get("processRef")) in processes
     }
     width = max([_LEAST_WIDTH, *(inside.width for inside in insides.values())])
     flows = [*model.children(collaboration, "messageFlow")]
@@ -40,7 +51,7 @@ def _pools(collaboration: Element, processes: dict[str, Element]) -> Block:
     block = Block(width=width + _HEADER)
     for pool in pools:
         inside = insides.get(name_of(pool))
-        lanes = [] if inside is None else _lanes(processes[pool.get("processRef", "")])
+        lanes = [] if inside is None else _lanes(processes[local(pool.get("processRef"))])
         for lane in lanes:
             assert inside is not None
             inside.boxes[lane].width = width
@@ -60,7 +71,7 @@ def _lanes(process: Element) -> list[str]:
 
 
 def _message(flow: Element, number: int, block: Block, pools: list[Element]) -> list[Point]:
-    source, target = flow.get("sourceRef", ""), flow.get("targetRef", "")
+    source, target = local(flow.get("sourceRef")), local(flow.get("targetRef"))
     for end in (source, target):
         if end not in block.boxes:
             raise ValueError(f"{name_of(flow)}: nothing drawn is called {end!r}")

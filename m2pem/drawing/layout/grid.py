@@ -16,6 +16,7 @@ class Link:
 
     @property
     def below(self) -> bool:
+        """Whether it leaves downwards."""
         return self.at != self.source
 
 
@@ -31,10 +32,12 @@ class Grid:
 
     @property
     def columns(self) -> int:
+        """How many there are."""
         return max((column for column, _ in self.cells.values()), default=-1) + 1
 
     @property
     def rows(self) -> int:
+        """How many there are."""
         rows = [row for _, row in self.cells.values()]
         rows += [row for way in self.ways.values() for row in way]
         return max(rows, default=-1) + 1

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from tests.drawing.block import Box, Point
-from tests.drawing.grid import Grid, Link
+from m2pem.drawing.layout.block import Box, Point
+from m2pem.drawing.layout.grid import Grid, Link
 
 _TRACK = 10
 _GAP = 40  # a gap without a line
@@ -57,6 +57,7 @@ class Router:
         self._sizes = sizes
 
     def add(self, link: Link) -> None:
+        """A flow."""
         self._links.append(link)
         column, row = self._grid.cells[link.at]
         if link.below:
@@ -84,9 +85,11 @@ class Router:
     # --- where things are -----------------------------------------------------------------------
 
     def size(self) -> tuple[float, float]:
+        """Of the whole."""
         return self._left(self._grid.columns), self._top(self._grid.rows)
 
     def corner(self, name: str) -> Point:
+        """The upper left one of a symbol."""
         column, row = self._grid.cells[name]
         width, height = self._sizes[name]
         return (

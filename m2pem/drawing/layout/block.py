@@ -18,14 +18,17 @@ class Box:
 
     @property
     def middle(self) -> Point:
+        """Its centre."""
         return (self.x + self.width / 2, self.y + self.height / 2)
 
     @property
     def right(self) -> float:
+        """Its right side."""
         return self.x + self.width
 
     @property
     def bottom(self) -> float:
+        """Its lower side."""
         return self.y + self.height
 
 

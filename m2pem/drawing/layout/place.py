@@ -1,10 +1,10 @@
 """Lays out one container: its grid becomes boxes, its flows become lines between them."""
 
-from tests.drawing import model
-from tests.drawing.block import Block, Box
-from tests.drawing.grid import Link, arrange
-from tests.drawing.model import Element, name_of, tag
-from tests.drawing.route import Router
+from m2pem.drawing.layout import model
+from m2pem.drawing.layout.block import Block, Box
+from m2pem.drawing.layout.grid import Link, arrange
+from m2pem.drawing.layout.model import Element, name_of, tag
+from m2pem.drawing.layout.route import Router
 
 _EVENT = 36
 _SIZES = {"Event": (36, 36), "Gateway": (50, 50)}
@@ -76,9 +76,13 @@ def lay_out(container: Element) -> Block:
 def _links(container: Element, nodes: dict[str, Element], host: dict[str, str]) -> list[Link]:
     found = []
     lines = [*model.children(container, "sequenceFlow")]
-    lines += [a for a in model.children(container, "association") if a.get("sourceRef") in host]
+    lines += [
+        a
+        for a in model.children(container, "association")
+        if model.local(a.get("sourceRef")) in host
+    ]
     for line in lines:
-        source, target = line.get("sourceRef", ""), line.get("targetRef", "")
+        source, target = model.local(line.get("sourceRef")), model.local(line.get("targetRef"))
         if target not in nodes:
             if tag(line) == "association":
                 continue
@@ -94,7 +98,7 @@ def _ties(container: Element, here: dict[str, object]) -> dict[str, tuple[str, s
     surfaces = {name_of(each) for each in model.children(container, *model.SURFACES)}
     lines = [*model.data_lines(container)]
     lines += [
-        (name_of(a), a.get("sourceRef", ""), a.get("targetRef", ""))
+        (name_of(a), model.local(a.get("sourceRef")), model.local(a.get("targetRef")))
         for a in model.children(container, "association")
     ]
     found = {}
@@ -109,7 +113,7 @@ def _reversed(container: Element) -> set[str]:
     surfaces = {name_of(each) for each in model.children(container, *model.SURFACES)}
     found = {name for name, source, _ in model.data_lines(container) if source in surfaces}
     associations = model.children(container, "association")
-    return found | {name_of(a) for a in associations if a.get("sourceRef") in surfaces}
+    return found | {name_of(a) for a in associations if model.local(a.get("sourceRef")) in surfaces}
 
 
 def _size(node: Element, inner: Block | None, events: list[Element]) -> tuple[float, float]:

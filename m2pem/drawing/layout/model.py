@@ -34,7 +34,13 @@ def name_of(element: Element) -> str:
     return identifier
 
 
+def local(reference: str | None) -> str:
+    """An id that is referred to, without the prefix of its namespace."""
+    return (reference or "").rpartition(":")[2].strip()
+
+
 def children(element: Element, *tags: str) -> Iterator[Element]:
+    """Those directly in it that have one of the tags."""
     return (child for child in element if tag(child) in tags)
 
 
@@ -57,7 +63,7 @@ def boundary_events(container: Element) -> dict[str, list[Element]]:
     """By the activity that they are attached to."""
     found: dict[str, list[Element]] = {}
     for event in children(container, "boundaryEvent"):
-        found.setdefault(event.get("attachedToRef", ""), []).append(event)
+        found.setdefault(local(event.get("attachedToRef")), []).append(event)
     return found
 
 
@@ -65,21 +71,21 @@ def data_lines(container: Element) -> Iterator[tuple[str, str, str]]:
     """Id, source and target of the data associations of the container's own flow nodes."""
     for node in (e for e in container if is_node(e)):
         for line in children(node, *_LINES_OF_DATA):
-            source = next((e.text or "" for e in children(line, "sourceRef")), "")
-            target = next((e.text or "" for e in children(line, "targetRef")), "")
+            source = next((local(e.text) for e in children(line, "sourceRef")), "")
+            target = next((local(e.text) for e in children(line, "targetRef")), "")
             if tag(line) == "dataInputAssociation":
                 target = name_of(node)
             else:
                 source = name_of(node)
             if source and target:
-                yield name_of(line), source.strip(), target.strip()
+                yield name_of(line), source, target
 
 
 def lanes(process: Element) -> tuple[list[Element], dict[str, int]]:
     """The lanes of the process, and the number of each node's; the innermost are not looked at."""
     found = [lane for each in children(process, "laneSet") for lane in children(each, "lane")]
     where = {
-        (ref.text or "").strip(): number
+        local(ref.text): number
         for number, lane in enumerate(found)
         for ref in children(lane, "flowNodeRef")
     }
