@@ -10,6 +10,15 @@ MOST_PLACES = 1_500
 """Of a system that is looked at; the work grows with the square."""
 
 
+MOST_RULES = 6_000
+"""Likewise."""
+
+
+def is_small(system: System) -> bool:
+    """Whether it is worth the work."""
+    return len(system.places) <= MOST_PLACES and len(system.rules) <= MOST_RULES
+
+
 class Concurrency:
     """`rows[p]`: a bit for each place that may have a token when p has one; p's own bit: two."""
 

@@ -20,7 +20,7 @@ from m2pem.verify.encoding import Encoding, Marking
 from m2pem.verify.reduction import Reduction
 from m2pem.verify.system import Flag, Kind, System
 
-_LOOK_EVERY = 1024
+_LOOK_EVERY = 128
 """States between two looks at the clock."""
 _BYTES_A_STATE = 250
 """About what a state costs in memory, beside its own bits."""

@@ -20,7 +20,7 @@ What a requirement looks at must be `visible`: rules that change it are tried in
 from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol
 
-from m2pem.verify.concurrency import MOST_PLACES, Concurrency
+from m2pem.verify.concurrency import Concurrency, is_small
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.system import Kind, Role, System
 
@@ -56,7 +56,7 @@ class StubbornSets:
 
 def safe_places(system: System) -> frozenset[int]:
     """Places that the structure proves to have one token at most."""
-    if len(system.places) <= MOST_PLACES:
+    if is_small(system):
         rows = Concurrency(system).rows
         return frozenset(p.index for p in system.places if not rows[p.index] >> p.index & 1)
     producers: dict[int, int] = {}

@@ -7,7 +7,7 @@ what comes to the place goes straight to what follows it. The places that remain
 from collections import Counter
 from dataclasses import replace
 
-from m2pem.verify.concurrency import MOST_PLACES, Concurrency
+from m2pem.verify.concurrency import Concurrency, is_small
 from m2pem.verify.system import Kind, Role, Rule, System
 
 _MOST_PAIRS = 64
@@ -16,7 +16,7 @@ _MOST_PAIRS = 64
 
 def simplify(system: System) -> System:
     """The same, smaller."""
-    concurrency = Concurrency(system) if len(system.places) <= MOST_PLACES else None
+    concurrency = Concurrency(system) if is_small(system) else None
     rules = list(system.rules)
     if concurrency is not None:
         rules = [_trim(rule, concurrency) for rule in rules if concurrency.may_fire(rule)]

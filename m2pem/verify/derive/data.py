@@ -142,9 +142,10 @@ class Data:
             return (ERROR,)
 
     def is_followed(self, conditions: Iterable[Expression], node: e.FlowNode) -> bool:
-        """Whether all that some conditions read is followed."""
+        """Whether all that some conditions read is followed, value by value."""
         hidden = self.hidden(node)
-        return all(self._follows(name, hidden) for c in conditions for name in c.names)
+        names = {name for condition in conditions for name in condition.names}
+        return all(self._follows(name, hidden) for name in names) and self._small(names)
 
     def may_change(self, condition: Expression) -> bool:
         """Whether anything in the mission may write what a condition reads."""

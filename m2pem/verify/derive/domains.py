@@ -17,7 +17,7 @@ from m2pem.model.values import Value
 
 MOST_VALUES = 40
 """Of one name; a name that is given more is not followed value by value."""
-MOST_COMBINATIONS = 4096
+MOST_COMBINATIONS = 512
 
 
 class Unknown:
