@@ -1,9 +1,10 @@
 """What `m2pem verify` was told, put together: mission, fleet and options, and who searches."""
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from m2pem.verify.derive.options import Options
     from m2pem.verify.explore import Limits, Progress
     from m2pem.verify.report.findings import Findings
+    from m2pem.verify.requirements import Requirement
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +27,7 @@ class Asked:
     process: str | None
     data: "Mapping[str, Value]"
     options: "Options"
+    requirements: "Sequence[Requirement]" = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +44,14 @@ def asked_of(
     fleet_file: str | None,
     process: str | None,
     data: "Mapping[str, Value]",
+    spec: Path | None = None,
 ) -> Asked:
-    """What is to be searched, if `m2pem check` finds no errors in it.
+    """What is to be searched, if `m2pem check` finds no errors in it. `spec`: more requirements.
 
     Raises:
         MissionError: there are errors; tells them all.
         FleetError: the fleet cannot be used.
+        RequirementsError: requirements cannot be read, or do not fit; tells all that is wrong.
     """
     from m2pem.cli.fleets import arbiters_of
     from m2pem.cli.given import get_fleet
@@ -54,6 +59,7 @@ def asked_of(
     from m2pem.plugins import PluginManager
     from m2pem.resources.madeup import fleet_for
     from m2pem.verify.derive.options import Options
+    from m2pem.verify.requirements import Names, gather
 
     plugins = PluginManager()
     fleet = get_fleet(fleet_file, mission) if fleet_file is not None else None
@@ -62,15 +68,29 @@ def asked_of(
     refuse_errors(f"{mission.file} cannot be verified: `m2pem check` finds errors", wrong)
     writes = {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
     options = Options(data=data, service_writes=writes)
-    return Asked(mission, fleet or fleet_for(mission), process, data, options)
+    fleet = fleet or fleet_for(mission)
+    requirements = gather(Names(mission, fleet, writes, data), spec)
+    return Asked(mission, fleet, process, data, options, requirements)
 
 
 def findings(asked: Asked, engine: Engine, *, strict: bool) -> "Findings":
     """Search, and tell what was found."""
     from m2pem.verify.report.findings import findings_of
+    from m2pem.verify.requirements.results import with_requirements
+    from m2pem.verify.spin.asking import Storage
 
     with progress() as show:
-        report = _report(asked, engine, show)
+        report = with_requirements(
+            _report(asked, engine, show),
+            asked.mission,
+            asked.fleet,
+            asked.requirements,
+            process=asked.process,
+            options=asked.options,
+            limits=engine.limits,
+            storage=Storage(engine.storage),
+            progress=show,
+        )
     return findings_of(asked.mission, report, strict=strict, given=asked.data)
 
 

@@ -35,6 +35,12 @@ if TYPE_CHECKING:
 @process_option
 @path_option
 @data_option
+@click.option(
+    "--spec",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Requirements (YAML) beside those in the mission's own file.",
+)
 @click.option("--strict", is_flag=True, help="Warnings are violations.")
 @click.option(
     "--engine",
@@ -86,6 +92,7 @@ def verify(
     process: str | None,
     search_path: tuple[Path, ...],
     data: "dict[str, Value]",
+    spec: Path | None,
     strict: bool,
     engine: str,
     storage: str,
@@ -95,11 +102,11 @@ def verify(
     max_seconds: float,
     output: str,
 ) -> int:
-    """Prove properties of a mission, or show a run that violates them.
+    """Prove properties and requirements of a mission, or show a run that violates them.
 
-    Ends with 0 if all holds, with 1 if something is violated, with 2 if the mission or the fleet
-    cannot be used, and with 3 if something is undecided. Ctrl-C ends the search: what was seen
-    until then is told.
+    Ends with 0 if all holds, with 1 if something is violated, with 2 if the mission, the fleet or
+    the requirements cannot be used, and with 3 if something is undecided. Ctrl-C ends the search:
+    what was seen until then is told.
     """
     _refuse_what_does_not_go_together(engine, storage, emit, reports)
     from m2pem.cli.proving import Engine, asked_of, findings, promela
@@ -107,7 +114,7 @@ def verify(
     from m2pem.verify.explore import Limits
     from m2pem.verify.report.data import as_data
 
-    asked = asked_of(load_source(mission, search_path), fleet_file, process, data)
+    asked = asked_of(load_source(mission, search_path), fleet_file, process, data, spec)
     if emit is not None:
         _emit(promela(asked), emit.partition("=")[2])
         return 0

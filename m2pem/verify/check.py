@@ -10,21 +10,23 @@ from m2pem.verify.derive import Options, derive
 from m2pem.verify.explore import Exploration, Limits, Progress, Stopped, explore
 from m2pem.verify.interruption import watch_interruptions
 from m2pem.verify.properties import ALL, Searched
+from m2pem.verify.properties.commands import INTERRUPTED
 from m2pem.verify.reduction import StubbornSets
 from m2pem.verify.results import Result, Verdict
 from m2pem.verify.simplify import simplify
 from m2pem.verify.system import System
 
-_FULL_STATES = 30_000
+FULL_STATES = 30_000
 """States up to which nothing is left out: that gives the shortest runs."""
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """All that a check found. `system` is what `Violation.run` numbers the rules of.
+    """All that a check found. `rules_of` says what `Violation.run` numbers the rules of.
 
     `states`: how many states were seen; `found` may hold fewer, if another engine saw the rest.
-    `notes`: what else is to be told of the answers.
+    `notes`: what else is to be told of the answers. `watched`: the rules that also note which
+    vehicles are interrupted; `asked`: those that requirements were asked of.
     """
 
     system: System
@@ -34,6 +36,13 @@ class Report:
     engine: str = "builtin"
     states: int = 0
     notes: tuple[str, ...] = ()
+    asked: System | None = None
+
+    def rules_of(self, result: Result) -> System:
+        """The system of which the runs of a result number the rules."""
+        if result.required:
+            return self.asked or self.system
+        return (self.watched or self.system) if result.property == INTERRUPTED else self.system
 
     @property
     def verdict(self) -> Verdict:
@@ -86,8 +95,8 @@ def search(
     system: System, limits: Limits, progress: Callable[[Progress], None] | None = None
 ) -> Exploration:
     """All of it if it is small; else without the orders that lead to the same."""
-    small = replace(limits, states=min(limits.states, _FULL_STATES))
+    small = replace(limits, states=min(limits.states, FULL_STATES))
     found = explore(system, small, progress=progress)
-    if found.stopped is not Stopped.STATES or limits.states <= _FULL_STATES:
+    if found.stopped is not Stopped.STATES or limits.states <= FULL_STATES:
         return found
     return explore(system, limits, reduction=StubbornSets(system), progress=progress)

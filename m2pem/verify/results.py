@@ -28,7 +28,11 @@ class Violation:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """The verdict on one property. `warning`: a violation of it is a warning, unless strict."""
+    """The verdict on one property, or on one requirement of the mission's author (`required`).
+
+    `property`: its name, or the requirement's id. `text`: what it says. `warning`: a violation of
+    it is a warning, unless strict. `author`: what the author says that a requirement is for.
+    """
 
     property: str
     text: str
@@ -36,4 +40,6 @@ class Result:
     violations: tuple[Violation, ...] = ()
     warning: bool = False
     covered: str = ""
-    """Of an undecided one: what was looked at."""
+    """Of an undecided one: what was looked at, or what stands in the way."""
+    required: bool = False
+    author: str = ""

@@ -4,6 +4,9 @@ from m2pem.verify.properties.searched import Searched
 from m2pem.verify.results import Result, Violation
 from m2pem.verify.system import Flag
 
+INTERRUPTED = "interrupted-commanded-again"
+"""The property that is read from rules that also note which vehicles are interrupted."""
+
 
 def _flagged(searched: Searched, flag: Flag, message: str) -> list[Violation]:
     """The shortest run to each element and matter that has a flag."""
@@ -80,11 +83,10 @@ def failures_handled(searched: Searched) -> Result:
 
 def interrupted_commanded_again(searched: Searched) -> Result:
     """Every vehicle whose behavior was interrupted is commanded again, or stopped, by the model."""
-    name = "interrupted-commanded-again"
     text = "Every interrupted vehicle is commanded again, or stopped, by the model."
     found = searched.watched
     if found is None:
-        return searched.result(name, text, [], static=True)
+        return searched.result(INTERRUPTED, text, [], static=True)
     first: dict[str, int] = {}
     for state in found.terminals:
         tokens = found.marking(state).tokens
@@ -105,7 +107,7 @@ def interrupted_commanded_again(searched: Searched) -> Result:
                 run,
             )
         )
-    return searched.result(name, text, violations, found=found)
+    return searched.result(INTERRUPTED, text, violations, found=found)
 
 
 def _interruption(

@@ -40,6 +40,8 @@ def as_data(findings: Findings) -> dict[str, Any]:
                 "verdict": answer.verdict.value,
                 "warning": answer.warning,
                 "note": answer.covered,
+                "required": answer.required,
+                "author": answer.author,
             }
             for answer in findings.results
         ],
@@ -56,6 +58,7 @@ def _violation(violation: Violated) -> dict[str, Any]:
     return {
         "property": violation.answer.property,
         "warning": violation.answer.warning,
+        "required": violation.answer.required,
         "text": violation.found.message,
         "elements": [*violation.found.elements],
         "missing": [*violation.missing],

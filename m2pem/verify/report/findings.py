@@ -16,7 +16,6 @@ from m2pem.verify.results import Result, Verdict, Violation
 from m2pem.verify.system import Action, System
 
 DEADLOCK = "no-deadlock"
-INTERRUPTED = "interrupted-commanded-again"
 FOLLOWING = frozenset({"no-dead-element", "can-complete", "completes-if-fair"})
 """Properties whose violations often follow from those of others."""
 
@@ -91,10 +90,9 @@ def findings_of(
     words = Words(mission)
     told = []
     for result in report.results:
-        watched = result.property == INTERRUPTED and report.watched is not None
-        system = report.watched if watched and report.watched is not None else report.system
+        system = report.rules_of(result)
         told += [_told(system, words, result, each) for each in result.violations]
-    told.sort(key=lambda each: (each.answer.warning, each.answer.property in FOLLOWING))
+    told.sort(key=lambda each: (each.answer.warning, _follows(each.answer)))
     found = report.found
     stopped = found.stopped.value if found.stopped is not None else ""
     return Findings(
@@ -115,6 +113,10 @@ def findings_of(
         strict,
         given or {},
     )
+
+
+def _follows(answer: Result) -> bool:
+    return not answer.required and answer.property in FOLLOWING
 
 
 def _unreached(mission: Mission, report: Report) -> frozenset[str]:
@@ -158,7 +160,8 @@ def _told(system: System, words: Words, answer: Result, found: Violation) -> Vio
     story, state = tell(system, words, found.run)
     loop, state = tell(system, words, found.cycle, begin=len(story), at=state)
     tokens = tokens_of(encoding_of(system), state)
-    stuck = why_stuck(words, story, tokens) if answer.property == DEADLOCK else []
+    deadlock = answer.property == DEADLOCK and not answer.required
+    stuck = why_stuck(words, story, tokens) if deadlock else []
     missing = tuple(flow for each in stuck for flow in each.missing)
     if stuck:
         found = replace(found, message="; ".join(each.text for each in stuck))

@@ -21,14 +21,15 @@ def _lines(findings: Findings, pictures: Mapping[int, str]) -> Iterator[str]:
     for note in findings.coverage.notes:
         yield _plain(_sentence(note))
     yield ""
-    yield "| property | verdict | what it says |"
+    yield "| property or requirement | verdict | what it says |"
     yield "|---|---|---|"
     for answer in findings.results:
         verdict = answer.verdict.value
         if answer.verdict is Verdict.VIOLATED and not findings.counts(answer):
             verdict = "warning"
-        note = f" ({answer.covered})" if answer.covered else ""
-        yield f"| `{answer.property}` | {verdict} | {answer.text}{note} |"
+        said = [answer.text, *([f"({answer.covered})"] if answer.covered else [])]
+        said += [f"For: {answer.author}"] if answer.author else []
+        yield f"| `{answer.property}` | {verdict} | {_plain(' '.join(said))} |"
     for number, violation in enumerate(findings.violations):
         yield ""
         yield from _violation(violation, pictures.get(number, ""))

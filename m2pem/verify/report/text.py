@@ -36,7 +36,10 @@ def _properties(findings: Findings, paint: Paint) -> Iterator[str]:
     for answer in findings.results:
         word, colour = _verdict(findings, answer)
         note = f" ({answer.covered})" if answer.covered else ""
-        yield f"{paint(f'{word:<9}', colour)}  {answer.property:<{width}}  {answer.text}{note}"
+        told = _shown(f"{answer.property:<{width}}  {answer.text}{note}")
+        yield f"{paint(f'{word:<9}', colour)}  {told}"
+        if answer.author:
+            yield f"{'':<{width + 13}}for: {_shown(answer.author)}"
 
 
 def _verdict(findings: Findings, answer: Result) -> tuple[str, str]:

@@ -31,6 +31,9 @@ _FAIRNESS = (
     "whether there is another, Spin is not asked: the built-in engine is"
 )
 
+BEYOND_SPIN = frozenset({_STEPS, _FAIRNESS})
+"""What stands in the way of an answer where the built-in engine has one."""
+
 
 def check_requirement(
     found: Found,
