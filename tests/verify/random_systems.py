@@ -38,7 +38,9 @@ def random_system(dice: Random, places: int = 7, rules: int = 9) -> System:
         variables,
         tuple(_rule(dice, n, tokens, variables) for n in range(rules)),
         ((_ENDS, 1),),
-        *range(_ENDS),
+        completed=0,
+        terminated=1,
+        failed=2,
         elements={each.element: each.element for each in made},
     )
 
