@@ -10,7 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/*/pyproject.toml))
 JS := tests/js
-DEBIAN_PACKAGES := nodejs npm tmux
+DEBIAN_PACKAGES := nodejs npm spin tcc tmux
 
 # An environment holds absolute paths: one made elsewhere, or by another Python, is made anew.
 INSTALLED := $(VENV)/installed
@@ -40,10 +40,10 @@ $(INSTALLED): pyproject.toml constraints.txt $(PLUGINS:%=%/pyproject.toml)
 	  --quiet --disable-pip-version-check --editable '.[dev,docs]' $(PLUGINS:%=--editable %)
 	@echo '$(IDENTITY)' > $@
 
-# The tests of what BPMN editors see need Node.js, and those of the terminal unit tmux; nothing else
-# does, so their absence stops nothing.
+# The tests of what BPMN editors see need Node.js, those of the terminal unit tmux, and those of
+# verification Spin and a C compiler; nothing else does, so their absence stops nothing.
 npm-packages:
-	@{ command -v npm && command -v tmux; } >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && { \
+	@{ command -v npm && command -v tmux && command -v spin && command -v tcc; } >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && { \
 	  echo "Installing Debian packages: $(DEBIAN_PACKAGES)"; \
 	  apt-get update -qq && apt-get install -y -qq $(DEBIAN_PACKAGES) >/dev/null; }; } || true
 	@if command -v npm >/dev/null; then $(MAKE) --silent $(JS)/node_modules/.package-lock.json; \
@@ -207,9 +207,10 @@ fuzz: python-packages ## read and run strange files for FUZZ_S seconds (600)
 docs: python-packages ## build the documentation into site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
-pictures: npm-packages ## draw the missions and examples for the docs (needs Chromium)
+pictures: npm-packages python-packages ## draw the missions and examples for the docs (needs Chromium)
 	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn && \
 	for example in ../../examples/*/; do node draw_bpmn.mjs "$$example" "$$example"*.bpmn; done
+	@$(BIN)/python -m tests.broken
 
 PEERS := .conformance
 

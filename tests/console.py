@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 REPOSITORY = Path(__file__).parents[1]
-WHAT_COMMANDS_READ = ("missions", "fleet_configs", "examples")
+WHAT_COMMANDS_READ = ("missions", "fleet_configs", "examples", "docs/broken")
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,11 +2,12 @@
 
 import asyncio
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from m2pem.cli.options import as_json, example, format_option, journal_option, run_argument
+from m2pem.cli.options import as_json, example, fleet_option, format_option, journal_option
 
 if TYPE_CHECKING:
     from m2pem.cli.progress import Progress
@@ -14,17 +15,53 @@ if TYPE_CHECKING:
 
 
 @click.command(epilog=example("m2pem replay r1 --verify"))
-@run_argument
+@click.argument("run_id", metavar="RUN", required=False)
 @journal_option
 @click.option("--verify", is_flag=True, help="Decide every input again, and compare.")
 @click.option("--state", "state_only", is_flag=True, help="Print only how it stands.")
+@click.option(
+    "--counterexample",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE.json",
+    help="Play a run of a report of `m2pem verify` to the engine instead.",
+)
+@click.option(
+    "--violation",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    help="Which of the report's violations that have a run.",
+)
+@click.option("--mission", metavar="MISSION", help="The report's mission, if it is elsewhere now.")
+@fleet_option(required=False)
 @format_option
-def replay(run_id: str, journal: str | None, verify: bool, state_only: bool, output: str) -> int:
+def replay(
+    run_id: str | None,
+    journal: str | None,
+    verify: bool,
+    state_only: bool,
+    counterexample: Path | None,
+    violation: int,
+    mission: str | None,
+    fleet_file: str | None,
+    output: str,
+) -> int:
     """Print what happened in a run, and how it stands.
 
     The state is rebuilt by applying the journaled records alone, as after a crash. With --verify
     every input is decided again instead, and the first difference ends it with status 1.
+
+    With --counterexample no journal is read: a run that violates a property is played step by
+    step, and the engine's records are printed. It ends with 1 if the engine does not follow it.
     """
+    if counterexample is not None:
+        if run_id is not None or verify or state_only:
+            raise click.UsageError("--counterexample goes with no RUN, --verify or --state")
+        from m2pem.cli.counterexample import replay_counterexample
+
+        return replay_counterexample(counterexample, mission, fleet_file, violation, output)
+    if run_id is None:
+        raise click.UsageError("name a RUN, or a report with --counterexample")
     if verify and state_only:
         raise click.UsageError("--verify and --state do not go together")
     return asyncio.run(_replay(run_id, journal, verify, state_only, output))

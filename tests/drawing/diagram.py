@@ -2,10 +2,10 @@
 
 from lxml import etree
 
-from tests.drawing import model
-from tests.drawing.block import Block
-from tests.drawing.model import BPMN, Element, name_of, tag
-from tests.drawing.pools import lay_out_file
+from m2pem.drawing.layout import model
+from m2pem.drawing.layout.block import Block
+from m2pem.drawing.layout.model import BPMN, Element, name_of, tag
+from m2pem.drawing.layout.pools import lay_out_file
 
 DI = {
     "bpmndi": "http://www.omg.org/spec/BPMN/20100524/DI",

@@ -1,0 +1,237 @@
+"""Tasks and other activities: their beginning, their work, and how it ends."""
+
+from m2pem.model import elements as e
+from m2pem.model.behavior import Assignment, Behavior
+from m2pem.model.expression.expression import literal
+from m2pem.resources.units import Dimension, UnitError, quantity
+from m2pem.verify.derive import containers
+from m2pem.verify.derive.compensation import undoable, undone
+from m2pem.verify.derive.effect import Effect, product
+from m2pem.verify.derive.holding import behavior_of, held_by, resources
+from m2pem.verify.derive.leaving import leave
+from m2pem.verify.derive.loops import looped
+from m2pem.verify.derive.making import Host, Making
+from m2pem.verify.derive.net import Area, at
+from m2pem.verify.derive.throwing import catchable, message_effects, throw_error
+from m2pem.verify.derive.waiting import boundaries, catching, due_us
+from m2pem.verify.system import Action, Flag, Kind, Role, Step, Trigger
+
+
+def activity(making: Making, node: e.FlowNode, area: Area) -> None:
+    """A token comes to an activity, works, and leaves."""
+    assert isinstance(node, e.Activity)
+    net = making.net
+    inside = net.area(node, area)
+    inside.several = area.several or node in making.repeated
+    held, behavior = held_by(making, node)
+    repeated = node in making.repeated
+    active = net.place(node, area, Role.ACTIVE, several=repeated, resources=held, behavior=behavior)
+    host = Host(node, area, inside, active, lambda: [])
+    host.done = lambda: pass_on(making, host)
+    inside.host = host
+    boundaries(making, host)
+    if node.loop is not None:
+        begun = looped(making, host, work)
+    else:
+        begun = work(making, host)
+    come = Effect(
+        steps=(Step(node.id, Action.ENTERED),),
+        consume=(at(net, node, area),) * node.start_quantity,
+    )
+    for effect in product([come], begun):
+        net.rule(effect)
+
+
+def pass_on(making: Making, host: Host) -> list[Effect]:
+    """An activity is done: it leaves by its flows. Its token is taken off already."""
+    node = host.node
+    noted = undoable(making, host)
+    ways = [noted] if noted is not None else [Effect()]
+    for mapping in node.data_flow.outputs:
+        ways = making.data.write(ways, mapping.target, None, host.outer, node)
+    if node.for_compensation:
+        return product(ways, [undone(making, host)])
+    out = leave(
+        making,
+        host.outer,
+        node,
+        node.default,
+        lambda code: throw_error(making, host.outer, node, host, code),
+        times=node.completion_quantity,
+    )
+    if isinstance(node.container, e.AdHocSubProcess):
+        asked = making.net.place(node.container, host.outer, Role.ENTERING, ":asked")
+        if node.container.active_elements is None and node.container.entries:
+            ways = product(ways, [Effect(produce=(asked,))])
+    return product(ways, out)
+
+
+# --- work ---------------------------------------------------------------------------------------
+
+
+def work(making: Making, host: Host) -> list[Effect]:
+    """What an activity, or an instance of one, does when it begins."""
+    node = host.node
+    behavior = behavior_of(node)
+    if behavior is not None:
+        return _behavior(making, host, behavior)
+    match node:
+        case e.UserTask():
+            return _user_task(making, host, node)
+        case e.ScriptTask():
+            return _script(making, host, node)
+        case e.ServiceTask(call=call) if call is not None:
+            return _outside_work(making, host)
+        case e.SendTask(message=message) if message is not None:
+            return _send(making, host, message.id)
+        case e.ReceiveTask(message=message) if message is not None:
+            return _receive(making, host, node)
+        case e.AdHocSubProcess():
+            return containers.ad_hoc(making, host)
+        case e.SubProcess():
+            return containers.subprocess(making, host)
+        case e.CallActivity():
+            return containers.call(making, host)
+        case _:
+            return _at_once(host)
+
+
+def _at_once(host: Host) -> list[Effect]:
+    stop = Effect(steps=(Step(host.node.id, Action.COMPLETED),))
+    return product([stop], host.done())
+
+
+def failing(making: Making, host: Host, code: str, flag: Flag) -> list[Effect]:
+    """An activity fails, its token being taken off already."""
+    return throw_error(making, host.outer, host.node, host, code, flag)
+
+
+def _behavior(making: Making, host: Host, behavior: Behavior) -> list[Effect]:
+    net = making.net
+    if not behavior.roles and behavior.name == "hold":
+        done = _ended(host, host.leave())
+        for effect in product([done], host.done()):
+            net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=_hold_us(behavior))
+        return [host.begin()]
+    held = resources(making, behavior)
+    if not held:
+        return failing(making, host, "RESOURCE_UNAVAILABLE", Flag.UNCAUGHT)
+    _outside_work(making, host)
+    wants = net.place(node_of(host), host.outer, Role.ENTERING, f":wants{host.inside.index}")
+    making.contended.append((host, wants, held))
+    return [Effect(produce=(wants,))]
+
+
+def node_of(host: Host) -> e.Activity:
+    """The activity itself."""
+    return host.node
+
+
+def contend(making: Making) -> None:
+    """A behavior begins when nobody holds what it wants; else it fails at once."""
+    net = making.net
+    for host, wants, held in making.contended:
+        holders = {n: r for r in held for n in net.holders.get(r, ())}
+        begins = Effect(
+            steps=(Step(host.node.id, Action.ENTERED, "commands"),),
+            consume=(wants,),
+            inhibit=frozenset(holders),
+        ).then(host.begin())
+        assert begins is not None
+        net.rule(begins)
+        for holder, resource in holders.items():
+            refused = Effect(
+                consume=(wants,),
+                read=frozenset({holder}),
+                flag=Flag.CONFLICT,
+                flagged=resource,
+            )
+            fails = failing(making, host, "RESOURCE_UNAVAILABLE", Flag.CONFLICT)
+            for effect in product([refused], fails):
+                net.rule(effect)
+
+
+def _hold_us(behavior: Behavior) -> int | None:
+    for parameter in behavior.parameters:
+        if parameter.name == "duration" and isinstance(parameter.value, str):
+            try:
+                return round(quantity(parameter.value, Dimension.DURATION) * 1_000_000)
+            except UnitError:
+                return None
+    return 0 if not any(p.name == "duration" for p in behavior.parameters) else None
+
+
+def _ended(host: Host, effect: Effect) -> Effect:
+    return effect.saying(host.node.id, Action.COMPLETED)
+
+
+def _outside_work(making: Making, host: Host) -> list[Effect]:
+    """A behavior or service: it ends well or badly, when its report comes."""
+    net = making.net
+    well = [_ended(host, host.leave())]
+    badly = Effect(consume=(host.active,))
+    for key in making.data.written_anyhow(host.node):
+        well = making.data.write(well, key, None, host.outer, host.node)
+    for effect in product(well, host.done()):
+        net.rule(effect, Kind.OUTSIDE, Trigger.SUCCEEDS)
+    if making.options.failures:
+        codes = dict.fromkeys((*catchable(making, host.outer, host), "FAILED"))
+        for code in codes:
+            for effect in failing(making, host, code, Flag.UNCAUGHT_FAILURE):
+                both = badly.then(effect)
+                if both is not None:
+                    net.rule(both, Kind.OUTSIDE, Trigger.FAILS, code)
+    return [host.begin()]
+
+
+def _user_task(making: Making, host: Host, node: e.UserTask) -> list[Effect]:
+    net = making.net
+    assert node.prompt is not None
+    prompt = node.prompt
+    for decision in prompt.decisions:
+        answered = [_ended(host, host.leave())]
+        answered = making.data.write(
+            answered, prompt.store, literal(decision.value), host.outer, node
+        )
+        for effect in product(answered, host.done()):
+            net.rule(effect, Kind.OUTSIDE, Trigger.ANSWER, decision.value)
+    if prompt.timeout is not None:
+        late = Effect(consume=(host.active,))
+        for effect in product(
+            [late], failing(making, host, "PROMPT_TIMEOUT", Flag.UNCAUGHT_FAILURE)
+        ):
+            net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=due_us(prompt.timeout))
+    return [host.begin()]
+
+
+def _script(making: Making, host: Host, node: e.ScriptTask) -> list[Effect]:
+    ways = [Effect()]
+    for statement in node.script.statements if node.script is not None else ():
+        if isinstance(statement, Assignment):
+            ways = making.data.write(ways, statement.key, statement.expression, host.outer, node)
+        else:
+            return product(ways, failing(making, host, statement.code, Flag.UNCAUGHT))
+    return product(ways, _at_once(host))
+
+
+def _send(making: Making, host: Host, message: str) -> list[Effect]:
+    """Between coming and leaving, so that who receives is known when it is thrown."""
+    thrown = making.net.place(host.node, host.outer, Role.ENTERING, f":sends{host.inside.index}")
+
+    def spell_out() -> None:
+        sends = Effect(steps=(Step(host.node.id, Action.THROWN, message),), consume=(thrown,))
+        for effect in product(product([sends], message_effects(making, message)), _at_once(host)):
+            making.net.rule(effect)
+
+    making.later.append(spell_out)
+    return [Effect(produce=(thrown,))]
+
+
+def _receive(making: Making, host: Host, node: e.ReceiveTask) -> list[Effect]:
+    told = making.net.place(node, host.outer, Role.TRIGGERED, f":{host.inside.index}")
+    assert node.message is not None
+    catching(making, "message", node.message.id, host.active, told, False, node)
+    stop = Effect(consume=(told,), kill_scopes=frozenset({host.inside.index}))
+    for effect in product([_ended(host, stop)], host.done()):
+        making.net.rule(effect)
+    return [host.begin()]

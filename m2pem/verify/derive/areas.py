@@ -1,0 +1,51 @@
+"""How areas begin, are quiet, and hold their event subprocesses."""
+
+from m2pem.model import elements as e
+from m2pem.model.events import ConditionalEventDefinition, TimerEventDefinition, TimerKind
+from m2pem.verify.derive.effect import Effect
+from m2pem.verify.derive.making import Host, Making
+from m2pem.verify.derive.net import Area, at
+from m2pem.verify.system import Role
+
+
+def begin(making: Making, container: e.Container, area: Area) -> Effect:
+    """A token for each of its start events."""
+    produce = [at(making.net, entry, area) for entry in container.entries]
+    if container.event_subprocesses:
+        produce.append(making.net.place(area.element, area, Role.CONTROL, ":open"))
+        produce += armed_handlers(making, container, area)
+    return Effect(produce=tuple(produce))
+
+
+def quiet(area: Area) -> Effect:
+    """Only when no token is left in it."""
+    return Effect(quiet_scopes=frozenset({area.index}))
+
+
+def handler_host(making: Making, area: Area, container: e.SubProcess) -> Host:
+    """The event subprocess of an area, as an activity in it; made when it is first asked for."""
+    place = making.net.place(container, area, Role.ACTIVE)
+    for child in area.children:
+        if child.element is container and isinstance(child.host, Host):
+            return child.host
+    inside = making.net.area(container, area)
+    host = Host(container, area, inside, place, lambda: [Effect()])
+    inside.host = host
+    return host
+
+
+def armed_handlers(making: Making, container: e.Container, area: Area) -> list[int]:
+    """Places that get a token when an area begins, for its event subprocesses."""
+    armed: list[int] = []
+    for each in container.event_subprocesses:
+        for start in each.starts:
+            if start.interrupting:
+                continue
+            for number, definition in enumerate(start.definitions):
+                once = (
+                    isinstance(definition, TimerEventDefinition)
+                    and definition.kind is not TimerKind.CYCLE
+                )
+                if once or isinstance(definition, ConditionalEventDefinition):
+                    armed.append(making.net.place(start, area, Role.CONTROL, f":armed{number}"))
+    return armed

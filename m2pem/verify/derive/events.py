@@ -1,0 +1,286 @@
+"""Events that are entered: starts, ends, catches, throws, and the event-based gateway."""
+
+from m2pem.model import elements as e
+from m2pem.model.events import (
+    CancelEventDefinition,
+    CompensateEventDefinition,
+    ConditionalEventDefinition,
+    ErrorEventDefinition,
+    EscalationEventDefinition,
+    EventDefinition,
+    MessageEventDefinition,
+    SignalEventDefinition,
+    TerminateEventDefinition,
+    TimerEventDefinition,
+)
+from m2pem.verify.derive.compensation import cancel, compensate
+from m2pem.verify.derive.effect import Effect, product
+from m2pem.verify.derive.leaving import along, leave
+from m2pem.verify.derive.making import Host, Making
+from m2pem.verify.derive.net import Area, at
+from m2pem.verify.derive.throwing import (
+    message_effects,
+    signal_effects,
+    throw_error,
+    throw_escalation,
+)
+from m2pem.verify.derive.waiting import catching, timer_us, what_and_ref
+from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step, Trigger
+
+
+def _leave(making: Making, node: e.FlowNode, area: Area) -> list[Effect]:
+    return leave(making, area, node, None, lambda code: throw_error(making, area, node, None, code))
+
+
+def _come(making: Making, node: e.FlowNode, area: Area, action: Action) -> Effect:
+    return Effect(steps=(Step(node.id, action),), consume=(at(making.net, node, area),))
+
+
+# --- catching -----------------------------------------------------------------------------------
+
+
+def start(making: Making, node: e.FlowNode, area: Area) -> None:
+    """A plain start goes on at once; so does one whose trigger has made its instance."""
+    assert isinstance(node, e.StartEvent)
+    container = node.container
+    begun = isinstance(container, e.SubProcess) and container.triggered_by_event
+    begun = begun or (area.parent is making.everything and container is not making.process)
+    if node.definitions and not begun:
+        _wait(making, node, area)
+    else:
+        come = _come(making, node, area, Action.COMPLETED)
+        making.rules(product([come], _leave(making, node, area)))
+
+
+def catch(making: Making, node: e.FlowNode, area: Area) -> None:
+    """Waits for its trigger; the target of a link has none."""
+    assert isinstance(node, e.IntermediateCatchEvent)
+    if not node.definitions or node.linked_from:
+        come = _come(making, node, area, Action.COMPLETED)
+        making.rules(product([come], _leave(making, node, area)))
+        return
+    _wait(making, node, area)
+
+
+def _wait(making: Making, node: e.Event, area: Area) -> None:
+    net = making.net
+    waiting = net.place(node, area, Role.ACTIVE, several=node in making.repeated)
+    come = _come(making, node, area, Action.ENTERED).then(Effect(produce=(waiting,)))
+    assert come is not None
+    net.rule(come)
+    if node.parallel_multiple and len(node.definitions) > 1:
+        _wait_for_all(making, node, area, waiting)
+        return
+    for number, definition in enumerate(node.definitions):
+        _trigger(making, node, area, definition, waiting, _leave(making, node, area), number)
+
+
+def _wait_for_all(making: Making, node: e.Event, area: Area, waiting: int) -> None:
+    """All of its triggers must come, in any order."""
+    net = making.net
+    came: list[int] = []
+    for number, definition in enumerate(node.definitions):
+        awaited_place = net.place(node, area, Role.CONTROL, f":awaits{number}")
+        told = net.place(node, area, Role.CONTROL, f":came{number}")
+        came.append(told)
+        seen = Effect(
+            steps=(Step(node.id, Action.TRIGGERED, "one of several"),),
+            consume=(awaited_place,),
+            produce=(told,),
+        )
+        match definition:
+            case TimerEventDefinition():
+                net.rule(seen, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+            case SignalEventDefinition() | MessageEventDefinition():
+                what, ref = what_and_ref(definition)
+                catching(making, what, ref, awaited_place, told, False, node)
+            case ConditionalEventDefinition(condition=condition):
+                if making.data.is_followed([condition], node):
+                    for guard, truth in making.data.cases([condition], area, node, lambda t: t[0]):
+                        if truth is True:
+                            making.rules(product([seen], [Effect(guard=guard)]))
+                else:
+                    net.rule(seen, Kind.OUTSIDE, Trigger.CONDITION)
+            case _:
+                net.rule(seen)
+        net.rule(
+            Effect(
+                steps=(Step(node.id, Action.ENTERED, "waits"),),
+                read=frozenset({waiting}),
+                inhibit=frozenset({awaited_place, told}),
+                produce=(awaited_place,),
+            )
+        )
+    done = Effect(steps=(Step(node.id, Action.COMPLETED),), consume=(waiting, *came))
+    making.rules(product([done], _leave(making, node, area)))
+
+
+def _trigger(
+    making: Making,
+    node: e.FlowNode,
+    area: Area,
+    definition: EventDefinition,
+    waiting: int,
+    ways: list[Effect],
+    number: int,
+) -> None:
+    """The token of `waiting` goes on when the trigger comes."""
+    net = making.net
+    came = Effect(steps=(Step(node.id, Action.TRIGGERED),), consume=(waiting,))
+    match definition:
+        case TimerEventDefinition():
+            for effect in product([came], ways):
+                net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+        case SignalEventDefinition() | MessageEventDefinition():
+            told = net.place(node, area, Role.TRIGGERED, f":{number}:{waiting}")
+            what, ref = what_and_ref(definition)
+            catching(making, what, ref, waiting, told, False, node)
+            came = Effect(steps=came.steps, consume=(told,))
+            making.rules(product([came], ways))
+        case ConditionalEventDefinition(condition=condition):
+            if not making.data.is_followed([condition], node):
+                net.approximate(node, Exactness.MORE, "its condition may become true at any time")
+                for effect in product([came], ways):
+                    net.rule(effect, Kind.OUTSIDE, Trigger.CONDITION)
+                return
+            for guard, truth in making.data.cases([condition], area, node, lambda t: t[0]):
+                if truth is True:
+                    making.rules(product(product([came], [Effect(guard=guard)]), ways))
+        case _:
+            making.rules(product([came], ways))
+
+
+def _true_or_never(making: Making, node: e.FlowNode, area: Area, ways: list[Effect]) -> None:
+    """A condition on what nothing in the mission writes: it is true at once, or never."""
+    come = _come(making, node, area, Action.TRIGGERED)
+    making.rules(product([come], ways))
+
+
+def event_based(making: Making, node: e.FlowNode, area: Area) -> None:
+    """Waits for the first of the events behind it."""
+    assert isinstance(node, e.EventBasedGateway)
+    net = making.net
+    waiting = net.place(node, area, Role.ACTIVE, several=node in making.repeated)
+    come = _come(making, node, area, Action.ENTERED).then(Effect(produce=(waiting,)))
+    assert come is not None
+    net.rule(come)
+    number = 0
+    for flow in node.outgoing:
+        target = flow.target
+        taken = Effect(steps=(Step(flow.id, Action.TAKEN),))
+        ways = product([taken], after(making, target, area))
+        for definition in awaited(target):
+            _trigger(making, target, area, definition, waiting, ways, number)
+            number += 1
+
+
+def awaited(node: e.FlowNode) -> tuple[EventDefinition, ...]:
+    """What triggers a catch event or receive task."""
+    if isinstance(node, e.ReceiveTask):
+        return (MessageEventDefinition(node.line, node.message),) if node.message else ()
+    return node.definitions if isinstance(node, e.Event) else ()
+
+
+def after(making: Making, node: e.FlowNode, area: Area) -> list[Effect]:
+    """What follows a catch event or receive task whose trigger has come already."""
+    if isinstance(node, e.Activity):
+        done = Effect(steps=(Step(node.id, Action.COMPLETED),))
+        out = leave(
+            making,
+            area,
+            node,
+            node.default,
+            lambda code: throw_error(making, area, node, None, code),
+            times=node.completion_quantity,
+        )
+        return product([done], out)
+    return _leave(making, node, area)
+
+
+# --- throwing -----------------------------------------------------------------------------------
+
+
+def throw(making: Making, node: e.FlowNode, area: Area) -> None:
+    """Throws, and goes on."""
+    assert isinstance(node, e.IntermediateThrowEvent)
+    if node.links_to is not None:
+        link = Effect(produce=(at(making.net, node.links_to, area),))
+        come = _come(making, node, area, Action.COMPLETED)
+        making.rules(product([come], [link]))
+        return
+    making.later.append(
+        lambda: making.rules(
+            _throw_all(making, node, area, node.definitions, _leave(making, node, area))
+        )
+    )
+
+
+def _throw_all(
+    making: Making,
+    node: e.Event,
+    area: Area,
+    definitions: tuple[EventDefinition, ...],
+    ways: list[Effect],
+) -> list[Effect]:
+    """What several definitions throw, one after the other, and then `ways`."""
+    begun = [_come(making, node, area, Action.COMPLETED)]
+    ended: list[Effect] = []
+    for definition in definitions:
+        match definition:
+            case SignalEventDefinition(signal=signal):
+                thrown = Effect(steps=(Step(node.id, Action.THROWN, signal.id),))
+                begun = product(product(begun, [thrown]), signal_effects(making, signal.id))
+            case MessageEventDefinition(message=message):
+                thrown = Effect(steps=(Step(node.id, Action.THROWN, message.id),))
+                begun = product(product(begun, [thrown]), message_effects(making, message.id))
+            case EscalationEventDefinition(escalation=escalation):
+                assert escalation is not None
+                going: list[Effect] = []
+                for effect, goes_on in throw_escalation(making, area, node, escalation.code):
+                    (going if goes_on else ended).extend(product(begun, [effect]))
+                begun = going
+            case CompensateEventDefinition():
+                waited, begun = compensate(making, node, area, definition, begun, ways)
+                ended += waited
+            case _:
+                pass
+    return [*product(begun, ways), *ended]
+
+
+def end(making: Making, node: e.FlowNode, area: Area) -> None:
+    """The token ends here, perhaps throwing something."""
+    assert isinstance(node, e.EndEvent)
+    making.later.append(lambda: making.rules(_end(making, node, area)))
+
+
+def _end(making: Making, node: e.EndEvent, area: Area) -> list[Effect]:
+    last: list[Effect] = [making.reached(node, area)]
+    thrown = []
+    for definition in node.definitions:
+        match definition:
+            case TerminateEventDefinition():
+                last = _terminate(making, area)
+            case CancelEventDefinition():
+                last = cancel(making, node, area)
+            case ErrorEventDefinition(error=error):
+                assert error is not None
+                last = throw_error(making, area, node, None, error.code, Flag.UNCAUGHT)
+            case _:
+                thrown.append(definition)
+    return _throw_all(making, node, area, tuple(thrown), last)
+
+
+def _terminate(making: Making, area: Area) -> list[Effect]:
+    """The scope ends at once; the process that the run began with, and the run with it."""
+    if area is making.root:
+        return [making.end_run(making.terminated)]
+    stop = Effect(kill_scopes=frozenset({area.index}))
+    host = area.host
+    if not isinstance(host, Host):
+        return [stop]
+    left = host.leave().then(stop)
+    assert left is not None
+    return product([left], host.done())
+
+
+__all__ = ["along", "catch", "end", "event_based", "start", "throw"]

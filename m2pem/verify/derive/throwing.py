@@ -1,0 +1,294 @@
+"""Errors, escalations, signals and messages: who catches them, and what follows."""
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+from m2pem.model import elements as e
+from m2pem.model.events import (
+    ErrorEventDefinition,
+    EscalationEventDefinition,
+    EventDefinition,
+    MessageEventDefinition,
+    SignalEventDefinition,
+)
+from m2pem.verify.derive.areas import begin, handler_host
+from m2pem.verify.derive.effect import Effect
+from m2pem.verify.derive.making import Host, Making
+from m2pem.verify.derive.net import Area, at
+from m2pem.verify.system import Action, Flag, Kind, Role, Step
+
+Catching = TypeVar("Catching", bound=e.Event)
+
+
+def catchable(making: Making, area: Area, host: Host | None) -> list[str]:
+    """Codes of errors that something around a place names, and one that nothing names."""
+    codes: dict[str, None] = {}
+    for event in _around(area, host):
+        for definition in event.definitions:
+            if isinstance(definition, ErrorEventDefinition) and definition.error is not None:
+                codes[definition.error.code] = None
+    return list(codes)
+
+
+def _around(area: Area, host: Host | None) -> list[e.Event]:
+    found: list[e.Event] = []
+    here: Area | None = area
+    while here is not None:
+        if host is not None and host.boundary:
+            found += host.node.boundary
+        found += [s for each in handlers(here) for s in each.starts]
+        host = here.host if isinstance(here.host, Host) else None
+        here = host.outer if host is not None else None
+    return found
+
+
+def handlers(area: Area) -> Sequence[e.SubProcess]:
+    """The event subprocesses that can begin in an area."""
+    element = area.element
+    if area.open is None or not isinstance(element, e.Process | e.SubProcess | e.CallActivity):
+        return ()
+    container = element.called if isinstance(element, e.CallActivity) else element
+    return container.event_subprocesses
+
+
+def throw_error(
+    making: Making,
+    area: Area,
+    thrower: e.FlowNode,
+    host: Host | None,
+    code: str,
+    uncaught: Flag = Flag.UNCAUGHT,
+) -> list[Effect]:
+    """What an error leads to. The thrower's own token is taken off already; `host`: the activity
+    that it was on, which may catch it itself."""
+    thrown = Step(thrower.id, Action.THROWN, code)
+    return _go_up(making, area, thrower, host, code, thrown, uncaught, _error_code, first=True)
+
+
+def throw_escalation(
+    making: Making, area: Area, thrower: e.FlowNode, code: str
+) -> list[tuple[Effect, bool]]:
+    """What an escalation leads to, and whether its scope goes on."""
+    thrown = Step(thrower.id, Action.THROWN, code)
+    found: list[tuple[Effect, bool]] = []
+    condition = Effect(steps=(thrown,))
+    here: Area | None = area
+    host: Host | None = None
+    node: e.FlowNode = thrower
+    while here is not None:
+        if host is not None and host.boundary:
+            event = best(host.node.boundary, code, _escalation_code)
+            if event is not None:
+                found.append(_at_boundary(making, condition, host, event, taken_off=False))
+                return found
+        if here.open is not None:
+            start = best(_starts(here, node), code, _escalation_code)
+            if start is not None:
+                begun = condition.then(Effect(read=frozenset({here.open})))
+                assert begun is not None
+                for effect in begin_handler(making, here, start):
+                    both = begun.then(effect)
+                    if both is not None:
+                        found.append((both, not start.interrupting))
+                without = condition.then(Effect(inhibit=frozenset({here.open})))
+                assert without is not None
+                condition = without
+        host = here.host if isinstance(here.host, Host) else None
+        if host is None:
+            break
+        node, here = host.node, host.outer
+    ignored = condition.then(Effect(flag=Flag.UNHEARD, flagged=code))
+    assert ignored is not None
+    found.append((ignored, True))
+    return found
+
+
+def _at_boundary(
+    making: Making, condition: Effect, host: Host, event: e.BoundaryEvent, *, taken_off: bool
+) -> tuple[Effect, bool]:
+    caught = Effect(
+        steps=(Step(event.id, Action.TRIGGERED),), produce=(at(making.net, event, host.outer),)
+    )
+    if event.interrupting:
+        inside = frozenset({host.inside.index})
+        left = Effect(kill_scopes=inside) if taken_off else host.leave()
+        stopped = left.saying(host.node.id, Action.INTERRUPTED)
+        both = condition.then(stopped)
+        assert both is not None
+        condition = both
+    done = condition.then(caught)
+    assert done is not None
+    return done, not event.interrupting
+
+
+def _go_up(
+    making: Making,
+    area: Area,
+    thrower: e.FlowNode,
+    host: Host | None,
+    code: str,
+    thrown: Step,
+    uncaught: Flag,
+    code_of: "object",
+    *,
+    first: bool,
+) -> list[Effect]:
+    found: list[Effect] = []
+    condition = Effect(steps=(thrown,))
+    here: Area | None = area
+    node = thrower
+    taken_off = True
+    while here is not None:
+        if host is not None and host.boundary:
+            event = best(host.node.boundary, code, _error_code)
+            if event is not None:
+                found.append(_at_boundary(making, condition, host, event, taken_off=taken_off)[0])
+                return found
+        if here.open is not None:
+            start = best(_starts(here, node), code, _error_code)
+            if start is not None:
+                begun = condition.then(Effect(read=frozenset({here.open})))
+                assert begun is not None
+                found += [
+                    both
+                    for effect in begin_handler(making, here, start)
+                    if (both := begun.then(effect)) is not None
+                ]
+                without = condition.then(Effect(inhibit=frozenset({here.open})))
+                assert without is not None
+                condition = without
+        host = here.host if isinstance(here.host, Host) else None
+        if host is None:
+            break
+        node, here, taken_off = host.node, host.outer, False
+    failed = condition.then(making.end_run(making.failed))
+    assert failed is not None
+    flagged = failed.then(Effect(flag=uncaught, flagged=code))
+    assert flagged is not None
+    found.append(flagged)
+    return found
+
+
+def begin_handler(making: Making, area: Area, start: e.StartEvent) -> list[Effect]:
+    """An event subprocess begins in an area; an interrupting one ends all else there first."""
+    container = start.container
+    assert isinstance(container, e.SubProcess)
+    host = handler_host(making, area, container)
+    inside = begin(making, container, host.inside)
+    entries = {at(making.net, entry, host.inside) for entry in container.entries}
+    begun = Effect(
+        steps=(Step(start.id, Action.TRIGGERED),),
+        produce=(
+            at(making.net, start, host.inside),
+            *(place for place in inside.produce if place not in entries),
+        ),
+    ).then(host.begin())
+    assert begun is not None
+    if start.interrupting:
+        stop = Effect(kill_scopes=frozenset({area.index}))
+        both = stop.then(begun)
+        assert both is not None
+        return [both]
+    return [begun]
+
+
+def _starts(area: Area, but: e.FlowNode) -> list[e.StartEvent]:
+    return [start for each in handlers(area) if each is not but for start in each.starts]
+
+
+def _error_code(definition: EventDefinition) -> str | None:
+    """The code that it catches, "" for every one; None: it catches no error."""
+    if not isinstance(definition, ErrorEventDefinition):
+        return None
+    return definition.error.code if definition.error is not None else ""
+
+
+def _escalation_code(definition: EventDefinition) -> str | None:
+    if not isinstance(definition, EscalationEventDefinition):
+        return None
+    return definition.escalation.code if definition.escalation is not None else ""
+
+
+def best(events: Sequence[Catching], code: str, code_of: "object") -> Catching | None:
+    """The event that names a code, else one that takes all."""
+    assert callable(code_of)
+    for_all = None
+    for event in events:
+        for definition in event.definitions:
+            caught = code_of(definition)
+            if caught == "":
+                for_all = for_all or event
+            elif caught == code:
+                return event
+    return for_all
+
+
+# --- signals and messages -----------------------------------------------------------------------
+
+
+def throw_signal(making: Making, signal: str) -> Effect:
+    """Every catcher that waits has it. Complete only when all catchers are known."""
+    moves = [(c.waiting, c.told) for c in making.signals.get(signal, ()) if not c.keeps]
+    copies = [(c.waiting, c.told) for c in making.signals.get(signal, ()) if c.keeps]
+    return Effect(moves=tuple(moves), copies=tuple(copies))
+
+
+def signal_effects(making: Making, signal: str) -> list[Effect]:
+    """The same, with the processes that it begins."""
+    found = [throw_signal(making, signal)]
+    for begun in making.begins.get(("signal", signal), ()):
+        found = [both for one in found for way in begun if (both := one.then(way)) is not None]
+    return found
+
+
+def message_effects(making: Making, message: str, *, kept: bool = True) -> list[Effect]:
+    """One of those that wait for a message gets it, else a process begins, else it is kept."""
+    catchers = making.messages.get(message, [])
+    found: list[Effect] = []
+    for catcher in catchers:
+        if catcher.keeps:
+            found.append(Effect(read=frozenset({catcher.waiting}), produce=(catcher.told,)))
+        else:
+            found.append(Effect(consume=(catcher.waiting,), produce=(catcher.told,)))
+    nobody = Effect(inhibit=frozenset(c.waiting for c in catchers))
+    begins = making.begins.get(("message", message), ())
+    if begins:
+        return found + [both for way in begins[0] if (both := nobody.then(way)) is not None]
+    if not catchers:
+        return [Effect()]
+    if kept:
+        letter = making.net.place(
+            making.process, making.everything, Role.CONTROL, f":{message}", several=True
+        )
+        nobody = nobody.then(Effect(produce=(letter,))) or nobody
+    return [*found, nobody]
+
+
+def deliver_kept(making: Making, message: str) -> None:
+    """Who waits for a message gets one that was kept."""
+    letter = making.net.place(
+        making.process, making.everything, Role.CONTROL, f":{message}", several=True
+    )
+    for catcher in making.messages.get(message, ()):
+        taken = Effect(
+            steps=(Step(catcher.element, Action.TRIGGERED, message),),
+            consume=(letter,) if catcher.keeps else (letter, catcher.waiting),
+            read=frozenset({catcher.waiting}) if catcher.keeps else frozenset(),
+            produce=(catcher.told,),
+        )
+        making.net.rule(taken, Kind.INTERNAL)
+
+
+def thrown_by(node: e.FlowNode) -> tuple[set[str], set[str]]:
+    """Ids of the signals and messages that an element throws."""
+    signals: set[str] = set()
+    messages: set[str] = set()
+    if isinstance(node, e.SendTask) and node.message is not None:
+        messages.add(node.message.id)
+    if isinstance(node, e.EndEvent | e.IntermediateThrowEvent):
+        for definition in node.definitions:
+            if isinstance(definition, SignalEventDefinition):
+                signals.add(definition.signal.id)
+            elif isinstance(definition, MessageEventDefinition):
+                messages.add(definition.message.id)
+    return signals, messages

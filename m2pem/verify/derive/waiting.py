@@ -1,0 +1,316 @@
+"""What waits for something: boundary events, the starts of event subprocesses, catch events."""
+
+from collections.abc import Sequence
+
+from m2pem.errors import ExpressionError, ExpressionSyntaxError
+from m2pem.model import elements as e
+from m2pem.model.duration import duration_us
+from m2pem.model.events import (
+    CancelEventDefinition,
+    CompensateEventDefinition,
+    ConditionalEventDefinition,
+    EventDefinition,
+    MessageEventDefinition,
+    SignalEventDefinition,
+    TimerEventDefinition,
+    TimerKind,
+)
+from m2pem.model.expression import Expression
+from m2pem.verify.derive.areas import handler_host
+from m2pem.verify.derive.data import ERROR, Truth
+from m2pem.verify.derive.effect import Effect, product
+from m2pem.verify.derive.leaving import leave
+from m2pem.verify.derive.making import Catcher, Host, Making
+from m2pem.verify.derive.net import Area, at, is_join
+from m2pem.verify.derive.throwing import begin_handler, throw_error
+from m2pem.verify.system import Action, Exactness, Kind, Role, Step, Trigger
+
+_2026_US = 1_767_225_600_000_000
+
+
+def due_us(expression: Expression) -> int | None:
+    """A duration that is written in the mission, in microseconds; None: it is not."""
+    if not expression.constant:
+        return None
+    try:
+        value = expression.evaluate(lambda _: None)
+        return duration_us(value, _2026_US) if isinstance(value, str) else None
+    except (ExpressionError, ExpressionSyntaxError):
+        return None
+
+
+def timer_us(definition: TimerEventDefinition) -> int | None:
+    """The same, of a timer event."""
+    if definition.kind is not TimerKind.DURATION:
+        return None
+    return due_us(definition.expression)
+
+
+def catching(
+    making: Making,
+    what: str,
+    ref: str,
+    waiting: int,
+    told: int,
+    keeps: bool,
+    node: e.FlowNode,
+) -> None:
+    """A signal or message of that id reaches a token on `waiting`."""
+    register = making.signals if what == "signal" else making.messages
+    register.setdefault(ref, []).append(Catcher(waiting, told, keeps, node.id))
+
+
+# --- boundary events ----------------------------------------------------------------------------
+
+
+def boundaries(making: Making, host: Host) -> None:
+    """Everything that can come to the boundary of an activity from outside of it."""
+    for event in host.node.boundary:
+        making.net.knows(event)
+        out = at(making.net, event, host.outer)
+        _leave_boundary(making, host, event, out)
+        if event.parallel_multiple and len(event.definitions) > 1:
+            making.net.approximate(
+                event, Exactness.MORE, "one of its triggers is enough, not all of them"
+            )
+        for number, definition in enumerate(event.definitions):
+            _boundary(making, host, event, definition, out, number)
+
+
+def _leave_boundary(making: Making, host: Host, event: e.BoundaryEvent, out: int) -> None:
+    if any(isinstance(d, CompensateEventDefinition) for d in event.definitions):
+        return
+    come = Effect(steps=(Step(event.id, Action.COMPLETED),), consume=(out,))
+    ways = leave(
+        making,
+        host.outer,
+        event,
+        None,
+        lambda code: throw_error(making, host.outer, event, None, code),
+    )
+    making.rules(product([come], ways))
+
+
+def _boundary(
+    making: Making,
+    host: Host,
+    event: e.BoundaryEvent,
+    definition: EventDefinition,
+    out: int,
+    number: int,
+) -> None:
+    net = making.net
+    caught = Step(event.id, Action.TRIGGERED)
+    if event.interrupting:
+        stop = host.leave().saying(host.node.id, Action.INTERRUPTED)
+        comes = Effect(steps=(caught, *stop.steps), produce=(out,)).then(
+            Effect(consume=stop.consume, kill_scopes=stop.kill_scopes)
+        )
+        told_comes = Effect(
+            steps=(caught, *stop.steps), kill_scopes=stop.kill_scopes, produce=(out,)
+        )
+    else:
+        comes = Effect(steps=(caught,), read=frozenset({host.active}), produce=(out,))
+        told_comes = Effect(steps=(caught,), produce=(out,))
+    assert comes is not None
+    match definition:
+        case TimerEventDefinition():
+            if not event.interrupting:
+                comes = _again(making, host, event, comes, definition.kind is TimerKind.CYCLE)
+            net.rule(comes, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+        case SignalEventDefinition() | MessageEventDefinition():
+            told = net.place(event, host.outer, Role.TRIGGERED, f":{number}")
+            what, ref = what_and_ref(definition)
+            catching(making, what, ref, host.active, told, not event.interrupting, event)
+            both = told_comes.then(Effect(consume=(told,)))
+            assert both is not None
+            net.rule(both)
+        case ConditionalEventDefinition(condition=condition):
+            _boundary_condition(making, host, event, condition, comes, number)
+        case CancelEventDefinition():
+            pass  # its transaction comes here by itself
+        case _:
+            pass  # errors and escalations look for their catcher
+
+
+def _again(
+    making: Making, host: Host, event: e.BoundaryEvent, comes: Effect, repeats: bool
+) -> Effect:
+    """What does not interrupt comes once; or again and again, one handling at a time."""
+    if not repeats:
+        armed = making.net.place(event, host.inside, Role.CONTROL, ":armed")
+        host.armed.append(armed)
+        both = comes.then(Effect(consume=(armed,)))
+        assert both is not None
+        return both
+    making.net.approximate(
+        event, Exactness.BOUNDED, "it comes again only when what it began has ended"
+    )
+    region = handled(event)
+    found: set[int] = set()
+    both = comes.then(Effect(inhibit=_Late(making, host.outer, region, found)))
+    assert both is not None
+    return both
+
+
+class _Late(frozenset[int]):
+    """Places of some nodes, known when all are made."""
+
+    __slots__ = ()
+
+    def __new__(
+        cls, making: Making, area: Area, nodes: frozenset[e.FlowNode], found: set[int]
+    ) -> "_Late":
+        del found
+        return super().__new__(cls, {at(making.net, node, area) for node in nodes})
+
+
+def handled(event: e.BoundaryEvent) -> frozenset[e.FlowNode]:
+    """The event's own first steps: what follows it until something else joins."""
+    found: set[e.FlowNode] = {event}
+    waiting: list[e.FlowNode] = [event]
+    while waiting:
+        for flow in waiting.pop().outgoing:
+            node = flow.target
+            if node not in found and all(f.source in found for f in node.incoming):
+                found.add(node)
+                waiting.append(node)
+    return frozenset(node for node in found if not is_join(node))
+
+
+def _boundary_condition(
+    making: Making,
+    host: Host,
+    event: e.BoundaryEvent,
+    condition: Expression,
+    comes: Effect,
+    number: int,
+) -> None:
+    net = making.net
+    if not making.data.is_followed([condition], event):
+        net.approximate(event, Exactness.MORE, "its condition may become true at any time")
+        if not event.interrupting:
+            comes = _again(making, host, event, comes, repeats=True)
+        net.rule(comes, Kind.OUTSIDE, Trigger.CONDITION)
+        return
+    for guard, truth in making.data.cases([condition], host.outer, event, _first):
+        if event.interrupting:
+            if truth is True:
+                making.rules(product([comes], [Effect(guard=guard)]))
+            continue
+        ready = net.place(event, host.inside, Role.CONTROL, f":ready{number}")
+        if ready not in host.armed:
+            host.armed.append(ready)
+        if truth is True:
+            making.rules(product([comes], [Effect(guard=guard, consume=(ready,))]))
+        else:
+            reset = Effect(
+                steps=(Step(event.id, Action.ENTERED, "its condition is false"),),
+                guard=guard,
+                read=frozenset({host.active}),
+                inhibit=frozenset({ready}),
+                produce=(ready,),
+            )
+            net.rule(reset)
+
+
+def _first(truths: Sequence[Truth]) -> Truth:
+    return truths[0]
+
+
+def what_and_ref(definition: EventDefinition) -> tuple[str, str]:
+    """("signal" or "message", its id)."""
+    if isinstance(definition, SignalEventDefinition):
+        return "signal", definition.signal.id
+    assert isinstance(definition, MessageEventDefinition)
+    return "message", definition.message.id
+
+
+# --- event subprocesses -------------------------------------------------------------------------
+
+
+def arm_handler(making: Making, area: Area, start: e.StartEvent) -> None:
+    """What begins an event subprocess from outside of its area."""
+    net = making.net
+    assert area.open is not None
+    if start.parallel_multiple and len(start.definitions) > 1:
+        net.approximate(start, Exactness.MORE, "one of its triggers is enough, not all of them")
+    for number, definition in enumerate(start.definitions):
+        begun = begin_handler(making, area, start)
+        when = Effect(read=frozenset({area.open}))
+        match definition:
+            case TimerEventDefinition():
+                if not start.interrupting:
+                    if definition.kind is TimerKind.CYCLE:
+                        when = when.then(_once_at_a_time(making, area, start)) or when
+                    else:
+                        armed = net.place(start, area, Role.CONTROL, f":armed{number}")
+                        when = when.then(Effect(consume=(armed,))) or when
+                for effect in product([when], begun):
+                    net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+            case SignalEventDefinition() | MessageEventDefinition():
+                told = net.place(start, area, Role.TRIGGERED, f":told{number}")
+                what, ref = what_and_ref(definition)
+                catching(making, what, ref, area.open, told, not start.interrupting, start)
+                come = Effect(steps=(Step(start.id, Action.TRIGGERED),), consume=(told,))
+                if not start.interrupting:
+                    come = come.then(_once_at_a_time(making, area, start)) or come
+                    host = _host_of(making, area, start)
+                    net.rule(
+                        Effect(steps=come.steps, consume=(told,), read=frozenset({host.active}))
+                    )
+                making.rules(product([come], begun))
+            case ConditionalEventDefinition(condition=condition):
+                _handler_condition(making, area, start, condition, when, begun, number)
+            case _:
+                pass
+
+
+def _once_at_a_time(making: Making, area: Area, start: e.StartEvent) -> Effect:
+    making.net.approximate(start, Exactness.BOUNDED, "it begins again only when it has ended")
+    return Effect(inhibit=frozenset({_host_of(making, area, start).active}))
+
+
+def _host_of(making: Making, area: Area, start: e.StartEvent) -> Host:
+    assert isinstance(start.container, e.SubProcess)
+    return handler_host(making, area, start.container)
+
+
+def _handler_condition(
+    making: Making,
+    area: Area,
+    start: e.StartEvent,
+    condition: Expression,
+    when: Effect,
+    begun: list[Effect],
+    number: int,
+) -> None:
+    net = making.net
+    armed = net.place(start, area, Role.CONTROL, f":armed{number}")
+    if not making.data.is_followed([condition], start):
+        net.approximate(start, Exactness.MORE, "its condition may become true at any time")
+        if not start.interrupting:
+            when = when.then(_once_at_a_time(making, area, start)) or when
+        for effect in product([when], begun):
+            net.rule(effect, Kind.OUTSIDE, Trigger.CONDITION)
+        return
+    for guard, truth in making.data.cases([condition], area, start, _first):
+        asked = when.then(Effect(guard=guard))
+        assert asked is not None
+        if truth is True:
+            if not start.interrupting:
+                asked = asked.then(Effect(consume=(armed,)))
+                assert asked is not None
+                asked = asked.then(_once_at_a_time(making, area, start))
+                assert asked is not None
+            making.rules(product([asked], begun))
+        elif not start.interrupting and truth != ERROR:
+            reset = asked.then(
+                Effect(
+                    steps=(Step(start.id, Action.ENTERED, "its condition is false"),),
+                    inhibit=frozenset({armed}),
+                    produce=(armed,),
+                )
+            )
+            assert reset is not None
+            net.rule(reset)

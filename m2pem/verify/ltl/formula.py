@@ -1,0 +1,272 @@
+"""The syntax tree of formulas. Nodes are immutable and compared by what they say.
+
+Operators of the past look at a run from its beginning to now; what they and `Count` are applied
+to has no operator of the future in it. `Next` is no word of the language: only patterns that look
+at single steps use it (`needs_steps`).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, TypeAlias, Union
+
+from m2pem.model.expression import Expression
+
+# --- propositions: what is true or false of one moment of a run ----------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Active:
+    """A token is on the element."""
+
+    element: str
+    position: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Completed:
+    """A token leaves the element as completed, in this moment."""
+
+    element: str
+    position: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Commanded:
+    """The behavior holds the resource; any behavior does, where none is named."""
+
+    resource: str
+    behavior: str = ""
+    position: int = field(default=0, compare=False)
+    behavior_position: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """The run is over: as "completed", "terminated" or "failed", or in any way ("")."""
+
+    outcome: str = ""
+    position: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Data:
+    """A condition over the data of the process that the run begins with."""
+
+    expression: Expression
+    position: int = field(default=0, compare=False)
+
+
+OUTCOMES = ("completed", "terminated", "failed")
+
+Proposition: TypeAlias = Union[Active, Completed, Commanded, Ended, Data]
+
+# --- formulas ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """Always true, or never."""
+
+    value: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Not:
+    """`!a`."""
+
+    operand: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class And:
+    """`a && b && ...`."""
+
+    operands: "tuple[Formula, ...]"
+
+
+@dataclass(frozen=True, slots=True)
+class Or:
+    """`a || b || ...`."""
+
+    operands: "tuple[Formula, ...]"
+
+
+@dataclass(frozen=True, slots=True)
+class Implies:
+    """`a -> b`."""
+
+    left: "Formula"
+    right: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class Iff:
+    """`a <-> b`."""
+
+    left: "Formula"
+    right: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class Always:
+    """`[] a`: from now on."""
+
+    operand: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class Eventually:
+    """`<> a`: now or later."""
+
+    operand: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class Until:
+    """`a U b`: b comes, and a holds until then."""
+
+    left: "Formula"
+    right: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class WeakUntil:
+    """`a W b`: the same, or a holds for ever."""
+
+    left: "Formula"
+    right: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class Next:
+    """In the next moment."""
+
+    operand: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class Once:
+    """`once a`: now or before."""
+
+    operand: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class Historically:
+    """`historically a`: until now, always."""
+
+    operand: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class Since:
+    """`a since b`: b came, and a has held after it."""
+
+    left: "Formula"
+    right: "Formula"
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """`count(a, b) >= 2`: how many times, all together, one of them has begun to hold so far."""
+
+    operands: "tuple[Formula, ...]"
+    operator: str
+    number: int
+
+
+Formula: TypeAlias = Union[
+    Active,
+    Completed,
+    Commanded,
+    Ended,
+    Data,
+    Constant,
+    Not,
+    And,
+    Or,
+    Implies,
+    Iff,
+    Always,
+    Eventually,
+    Until,
+    WeakUntil,
+    Next,
+    Once,
+    Historically,
+    Since,
+    Count,
+]
+
+PROPOSITIONS = (Active, Completed, Commanded, Ended, Data)
+PAST = (Once, Historically, Since, Count)
+FUTURE = (Always, Eventually, Until, WeakUntil, Next)
+
+TRUE = Constant(True)
+FALSE = Constant(False)
+
+
+def conjunction(operands: "Sequence[Formula]") -> Formula:
+    """All of them; true of none."""
+    if not operands:
+        return TRUE
+    return operands[0] if len(operands) == 1 else And(tuple(operands))
+
+
+def disjunction(operands: "Sequence[Formula]") -> Formula:
+    """One of them; false of none."""
+    if not operands:
+        return FALSE
+    return operands[0] if len(operands) == 1 else Or(tuple(operands))
+
+
+def negated(formula: Formula) -> Formula:
+    """What holds where the formula does not."""
+    return formula.operand if isinstance(formula, Not) else Not(formula)
+
+
+def children(formula: Formula) -> tuple[Formula, ...]:
+    """The formulas directly below, in the order in which they are written."""
+    match formula:
+        case And() | Or() | Count():
+            return formula.operands
+        case Implies() | Iff() | Until() | WeakUntil() | Since():
+            return (formula.left, formula.right)
+        case Not() | Always() | Eventually() | Next() | Once() | Historically():
+            return (formula.operand,)
+        case _:
+            return ()
+
+
+def rebuilt(formula: Formula, change: Callable[[Formula], Formula]) -> Formula:
+    """The formula with `change` done to those directly below."""
+    if not children(formula):
+        return formula
+    new: dict[str, Any] = {}
+    for each in fields(formula):
+        value = getattr(formula, each.name)
+        if each.name == "operands":
+            new[each.name] = tuple(change(operand) for operand in value)
+        elif each.name in ("operand", "left", "right"):
+            new[each.name] = change(value)
+    return replace(formula, **new)
+
+
+def walk(formula: Formula) -> Iterator[Formula]:
+    """The formula and all below it, parents first."""
+    waiting = [formula]
+    while waiting:
+        current = waiting.pop()
+        yield current
+        waiting += reversed(children(current))
+
+
+def propositions(formula: Formula) -> tuple[Proposition, ...]:
+    """What it asks of a moment, each once, in the order in which it is written."""
+    found = (each for each in walk(formula) if isinstance(each, PROPOSITIONS))
+    return tuple(dict.fromkeys(found))
+
+
+def needs_steps(formula: Formula) -> bool:
+    """Whether it looks at single steps, so that a search may leave none out."""
+    return any(isinstance(each, Next) for each in walk(formula))

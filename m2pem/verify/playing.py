@@ -1,0 +1,162 @@
+"""Plays a run of the rules to the engine: each step that comes from outside becomes an input.
+
+    player = Player(mission, fleet, process, data)
+    for step in steps:                # those of a report as data (m2pem.verify.report.data)
+        player.play(step)
+    player.undone                     # flows that the rules took and the engine did not
+
+What the engine does by itself it does by itself: the steps of a run that come from within are what
+it is compared with.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from m2pem.engine import inputs as i
+from m2pem.engine import records as r
+from m2pem.engine.run import MissionRun, Step
+from m2pem.engine.state import BehaviorPhase, RunStatus, Token
+from m2pem.model.catalogue import BehaviorState
+from m2pem.model.mission import Mission
+from m2pem.model.values import Value
+from m2pem.resources.fleet import Fleet
+from m2pem.verify.system import Trigger
+
+_SECOND_US = 1_000_000
+_START_US = 1_767_225_600 * _SECOND_US  # 2026-01-01, as of rehearsals
+_MOST_TIMERS = 1_000
+"""That may fire before the one that is meant."""
+_BY = "counterexample"
+
+
+class NotPlayableError(Exception):
+    """The engine is not where the run says, or something in it cannot be brought about."""
+
+
+class Player:
+    """A run of the engine that is led along a run of the rules. `steps` has all that it did."""
+
+    def __init__(
+        self,
+        mission: Mission,
+        fleet: Fleet | None,
+        process: str,
+        data: Mapping[str, Value] | None = None,
+    ) -> None:
+        self.run = MissionRun(mission, fleet, "r1")
+        self.steps: list[Step] = []
+        self._now_us = _START_US
+        self._reports: Counter[str] = Counter()
+        self._expected: Counter[str] = Counter()
+        self._give(i.StartRun(process, dict(data or {}), _BY))
+
+    def play(self, step: Mapping[str, Any]) -> Sequence[Step]:
+        """Bring a step about, and answer with what the engine did then.
+
+        Raises:
+            NotPlayableError: it cannot be brought about here.
+        """
+        before = len(self.steps)
+        trigger = step["trigger"]
+        if trigger is not None:
+            self._now_us += _SECOND_US
+            self._bring_about(Trigger(trigger), step)
+        for action in step["actions"]:
+            if action["action"] == "taken":
+                self._expected[action["element"]] += 1
+        return self.steps[before:]
+
+    @property
+    def undone(self) -> list[str]:
+        """Sequence flows that the run takes, and the engine has not taken as often."""
+        taken = Counter(
+            record.flow
+            for step in self.steps
+            for record in step.records
+            if isinstance(record, r.FlowTaken)
+        )
+        return sorted((self._expected - taken).keys())
+
+    @property
+    def where(self) -> list[str]:
+        """Elements with a token now."""
+        return sorted(token.node.id for token in self.run.state.tokens.values())
+
+    # --- inputs ---------------------------------------------------------------------------------
+
+    def _bring_about(self, trigger: Trigger, step: Mapping[str, Any]) -> None:
+        element, detail = step["element"], step["detail"]
+        match trigger:
+            case Trigger.SUCCEEDS | Trigger.FAILS:
+                self._end_work(
+                    element, "" if trigger is Trigger.SUCCEEDS else detail, step["writes"]
+                )
+            case Trigger.ANSWER:
+                token = self._token(element, "prompt")
+                self._give(i.PromptAnswer(token.prompt, detail, _BY))
+            case Trigger.SIGNAL:
+                self._give(i.SignalReceived(detail, step["writes"], _BY))
+            case Trigger.MESSAGE:
+                self._give(i.MessageReceived(detail, step["writes"], _BY))
+            case Trigger.TIMER:
+                self._time_is_up(element)
+            case Trigger.CONDITION:
+                raise NotPlayableError(
+                    f"the condition of {element} becomes true by data that the rules do not know"
+                )
+
+    def _end_work(self, element: str, code: str, writes: Mapping[str, Any]) -> None:
+        token = self._token(element, "behavior", "service", "prompt")
+        if token.service and not code:
+            self._give(i.ServiceCompleted(token.service, dict(writes)))
+        elif token.service:
+            self._give(i.ServiceFailed(token.service, code))
+        elif token.behavior:
+            state = BehaviorState.FAILED if code else BehaviorState.SUCCEEDED
+            self._report(token.behavior, state, code)
+        else:
+            self._time_is_up(element)  # a prompt fails only when its time is up
+
+    def _report(self, behavior: str, state: BehaviorState, code: str = "") -> None:
+        self._reports[behavior] += 1
+        self._give(i.BehaviorReported(behavior, self._reports[behavior], state, code))
+
+    def _time_is_up(self, element: str) -> None:
+        for _ in range(_MOST_TIMERS):
+            due = self.run.next_due_us
+            if due is None:
+                break
+            self._now_us = max(self._now_us, due)
+            if self._fires(self._give(i.Tick()), element):
+                return
+        raise NotPlayableError(f"no timer of {element} runs in the engine")
+
+    def _fires(self, steps: Sequence[Step], element: str) -> bool:
+        return any(
+            getattr(record, "element", "") == element for step in steps for record in step.records
+        )
+
+    def _give(self, item: i.Input) -> Sequence[Step]:
+        before = len(self.steps)
+        self.steps.append(self.run.receive(item, self._now_us))
+        while self.run.wants_continue:
+            self.steps.append(self.run.receive(i.Continue(), self._now_us))
+        if not isinstance(item, i.BehaviorReported) or item.state is not BehaviorState.CANCELLED:
+            self._end_cancelled()
+        return self.steps[before:]
+
+    def _end_cancelled(self) -> None:
+        """Vehicles do at once what they are told: a behavior that is cancelled ends."""
+        for behavior in [*self.run.state.behaviors.values()]:
+            if behavior.phase is BehaviorPhase.CANCELLING:
+                self._report(behavior.id, BehaviorState.CANCELLED)
+
+    def _token(self, element: str, *works: str) -> Token:
+        if self.run.state.status is RunStatus.ENDED:
+            raise NotPlayableError(f"the engine's run is over before {element} goes on")
+        for token in self.run.state.tokens.values():
+            if token.node.id == element and any(getattr(token, work) for work in works):
+                return token
+        where = ", ".join(self.where) or "nowhere"
+        raise NotPlayableError(f"{element} does not work in the engine now: its tokens are {where}")

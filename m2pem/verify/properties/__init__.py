@@ -1,0 +1,42 @@
+"""What is checked of every mission. `ALL` lists the properties, each a function of a `Searched`."""
+
+from collections.abc import Callable
+
+from m2pem.verify.properties.commands import (
+    errors_caught,
+    failures_handled,
+    interrupted_commanded_again,
+    one_behavior_each,
+)
+from m2pem.verify.properties.completion import (
+    can_complete,
+    completes_if_fair,
+    no_dead_element,
+    no_deadlock,
+    no_livelock,
+)
+from m2pem.verify.properties.events import can_be_triggered, is_caught
+from m2pem.verify.properties.operators import decisions_handled, prompts_have_decisions
+from m2pem.verify.properties.searched import Searched
+from m2pem.verify.properties.tokens import one_token_each, proper_completion
+from m2pem.verify.results import Result
+
+ALL: tuple[Callable[[Searched], Result], ...] = (
+    no_deadlock,
+    proper_completion,
+    can_complete,
+    completes_if_fair,
+    no_livelock,
+    no_dead_element,
+    one_token_each,
+    can_be_triggered,
+    is_caught,
+    one_behavior_each,
+    interrupted_commanded_again,
+    errors_caught,
+    failures_handled,
+    prompts_have_decisions,
+    decisions_handled,
+)
+
+__all__ = ["ALL", "Searched"]

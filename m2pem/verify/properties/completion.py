@@ -1,0 +1,166 @@
+"""Does the mission come to its end, whatever happens?"""
+
+from m2pem.model import elements as e
+from m2pem.model.events import CompensateEventDefinition
+from m2pem.verify.properties.searched import Searched
+from m2pem.verify.results import Result, Violation
+from m2pem.verify.system import Exactness, Flag
+
+
+def no_deadlock(searched: Searched) -> Result:
+    """There is always something that can happen, until the run is over."""
+    found = searched.found
+    first: dict[tuple[str, ...], int] = {}
+    for state in found.terminals:
+        if not searched.ended(state):
+            first.setdefault(searched.where(state), state)
+    violations = [
+        Violation(
+            f"stuck at {searched.labels(stuck) or 'the process'}: nothing can happen any more",
+            stuck,
+            tuple(found.run_to(state)),
+        )
+        for stuck, state in first.items()
+    ]
+    return searched.result("no-deadlock", "No token is stuck for ever.", violations)
+
+
+def _reaching(searched: Searched, goals: list[int]) -> bytearray:
+    """Which states some of the goals can be reached from, if no work fails uncaught.
+
+    That a vehicle may fail, and end the run so, is no way out.
+    """
+    found = searched.found
+    assert found.edge_start is not None
+    assert found.edge_rule is not None
+    assert found.edge_state is not None
+    count = len(found.states)
+    before: list[list[int]] = [[] for _ in range(count)]
+    for state in range(count):
+        for at in range(found.edge_start[state], found.edge_start[state + 1]):
+            if not _fails(searched, found.edge_rule[at]):
+                before[found.edge_state[at]].append(state)
+    marked = bytearray(count)
+    waiting = list(goals)
+    for state in waiting:
+        marked[state] = 1
+    while waiting:
+        for each in before[waiting.pop()]:
+            if not marked[each]:
+                marked[each] = 1
+                waiting.append(each)
+    return marked
+
+
+def _fails(searched: Searched, rule: int) -> bool:
+    return searched.system.rules[rule].flag is Flag.UNCAUGHT_FAILURE
+
+
+def _lost(searched: Searched, *, ends_only: bool) -> list[int]:
+    """States from which no end (or nothing that ends at all) can be reached, in their order."""
+    found = searched.found
+    goals = [s for s in found.terminals if not ends_only or searched.ended(s)]
+    if not found.complete:
+        done = len(found.edge_start) - 1 if found.edge_start is not None else 0
+        last = next(
+            (
+                n
+                for n in range(len(found.states))
+                if found.edge_start is not None and found.edge_start[n + 1] == found.edge_start[n]
+            ),
+            done,
+        )
+        goals += range(last, len(found.states))
+    marked = _reaching(searched, goals)
+    return [state for state in range(len(found.states)) if not marked[state]]
+
+
+def can_complete(searched: Searched) -> Result:
+    """From everywhere, the end can be reached."""
+    violations: list[Violation] = []
+    lost = _lost(searched, ends_only=True)
+    if lost:
+        stuck = searched.where(lost[0])
+        run = tuple(searched.found.run_to(lost[0]))
+        last = searched.system.rules[run[-1]].element if run else ""
+        message = f"from {searched.labels(stuck)} on, the end cannot be reached any more"
+        if last:
+            message += f" (since {searched.label(last)})"
+        violations.append(Violation(message, stuck, run))
+    return searched.result("can-complete", "From everywhere, the end can be reached.", violations)
+
+
+def completes_if_fair(searched: Searched) -> Result:
+    """It comes to its end when all that can happen again and again happens at last."""
+    result = can_complete(searched)
+    return searched.result(
+        "completes-if-fair",
+        "It ends, if nothing that can happen again and again is put off for ever.",
+        list(result.violations),
+    )
+
+
+def no_livelock(searched: Searched) -> Result:
+    """It never goes on for ever without a way out."""
+    found = searched.found
+    lost = _lost(searched, ends_only=False)
+    violations: list[Violation] = []
+    if lost:
+        first = lost[0]
+        run = tuple(found.run_to(first))
+        cycle = _cycle(searched, first)
+        elements = tuple(dict.fromkeys(searched.system.rules[rule].element for rule in cycle))
+        violations.append(
+            Violation(
+                f"goes round {searched.labels(elements)} for ever, with no way out",
+                elements,
+                run,
+                tuple(cycle),
+            )
+        )
+    return searched.result("no-livelock", "Nothing goes on for ever without a way out.", violations)
+
+
+def _cycle(searched: Searched, start: int) -> list[int]:
+    """Rules that lead round, from somewhere that can be reached from a state."""
+    seen: dict[int, int] = {}
+    rules: list[int] = []
+    state = start
+    while state not in seen:
+        seen[state] = len(rules)
+        rule, state = next(
+            each for each in searched.found.successors(state) if not _fails(searched, each[0])
+        )
+        rules.append(rule)
+    return rules[seen[state] :]
+
+
+def no_dead_element(searched: Searched) -> Result:
+    """Every element is reached in some run."""
+    system, found = searched.system, searched.found
+    reached = {step.element for rule in found.fired for step in system.rules[rule].steps}
+    unknown = {a.element for a in system.approximations if a.exactness is Exactness.BOUNDED}
+    violations = [
+        Violation(f"{searched.label(element)} is never reached", (element,))
+        for element in system.elements
+        if element not in reached
+        and element not in unknown
+        and not _undoes(searched.mission.elements.get(element))
+    ]
+    if not found.complete:
+        violations = []
+    return searched.result("no-dead-element", "Every element is reached in some run.", violations)
+
+
+def _undoes(element: object) -> bool:
+    """Compensation is not entered by the flow."""
+    if isinstance(element, e.BoundaryEvent):
+        return any(isinstance(d, CompensateEventDefinition) for d in element.definitions)
+    around = element.container if isinstance(element, e.FlowNode) else None
+    return (
+        isinstance(around, e.SubProcess)
+        and around.triggered_by_event
+        and any(
+            isinstance(d, CompensateEventDefinition) for s in around.starts for d in s.definitions
+        )
+    )

@@ -1,0 +1,89 @@
+"""Can what is awaited come, and is what is thrown heard?"""
+
+from m2pem.model import elements as e
+from m2pem.model.events import MessageEventDefinition, RootElement, SignalEventDefinition
+from m2pem.verify.derive.derive import messages_from_strangers
+from m2pem.verify.derive.events import awaited
+from m2pem.verify.derive.throwing import thrown_by
+from m2pem.verify.properties.searched import Searched
+from m2pem.verify.results import Result, Violation
+from m2pem.verify.system import Flag
+
+
+def _thrown(searched: Searched) -> set[str]:
+    found: set[str] = set()
+    for node in searched.mission.nodes:
+        signals, messages = thrown_by(node)
+        found |= signals | messages
+    return found
+
+
+def can_be_triggered(searched: Searched) -> Result:
+    """What waits for a signal or message that nothing sends waits for ever."""
+    mission = searched.mission
+    sent = _thrown(searched) | set(messages_from_strangers(mission))
+    sent |= {s.id for s in mission.signals.values() if s.from_operator or s.returned}
+    sent |= {m.id for m in mission.messages.values() if m.from_operator}
+    violations: list[Violation] = []
+    for node in mission.nodes:
+        if isinstance(node, e.EndEvent | e.IntermediateThrowEvent):
+            continue
+        for definition in awaited(node):
+            root: RootElement | None = None
+            if isinstance(definition, SignalEventDefinition):
+                root = definition.signal
+            elif isinstance(definition, MessageEventDefinition):
+                root = definition.message
+            if root is not None and root.id not in sent:
+                violations.append(
+                    Violation(
+                        f"{searched.label(node.id)} waits for {root.name or root.id}, which"
+                        ' nothing in the mission sends; m2pem:from="operator" says that'
+                        " operators do",
+                        (node.id,),
+                    )
+                )
+    return searched.result(
+        "can-be-triggered",
+        "Whatever waits for a signal or message can get it.",
+        violations,
+        static=True,
+    )
+
+
+def is_caught(searched: Searched) -> Result:
+    """A signal or escalation that is thrown can be caught by something."""
+    mission = searched.mission
+    caught: set[str] = set()
+    for node in mission.nodes:
+        if isinstance(node, e.EndEvent | e.IntermediateThrowEvent):
+            continue
+        for definition in awaited(node):
+            if isinstance(definition, SignalEventDefinition):
+                caught.add(definition.signal.id)
+    violations: list[Violation] = []
+    for node in mission.nodes:
+        for signal in sorted(thrown_by(node)[0] - caught):
+            violations.append(
+                Violation(
+                    f"{searched.label(node.id)} throws signal {signal}, which nothing catches",
+                    (node.id,),
+                )
+            )
+    found, rules = searched.found, searched.system.rules
+    for rule, state in sorted(found.of_flag(Flag.UNHEARD).items(), key=lambda each: each[1]):
+        element = rules[rule].element
+        violations.append(
+            Violation(
+                f"escalation {rules[rule].flagged} of {searched.label(element)} is caught by"
+                " nothing",
+                (element,),
+                (*found.run_to(state), rule),
+            )
+        )
+    return searched.result(
+        "is-caught",
+        "Every signal and escalation that is thrown can be caught.",
+        violations,
+        warning=True,
+    )

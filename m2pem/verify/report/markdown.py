@@ -1,0 +1,80 @@
+"""The report as Markdown, with a picture for each violation."""
+
+from collections.abc import Iterator, Mapping
+from xml.sax.saxutils import escape
+
+from m2pem.verify.report.findings import Findings, Violated
+from m2pem.verify.report.telling import Told
+from m2pem.verify.report.text import covered
+from m2pem.verify.results import Verdict
+
+
+def as_markdown(findings: Findings, pictures: Mapping[int, str]) -> str:
+    """The whole report. `pictures`: by violation, from 0, the name of its picture's file."""
+    return "\n".join(_lines(findings, pictures)) + "\n"
+
+
+def _lines(findings: Findings, pictures: Mapping[int, str]) -> Iterator[str]:
+    yield f"# {_plain(findings.mission.file)}: {findings.verdict.value}"
+    yield ""
+    yield f"Process `{findings.system.process}`. {_sentence(covered(findings.coverage))}"
+    for note in findings.coverage.notes:
+        yield _plain(_sentence(note))
+    yield ""
+    yield "| property or requirement | verdict | what it says |"
+    yield "|---|---|---|"
+    for answer in findings.results:
+        verdict = answer.verdict.value
+        if answer.verdict is Verdict.VIOLATED and not findings.counts(answer):
+            verdict = "warning"
+        said = [answer.text, *([f"({answer.covered})"] if answer.covered else [])]
+        said += [f"For: {answer.author}"] if answer.author else []
+        yield f"| `{answer.property}` | {verdict} | {_plain(' '.join(said))} |"
+    for number, violation in enumerate(findings.violations):
+        yield ""
+        yield from _violation(violation, pictures.get(number, ""))
+    rough = findings.system.approximations
+    if rough:
+        yield ""
+        yield "## Where the rules are not exactly the mission"
+        yield ""
+        for each in rough:
+            yield f"- `{each.element}` ({each.exactness.value}): {_plain(each.what)}"
+
+
+def _violation(violation: Violated, picture: str) -> Iterator[str]:
+    kind = "warning" if violation.answer.warning else "violated"
+    yield f"## {violation.answer.property}: {kind}"
+    yield ""
+    yield _plain(_sentence(violation.found.message))
+    if violation.found.elements:
+        yield ""
+        yield f"At {', '.join(f'`{each}`' for each in violation.found.elements)}."
+    if picture:
+        yield ""
+        yield f"![{violation.answer.property}]({picture})"
+    if violation.story:
+        yield ""
+        yield from _steps(violation.story)
+    if violation.loop:
+        yield ""
+        yield "And then, again and again:"
+        yield ""
+        yield from _steps(violation.loop)
+
+
+def _steps(story: tuple[Told, ...]) -> Iterator[str]:
+    for told in story:
+        yield f"{told.number}. {_plain(told.text)}"
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _plain(text: str) -> str:
+    """Names come from people's files: nothing in them is to be taken for Markdown or HTML."""
+    marked = escape(text)
+    for sign in "\\`*_[]|#":
+        marked = marked.replace(sign, f"\\{sign}")
+    return marked

@@ -1,0 +1,100 @@
+"""The report for a terminal: a line a property, then each violation with its run."""
+
+from collections.abc import Callable, Iterator
+
+from m2pem.verify.report.findings import Coverage, Findings, Violated
+from m2pem.verify.report.telling import Told
+from m2pem.verify.results import Result, Verdict
+
+Paint = Callable[[str, str], str]
+"""A text in a colour (`green`, `red`, `yellow`, `cyan`)."""
+
+_MARK = {Verdict.HOLDS: ("holds", "green"), Verdict.UNDECIDED: ("undecided", "yellow")}
+_MOST_STEPS = 40
+"""Of a run; the beginning of a longer one is left out."""
+
+
+def as_text(findings: Findings, paint: Paint = lambda text, _: text) -> str:
+    """The whole report."""
+    lines = [*_properties(findings, paint)]
+    for violation in findings.violations:
+        if violation.answer.warning and not findings.strict:
+            continue
+        lines += ["", *_violation(violation, paint)]
+    warnings = [v for v in findings.violations if v.answer.warning and not findings.strict]
+    if warnings:
+        lines.append("")
+        lines += [f"{paint('warning', 'yellow')}: {_shown(v.found.message)}" for v in warnings]
+    lines.append("")
+    lines += [f"note: {_shown(each)}" for each in findings.coverage.notes]
+    lines.append(_summary(findings, paint))
+    return "\n".join(lines)
+
+
+def _properties(findings: Findings, paint: Paint) -> Iterator[str]:
+    width = max(len(answer.property) for answer in findings.results)
+    for answer in findings.results:
+        word, colour = _verdict(findings, answer)
+        note = f" ({answer.covered})" if answer.covered else ""
+        told = _shown(f"{answer.property:<{width}}  {answer.text}{note}")
+        yield f"{paint(f'{word:<9}', colour)}  {told}"
+        if answer.author:
+            yield f"{'':<{width + 13}}for: {_shown(answer.author)}"
+
+
+def _verdict(findings: Findings, answer: Result) -> tuple[str, str]:
+    if answer.verdict is Verdict.VIOLATED:
+        return ("violated", "red") if findings.counts(answer) else ("warning", "yellow")
+    return _MARK[answer.verdict]
+
+
+def _violation(violation: Violated, paint: Paint) -> Iterator[str]:
+    yield f"{paint(violation.answer.property, 'red')}: {_shown(violation.found.message)}"
+    if violation.found.elements:
+        yield f"  at {_shown(', '.join(violation.found.elements))}"
+    if violation.story or violation.loop:
+        yield "  the run:"
+        yield from _steps(violation.story)
+    if violation.loop:
+        yield "  and then, again and again:"
+        yield from _steps(violation.loop)
+
+
+def _steps(story: tuple[Told, ...]) -> Iterator[str]:
+    if len(story) > _MOST_STEPS:
+        yield f"       ... {len(story) - _MOST_STEPS} steps before"
+    for told in story[-_MOST_STEPS:]:
+        yield f"  {told.number:>4}. {_shown(told.text)}"
+
+
+def _shown(text: str) -> str:
+    """Without what would steer a terminal: names come from strangers' files."""
+    return "".join(each if each.isprintable() else "?" for each in text)
+
+
+def covered(coverage: Coverage) -> str:
+    """How much was searched."""
+    found = f"{coverage.states:,} states and {coverage.transitions:,} steps"
+    by = " by Spin" if coverage.engine == "spin" else ""
+    took = f"in {coverage.seconds * 1000:.0f} ms{by}"
+    if coverage.stopped:
+        return f"{found} were searched {took}; then {coverage.stopped} ended the search"
+    return f"{found}, all that there are, were searched {took}"
+
+
+def _summary(findings: Findings, paint: Paint) -> str:
+    verdict = findings.verdict
+    colour = {"holds": "green", "violated": "red", "undecided": "yellow"}[verdict.value]
+    said = {
+        Verdict.HOLDS: "everything holds",
+        Verdict.VIOLATED: "violated",
+        Verdict.UNDECIDED: "undecided",
+    }[verdict]
+    process = findings.system.process
+    summary = f"{_shown(findings.mission.file)}: {process}: {paint(said, colour)}"
+    text = f"{summary}; {covered(findings.coverage)}"
+    rough = len(findings.system.approximations)
+    if rough:
+        places = "place" if rough == 1 else "places"
+        text += f"; at {rough} {places} the rules are not exactly the mission (see --report)"
+    return text

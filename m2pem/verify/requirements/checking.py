@@ -1,0 +1,145 @@
+"""Whether a mission does what its author requires."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from m2pem.model.expression import Expression
+from m2pem.model.mission import Mission
+from m2pem.resources.fleet import Fleet
+from m2pem.verify.derive import Options, derive
+from m2pem.verify.explore import Exploration, explore
+from m2pem.verify.explore import Limits as ExploreLimits
+from m2pem.verify.explore import Stopped as ExploreStopped
+from m2pem.verify.labels import Labels, UnknownDataError
+from m2pem.verify.ltl import Observer, negated, propositions
+from m2pem.verify.ltl.formula import Data, needs_steps
+from m2pem.verify.mission_runs import MissionRuns
+from m2pem.verify.product import Limits, Progress, Result, Run, Stopped, Verdict, check
+from m2pem.verify.reduction import Reduction, StubbornSets
+from m2pem.verify.requirements.requirement import Requirement
+from m2pem.verify.system import Rule, System
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What is known of one requirement.
+
+    `why`: of an undecided one, what stands in the way. `prefix` and `cycle`: the rules of a run
+    that breaks it, `cycle` again and again; without a cycle it is over then, or broken whatever
+    follows (`run.whatever_follows`).
+    """
+
+    requirement: Requirement
+    result: Result
+    run: Run | None = None
+    prefix: tuple[Rule, ...] = ()
+    cycle: tuple[Rule, ...] = ()
+    why: str = ""
+    states: int = 0
+    seconds: float = 0.0
+
+
+def conditions(requirements: Sequence[Requirement]) -> tuple[Expression, ...]:
+    """What requirements ask of the data: rules must be derived with them (`Options.conditions`)."""
+    return tuple(
+        each.expression
+        for requirement in requirements
+        for each in propositions(requirement.formula)
+        if isinstance(each, Data)
+    )
+
+
+def check_mission(
+    mission: Mission,
+    fleet: Fleet,
+    requirements: Sequence[Requirement],
+    *,
+    process: str | None = None,
+    options: Options | None = None,
+    limits: ExploreLimits | None = None,
+    reduce: bool = False,
+) -> list[Answer]:
+    """Derive, search and check, in one go.
+
+    With `reduce`, orders that make no difference to a requirement are left out where they can be.
+    """
+    options = replace(options or Options(), conditions=conditions(requirements))
+    system = derive(mission, fleet, process=process, options=options)
+    whole: Exploration | None = None
+    answers = []
+    for each in requirements:
+        reduction = reduction_for(system, mission, fleet, each) if reduce else None
+        if reduction is not None:
+            found = explore(system, limits, reduction=reduction)
+        else:
+            found = whole = whole or explore(system, limits)
+        answers.append(check_requirement(found, mission, fleet, each))
+    return answers
+
+
+def reduction_for(
+    system: System, mission: Mission, fleet: Fleet, requirement: Requirement
+) -> Reduction | None:
+    """What may be left out of the search for one requirement; None: nothing.
+
+    Only what is broken once and for all, if at all, can do with less: runs that go round for ever
+    in one part of the mission, and leave another where it is, may be missing then.
+    """
+    formula = requirement.formula
+    if requirement.fair or needs_steps(formula):
+        return None
+    if Observer(negated(formula)).automaton.needs_rounds:
+        return None
+    try:
+        places = Labels(system, mission, fleet, propositions(formula)).visible_places()
+    except UnknownDataError:
+        return None
+    return StubbornSets(system, places) if places is not None else None
+
+
+def check_requirement(
+    exploration: Exploration,
+    mission: Mission,
+    fleet: Fleet,
+    requirement: Requirement,
+    *,
+    limits: Limits | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Answer:
+    """Whether a requirement holds of all that an exploration found; it must have kept its edges.
+
+    Of a search that was cut short, what was found to be broken is; the rest is undecided.
+    """
+    if exploration.stopped is ExploreStopped.TOKENS:
+        return Answer(
+            requirement, Result.UNDECIDED, why=f"the search stopped at {exploration.stopped}"
+        )
+    system = exploration.system
+    asked = propositions(requirement.formula)
+    try:
+        runs = MissionRuns(exploration, Labels(system, mission, fleet, asked))
+        fair: Mapping[int, int] | None = runs.outcomes() if requirement.fair else None
+        verdict = check(runs, requirement.formula, fair=fair, limits=limits, progress=progress)
+    except UnknownDataError as error:
+        return Answer(requirement, Result.UNDECIDED, why=str(error))
+    return _answer(requirement, verdict, exploration, system)
+
+
+def _answer(
+    requirement: Requirement, verdict: Verdict, exploration: Exploration, system: System
+) -> Answer:
+    why = ""
+    if verdict.result is Result.UNDECIDED:
+        own = verdict.stopped is not Stopped.SYSTEM
+        why = f"the search stopped at {verdict.stopped if own else exploration.stopped}"
+    run = verdict.run
+    return Answer(
+        requirement,
+        verdict.result,
+        run,
+        tuple(system.rules[move.rule] for move in run.prefix) if run else (),
+        tuple(system.rules[move.rule] for move in run.cycle) if run else (),
+        why,
+        verdict.states,
+        verdict.seconds,
+    )

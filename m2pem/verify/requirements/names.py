@@ -1,0 +1,207 @@
+"""What the names in formulas and arguments stand for, in one mission and its fleet."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from m2pem.errors import ExpressionSyntaxError
+from m2pem.model.behavior import Behavior
+from m2pem.model.elements import FlowNode, UserTask
+from m2pem.model.expression import Expression
+from m2pem.model.mission import Mission
+from m2pem.resources.allocation import resources_of, spelled_out
+from m2pem.resources.behaviors import SHARED
+from m2pem.resources.fleet import Fleet
+from m2pem.resources.nearmiss import suggest
+from m2pem.verify.ltl.formula import (
+    Active,
+    Commanded,
+    Completed,
+    Data,
+    Formula,
+    rebuilt,
+)
+from m2pem.verify.requirements.data_names import data_names
+
+_WHERE = ("area", "route", "target")
+
+
+class UnknownNameError(ValueError):
+    """A name that stands for nothing here; the message says what may have been meant."""
+
+
+class Names:
+    """The elements, resources, behaviors and data of a mission on a fleet."""
+
+    def __init__(
+        self,
+        mission: Mission,
+        fleet: Fleet,
+        service_writes: Mapping[str, Sequence[str]] | None = None,
+        data: Iterable[str] = (),
+    ) -> None:
+        """`service_writes`: what services write, by class. `data`: names given at the start."""
+        self.mission = mission
+        self.fleet = fleet
+        self.data_names = data_names(mission, service_writes) | frozenset(data)
+        self.labels = {each.id: each.name for each in (*mission.nodes, *mission.processes)}
+        self._by_name: dict[str, list[str]] = {}
+        for identifier, name in self.labels.items():
+            if name:
+                self._by_name.setdefault(name, []).append(identifier)
+        self._tasks = [
+            (node, behavior)
+            for node in mission.nodes
+            if isinstance(behavior := getattr(node, "behavior", None), Behavior)
+        ]
+
+    # --- single names ---------------------------------------------------------------------------
+
+    def element(self, name: str) -> str:
+        """The id of an element, of which the id or the name was written.
+
+        Raises:
+            UnknownNameError: there is none, or there are several of that name.
+        """
+        if name in self.labels:
+            return name
+        found = self._by_name.get(name, [])
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise UnknownNameError(f"several elements are called '{name}': {', '.join(found)}")
+        if name in self.mission.elements:
+            raise UnknownNameError(f"'{name}' is a sequence flow; name an element that it leads to")
+        known = [*self._by_name, *self.labels]
+        raise UnknownNameError(
+            f"the mission has no element '{name}'; {suggest(name, known, 'elements')}"
+        )
+
+    def resource(self, name: str) -> str:
+        """A vehicle, payload or team.
+
+        Raises:
+            UnknownNameError: the fleet has none.
+        """
+        known = [*self.fleet.vehicles, *self.fleet.payloads, *self.fleet.teams]
+        if name in known:
+            return name
+        raise UnknownNameError(
+            f"the fleet has no vehicle, payload or team '{name}'; "
+            f"{suggest(name, known, 'vehicles, payloads and teams')}"
+        )
+
+    def behavior(self, name: str) -> str:
+        """A behavior that the mission uses, or that all arbiters share.
+
+        Raises:
+            UnknownNameError: nobody knows it.
+        """
+        used = list(dict.fromkeys(behavior.name for _, behavior in self._tasks))
+        shared = [shared_name for shared_name, _ in SHARED]
+        if name in used or name in shared:
+            return name
+        known = list(dict.fromkeys([*used, *shared]))
+        raise UnknownNameError(
+            f"there is no behavior '{name}'; {suggest(name, known, 'behaviors')}"
+        )
+
+    def decision(self, task: str, value: str) -> str:
+        """A decision that the user task offers.
+
+        Raises:
+            UnknownNameError: it offers none such.
+        """
+        prompt = self._user_task(task).prompt
+        known = [each.value for each in prompt.decisions] if prompt else []
+        if value in known:
+            return value
+        hint = suggest(value, known, "decisions")
+        raise UnknownNameError(f"'{task}' has no decision '{value}'; {hint}")
+
+    def store_of(self, task: str) -> str:
+        """The name under which a user task's decision is written."""
+        prompt = self._user_task(task).prompt
+        return prompt.store if prompt else ""
+
+    def _user_task(self, task: str) -> UserTask:
+        node = self.mission.elements.get(task)
+        if isinstance(node, UserTask):
+            return node
+        known = [each.id for each in self.mission.nodes if isinstance(each, UserTask)]
+        raise UnknownNameError(f"'{task}' is no user task; {suggest(task, known, 'user tasks')}")
+
+    def vehicles(self) -> tuple[str, ...]:
+        """Every vehicle of the fleet, in its order."""
+        return tuple(self.fleet.vehicles)
+
+    def members(self, resource: str) -> frozenset[str]:
+        """What is held when the resource is: a team's members, else itself."""
+        team = self.fleet.teams.get(resource)
+        return frozenset(spelled_out(team)) if team else frozenset({resource})
+
+    def places_of(self, resource: str, behavior: str) -> Mapping[str, Sequence[str]]:
+        """By where it is done, the tasks in which a resource does a behavior."""
+        found: dict[str, list[str]] = {}
+        for node, each in self._tasks:
+            if each.name == behavior and self.members(resource) <= self._held(each):
+                found.setdefault(_where(node, each), []).append(node.id)
+        return found
+
+    def _held(self, behavior: Behavior) -> frozenset[str]:
+        return frozenset(r for role in behavior.roles for r in resources_of(role, self.fleet))
+
+    # --- formulas -------------------------------------------------------------------------------
+
+    def resolved(self, formula: Formula, text: str) -> Formula:
+        """The formula with the ids of what is named in it. `text`: where positions point into.
+
+        Raises:
+            ExpressionSyntaxError: a name stands for nothing; points at it.
+        """
+
+        def resolve(each: Formula) -> Formula:
+            try:
+                match each:
+                    case Active() | Completed():
+                        return type(each)(self.element(each.element), each.position)
+                    case Commanded():
+                        self.resource(each.resource)
+                        at = each.behavior_position
+                        if each.behavior:
+                            self._commanded(each, text)
+                        return Commanded(each.resource, each.behavior, each.position, at)
+                    case Data():
+                        self._data(each.expression)
+                        return each
+                    case _:
+                        return rebuilt(each, resolve)
+            except UnknownNameError as error:
+                position = getattr(each, "position", 0)
+                raise ExpressionSyntaxError(str(error), text, position) from None
+
+        return resolve(formula)
+
+    def _commanded(self, each: Commanded, text: str) -> None:
+        try:
+            self.behavior(each.behavior)
+        except UnknownNameError as error:
+            raise ExpressionSyntaxError(str(error), text, each.behavior_position) from None
+
+    def _data(self, expression: Expression) -> None:
+        for name in sorted(expression.names):
+            if name in self.mission.elements or name in self._by_name:
+                raise UnknownNameError(
+                    f"'{name}' is an element: write active({name}) or completed({name})"
+                )
+            known = sorted(self.data_names)
+            parts = name.split(".")
+            if not any(".".join(parts[: n + 1]) in known for n in range(len(parts))):
+                raise UnknownNameError(
+                    f"the mission has no data '{name}'; {suggest(name, known, 'data')}"
+                )
+
+
+def _where(node: FlowNode, behavior: Behavior) -> str:
+    for parameter in behavior.parameters:
+        if parameter.name in _WHERE and isinstance(parameter.value, str):
+            return f"{parameter.name} {parameter.value}"
+    return f"task {node.id}"

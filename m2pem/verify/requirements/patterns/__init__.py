@@ -1,0 +1,25 @@
+"""The catalogue of patterns, by name."""
+
+from collections.abc import Mapping
+
+from m2pem.verify.requirements.patterns.avoidance import AVOIDANCE
+from m2pem.verify.requirements.patterns.occurrence import OCCURRENCE
+from m2pem.verify.requirements.patterns.pattern import Argument, Kind, Pattern
+from m2pem.verify.requirements.patterns.reactions import REACTIONS
+from m2pem.verify.requirements.patterns.teams import TEAMS
+from m2pem.verify.requirements.patterns.visits import VISITS
+
+GROUPS: Mapping[str, tuple[Pattern, ...]] = {
+    "Visits": VISITS,
+    "Avoidance": AVOIDANCE,
+    "Reactions": REACTIONS,
+    "Occurrence": OCCURRENCE,
+    "Teams": TEAMS,
+}
+"""Patterns by the heading that they have in docs/requirements.md."""
+
+PATTERNS: Mapping[str, Pattern] = {
+    pattern.name: pattern for group in GROUPS.values() for pattern in group
+}
+
+__all__ = ["Argument", "GROUPS", "Kind", "PATTERNS", "Pattern"]

@@ -1,0 +1,122 @@
+"""Specification patterns of Dwyer, Avrunin and Corbett: whether and in which order things happen.
+
+With their five scopes (`scopes.py`). In chains, what follows comes later or in the same moment.
+"""
+
+from collections.abc import Sequence
+
+from m2pem.verify.ltl.formula import (
+    Always,
+    And,
+    Eventually,
+    Formula,
+    Implies,
+    Not,
+    Until,
+    WeakUntil,
+)
+from m2pem.verify.requirements.patterns.pattern import TIMES, Argument, Kind, Pattern
+from m2pem.verify.requirements.patterns.visits import sequence
+
+_WHAT = Argument("what", Kind.CONDITION)
+_FIRST, _THEN = Argument("first", Kind.CONDITION), Argument("then", Kind.CONDITION)
+_WHEN = Argument("when", Kind.CONDITION)
+_FIRSTS, _THENS = Argument("first", Kind.CONDITIONS), Argument("then", Kind.CONDITIONS)
+_WHENS = Argument("when", Kind.CONDITIONS)
+
+
+def at_most(what: Formula, times: int) -> Formula:
+    """It begins to hold so many times at most, from now on."""
+    never: Formula = Always(Not(what))
+    for _ in range(times):
+        never = WeakUntil(Not(what), WeakUntil(what, never))
+    return never
+
+
+def _only_after(chain: Sequence[Formula], then: Formula) -> Formula:
+    first, *rest = chain
+    return WeakUntil(Not(then), And((first, _only_after(rest, then))) if rest else first)
+
+
+def _nested_response(whens: Sequence[Formula], then: Formula) -> Formula:
+    first, *rest = whens
+    inner = _nested_response(rest, then) if rest else Eventually(then)
+    return Always(Implies(first, inner))
+
+
+OCCURRENCE = (
+    Pattern(
+        "absence",
+        "it never happens",
+        (_WHAT,),
+        lambda a, _: Always(Not(a["what"])),
+        lambda a, words: f"never {words.of(a['what'])}",
+    ),
+    Pattern(
+        "existence",
+        "it happens at some point",
+        (_WHAT,),
+        lambda a, _: Eventually(a["what"]),
+        lambda a, words: f"at some point {words.of(a['what'])}",
+    ),
+    Pattern(
+        "bounded_existence",
+        "it happens at most so many times",
+        (_WHAT, TIMES),
+        lambda a, _: at_most(a["what"], a["times"]),
+        lambda a, words: f"at most {a['times']} times: {words.of(a['what'])}",
+    ),
+    Pattern(
+        "universality",
+        "it holds all the time",
+        (_WHAT,),
+        lambda a, _: Always(a["what"]),
+        lambda a, words: f"always {words.of(a['what'])}",
+    ),
+    Pattern(
+        "precedence",
+        "the second happens only after (or with) the first",
+        (_FIRST, _THEN),
+        lambda a, _: WeakUntil(Not(a["then"]), a["first"]),
+        lambda a, words: f"{words.of(a['then'])} only after {words.of(a['first'])}",
+    ),
+    Pattern(
+        "response",
+        "whenever the one happens, the other does then or later",
+        (_WHEN, _THEN),
+        lambda a, _: Always(Implies(a["when"], Eventually(a["then"]))),
+        lambda a, words: f"whenever {words.of(a['when'])}, then or later {words.of(a['then'])}",
+    ),
+    Pattern(
+        "chain_precedence",
+        "it happens only after a chain of others has, in its order",
+        (_FIRSTS, _THEN),
+        lambda a, _: _only_after(a["first"], a["then"]),
+        lambda a, words: f"{words.of(a['then'])} only after {words.each(a['first'], 'then')}",
+    ),
+    Pattern(
+        "precedence_chain",
+        "a chain of things happens, in its order, only after something else has",
+        (_FIRST, _THENS),
+        lambda a, _: Implies(sequence(a["then"]), Until(Not(a["then"][0]), a["first"])),
+        lambda a, words: f"{words.each(a['then'], 'then')} only after {words.of(a['first'])}",
+    ),
+    Pattern(
+        "response_chain",
+        "whenever the one happens, a chain of others does then or later, in its order",
+        (_WHEN, _THENS),
+        lambda a, _: Always(Implies(a["when"], sequence(a["then"]))),
+        lambda a, words: (
+            f"whenever {words.of(a['when'])}, then or later {words.each(a['then'], 'then')}"
+        ),
+    ),
+    Pattern(
+        "chain_response",
+        "whenever a chain of things has happened, in its order, another does then or later",
+        (_WHENS, _THEN),
+        lambda a, _: _nested_response(a["when"], a["then"]),
+        lambda a, words: (
+            f"whenever {words.each(a['when'], 'then')}, then or later {words.of(a['then'])}"
+        ),
+    ),
+)

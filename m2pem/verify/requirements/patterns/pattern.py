@@ -1,0 +1,96 @@
+"""A pattern: a requirement with a name and arguments, which says its formula and itself."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Protocol, TypeAlias
+
+from m2pem.verify.ltl.formula import Formula
+
+
+class Kind(StrEnum):
+    """What an argument is."""
+
+    CONDITION = "condition"
+    """A formula, or the id of an element, which stands for `completed(id)`."""
+    CONDITIONS = "conditions"
+    """A list of at least two."""
+    ELEMENT = "element"
+    ELEMENTS = "elements"
+    RESOURCE = "resource"
+    """A vehicle, payload or team, or `each`: the requirement is made for each vehicle."""
+    BEHAVIOR = "behavior"
+    COUNT = "count"
+    FLAG = "flag"
+    DECISION = "decision"
+    """A decision that an operator can take."""
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """One argument. `default` None, and not required: it may be absent."""
+
+    name: str
+    kind: Kind
+    required: bool = True
+    default: int | bool | None = None
+
+
+class Surroundings(Protocol):
+    """What a pattern may ask about the mission and its fleet."""
+
+    def places_of(self, resource: str, behavior: str) -> Mapping[str, Sequence[str]]:
+        """By where it is done, the tasks in which a resource does a behavior."""
+        ...
+
+    def store_of(self, task: str) -> str:
+        """The name under which a user task's decision is written."""
+        ...
+
+
+class Words(Protocol):
+    """How things are said in English."""
+
+    def of(self, formula: Formula) -> str:
+        """A condition as a clause: "'Drive route' is completed"."""
+        ...
+
+    def each(self, formulas: Sequence[Formula], word: str = "and") -> str:
+        """Several, one after the other."""
+        ...
+
+    def element(self, element: str) -> str:
+        """What an element is called."""
+        ...
+
+
+Arguments: TypeAlias = Mapping[str, Any]
+"""Values by name: formulas, texts, numbers, flags, as `Kind` says; absent ones are None."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """One pattern. `meaning` is for the docs; `fair`: only fair runs count unless said otherwise.
+
+    `scoped`: it may be asked for a part of the run only (`scopes.py`).
+    """
+
+    name: str
+    meaning: str
+    arguments: tuple[Argument, ...]
+    build: Callable[[Arguments, Surroundings], Formula]
+    say: Callable[[Arguments, Words], str]
+    scoped: bool = True
+    fair: bool = False
+    steps: bool = False
+    """It looks at single steps of the run."""
+
+    def argument(self, name: str) -> Argument | None:
+        """The argument of that name."""
+        return next((each for each in self.arguments if each.name == name), None)
+
+
+CONDITIONS = Argument("locations", Kind.CONDITIONS)
+AVOIDED = Argument("avoid", Kind.CONDITION)
+WHEN, THEN = Argument("when", Kind.CONDITION), Argument("then", Kind.CONDITION)
+TIMES = Argument("times", Kind.COUNT)

@@ -1,0 +1,248 @@
+"""From what an author wrote to requirements: the part that the spec file and BPMN files share."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from m2pem.errors import ExpressionSyntaxError, M2pemError
+from m2pem.resources.nearmiss import suggest
+from m2pem.verify.ltl import parse
+from m2pem.verify.ltl.formula import Completed, Formula, negated
+from m2pem.verify.ltl.observer import Observer
+from m2pem.verify.requirements.english import English, sentence
+from m2pem.verify.requirements.names import Names, UnknownNameError
+from m2pem.verify.requirements.patterns import PATTERNS, Argument, Kind, Pattern
+from m2pem.verify.requirements.patterns.scopes import ScopeError, say_scope, within
+from m2pem.verify.requirements.requirement import Requirement
+
+EACH = "each"
+SCOPES = ("before", "after", "until")
+_MOST_TIMES = 100
+_NAME = re.compile(r"[\w.:-]+")
+_CONSTANTS = ("true", "false", "ended")
+
+
+class UnusableError(Exception):
+    """Something is wrong with one requirement. `where`: its key ("ltl", "pattern", "args.x")."""
+
+    def __init__(self, where: str, message: str, remedy: str = "") -> None:
+        super().__init__(message)
+        self.where = where
+        self.message = message
+        self.remedy = remedy
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A requirement as written. `arguments`: texts, numbers, flags and lists of texts, by name."""
+
+    id: str
+    ltl: str | None = None
+    pattern: str | None = None
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    text: str = ""
+    fair: bool | None = None
+    file: str = ""
+    line: int = 0
+
+
+def made(written: Written, names: Names) -> Iterator[Requirement]:
+    """The requirements that something written stands for: one, or one for each vehicle.
+
+    Raises:
+        UnusableError: it cannot be read, or names what the mission or fleet lacks.
+    """
+    if (written.ltl is None) == (written.pattern is None):
+        raise UnusableError(
+            "", "a requirement has either 'ltl' or 'pattern'", "write one of the two"
+        )
+    if written.ltl is not None:
+        if written.arguments:
+            raise UnusableError("args", "only a pattern takes arguments", "delete them")
+        formula = _formula(written.ltl, "ltl", names)
+        yield _checked(
+            Requirement(
+                written.id,
+                formula,
+                English(names.labels).sentence(formula),
+                written.text,
+                fair=bool(written.fair),
+                file=written.file,
+                line=written.line,
+            ),
+            "ltl",
+        )
+        return
+    assert written.pattern is not None
+    pattern = PATTERNS.get(written.pattern)
+    if pattern is None:
+        hint = suggest(written.pattern, PATTERNS, "patterns")
+        raise UnusableError("pattern", f"there is no pattern '{written.pattern}'", hint)
+    yield from _of_pattern(written, pattern, names)
+
+
+def _of_pattern(written: Written, pattern: Pattern, names: Names) -> Iterator[Requirement]:
+    values, scope = _values(written, pattern, names)
+    resource = pattern.argument("resource")
+    each = resource is not None and values["resource"] == EACH
+    for vehicle in names.vehicles() if each else ("",):
+        chosen = {**values, "resource": vehicle} if each else values
+        words = English(names.labels)
+        try:
+            formula = within(pattern.build(chosen, names), **scope)
+        except ScopeError as error:
+            message = f"{pattern.name} cannot be asked for a part of a run: {error}"
+            raise UnusableError("args", message) from None
+        except UnknownNameError as error:
+            raise UnusableError("args", str(error)) from None
+        parts = {name: words.of(each) if each is not None else "" for name, each in scope.items()}
+        said = say_scope(
+            pattern.say(chosen, words), parts["before"], parts["after"], parts["until"]
+        )
+        yield _checked(
+            Requirement(
+                f"{written.id}/{vehicle}" if each else written.id,
+                formula,
+                sentence(said),
+                written.text,
+                pattern.name,
+                vehicle,
+                pattern.fair if written.fair is None else written.fair,
+                written.file,
+                written.line,
+            ),
+            "args",
+        )
+
+
+def _checked(requirement: Requirement, where: str) -> Requirement:
+    """The requirement, if its automaton is not too large."""
+    try:
+        Observer(negated(requirement.formula))
+    except M2pemError as error:
+        raise UnusableError(where, str(error)) from None
+    return requirement
+
+
+def _values(
+    written: Written, pattern: Pattern, names: Names
+) -> tuple[dict[str, Any], dict[str, Formula | None]]:
+    scopes = [name for name in SCOPES if pattern.scoped and pattern.argument(name) is None]
+    known = [*(each.name for each in pattern.arguments), *scopes]
+    for name in written.arguments:
+        if name not in known:
+            raise UnusableError(
+                f"args.{name}",
+                f"{pattern.name} takes no '{name}'",
+                suggest(name, known, "arguments"),
+            )
+    scope: dict[str, Formula | None] = dict.fromkeys(SCOPES)
+    for name in scopes:
+        if name in written.arguments:
+            scope[name] = _condition(written.arguments[name], name, names)
+    values: dict[str, Any] = {}
+    for argument in pattern.arguments:
+        if argument.name in written.arguments:
+            value = written.arguments[argument.name]
+            values[argument.name] = _value(argument, value, names, values)
+        elif argument.required:
+            raise UnusableError(
+                "args", f"{pattern.name} needs '{argument.name}'", _example(argument)
+            )
+        else:
+            values[argument.name] = argument.default
+    return values, scope
+
+
+def _value(argument: Argument, value: Any, names: Names, others: Mapping[str, Any]) -> Any:
+    where = f"args.{argument.name}"
+    try:
+        match argument.kind:
+            case Kind.CONDITION:
+                return _condition(value, argument.name, names)
+            case Kind.CONDITIONS:
+                listed = _listed(value, where)
+                return tuple(_condition(each, argument.name, names) for each in listed)
+            case Kind.ELEMENT:
+                return names.element(_text(value, where))
+            case Kind.ELEMENTS:
+                return tuple(names.element(each) for each in _listed(value, where))
+            case Kind.RESOURCE:
+                return value if value == EACH else names.resource(_text(value, where))
+            case Kind.BEHAVIOR:
+                return names.behavior(_text(value, where))
+            case Kind.COUNT:
+                return _count(value, where)
+            case Kind.FLAG:
+                if value not in (True, False, "true", "false"):
+                    raise UnusableError(where, f"{value!r} is neither true nor false")
+                return value in (True, "true")
+            case Kind.DECISION:
+                return names.decision(others["ask"], _text(value, where))
+    except UnknownNameError as error:
+        raise UnusableError(where, str(error)) from None
+
+
+def _condition(value: Any, name: str, names: Names) -> Formula:
+    text = _text(value, f"args.{name}")
+    try:
+        return Completed(names.element(text))
+    except UnknownNameError as error:
+        if _NAME.fullmatch(text) and text not in names.data_names and text not in _CONSTANTS:
+            raise UnusableError(f"args.{name}", str(error)) from None
+        return _formula(text, f"args.{name}", names)
+
+
+def _formula(text: str, where: str, names: Names) -> Formula:
+    try:
+        return names.resolved(parse(text), text)
+    except ExpressionSyntaxError as error:
+        raise UnusableError(where, str(error)) from None
+
+
+def _text(value: Any, where: str) -> str:
+    if not isinstance(value, str) or not value.strip():
+        raise UnusableError(where, f"{value!r} is no text", "write a name, or a formula")
+    return value.strip()
+
+
+def _listed(value: Any, where: str) -> list[str]:
+    found = value if isinstance(value, list) else _split(_text(value, where))
+    if len(found) < 2:
+        raise UnusableError(where, "a list of two or more is needed", "write [A, B]")
+    return [_text(each, where) for each in found]
+
+
+def _split(text: str) -> list[str]:
+    """The parts between the commas that stand in no parentheses."""
+    parts, depth = [""], 0
+    for character in text:
+        depth += (character in "([") - (character in ")]")
+        if character == "," and not depth:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return parts
+
+
+def _count(value: Any, where: str) -> int:
+    number = int(value) if isinstance(value, str) and value.strip().isdecimal() else value
+    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number <= _MOST_TIMES:
+        raise UnusableError(where, f"{value!r} is no whole number from 0 to {_MOST_TIMES}")
+    return number
+
+
+def _example(argument: Argument) -> str:
+    examples = {
+        Kind.CONDITION: "Survey, or a formula",
+        Kind.CONDITIONS: "[SurveyNorth, SurveySouth]",
+        Kind.ELEMENT: "AskOperator",
+        Kind.ELEMENTS: "[DriveNorth, DriveSouth]",
+        Kind.RESOURCE: "each, or the name of a vehicle",
+        Kind.BEHAVIOR: "area_survey",
+        Kind.COUNT: "2",
+        Kind.FLAG: "true",
+        Kind.DECISION: "continue",
+    }
+    return f"write {argument.name}: {examples[argument.kind]}"

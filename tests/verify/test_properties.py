@@ -1,0 +1,96 @@
+"""Each property catches a mission that breaks it, at the elements where it shows."""
+
+import pytest
+
+from m2pem.verify.check import check
+from m2pem.verify.results import Verdict
+from tests.engine.notation import mission
+
+JOIN_FED_BY_ONE = """
+<process id="MAIN"><startEvent id="s"/><exclusiveGateway id="x"/><userTask id="a">ask l r</userTask>
+<userTask id="b">ask l r</userTask><parallelGateway id="join"/><endEvent id="e"/>
+s -> x
+x -> a
+x -> b
+a -> join
+b -> join
+join -> e
+</process>
+"""
+TWO_ON_ONE = """
+<process id="MAIN"><startEvent id="s"/><parallelGateway id="fork"/><parallelGateway id="join"/>
+<scriptTask id="a">do drive_stop evsg1</scriptTask>
+<scriptTask id="b">do drive_stop evsg1</scriptTask>
+<endEvent id="e"/>
+s -> fork
+fork -> a
+fork -> b
+a -> join
+b -> join
+join -> e
+</process>
+"""
+UNJOINED = """
+<process id="MAIN"><startEvent id="s"/><parallelGateway id="fork"/><exclusiveGateway id="merge"/>
+<userTask id="a">ask l r</userTask><userTask id="b">ask l r</userTask>
+<userTask id="c">ask l r</userTask><endEvent id="e"/>
+s -> fork
+fork -> a
+fork -> b
+a -> merge
+b -> merge
+merge -> c
+c -> e
+</process>
+"""
+UNSENT = """
+<process id="MAIN"><startEvent id="s"/>
+<intermediateCatchEvent id="wait">signal gone</intermediateCatchEvent>
+<endEvent id="e"/>
+s -> wait
+wait -> e
+</process>
+"""
+UNHANDLED = """
+<process id="MAIN"><startEvent id="s"/><userTask id="ask">ask go stop</userTask>
+<exclusiveGateway id="x"/><endEvent id="e"/>
+s -> ask
+ask -> x
+x -> e if user.decision == 'go'
+</process>
+"""
+ROUND = """
+<process id="MAIN"><startEvent id="s"/><exclusiveGateway id="x"/><userTask id="a">ask l r</userTask>
+<exclusiveGateway id="y"/><endEvent id="e"/>
+s -> x
+x -> a
+a -> y
+y -> x if 1 == 1
+y -> e if 1 == 2
+</process>
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "broken", "element"),
+    [
+        (JOIN_FED_BY_ONE, "no-deadlock", "join"),
+        (JOIN_FED_BY_ONE, "can-complete", "s"),
+        (JOIN_FED_BY_ONE, "no-dead-element", "e"),
+        (TWO_ON_ONE, "one-behavior", "a"),
+        (UNJOINED, "one-token", "c"),
+        (UNJOINED, "proper-completion", "e"),
+        (UNSENT, "can-be-triggered", "wait"),
+        (UNSENT, "no-deadlock", "wait"),
+        (UNHANDLED, "decisions-handled", "x"),
+        (UNHANDLED, "errors-caught", "x"),
+        (ROUND, "no-livelock", "a"),
+        (ROUND, "no-dead-element", "e"),
+    ],
+)
+def test_a_broken_mission_is_caught(text: str, broken: str, element: str) -> None:
+    report = check(mission(text))
+    result = next(each for each in report.results if each.property == broken)
+    assert result.verdict is Verdict.VIOLATED
+    assert element in {each for violation in result.violations for each in violation.elements}
+    assert report.verdict is Verdict.VIOLATED

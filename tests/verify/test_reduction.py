@@ -1,0 +1,68 @@
+"""What is left out of a search changes no verdict."""
+
+from random import Random
+
+import pytest
+
+from m2pem.verify.derive import derive
+from m2pem.verify.explore import Exploration, Limits, explore
+from m2pem.verify.reduction import StubbornSets
+from m2pem.verify.simplify import simplify
+from m2pem.verify.system import System
+from tests.engine.notation import mission as notation
+from tests.engine.random_missions import graph, structured
+from tests.verify.models import branches
+
+SMALL = Limits(states=1_000, tokens=3, seconds=2.0)
+
+
+def seen(found: Exploration) -> tuple[object, ...]:
+    """What properties are read from, told by names."""
+    system = found.system
+    places = system.places
+    return (
+        {
+            tuple(sorted((places[p].name, n) for p, n in found.marking(s).tokens.items()))
+            for s in found.terminals
+        },
+        {step.element for rule in found.fired for step in system.rules[rule].steps},
+        {(system.rules[r].element, system.rules[r].flag) for r in found.flagged},
+        bool(found.overflows),
+    )
+
+
+def reduced(system: System, **given: bool) -> Exploration:
+    return explore(system, SMALL, reduction=StubbornSets(system), **given)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_a_random_mission_shows_the_same_with_and_without_reduction(seed: int) -> None:
+    whole = derive(notation((structured if seed % 2 else graph)(Random(1000 + seed))))
+    small = simplify(whole)
+    full = explore(whole, SMALL)
+    if full.stopped is not None:
+        pytest.skip("too large to look at whole")
+    # A second token where tokens only pass is not seen once that place is taken out.
+    simple = explore(small, SMALL)
+    assert seen(simple)[:3] == seen(full)[:3]
+    assert seen(reduced(small)) == seen(simple)
+
+
+@pytest.mark.parametrize("seed", [3014, 3056])
+def test_what_is_put_off_round_a_circle_is_tried_at_last(seed: int) -> None:
+    small = simplify(derive(notation((structured if seed % 2 else graph)(Random(seed)))))
+    assert seen(reduced(small)) == seen(explore(small, SMALL))
+
+
+def test_branches_are_searched_in_time_that_grows_with_their_number_alone() -> None:
+    for interruptible in (False, True):
+        system = simplify(derive(branches(100, interruptible=interruptible)))
+        found = reduced(system)
+        assert found.complete
+        assert len(found.states) < 320
+        assert set(found.fired) == set(range(len(system.rules)))
+
+
+def test_without_reduction_every_order_is_searched() -> None:
+    found = explore(simplify(derive(branches(5))))
+    assert len(found.states) == 4**5 + 3

@@ -1,0 +1,135 @@
+import pytest
+
+from m2pem.model.mission import Mission
+from m2pem.resources.madeup import fleet_for
+from m2pem.verify.derive import Options, derive
+from m2pem.verify.explore import Limits
+from m2pem.verify.labels import Labels
+from m2pem.verify.ltl import parse, propositions
+from m2pem.verify.product import Result
+from m2pem.verify.requirements import Names, parse_spec
+from m2pem.verify.requirements.checking import Answer, check_mission
+from m2pem.verify.system import Action
+from tests.verify.missions import approval, in_a_row, pair, survey, task
+
+HOLDS, VIOLATED, UNDECIDED = Result.HOLDS, Result.VIOLATED, Result.UNDECIDED
+CERTAIN = Options(failures=False)
+TWO_EACH = (
+    "{id: a, pattern: visits_at_least, args: {resource: each, behavior: area_survey, times: 2}}"
+)
+
+
+def check(mission: Mission, entry: str, options: Options = CERTAIN, **more: object) -> list[Answer]:
+    fleet = fleet_for(mission)
+    names = Names(mission, fleet, data=options.data)
+    found = parse_spec(f"requirements: [{entry}]".encode(), "spec.yaml", names)
+    return check_mission(mission, fleet, found, options=options, **more)  # type: ignore[arg-type]
+
+
+def ltl(mission: Mission, formula: str, options: Options = CERTAIN) -> Answer:
+    return check(mission, f'{{id: a, ltl: "{formula}"}}', options)[0]
+
+
+def test_each_robot_surveys_at_least_two_locations() -> None:
+    assert [each.result for each in check(pair(), TWO_EACH)] == [HOLDS, HOLDS]
+    assert [each.result for each in check(pair(again=True), TWO_EACH)] == [VIOLATED, HOLDS]
+    revisits = TWO_EACH.replace("2}}", "2, revisits: true}}")
+    assert [each.result for each in check(pair(again=True), revisits)] == [HOLDS, HOLDS]
+
+
+def test_what_fails_breaks_what_must_come() -> None:
+    answer = check(pair(), TWO_EACH, Options())[0]
+    assert answer.result is VIOLATED
+    assert answer.prefix[-1].element in ("North", "South", "East", "West")
+
+
+@pytest.mark.parametrize(
+    ("formula", "result"),
+    [
+        ("[](active(Drive) -> once(user.decision == 'go'))", HOLDS),
+        ("[](active(Drive) -> user.decision == 'go')", HOLDS),
+        ("[](active(Drive) -> user.decision == 'stop')", VIOLATED),
+        ("<> ended", VIOLATED),
+        ("[] count(completed(Drive)) <= 2", VIOLATED),
+        ("[](completed(Drive) -> <> active(Ask))", HOLDS),
+        ("[](commanded(rover, goto) <-> commanded(rover))", HOLDS),
+        ("!commanded(rover) W completed(Ask)", HOLDS),
+        ("[] !(active(Ask) && commanded(rover))", HOLDS),
+        ("active(P) && [](ended -> !active(P))", HOLDS),
+        ("[](completed(P) -> ended(completed))", HOLDS),
+        ("(!active(Drive) since active(Ask)) || true", HOLDS),
+    ],
+)
+def test_formulas_are_about_what_the_mission_does(formula: str, result: Result) -> None:
+    assert ltl(approval(), formula).result is result
+
+
+def test_a_broken_requirement_comes_with_the_rules_of_a_run() -> None:
+    answer = ltl(approval(), "[] !completed(Drive)")
+    done = [rule.element for rule in answer.prefix if rule.element in ("Ask", "Drive")]
+    assert done[-1] == "Drive"
+    assert answer.run is not None
+    assert answer.run.whatever_follows
+    answer = ltl(approval(), "<> ended")
+    assert {"Ask", "Drive"} <= {rule.element for rule in answer.cycle}
+
+
+def test_with_fairness_the_operator_says_stop_at_some_time() -> None:
+    assert check(approval(), "{id: a, pattern: reaches_proper_end}")[0].result is HOLDS
+    unfair = "{id: a, pattern: reaches_proper_end, fair: false}"
+    assert check(approval(), unfair)[0].result is VIOLATED
+    assert check(approval(), "{id: a, ltl: '<> ended', fair: true}")[0].result is HOLDS
+
+
+def test_one_answer_is_good_for_one_time() -> None:
+    entry = (
+        "{id: a, pattern: operator_in_the_loop, args: {ask: Ask, decision: go, before: "
+        "active(Drive)}}"
+    )
+    assert check(approval(), entry)[0].result is HOLDS
+    assert check(approval(), entry.replace("go", "stop"))[0].result is VIOLATED
+
+
+def test_the_next_step_is_the_next_rule() -> None:
+    mission = in_a_row(
+        task("A", "rover", "goto", target="x"), task("B", "rover", "goto", target="y")
+    )
+    prompt = "{id: a, pattern: prompt_reaction, args: {when: A, then: %s}}"
+    assert check(mission, prompt % "active(B)")[0].result is HOLDS
+    assert check(mission, prompt % "commanded(rover)")[0].result is VIOLATED
+
+
+def test_data_that_the_run_is_started_with_is_known() -> None:
+    mission = in_a_row(survey("North", "uav1", "${mission.area}"))
+    options = Options(data={"mission.area": "north"}, failures=False)
+    assert ltl(mission, "[] mission.area == 'north'", options).result is HOLDS
+    assert ltl(mission, "[] mission.area == 'south'", options).result is VIOLATED
+    answer = ltl(mission, "[] mission.area == 'north'")
+    assert answer.result is UNDECIDED
+    assert "'mission.area' is cannot be told from the mission" in answer.why
+
+
+def test_of_a_search_cut_short_what_is_broken_is_broken_and_the_rest_undecided() -> None:
+    formula = '{id: a, ltl: "%s"}'
+    nothing = Limits(seconds=0)
+    assert check(pair(), formula % "[] ended", limits=nothing)[0].result is VIOLATED
+    answer = check(pair(), formula % "[] !ended(failed)", limits=nothing)[0]
+    assert answer.result is UNDECIDED
+    assert answer.why == "the search stopped at the limit of time"
+
+
+def test_rules_that_cannot_change_what_a_formula_asks_are_not_visible() -> None:
+    mission = pair()
+    fleet = fleet_for(mission)
+    system = derive(mission, fleet, options=CERTAIN)
+    formula = parse("[](completed(North) -> <> commanded(uav1))")
+    visible = Labels(system, mission, fleet, propositions(formula)).visible_rules()
+    completing = {
+        rule.element: rule.index in visible
+        for rule in system.rules
+        if rule.steps[0].action is Action.COMPLETED
+    }
+    assert completing["North"]
+    assert completing["South"]
+    assert not completing["East"]
+    assert not completing["West"]

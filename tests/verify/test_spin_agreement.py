@@ -1,0 +1,239 @@
+"""Spin and the built-in search see the same, and say the same."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from m2pem.model.bpmn import read_mission
+from m2pem.model.mission import Mission
+from m2pem.resources.madeup import fleet_for
+from m2pem.verify.check import check
+from m2pem.verify.derive import Options, derive
+from m2pem.verify.encoding import Marking
+from m2pem.verify.explore import Exploration, Limits, explore
+from m2pem.verify.labels import Labels
+from m2pem.verify.ltl import Formula, propositions
+from m2pem.verify.ltl.formula import Active, Completed, needs_steps, rebuilt
+from m2pem.verify.mission_runs import MissionRuns
+from m2pem.verify.product import Result
+from m2pem.verify.product import check as check_formula
+from m2pem.verify.properties import ALL
+from m2pem.verify.requirements import Names, parse_spec
+from m2pem.verify.requirements.checking import check_requirement, conditions
+from m2pem.verify.requirements.requirement import Requirement
+from m2pem.verify.results import Verdict
+from m2pem.verify.simplify import simplify
+from m2pem.verify.spin import requiring
+from m2pem.verify.spin.checking import check_with_spin
+from m2pem.verify.spin.search import Found, search
+from m2pem.verify.spin.trail import replay
+from m2pem.verify.system import System
+from tests.engine.notation import mission as notation
+from tests.engine.random_missions import graph, structured
+from tests.verify import formulas
+from tests.verify.missions import approval, pair
+from tests.verify.random_systems import random_system
+from tests.verify.test_properties import (
+    JOIN_FED_BY_ONE,
+    ROUND,
+    TWO_ON_ONE,
+    UNHANDLED,
+    UNJOINED,
+    UNSENT,
+)
+
+ROOT = Path(__file__).parents[2]
+MISSIONS = sorted([*ROOT.glob("missions/*.bpmn"), *ROOT.glob("examples/**/*.bpmn")])
+BROKEN = (JOIN_FED_BY_ONE, TWO_ON_ONE, UNJOINED, UNSENT, UNHANDLED, ROUND)
+SMALL = Limits(states=3_000, tokens=3)
+FEW, MANY = 12, 600
+ODD_MISSIONS, ODD_RULES = (18, 27, 234, 251), (1, 19, 176, 203, 540)
+"""Seeds at which one of the two was wrong once."""
+
+
+def stuck(found: Exploration) -> list[Marking]:
+    ends = found.system.ends
+    markings = [found.marking(n) for n in found.terminals]
+    return [each for each in markings if not ends & each.tokens.keys()]
+
+
+def same(system: System, limits: Limits = SMALL) -> tuple[Exploration, Found]:
+    """What both see of a system without reduction; it must be the same."""
+    ours = explore(system, limits)
+    assume_small(ours)
+    spins = search(system, limits)
+    assert spins.states == len(ours.states)
+    # Spin counts the initial state, and goes on where nothing can happen any more.
+    assert spins.transitions == ours.transitions + len(ours.terminals) + 1
+    assert spins.fired == ours.fired.keys()
+    assert spins.stopped is ours.stopped
+    # Of several places that are overfull at once, the built-in search tells one at a time.
+    assert spins.beyond >= ours.beyond
+    assert spins.overflow_runs.keys() >= ours.overflows.keys()
+    if ours.complete:
+        assert spins.overflow_runs.keys() == ours.overflows.keys()
+    assert bool(spins.stuck_runs) == bool(stuck(ours))
+    for run in spins.stuck_runs:
+        assert spins.encoding.marking(replay(spins.encoding, run)[-1]) in stuck(ours)
+    for rule, state in ours.flagged.items():
+        # Spin's are short in its own steps, of which what comes from outside takes more.
+        assert len(spins.rule_runs[rule]) >= len(ours.run_to(state)) + 1
+    return ours, spins
+
+
+def assume_small(found: Exploration) -> None:
+    if len(found.states) > SMALL.states:
+        pytest.skip("too large to look at whole")
+
+
+@pytest.mark.parametrize("file", MISSIONS, ids=lambda file: str(file.relative_to(ROOT)))
+def test_the_missions_of_the_repository_have_one_answer(file: Path) -> None:
+    one_answer(read_mission(file))
+
+
+@pytest.mark.parametrize("text", BROKEN)
+def test_broken_missions_have_one_answer(text: str) -> None:
+    assert one_answer(notation(text)) is Verdict.VIOLATED
+
+
+def one_answer(mission: Mission) -> Verdict:
+    ours, spins = check(mission), check_with_spin(mission)
+    assert spins.states == ours.states
+    assert spins.engine == "spin"
+    assert len(spins.results) == len(ALL)
+    for one, other in zip(ours.results, spins.results, strict=True):
+        assert (one.property, one.verdict) == (other.property, other.verdict)
+        assert len(one.violations) == len(other.violations), one.property
+        assert {each.elements[:1] for each in one.violations} == {
+            each.elements[:1] for each in other.violations
+        }, one.property
+    assert spins.judged(strict=True) is ours.judged(strict=True)
+    return ours.verdict
+
+
+@pytest.mark.parametrize("file", ["vignette1.bpmn", "mehds_vignette_4.bpmn"])
+def test_the_rules_as_derived_have_the_same_states(file: str) -> None:
+    ours, _ = same(derive(read_mission(ROOT / "missions" / file)))
+    assert len(ours.states) > 30
+
+
+# --- random ones ----------------------------------------------------------------------------------
+
+
+def _random_mission(seed: int) -> System:
+    text = (structured if seed % 2 else graph)(Random(seed))
+    return (simplify if seed % 3 else lambda system: system)(derive(notation(text)))
+
+
+@pytest.mark.parametrize("seed", sorted({*range(FEW), *ODD_MISSIONS}))
+def test_random_missions_have_the_same_states(seed: int) -> None:
+    same(_random_mission(seed))
+
+
+@pytest.mark.parametrize("seed", sorted({*range(FEW), *ODD_RULES}))
+def test_random_rules_have_the_same_states(seed: int) -> None:
+    same(random_system(Random(seed)))
+
+
+@pytest.mark.long
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("made", [_random_mission, lambda seed: random_system(Random(seed))])
+def test_many_random_ones_have_the_same_states(made) -> None:  # type: ignore[no-untyped-def]
+    for seed in range(FEW, MANY):
+        system = made(seed)
+        if len(explore(system, SMALL).states) <= SMALL.states:
+            try:
+                same(system)
+            except Exception as error:
+                error.add_note(f"seed {seed}")
+                raise
+
+
+# --- requirements ---------------------------------------------------------------------------------
+
+
+def answers(mission: Mission, required: Sequence[Requirement]) -> list[tuple[Result, Result]]:
+    fleet = fleet_for(mission)
+    options = Options(failures=False, conditions=conditions(required))
+    system = derive(mission, fleet, options=options)
+    found, spins = explore(system), search(system)
+    return [
+        (
+            check_requirement(found, mission, fleet, each).result,
+            requiring.check_requirement(spins, mission, fleet, each).result,
+        )
+        for each in required
+    ]
+
+
+def required(mission: Mission, *entries: str) -> list[Requirement]:
+    names = Names(mission, fleet_for(mission), data={})
+    return parse_spec(f"requirements: [{','.join(entries)}]".encode(), "spec.yaml", names)
+
+
+def test_requirements_have_one_answer() -> None:
+    texts = [
+        "[](active(Drive) -> once(user.decision == 'go'))",
+        "[](active(Drive) -> user.decision == 'stop')",
+        "<> ended",
+        "[] count(completed(Drive)) <= 2",
+        "[](completed(Drive) -> <> active(Ask))",
+        "!commanded(rover) W completed(Ask)",
+        "active(P) && [](ended -> !active(P))",
+        "historically(!active(Drive)) U completed(Ask)",
+        "[](completed(Drive) -> (!active(Drive) since completed(Ask)))",
+    ]
+    entries = [f'{{id: a{n}, ltl: "{text}"}}' for n, text in enumerate(texts)]
+    found = answers(approval(), required(approval(), *entries))
+    assert [one for one, _ in found] == [other for _, other in found]
+    assert {one for one, _ in found} == {Result.HOLDS, Result.VIOLATED}
+
+
+@pytest.mark.parametrize("again", [True, False])
+def test_each_robot_surveys_two_locations_to_both(again: bool) -> None:
+    entry = "{id: a, pattern: visits_at_least, args: {resource: each, behavior: area_survey}}"
+    two = entry.replace("}}", ", times: 2}}")
+    found = answers(pair(again=again), required(pair(again=again), two))
+    expected = Result.VIOLATED if again else Result.HOLDS
+    assert found == [(expected, expected), (Result.HOLDS, Result.HOLDS)]
+
+
+def test_an_unfair_run_is_no_violation_where_fairness_is_assumed() -> None:
+    entry = "{id: a, pattern: reaches_proper_end, fair: %s}"
+    unfair = required(approval(), entry % "false")
+    assert answers(approval(), unfair) == [(Result.VIOLATED, Result.VIOLATED)]
+    fair = required(approval(), entry % "true")
+    assert answers(approval(), fair) == [(Result.HOLDS, Result.UNDECIDED)]
+    always = required(approval(), "{id: a, ltl: '[] !commanded(rover)', fair: true}")
+    assert answers(approval(), always) == [(Result.VIOLATED, Result.VIOLATED)]
+
+
+def _on_elements(formula: Formula, names: dict[str, str]) -> Formula:
+    if isinstance(formula, Active | Completed):
+        return replace(formula, element=names[formula.element])
+    return rebuilt(formula, lambda each: _on_elements(each, names))
+
+
+@given(formulas.formulas, st.integers(0, 10_000))
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+def test_random_formulas_have_one_answer(formula: Formula, seed: int) -> None:
+    assume(not needs_steps(formula))
+    dice = Random(seed)
+    mission = notation(structured(dice))
+    system = simplify(derive(mission))
+    found = explore(system, SMALL)
+    assume(found.complete)
+    elements = sorted(system.elements)
+    asked = _on_elements(formula, {each: dice.choice(elements) for each in "abc"})
+    fleet = fleet_for(mission)
+    labels = Labels(system, mission, fleet, propositions(asked))
+    ours = check_formula(MissionRuns(found, labels), asked)
+    spins = requiring.check_requirement(
+        search(system, SMALL), mission, fleet, Requirement("r", asked, "")
+    )
+    assert spins.result is ours.result
