@@ -19,7 +19,7 @@ COMMANDS = {
     "run": "Run a mission to its end.",
     "serve": "Serve operators, who start missions, until stopped.",
     "check": "Check a mission file, alone or against a fleet.",
-    "verify": "Prove properties of a mission, or show a run that violates them.",
+    "verify": "Prove properties and requirements of a mission, or show a run that violates them.",
     "simulate": "Rehearse a mission on a virtual clock.",
     "runs": "List the runs of a journal.",
     "replay": "Print what happened in a run, and how it stands.",
