@@ -135,6 +135,10 @@ DETECTED = Story(
 )
 """The man is found by the UAV's computer, and the mine by the radar that passes over it."""
 
+SIMULATED_ALONE = {"mehds_vignette_4_aborted_unheard", "mehds_vignette_4_following_aborted_unheard"}
+"""Vehicles that stand already have done as they are told, before it can be noticed that one of them
+is silent; the ends are those of other stories (tests/e2e/test_field_missions.py)."""
+
 SHORT = ("mehds_vignette_4_aborted",)
 """Those that are tried every time: ground, air, camera and detector in one."""
 
@@ -152,7 +156,7 @@ def check(story: Story, told: Told) -> None:
 
 def test_every_answers_file_of_the_vignettes_is_tried() -> None:
     files = {path.stem for path in (MISSIONS / "answers").glob("mehds_vignette_*.yaml")}
-    assert files == {story.answers for story in STORIES}
+    assert files - SIMULATED_ALONE == {story.answers for story in STORIES}
 
 
 @pytest.mark.timeout(WITHIN_S + 60)
