@@ -1,10 +1,13 @@
 """Pointing and tracking, from vehicles that drive and turn, with a head that turns no faster."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from m2pem_plugin_ptz.behaviors.aiming import PointAt
+from m2pem_plugin_ptz.behaviors.behavior import BehaviorFailedError, Job
 from ptz_head import ORIGIN, Head, rad
 from ptz_world import CAMERA, play, point
 
@@ -269,3 +272,12 @@ def test_a_late_camera_is_told_ahead():
 
     assert worst_of("200 ms") < 1.5
     assert worst_of("0 s") > 3.0
+
+
+def test_a_moment_in_which_nobody_looked_does_not_count_as_a_stuck_motor():
+    behavior = PointAt(Job("r1.b1", {}, SimpleNamespace(driver=None)))
+    behavior.check_turning(1.0, 0.05, 0.01)
+    behavior.check_turning(1.0, 30.0, 0.01)
+    with pytest.raises(BehaviorFailedError, match="no nearer for 10 s"):
+        for step in range(1, 240):
+            behavior.check_turning(1.0, 30.0 + step * 0.05, 0.01)

@@ -19,6 +19,10 @@ LEFT_S = 10.0
 STUCK_S = 10.0
 """So long may a camera come no nearer to where it is told to look."""
 
+LONGEST_STEP_S = 0.5
+"""Of a step that took longer, no more counts: this process was held up, and has not yet read what
+the camera said meanwhile."""
+
 _NEARER_RAD = math.radians(0.1)
 _SLOWEST_RAD_S = 0.02
 _SLACK_RAD = math.radians(5.0)
@@ -31,7 +35,8 @@ class Aiming(Behavior):
         super().__init__(job)
         self._reachable_s = 0.0
         self._nearest_rad = math.inf
-        self._nearer_s = 0.0
+        self._looked_s = 0.0
+        self._unmoved_s = 0.0
 
     @abstractmethod
     def wanted(self, at_us: int) -> tuple[float, float]:
@@ -75,10 +80,12 @@ class Aiming(Behavior):
 
     def check_turning(self, off_rad: float, elapsed_s: float, enough_rad: float) -> None:
         """Fails when the camera comes no nearer to where it is told to look."""
+        self._unmoved_s += min(elapsed_s - self._looked_s, LONGEST_STEP_S)
+        self._looked_s = elapsed_s
         if off_rad <= enough_rad or off_rad < self._nearest_rad - _NEARER_RAD:
             self._nearest_rad = off_rad if off_rad > enough_rad else math.inf
-            self._nearer_s = elapsed_s
-        elif elapsed_s - self._nearer_s >= STUCK_S:
+            self._unmoved_s = 0.0
+        elif self._unmoved_s >= STUCK_S:
             raise BehaviorFailedError(
                 f"the camera does not get there: {math.degrees(off_rad):.1f} deg are left, and it "
                 f"has come no nearer for {STUCK_S:g} s"
