@@ -41,7 +41,7 @@ def walked(mission: Mission, system: System, seeds: range) -> str:
 
 
 def _explained(walk: Walk, system: System) -> bool:
-    """What docs/verification.md says of where the rules stop short of the engine."""
+    """What docs/verification-internals.md says of where the rules stop short of the engine."""
     if any(a.exactness is Exactness.BOUNDED for a in system.approximations):
         return True
     if "EXPRESSION" in walk.run.state.detail:
