@@ -1,6 +1,8 @@
 """What `m2pem verify` was told, put together: mission, fleet and options, and who searches."""
 
+import signal
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,6 +18,10 @@ if TYPE_CHECKING:
     from m2pem.verify.explore import Limits, Progress
     from m2pem.verify.report.findings import Findings
     from m2pem.verify.requirements import Requirement
+
+_QUIET_S = 1.0
+"""A search that takes less is over before anybody has read how far it is."""
+_BETWEEN_LINES_S = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +85,7 @@ def findings(asked: Asked, engine: Engine, *, strict: bool) -> "Findings":
     from m2pem.verify.requirements.results import with_requirements
     from m2pem.verify.spin.asking import Storage
 
-    with progress() as show:
+    with _ended_as_by_hand(), progress() as show:
         report = with_requirements(
             _report(asked, engine, show),
             asked.mission,
@@ -131,22 +137,49 @@ def promela(asked: Asked) -> str:
 
 
 @contextmanager
+def _ended_as_by_hand() -> Iterator[None]:
+    """What else asks a program to end does what Ctrl-C does: what was seen is told, Spin ends."""
+    before = {}
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            before[number] = signal.signal(number, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
 def progress() -> "Iterator[Callable[[Progress], None] | None]":
     """A line on standard error that counts up, for a person who looks."""
     if not sys.stderr.isatty():
         yield None
         return
-    shown = False
+    shown_at = 0.0
 
     def show(searched: "Progress") -> None:
-        nonlocal shown
-        if searched.seconds > 1:
-            shown = True
-            counts = (
-                f"{searched.states:,} states found, {searched.waiting:,} of them to be searched"
-            )
-            print(f"\r\033[K{counts} (Ctrl-C to stop)", end="", file=sys.stderr, flush=True)
+        nonlocal shown_at
+        now = time.monotonic()
+        if searched.seconds > _QUIET_S and now > shown_at + _BETWEEN_LINES_S:
+            shown_at = now
+            _write(f"\r\033[K{_line(searched)} (Ctrl-C to stop)")
 
-    yield show
-    if shown:
-        print("\r\033[K", end="", file=sys.stderr, flush=True)
+    try:
+        yield show
+    finally:
+        if shown_at:
+            _write("\r\033[K")
+
+
+def _line(searched: "Progress") -> str:
+    said = [f"searching for {searched.seconds:.0f} s"]
+    if searched.states:
+        said.append(f"{searched.states:,} states found")
+    if searched.waiting:
+        said.append(f"{searched.waiting:,} of them to be searched")
+    return ", ".join(said)
+
+
+def _write(text: str) -> None:
+    print(text, end="", file=sys.stderr, flush=True)

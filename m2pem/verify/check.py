@@ -99,4 +99,8 @@ def search(
     found = explore(system, small, progress=progress)
     if found.stopped is not Stopped.STATES or limits.states <= FULL_STATES:
         return found
-    return explore(system, limits, reduction=StubbornSets(system), progress=progress)
+    try:
+        return explore(system, limits, reduction=StubbornSets(system), progress=progress)
+    except KeyboardInterrupt:  # before the other search had begun
+        found.stopped = Stopped.INTERRUPTED
+        return found

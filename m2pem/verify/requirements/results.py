@@ -96,7 +96,9 @@ def with_requirements(
     spins: Found | None = None
     results: list[Result] = []
     instead: list[str] = []
-    stopped = report.found.stopped is Stopped.INTERRUPTED
+    stopped = report.found.stopped is Stopped.INTERRUPTED or any(
+        each.covered.endswith(Stopped.INTERRUPTED) for each in report.results
+    )
     for each in requirements:
         if stopped or asking.interrupted:
             why = f"not begun, after {Stopped.INTERRUPTED}"

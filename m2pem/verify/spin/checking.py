@@ -61,9 +61,11 @@ def check_with_spin(
         )
     other = Searched(mission, system, _also(system, found, limits, progress))
     results = tuple(
-        each(other) if each in BEYOND_SPIN else _covered(each(searched), found) for each in ALL
+        _beyond(each(other), found) if each in BEYOND_SPIN else _covered(each(searched), found)
+        for each in ALL
     )
     beyond = ", ".join(each(other).property for each in BEYOND_SPIN)
+    answered = "answered" if found.stopped is not Stopped.INTERRUPTED else "was not begun"
     return Report(
         system,
         searched.found,
@@ -71,7 +73,7 @@ def check_with_spin(
         watched[0] if watched is not None else None,
         engine="spin",
         states=found.states,
-        notes=(f"Spin cannot be asked {beyond}: the built-in search answered",),
+        notes=(f"Spin cannot be asked {beyond}: the built-in search {answered}",),
     )
 
 
@@ -91,6 +93,12 @@ def _also(
             f"Spin sees {found.states:,} states, and the built-in search {len(other.states):,}"
         )
     return other
+
+
+def _beyond(result: Result, found: Found) -> Result:
+    if result.verdict is not Verdict.UNDECIDED or found.stopped is not Stopped.INTERRUPTED:
+        return result
+    return replace(result, covered=f"not begun, after {Stopped.INTERRUPTED}")
 
 
 def _covered(result: Result, found: Found) -> Result:

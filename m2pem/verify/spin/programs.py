@@ -6,6 +6,7 @@ while it runs, and what gcc made begins anew. Every program is ended when its ti
 a person interrupts.
 """
 
+import os
 import shutil
 import signal
 import subprocess
@@ -94,6 +95,8 @@ class Workshop:
         self.tools = tools or Tools.find()
         self._folder = tempfile.TemporaryDirectory(prefix="m2pem-spin-")
         self.folder = Path(self._folder.name)
+        # A compiler that is killed leaves its own temporary files behind.
+        self._environment = {**os.environ, "TMPDIR": str(self.folder)}
 
     def __enter__(self) -> Self:
         return self
@@ -192,6 +195,7 @@ class Workshop:
             done = subprocess.run(
                 command,
                 cwd=self.folder,
+                env=self._environment,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
@@ -210,6 +214,7 @@ class Workshop:
             return subprocess.Popen(
                 command,
                 cwd=self.folder,
+                env=self._environment,
                 stdin=subprocess.DEVNULL,
                 stdout=file,
                 stderr=subprocess.STDOUT,
@@ -225,6 +230,7 @@ def _read(file: Path) -> str:
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
+    """With those that it began: a compiler is several programs."""
     if process.poll() is None:
-        process.kill()
+        os.killpg(process.pid, signal.SIGKILL)
     process.wait()
