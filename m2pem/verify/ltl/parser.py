@@ -196,7 +196,8 @@ class _Parser:
             if called[1] not in FUNCTIONS and "." not in called[1]:
                 known = [*readers, "ended", "once", "historically", "since", *FUNCTIONS]
                 hint = did_you_mean(called[1], known)
-                self.reader.fail(f"there is no '{called[1]}(...)'; " + (hint or _listed()), start)
+                said = f"there is no '{called[1]}(...)'; {_listed()}"
+                self.reader.fail(f"{said}; {hint}" if hint else said, start)
         return self._data(start)
 
     def _alone(self, end: int) -> bool:

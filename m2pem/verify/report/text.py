@@ -5,6 +5,14 @@ from collections.abc import Callable, Iterator
 from m2pem.verify.report.findings import Coverage, Findings, Violated
 from m2pem.verify.report.telling import Told
 from m2pem.verify.results import Result, Verdict
+from m2pem.verify.system import Exactness
+
+_MOST_ROUGH = 5
+"""Places told of at which the rules are not exactly the mission; a file has them all."""
+_MEANING = {
+    Exactness.MORE: "an alarm may be false",
+    Exactness.BOUNDED: "what holds, holds up to that",
+}
 
 Paint = Callable[[str, str], str]
 """A text in a colour (`green`, `red`, `yellow`, `cyan`)."""
@@ -26,9 +34,19 @@ def as_text(findings: Findings, paint: Paint = lambda text, _: text) -> str:
         lines.append("")
         lines += [f"{paint('warning', 'yellow')}: {_shown(v.found.message)}" for v in warnings]
     lines.append("")
-    lines += [f"note: {_shown(each)}" for each in findings.coverage.notes]
+    lines += [f"note: {_shown(each)}" for each in (*findings.coverage.notes, *_rough(findings))]
     lines.append(_summary(findings, paint))
     return "\n".join(lines)
+
+
+def _rough(findings: Findings) -> Iterator[str]:
+    approximations = findings.system.approximations
+    for each in approximations[:_MOST_ROUGH]:
+        element = findings.mission.elements.get(each.element)
+        name = f" ({element.name})" if element is not None and element.name else ""
+        yield f"{each.element}{name}: {each.what}; {_MEANING[each.exactness]}"
+    if len(approximations) > _MOST_ROUGH:
+        yield f"and {len(approximations) - _MOST_ROUGH} more like these"
 
 
 def _properties(findings: Findings, paint: Paint) -> Iterator[str]:

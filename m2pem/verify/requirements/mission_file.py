@@ -10,7 +10,7 @@ from m2pem.model.bpmn.xml import Document, parse_xml
 from m2pem.model.near import did_you_mean
 from m2pem.verify.requirements.names import Names
 from m2pem.verify.requirements.reading import UnusableError, Written, made
-from m2pem.verify.requirements.requirement import Requirement, RequirementsError
+from m2pem.verify.requirements.requirement import Requirement, RequirementsError, misread
 
 _ATTRIBUTES = ("id", "ltl", "pattern", "text", "fair")
 
@@ -57,7 +57,14 @@ def read_mission_requirements(names: Names) -> list[Requirement]:
         try:
             found += made(_written(element, name, mission.file, document), names)
         except UnusableError as unusable:
-            error(unusable.message, unusable.remedy)
+            wrong = unusable.misread
+            if wrong is None:
+                error(unusable.message, unusable.remedy)
+                continue
+            line = document.line(element)
+            findings.append(
+                misread(mission.file, line, name, unusable.message, wrong.text, wrong.position)
+            )
     if findings:
         raise RequirementsError(findings)
     return found

@@ -24,13 +24,23 @@ _CONSTANTS = ("true", "false", "ended")
 
 
 class UnusableError(Exception):
-    """Something is wrong with one requirement. `where`: its key ("ltl", "pattern", "args.x")."""
+    """Something is wrong with one requirement. `where`: its key ("ltl", "pattern", "args.x").
 
-    def __init__(self, where: str, message: str, remedy: str = "") -> None:
+    `misread`: if it is in a formula, where.
+    """
+
+    def __init__(
+        self,
+        where: str,
+        message: str,
+        remedy: str = "",
+        misread: ExpressionSyntaxError | None = None,
+    ) -> None:
         super().__init__(message)
         self.where = where
         self.message = message
         self.remedy = remedy
+        self.misread = misread
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,7 +208,7 @@ def _formula(text: str, where: str, names: Names) -> Formula:
     try:
         return names.resolved(parse(text), text)
     except ExpressionSyntaxError as error:
-        raise UnusableError(where, str(error)) from None
+        raise UnusableError(where, error.message, misread=error) from None
 
 
 def _text(value: Any, where: str) -> str:

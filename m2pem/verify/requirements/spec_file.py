@@ -5,10 +5,10 @@ from typing import Any
 
 from m2pem.findings import Finding
 from m2pem.resources.nearmiss import suggest
-from m2pem.resources.yaml_source import KeyPath, YamlSource, parse_yaml, read_yaml
+from m2pem.resources.yaml_source import KeyPath, YamlSource, dotted, parse_yaml, read_yaml
 from m2pem.verify.requirements.names import Names
 from m2pem.verify.requirements.reading import UnusableError, Written, made
-from m2pem.verify.requirements.requirement import Requirement, RequirementsError
+from m2pem.verify.requirements.requirement import Requirement, RequirementsError, misread
 
 _KEYS = ("id", "text", "ltl", "pattern", "args", "fair")
 
@@ -50,10 +50,20 @@ def _requirements(source: YamlSource, names: Names) -> list[Requirement]:
                 found += made(written, names)
             except UnusableError as error:
                 where = (*path, *error.where.split(".", 1)) if error.where else path
-                source.error(where, "requirement", f"{written.id}: {error.message}", error.remedy)
+                _note(source, where, written.id, error)
     if source.findings:
         raise RequirementsError(_sorted(source.findings))
     return found
+
+
+def _note(source: YamlSource, where: KeyPath, name: str, error: UnusableError) -> None:
+    said = f"{name}: {error.message}"
+    wrong = error.misread
+    if wrong is None:
+        source.error(where, "requirement", said, error.remedy)
+        return
+    line, key = source.line(where), dotted(where)
+    source.findings.append(misread(source.file, line, key, said, wrong.text, wrong.position))
 
 
 def _sorted(findings: list[Finding]) -> list[Finding]:
