@@ -86,7 +86,7 @@ def _parts(rule: Rule) -> list[Rule]:
     for step in rule.steps:
         moved_on = groups and groups[-1][-1].action is Action.TAKEN
         again = step.action in (Action.COMPLETED, Action.ENTERED)
-        if not groups or (moved_on and again):
+        if not groups or (moved_on and again) or _beside(groups[-1][-1], step):
             groups.append([])
         groups[-1].append(step)
     if len(groups) < 2:
@@ -97,6 +97,11 @@ def _parts(rule: Rule) -> list[Rule]:
         for group in groups[1:]
     ]
     return [first, *later]
+
+
+def _beside(one: Step, other: Step) -> bool:
+    """Whether another element is entered: a fork's branches begin each for itself."""
+    return one.action is other.action is Action.ENTERED and one.element != other.element
 
 
 def _commanded_later(rules: Sequence[Rule]) -> dict[int, int]:
