@@ -14,7 +14,7 @@ from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
 from m2pem.verify.derive.throwing import catchable, message_effects, throw_error
 from m2pem.verify.derive.waiting import boundaries, catching, due_us
-from m2pem.verify.system import Action, Flag, Kind, Role, Step, Trigger
+from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step, Trigger
 
 
 def activity(making: Making, node: e.FlowNode, area: Area) -> None:
@@ -206,12 +206,24 @@ def _user_task(making: Making, host: Host, node: e.UserTask) -> list[Effect]:
 
 def _script(making: Making, host: Host, node: e.ScriptTask) -> list[Effect]:
     ways = [Effect()]
+    unable: list[Effect] = []
+    thrown = ""
     for statement in node.script.statements if node.script is not None else ():
-        if isinstance(statement, Assignment):
-            ways = making.data.write(ways, statement.key, statement.expression, host.outer, node)
-        else:
-            return product(ways, failing(making, host, statement.code, Flag.UNCAUGHT))
-    return product(ways, _at_once(host))
+        if not isinstance(statement, Assignment):
+            thrown = statement.code
+            break
+        if making.data.is_blurred(statement.key):
+            making.net.approximate(
+                node, Exactness.MORE, f"'{statement.key}' has more values than are told apart"
+            )
+        ways = making.data.write(
+            ways, statement.key, statement.expression, host.outer, node, unable=unable
+        )
+    over = failing(making, host, thrown, Flag.UNCAUGHT) if thrown else _at_once(host)
+    if not unable:
+        return product(ways, over)
+    wrong = failing(making, host, "EXPRESSION", Flag.UNCAUGHT)
+    return [*product(ways, over), *product(unable, wrong)]
 
 
 def _send(making: Making, host: Host, message: str) -> list[Effect]:

@@ -153,6 +153,10 @@ class Data:
             name in self.domains.of or self.domains.is_written(name) for name in condition.names
         )
 
+    def is_blurred(self, key: str) -> bool:
+        """Whether a name is followed, but with values that stand for many."""
+        return key in self.domains.of and not self.domains.of[key].closed
+
     # --- writing --------------------------------------------------------------------------------
 
     def write(
@@ -163,10 +167,12 @@ class Data:
         area: Area,
         node: e.FlowNode,
         into: tuple[str, ...] | None = None,
+        unable: list[Effect] | None = None,
     ) -> list[Effect]:
         """Effects that also write a name; several where what is written is not known.
 
-        `into`: the process instance whose name it is, when it is not the area's own.
+        `into`: the process instance whose name it is, when it is not the area's own. `unable` gets
+        those after which there is no value to write.
         """
         hidden = self.hidden(node) if into is None else frozenset()
         if not self._follows(key, hidden):
@@ -175,9 +181,12 @@ class Data:
         found: list[Effect] = []
         for effect in effects:
             for guard, value in self._values(effect, key, source, area, node):
-                both = effect.then(Effect(guard=guard, assign={target: value}))
-                if both is not None:
+                assign = {} if value is None else {target: value}
+                both = effect.then(Effect(guard=guard, assign=assign))
+                if both is not None and value is not None:
                     found.append(both)
+                elif both is not None and unable is not None:
+                    unable.append(both)
         return found
 
     def _values(
@@ -187,7 +196,8 @@ class Data:
         source: Expression | None,
         area: Area,
         node: e.FlowNode | None,
-    ) -> Iterator[tuple[dict[int, frozenset[int]], int]]:
+    ) -> Iterator[tuple[dict[int, frozenset[int]], int | None]]:
+        """Values (by number) and when; None: there is none, since it cannot be evaluated."""
         domain = self.domains.of[key]
         anything = range(len(domain.values))
         hidden = self.hidden(node) if node is not None else frozenset()
@@ -215,17 +225,14 @@ class Data:
             }
             of = {name: self.domains.of[name] for name in names}
             numbers = dict(zip(names, combination, strict=True))
-            number: int | None = None
+            values: Iterable[int | None] = anything
             if all(of[name].exact[numbers[name]] for name in names):
                 try:
-                    value = source.evaluate(lambda n: of[n].values[numbers[n]])  # noqa: B023
+                    values = domain.like(source.evaluate(lambda n: of[n].values[numbers[n]]))  # noqa: B023
                 except ExpressionError:
-                    continue
-                number = domain.find(value)
-            if number is None:
-                yield from ((guard, each) for each in anything)
-            else:
-                yield guard, number
+                    # Where values are supposed that may never be written, so is this one.
+                    values = (None,) if all(of[name].closed for name in names) else anything
+            yield from ((guard, each) for each in values)
 
     def write_out(
         self,
@@ -243,6 +250,8 @@ class Data:
         found: list[Effect] = []
         for effect in effects:
             for guard, value in self._values(effect, key, source, inside, None):
+                if value is None:
+                    continue
                 both = effect.then(Effect(guard=guard, assign={target: value}))
                 if both is not None:
                     found.append(both)

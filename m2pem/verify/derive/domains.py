@@ -51,6 +51,22 @@ class Domain:
         """The number of a value, if it has one."""
         return self._index.get((type(value).__name__, repr(value), exact))
 
+    def like(self, value: Value) -> list[int]:
+        """Numbers of all that may stand for a value, of which it may be that none is its own."""
+        known = self.find(value)
+        if known is not None:
+            return [known]
+        return [
+            number
+            for number, (each, exact) in enumerate(zip(self.values, self.exact, strict=True))
+            if not exact or (each == value and isinstance(each, bool) == isinstance(value, bool))
+        ]
+
+    @property
+    def closed(self) -> bool:
+        """Whether its values are all that are ever written."""
+        return all(self.exact)
+
 
 @dataclass(frozen=True, slots=True)
 class Write:
