@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from m2pem.verify.explore import Limits, Progress
     from m2pem.verify.report.findings import Findings
     from m2pem.verify.requirements import Requirement
+
+IN_ORDER = "timers that begin to run together come in the order of their times (--timers in-order)"
+"""What is told of answers to which that was assumed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +76,11 @@ def asked_of(
     return Asked(mission, fleet, process, data, options, requirements)
 
 
+def with_timers(asked: Asked, *, in_order: bool) -> Asked:
+    """The same, with timers that begin together `in_order` of their times, or in any order."""
+    return replace(asked, options=replace(asked.options, timers_in_order=in_order))
+
+
 def findings(asked: Asked, engine: Engine, *, strict: bool) -> "Findings":
     """Search, and tell what was found."""
     from m2pem.verify.report.findings import findings_of
@@ -91,6 +99,8 @@ def findings(asked: Asked, engine: Engine, *, strict: bool) -> "Findings":
             storage=Storage(engine.storage),
             progress=show,
         )
+    if asked.options.timers_in_order:
+        report = replace(report, notes=(*report.notes, IN_ORDER))
     return findings_of(asked.mission, report, strict=strict, given=asked.data)
 
 

@@ -8,6 +8,8 @@ import pytest
 from m2pem.verify.explore import Progress
 from tests.cli.conftest import Invoke
 from tests.command_line import FLEET, MISSION, REPOSITORY, CommandLine
+from tests.engine.notation import xml
+from tests.verify.test_timers import WARNED_FIRST
 
 BROKEN = REPOSITORY / "docs" / "broken"
 
@@ -177,3 +179,15 @@ def test_starting_it_loads_no_more_than_it_needs(m2pem: CommandLine) -> None:
     status, out, _ = m2pem.run("verify", "--help")
     assert status == 0
     assert "Ctrl-C" in out
+
+
+def test_timers_may_be_taken_to_come_in_the_order_of_their_times(
+    invoke: Invoke, tmp_path: Path
+) -> None:
+    mission = tmp_path / "late.bpmn"
+    mission.write_text(xml(WARNED_FIRST), encoding="utf-8")
+    assert invoke("verify", mission)[0] == 1
+    status, out, _ = invoke("verify", mission, "--timers", "in-order")
+    assert status == 0
+    assert "note: timers that begin to run together come in the order of their times" in out
+    assert invoke("verify", mission, "--timers", "in-order", "--engine", "spin")[0] == 0

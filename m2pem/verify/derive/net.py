@@ -60,6 +60,15 @@ class Draft:
     due_us: int | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """A timer whose duration is known: it runs while all of `running` have a token."""
+
+    after_us: int
+    running: tuple[int, ...]
+    rules: list[Draft]
+
+
 class Net:
     """Collects places, areas and rules; `finish` makes them a system."""
 
@@ -70,6 +79,7 @@ class Net:
         self.approximations: dict[Approximation, None] = {}
         self.elements: dict[str, str] = {}
         self.holders: dict[str, list[int]] = {}
+        self.timed: dict[int, list[Timed]] = {}
         self._at: dict[tuple[object, int, str], int] = {}
 
     # --- parts ----------------------------------------------------------------------------------
