@@ -13,6 +13,7 @@ from m2pem.model.elements import (
     SequenceFlow,
 )
 from m2pem.verify.derive.effect import Effect
+from m2pem.verify.outcomes import with_outcomes
 from m2pem.verify.system import (
     Approximation,
     Exactness,
@@ -191,7 +192,7 @@ class Net:
             ),
             tuple(self.places),
             variables,
-            tuple(rules),
+            tuple(with_outcomes(rules)),
             tuple(Counter(initial).items()),
             *ends,
             tuple(self.approximations),
