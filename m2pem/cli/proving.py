@@ -5,7 +5,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _QUIET_S = 1.0
 """A search that takes less is over before anybody has read how far it is."""
 _BETWEEN_LINES_S = 0.2
+IN_ORDER = "timers that begin to run together come in the order of their times (--timers in-order)"
+"""What is told of answers to which that was assumed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +81,11 @@ def asked_of(
     return Asked(mission, fleet, process, data, options, requirements)
 
 
+def with_timers(asked: Asked, *, in_order: bool) -> Asked:
+    """The same, with timers that begin together `in_order` of their times, or in any order."""
+    return replace(asked, options=replace(asked.options, timers_in_order=in_order))
+
+
 def findings(asked: Asked, engine: Engine, *, strict: bool) -> "Findings":
     """Search, and tell what was found."""
     from m2pem.verify.report.findings import findings_of
@@ -97,6 +104,8 @@ def findings(asked: Asked, engine: Engine, *, strict: bool) -> "Findings":
             storage=Storage(engine.storage),
             progress=show,
         )
+    if asked.options.timers_in_order:
+        report = replace(report, notes=(*report.notes, IN_ORDER))
     return findings_of(asked.mission, report, strict=strict, given=asked.data)
 
 

@@ -63,6 +63,14 @@ if TYPE_CHECKING:
     help="Check nothing: print what Spin would be given, or write it to FILE.",
 )
 @click.option(
+    "--timers",
+    type=click.Choice(["any", "in-order"]),
+    default="any",
+    show_default=True,
+    help="Whether timers that begin to run together may come in any order, or only in that of "
+    "their times.",
+)
+@click.option(
     "--report",
     "reports",
     type=click.Path(dir_okay=False, path_type=Path),
@@ -97,6 +105,7 @@ def verify(
     engine: str,
     storage: str,
     emit: str | None,
+    timers: str,
     reports: tuple[Path, ...],
     max_states: int,
     max_seconds: float,
@@ -109,12 +118,13 @@ def verify(
     what was seen until then is told.
     """
     _refuse_what_does_not_go_together(engine, storage, emit, reports)
-    from m2pem.cli.proving import Engine, asked_of, findings, promela
+    from m2pem.cli.proving import Engine, asked_of, findings, promela, with_timers
     from m2pem.executive.loading import load_source
     from m2pem.verify.explore import Limits
     from m2pem.verify.report.data import as_data
 
     asked = asked_of(load_source(mission, search_path), fleet_file, process, data, spec)
+    asked = with_timers(asked, in_order=timers == "in-order")
     if emit is not None:
         _emit(promela(asked), emit.partition("=")[2])
         return 0

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from m2pem.verify.explore import Exploration
 from m2pem.verify.labels import Labels
 from m2pem.verify.ltl.formula import Proposition
-from m2pem.verify.system import Kind
+from m2pem.verify.outcomes import outcomes_of
 
 
 class MissionRuns:
@@ -50,6 +50,6 @@ class MissionRuns:
         return self._labels.of_rules[rule]
 
     def outcomes(self) -> Mapping[int, int]:
-        """For fairness: each rule is an outcome of its own, but joins, which only wait."""
-        rules = self._exploration.system.rules
-        return {rule.index: rule.index for rule in rules if rule.kind is not Kind.JOIN}
+        """For fairness: the outcome that each rule stands for; joins, which only wait, for none."""
+        found = outcomes_of(self._exploration.system)
+        return {rule: outcomes[0] for rule, outcomes in found.items() if outcomes}

@@ -40,6 +40,7 @@ class Result:
     violations: tuple[Violation, ...] = ()
     warning: bool = False
     covered: str = ""
-    """Of an undecided one: what was looked at, or what stands in the way."""
+    """Of an undecided one: what was looked at, or what stands in the way. Of one that holds: in
+    what sense, if there is more to say."""
     required: bool = False
     author: str = ""

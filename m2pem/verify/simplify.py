@@ -162,4 +162,9 @@ def _joined(maker: Rule, eater: Rule, place: int) -> Rule:
     produce = Counter(dict(maker.produce))
     del produce[place]
     produce.update(dict(eater.produce))
-    return replace(maker, steps=maker.steps + eater.steps, produce=tuple(sorted(produce.items())))
+    return replace(
+        maker,
+        steps=maker.steps + eater.steps,
+        produce=tuple(sorted(produce.items())),
+        outcomes=tuple(dict.fromkeys(maker.outcomes + eater.outcomes)),
+    )

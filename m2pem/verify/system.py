@@ -193,6 +193,9 @@ class Rule:
     due_us: int | None = None
     """Of a timer whose duration is written in the mission: microseconds after it is armed."""
 
+    outcomes: tuple[int, ...] = ()
+    """What is decided when it fires (`m2pem.verify.outcomes`)."""
+
     @property
     def element(self) -> str:
         """The element that it belongs to."""

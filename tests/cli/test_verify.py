@@ -8,6 +8,9 @@ import pytest
 from m2pem.verify.explore import Progress
 from tests.cli.conftest import Invoke
 from tests.command_line import FLEET, MISSION, REPOSITORY, CommandLine
+from tests.engine.notation import xml
+from tests.verify.test_fair_completion import AGREE
+from tests.verify.test_timers import WARNED_FIRST
 
 BROKEN = REPOSITORY / "docs" / "broken"
 
@@ -177,3 +180,36 @@ def test_starting_it_loads_no_more_than_it_needs(m2pem: CommandLine) -> None:
     status, out, _ = m2pem.run("verify", "--help")
     assert status == 0
     assert "Ctrl-C" in out
+
+
+def test_timers_may_be_taken_to_come_in_the_order_of_their_times(
+    invoke: Invoke, tmp_path: Path
+) -> None:
+    mission = tmp_path / "late.bpmn"
+    mission.write_text(xml(WARNED_FIRST), encoding="utf-8")
+    assert invoke("verify", mission)[0] == 1
+    status, out, _ = invoke("verify", mission, "--timers", "in-order")
+    assert status == 0
+    assert "note: timers that begin to run together come in the order of their times" in out
+    assert invoke("verify", mission, "--timers", "in-order", "--engine", "spin")[0] == 0
+
+
+def test_a_round_that_is_fair_is_told_in_every_kind_of_report(
+    invoke: Invoke, tmp_path: Path
+) -> None:
+    mission = tmp_path / "agree.bpmn"
+    mission.write_text(xml(AGREE), encoding="utf-8")
+    files = [tmp_path / f"agree.{kind}" for kind in ("md", "json", "svg")]
+    status, out, _ = invoke("verify", mission, *(f"--report={file}" for file in files))
+    assert status == 1
+    assert "holds      can-complete" in out
+    assert "violated   completes-if-fair" in out
+    assert "and then, again and again:" in out
+    markdown, data, picture = (file.read_text(encoding="utf-8") for file in files)
+    assert "And then, again and again:" in markdown
+    (violation,) = json.loads(data)["violations"]
+    assert violation["property"] == "completes-if-fair"
+    last = violation["loop"][-1]["step"]
+    assert {step["element"] for step in violation["loop"]} >= {"first", "second", "x"}
+    assert f">{last}<" in picture or f"{last}</text>" in picture
+    assert invoke("replay", "--counterexample", files[1])[0] == 0

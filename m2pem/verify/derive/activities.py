@@ -13,6 +13,7 @@ from m2pem.verify.derive.loops import looped
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
 from m2pem.verify.derive.throwing import catchable, message_effects, throw_error
+from m2pem.verify.derive.timers import runs, written
 from m2pem.verify.derive.waiting import boundaries, catching, due_us
 from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step, Trigger
 
@@ -110,8 +111,12 @@ def _behavior(making: Making, host: Host, behavior: Behavior) -> list[Effect]:
     net = making.net
     if not behavior.roles and behavior.name == "hold":
         done = _ended(host, host.leave())
-        for effect in product([done], host.done()):
-            net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=_hold_us(behavior))
+        after_us = _hold_us(behavior)
+        made = [
+            net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=after_us)
+            for effect in product([done], host.done())
+        ]
+        runs(making, host.active, after_us, (host.active,), made)
         return [host.begin()]
     held = resources(making, behavior)
     if not held:
@@ -197,10 +202,13 @@ def _user_task(making: Making, host: Host, node: e.UserTask) -> list[Effect]:
             net.rule(effect, Kind.OUTSIDE, Trigger.ANSWER, decision.value)
     if prompt.timeout is not None:
         late = Effect(consume=(host.active,))
-        for effect in product(
-            [late], failing(making, host, "PROMPT_TIMEOUT", Flag.UNCAUGHT_FAILURE)
-        ):
+        made = [
             net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=due_us(prompt.timeout))
+            for effect in product(
+                [late], failing(making, host, "PROMPT_TIMEOUT", Flag.UNCAUGHT_FAILURE)
+            )
+        ]
+        runs(making, host.active, written(prompt.timeout), (host.active,), made)
     return [host.begin()]
 
 

@@ -26,6 +26,7 @@ from m2pem.verify.derive.throwing import (
     signal_effects,
     thrown_by,
 )
+from m2pem.verify.derive.timers import put_in_order
 from m2pem.verify.derive.waiting import timer_us, what_and_ref
 from m2pem.verify.system import Action, Exactness, Kind, Role, Step, System, Trigger
 
@@ -62,6 +63,8 @@ def derive(
     contend(making)
     choose(making)
     _outside(making)
+    if making.options.timers_in_order:
+        put_in_order(making)
     _completes(making)
     return making.net.finish(
         mission.file,

@@ -17,14 +17,15 @@ from m2pem.verify.derive.compensation import cancel, compensate
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.leaving import along, leave
 from m2pem.verify.derive.making import Host, Making
-from m2pem.verify.derive.net import Area, at
+from m2pem.verify.derive.net import Area, Draft, at
 from m2pem.verify.derive.throwing import (
     message_effects,
     signal_effects,
     throw_error,
     throw_escalation,
 )
-from m2pem.verify.derive.waiting import catching, timer_us, what_and_ref
+from m2pem.verify.derive.timers import fixed, runs
+from m2pem.verify.derive.waiting import all_must_come, catching, timer_us, what_and_ref
 from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step, Trigger
 
 
@@ -68,7 +69,7 @@ def _wait(making: Making, node: e.Event, area: Area) -> None:
     come = _come(making, node, area, Action.ENTERED).then(Effect(produce=(waiting,)))
     assert come is not None
     net.rule(come)
-    if node.parallel_multiple and len(node.definitions) > 1:
+    if all_must_come(node):
         _wait_for_all(making, node, area, waiting)
         return
     for number, definition in enumerate(node.definitions):
@@ -123,14 +124,16 @@ def _trigger(
     waiting: int,
     ways: list[Effect],
     number: int,
-) -> None:
-    """The token of `waiting` goes on when the trigger comes."""
+) -> list[Draft]:
+    """The token of `waiting` goes on when the trigger comes. Answers with a timer's rules."""
     net = making.net
     came = Effect(steps=(Step(node.id, Action.TRIGGERED),), consume=(waiting,))
     match definition:
         case TimerEventDefinition():
-            for effect in product([came], ways):
+            return [
                 net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+                for effect in product([came], ways)
+            ]
         case SignalEventDefinition() | MessageEventDefinition():
             told = net.place(node, area, Role.TRIGGERED, f":{number}:{waiting}")
             what, ref = what_and_ref(definition)
@@ -142,12 +145,13 @@ def _trigger(
                 net.approximate(node, Exactness.MORE, "its condition may become true at any time")
                 for effect in product([came], ways):
                     net.rule(effect, Kind.OUTSIDE, Trigger.CONDITION)
-                return
+                return []
             for guard, truth in making.data.cases([condition], area, node, lambda t: t[0]):
                 if truth is True:
                     making.rules(product(product([came], [Effect(guard=guard)]), ways))
         case _:
             making.rules(product([came], ways))
+    return []
 
 
 def _true_or_never(making: Making, node: e.FlowNode, area: Area, ways: list[Effect]) -> None:
@@ -170,8 +174,11 @@ def event_based(making: Making, node: e.FlowNode, area: Area) -> None:
         taken = Effect(steps=(Step(flow.id, Action.TAKEN),))
         ways = product([taken], after(making, target, area))
         for definition in awaited(target):
-            _trigger(making, target, area, definition, waiting, ways, number)
+            made = _trigger(making, target, area, definition, waiting, ways, number)
             number += 1
+            together = isinstance(target, e.Event) and all_must_come(target)
+            if isinstance(definition, TimerEventDefinition) and not (node.parallel or together):
+                runs(making, waiting, fixed(definition), (waiting,), made)
 
 
 def awaited(node: e.FlowNode) -> tuple[EventDefinition, ...]:

@@ -13,6 +13,7 @@ from m2pem.model.elements import (
     SequenceFlow,
 )
 from m2pem.verify.derive.effect import Effect
+from m2pem.verify.outcomes import with_outcomes
 from m2pem.verify.system import (
     Approximation,
     Exactness,
@@ -60,6 +61,15 @@ class Draft:
     due_us: int | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """A timer whose duration is known: it runs while all of `running` have a token."""
+
+    after_us: int
+    running: tuple[int, ...]
+    rules: list[Draft]
+
+
 class Net:
     """Collects places, areas and rules; `finish` makes them a system."""
 
@@ -70,6 +80,7 @@ class Net:
         self.approximations: dict[Approximation, None] = {}
         self.elements: dict[str, str] = {}
         self.holders: dict[str, list[int]] = {}
+        self.timed: dict[int, list[Timed]] = {}
         self._at: dict[tuple[object, int, str], int] = {}
 
     # --- parts ----------------------------------------------------------------------------------
@@ -181,7 +192,7 @@ class Net:
             ),
             tuple(self.places),
             variables,
-            tuple(rules),
+            tuple(with_outcomes(rules)),
             tuple(Counter(initial).items()),
             *ends,
             tuple(self.approximations),

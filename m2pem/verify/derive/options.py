@@ -17,7 +17,7 @@ class Options:
     `instances`: how many parallel instances of an activity, and of a process that is begun again
     and again, are told apart when the mission does not say how many there are. `calls`: how often
     a process may be called within itself. `failures`: behaviors and services may fail.
-    `timers_in_order`: of timers armed together in one scope, the one that is due first comes first.
+    `timers_in_order`: of timers that begin to run together, the one that is due first comes first.
     """
 
     data: Mapping[str, Value] = field(default_factory=dict)

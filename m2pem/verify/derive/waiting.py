@@ -23,6 +23,7 @@ from m2pem.verify.derive.leaving import leave
 from m2pem.verify.derive.making import Catcher, Host, Making
 from m2pem.verify.derive.net import Area, at, is_join
 from m2pem.verify.derive.throwing import begin_handler, throw_error
+from m2pem.verify.derive.timers import fixed, holder_of, runs
 from m2pem.verify.system import Action, Exactness, Kind, Role, Step, Trigger
 
 _2026_US = 1_767_225_600_000_000
@@ -44,6 +45,11 @@ def timer_us(definition: TimerEventDefinition) -> int | None:
     if definition.kind is not TimerKind.DURATION:
         return None
     return due_us(definition.expression)
+
+
+def all_must_come(event: e.Event) -> bool:
+    """Whether an event waits for all of its triggers."""
+    return event.parallel_multiple and len(event.definitions) > 1
 
 
 def catching(
@@ -69,7 +75,7 @@ def boundaries(making: Making, host: Host) -> None:
         making.net.knows(event)
         out = at(making.net, event, host.outer)
         _leave_boundary(making, host, event, out)
-        if event.parallel_multiple and len(event.definitions) > 1:
+        if all_must_come(event):
             making.net.approximate(
                 event, Exactness.MORE, "one of its triggers is enough, not all of them"
             )
@@ -115,9 +121,15 @@ def _boundary(
     assert comes is not None
     match definition:
         case TimerEventDefinition():
-            if not event.interrupting:
-                comes = _again(making, host, event, comes, definition.kind is TimerKind.CYCLE)
-            net.rule(comes, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+            running = host.active
+            if not event.interrupting and definition.kind is TimerKind.CYCLE:
+                comes = _again(making, host, event, comes)
+            elif not event.interrupting:
+                running = net.place(event, host.inside, Role.CONTROL, f":armed{number}")
+                comes = _once(host, comes, running)
+            made = net.rule(comes, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+            if not all_must_come(event):
+                runs(making, host.active, fixed(definition), (running,), [made])
         case SignalEventDefinition() | MessageEventDefinition():
             told = net.place(event, host.outer, Role.TRIGGERED, f":{number}")
             what, ref = what_and_ref(definition)
@@ -133,16 +145,16 @@ def _boundary(
             pass  # errors and escalations look for their catcher
 
 
-def _again(
-    making: Making, host: Host, event: e.BoundaryEvent, comes: Effect, repeats: bool
-) -> Effect:
-    """What does not interrupt comes once; or again and again, one handling at a time."""
-    if not repeats:
-        armed = making.net.place(event, host.inside, Role.CONTROL, ":armed")
-        host.armed.append(armed)
-        both = comes.then(Effect(consume=(armed,)))
-        assert both is not None
-        return both
+def _once(host: Host, comes: Effect, armed: int) -> Effect:
+    """What does not interrupt comes once for each token on the activity."""
+    host.armed.append(armed)
+    both = comes.then(Effect(consume=(armed,)))
+    assert both is not None
+    return both
+
+
+def _again(making: Making, host: Host, event: e.BoundaryEvent, comes: Effect) -> Effect:
+    """What does not interrupt, and comes again and again: one handling at a time."""
     making.net.approximate(
         event, Exactness.BOUNDED, "it comes again only when what it began has ended"
     )
@@ -190,7 +202,7 @@ def _boundary_condition(
     if not making.data.is_followed([condition], event):
         net.approximate(event, Exactness.MORE, "its condition may become true at any time")
         if not event.interrupting:
-            comes = _again(making, host, event, comes, repeats=True)
+            comes = _again(making, host, event, comes)
         net.rule(comes, Kind.OUTSIDE, Trigger.CONDITION)
         return
     for guard, truth in making.data.cases([condition], host.outer, event, _first):
@@ -233,21 +245,28 @@ def arm_handler(making: Making, area: Area, start: e.StartEvent) -> None:
     """What begins an event subprocess from outside of its area."""
     net = making.net
     assert area.open is not None
-    if start.parallel_multiple and len(start.definitions) > 1:
+    if all_must_come(start):
         net.approximate(start, Exactness.MORE, "one of its triggers is enough, not all of them")
     for number, definition in enumerate(start.definitions):
         begun = begin_handler(making, area, start)
         when = Effect(read=frozenset({area.open}))
         match definition:
             case TimerEventDefinition():
+                running: tuple[int, ...] = ()
                 if not start.interrupting:
                     if definition.kind is TimerKind.CYCLE:
                         when = when.then(_once_at_a_time(making, area, start)) or when
                     else:
                         armed = net.place(start, area, Role.CONTROL, f":armed{number}")
                         when = when.then(Effect(consume=(armed,))) or when
-                for effect in product([when], begun):
+                        running = (armed,)
+                made = [
                     net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+                    for effect in product([when], begun)
+                ]
+                if not all_must_come(start):
+                    holder = holder_of(making, area)
+                    runs(making, holder, fixed(definition), (area.open, *running), made)
             case SignalEventDefinition() | MessageEventDefinition():
                 told = net.place(start, area, Role.TRIGGERED, f":told{number}")
                 what, ref = what_and_ref(definition)

@@ -1,20 +1,35 @@
 """Does the mission come to its end, whatever happens?"""
 
+from collections.abc import Sequence
+
 from m2pem.model import elements as e
 from m2pem.model.events import CompensateEventDefinition
+from m2pem.verify.fair_rounds import FairRounds
 from m2pem.verify.properties.searched import Searched
 from m2pem.verify.results import Result, Violation
 from m2pem.verify.system import Exactness, Flag
 
+FAIR = "It ends, if nothing that can happen again and again is put off for ever."
+IN_EACH_STATE = (
+    "for runs in which that is so of each state that comes again and again: orders that lead to"
+    " the same were left out of the search"
+)
+"""In what sense it is proved to end, where not every order was searched."""
+
 
 def no_deadlock(searched: Searched) -> Result:
     """There is always something that can happen, until the run is over."""
+    return searched.result("no-deadlock", "No token is stuck for ever.", _stuck(searched))
+
+
+def _stuck(searched: Searched) -> list[Violation]:
+    """The nearest state of each set of elements at which a run can be stuck."""
     found = searched.found
     first: dict[tuple[str, ...], int] = {}
     for state in found.terminals:
         if not searched.ended(state):
             first.setdefault(searched.where(state), state)
-    violations = [
+    return [
         Violation(
             f"stuck at {searched.labels(stuck) or 'the process'}: nothing can happen any more",
             stuck,
@@ -22,7 +37,6 @@ def no_deadlock(searched: Searched) -> Result:
         )
         for stuck, state in first.items()
     ]
-    return searched.result("no-deadlock", "No token is stuck for ever.", violations)
 
 
 def _reaching(searched: Searched, goals: list[int]) -> bytearray:
@@ -91,13 +105,60 @@ def can_complete(searched: Searched) -> Result:
 
 
 def completes_if_fair(searched: Searched) -> Result:
-    """It comes to its end when all that can happen again and again happens at last."""
-    result = can_complete(searched)
-    return searched.result(
-        "completes-if-fair",
-        "It ends, if nothing that can happen again and again is put off for ever.",
-        list(result.violations),
+    """It comes to its end when all that can happen again and again happens again and again.
+
+    Of a search that left orders out it is known only whether the end can be reached from
+    everywhere, and whether anything goes round at all. If so, it ends in a stronger sense of
+    fairness, and the result says so.
+    """
+    found = searched.found
+    rounds = FairRounds(found, lambda rule: _fails(searched, rule))
+    violations: list[Violation] = []
+    note = ""
+    if not found.reduced:
+        violations = _stuck(searched)[:1] or _fair_round(searched, rounds)
+    if not violations and (lost := _lost(searched, ends_only=True)):
+        violations = [_never_ends(searched, lost[0])]
+    elif not violations and found.reduced and found.complete and rounds.any:
+        note = IN_EACH_STATE
+    return searched.result("completes-if-fair", FAIR, violations, note=note)
+
+
+def _fair_round(searched: Searched, rounds: FairRounds) -> list[Violation]:
+    lasso = rounds.nearest()
+    if lasso is None:
+        return []
+    elements = _elements(searched, lasso.cycle)
+    return [
+        Violation(
+            f"goes round {searched.labels(elements)} for ever, though nothing that can happen again"
+            " and again is put off",
+            elements,
+            lasso.prefix,
+            lasso.cycle,
+        )
+    ]
+
+
+def _never_ends(searched: Searched, lost: int) -> Violation:
+    """From a state on, no end can be reached."""
+    found = searched.found
+    stuck = next((s for s in found.terminals if not searched.ended(s)), None)
+    if stuck is not None:
+        return _stuck(searched)[0]
+    into, cycle = _into_cycle(searched, lost)
+    where = _elements(searched, cycle) or searched.where(lost)
+    how = "and can reach no end any more" if cycle else "or fails"
+    return Violation(
+        f"goes round {searched.labels(where)} for ever, {how}",
+        where,
+        (*found.run_to(lost), *into),
+        cycle,
     )
+
+
+def _elements(searched: Searched, rules: Sequence[int]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(searched.system.rules[rule].element for rule in rules))
 
 
 def no_livelock(searched: Searched) -> Result:
@@ -106,33 +167,32 @@ def no_livelock(searched: Searched) -> Result:
     lost = _lost(searched, ends_only=False)
     violations: list[Violation] = []
     if lost:
-        first = lost[0]
-        run = tuple(found.run_to(first))
-        cycle = _cycle(searched, first)
-        elements = tuple(dict.fromkeys(searched.system.rules[rule].element for rule in cycle))
+        into, cycle = _into_cycle(searched, lost[0])
+        elements = _elements(searched, cycle)
         violations.append(
             Violation(
                 f"goes round {searched.labels(elements)} for ever, with no way out",
                 elements,
-                run,
-                tuple(cycle),
+                (*found.run_to(lost[0]), *into),
+                cycle,
             )
         )
     return searched.result("no-livelock", "Nothing goes on for ever without a way out.", violations)
 
 
-def _cycle(searched: Searched, start: int) -> list[int]:
-    """Rules that lead round, from somewhere that can be reached from a state."""
+def _into_cycle(searched: Searched, start: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Rules that lead from a state to where it goes round, and those that lead round."""
     seen: dict[int, int] = {}
     rules: list[int] = []
     state = start
     while state not in seen:
         seen[state] = len(rules)
-        rule, state = next(
-            each for each in searched.found.successors(state) if not _fails(searched, each[0])
-        )
+        steps = (each for each in searched.found.successors(state) if not _fails(searched, each[0]))
+        rule, state = next(steps, (-1, -1))
+        if rule < 0:
+            return tuple(rules), ()
         rules.append(rule)
-    return rules[seen[state] :]
+    return tuple(rules[: seen[state]]), tuple(rules[seen[state] :])
 
 
 def no_dead_element(searched: Searched) -> Result:

@@ -71,15 +71,16 @@ class Searched:
         warning: bool = False,
         static: bool = False,
         found: Exploration | None = None,
+        note: str = "",
     ) -> Result:
         """Violated if there are violations; else it holds, if all was seen. `static`: no search
-        was needed."""
+        was needed. `note`: in what sense it holds."""
         if violations:
             return Result(
                 name, text, Verdict.VIOLATED, tuple(violations[:MOST_VIOLATIONS]), warning
             )
         found = found or self.found
         if static or found.complete:
-            return Result(name, text, Verdict.HOLDS, (), warning)
+            return Result(name, text, Verdict.HOLDS, (), warning, note)
         covered = f"{len(found.states):,} states, stopped by {found.stopped}"
         return Result(name, text, Verdict.UNDECIDED, (), warning, covered)

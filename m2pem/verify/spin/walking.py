@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.labels import Labels
 from m2pem.verify.ltl.formula import Proposition
+from m2pem.verify.outcomes import outcomes_of
 from m2pem.verify.product import Run
 from m2pem.verify.spin.trail import may_fire
-from m2pem.verify.system import Kind
 
 
 class Walking:
@@ -48,12 +48,12 @@ class Walking:
         return self._labels.of_rules[rule]
 
     def fair(self, run: Run) -> bool:
-        """Whether all that can fire in the cycle of a run fires in it; joins only wait."""
-        rules = self._encoding.system.rules
+        """Whether all that can come in the cycle of a run comes in it; joins only wait."""
+        outcomes = outcomes_of(self._encoding.system)
         possible = {
-            rule
+            outcome
             for move in run.cycle
             for rule, _ in self.successors(move.state)
-            if rules[rule].kind is not Kind.JOIN
+            for outcome in outcomes[rule]
         }
-        return possible <= {move.rule for move in run.cycle}
+        return possible <= {outcome for move in run.cycle for outcome in outcomes[move.rule]}
