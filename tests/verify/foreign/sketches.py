@@ -2,16 +2,20 @@
 
 Most models that people draw say nothing of when a timer comes or what a condition is: the reader
 refuses them, since they cannot be executed. What is missing is filled in here with something that
-the check takes for unknown. A flow that is drawn from or to nothing joins nothing, and goes.
+the check takes for unknown. A flow that is drawn from or to nothing joins nothing, and goes. A task
+of which nothing is said but its name does nothing in a mission; in a sketch it is work that takes
+time.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 from lxml import etree
 
 from m2pem.errors import MissionError
 from m2pem.findings import Finding, Severity
 from m2pem.model.bpmn import parse_mission
+from m2pem.model.bpmn.names import BPMN, M2PEM
 from m2pem.model.mission import Mission
 
 _MOST_ROUNDS = 4
@@ -19,6 +23,10 @@ _MOST_ROUNDS = 4
 UNREACHABLE = "unreachable"
 """The rule of what no start event reaches: it says itself that it is dead."""
 _UNKNOWN = "unsaid.condition_{}"
+WORK = "work"
+"""The service that tasks are taken for."""
+_PLAIN = ("task", "manualTask", "businessRuleTask", "serviceTask")
+_PARSER = etree.XMLParser(resolve_entities=False, no_network=True)
 _TIMES = ("timeDate", "timeDuration", "timeCycle")
 
 Fill = Callable[[etree._Element, str], bool]
@@ -31,6 +39,8 @@ def read_sketch(data: bytes, file: str) -> tuple[Mission, tuple[str, ...]]:
         MissionError: there is more wrong than that something is left unsaid.
     """
     filled: dict[str, None] = {}
+    with suppress(etree.XMLSyntaxError):  # which the reader says
+        data = _at_work(data)
     for _ in range(_MOST_ROUNDS):
         try:
             return parse_mission(data, file), tuple(filled)
@@ -49,7 +59,7 @@ def _filled_in(data: bytes, findings: Sequence[Finding]) -> tuple[bytes, list[st
     wanted = [each for each in wrong if each.rule != UNREACHABLE]
     if any(each.rule not in _FILLS for each in wanted):
         return None
-    root = etree.fromstring(data)
+    root = etree.fromstring(data, _PARSER)
     by_id = {name: each for each in root.iter(etree.Element) if (name := each.get("id"))}
     once = dict.fromkeys((each.rule, each.element) for each in wanted)
     for rule, identifier in once:
@@ -57,6 +67,16 @@ def _filled_in(data: bytes, findings: Sequence[Finding]) -> tuple[bytes, list[st
         if element is None or not _FILLS[rule](element, identifier):
             return None
     return etree.tostring(root), [rule for rule, _ in once]
+
+
+def _at_work(data: bytes) -> bytes:
+    """Plain tasks as services, which take time."""
+    root = etree.fromstring(data, _PARSER)
+    for element in root.iter(*(f"{BPMN}{name}" for name in _PLAIN)):
+        if not element.get("implementation"):
+            element.tag = f"{BPMN}serviceTask"
+            element.set(f"{M2PEM}class", WORK)
+    return etree.tostring(root)
 
 
 def _children(element: etree._Element, *names: str) -> list[etree._Element]:
