@@ -4,6 +4,8 @@ A superset of what can happen, found without a search: when it says no, it is no
 to have one token at most, and rules never to fire.
 """
 
+from collections.abc import Iterable
+
 from m2pem.verify.system import Rule, System
 
 MOST_PLACES = 1_500
@@ -19,14 +21,40 @@ def is_small(system: System) -> bool:
     return len(system.places) <= MOST_PLACES and len(system.rules) <= MOST_RULES
 
 
+class _Wants:
+    """What a rule asks for and does, as bits; `before`: what it needs before each of `needed`."""
+
+    __slots__ = ("absent", "before", "killed", "made", "needed", "needed_bits", "twice")
+
+    def __init__(self, rule: Rule) -> None:
+        self.needed = [place for place, _ in rule.consume] + list(rule.read)
+        self.needed_bits = 0
+        self.before: list[int] = []
+        for place in self.needed:
+            self.before.append(self.needed_bits & ~(1 << place))
+            self.needed_bits |= 1 << place
+        self.absent = bits_of(rule.inhibit)
+        self.killed = bits_of(rule.kill)
+        self.made = bits_of(place for place, _ in rule.produce)
+        self.twice = bits_of(place for place, count in rule.produce if count > 1)
+
+
+def bits_of(places: Iterable[int]) -> int:
+    """A bit for each place."""
+    bits = 0
+    for place in places:
+        bits |= 1 << place
+    return bits
+
+
 class Concurrency:
     """`rows[p]`: a bit for each place that may have a token when p has one; p's own bit: two."""
 
     def __init__(self, system: System) -> None:
         self.rows = [0] * len(system.places)
         self.live: set[int] = set()
-        self._system = system
         self._marked = 0
+        self._wants = [_Wants(rule) for rule in system.rules]
         by_place: dict[int, list[Rule]] = {}
         for rule in system.rules:
             for place in self._looks_at(rule):
@@ -54,38 +82,28 @@ class Concurrency:
 
     def _fire(self, rule: Rule) -> set[int]:
         """Add what firing a rule leads to; the places that it is news for."""
-        needed = [place for place, _ in rule.consume] + list(rule.read)
+        wants = self._wants[rule.index]
+        if wants.needed_bits & ~self._marked:
+            return set()
         beside = self._marked
-        for number, place in enumerate(needed):
-            if not self._marked >> place & 1:
+        for number, place in enumerate(wants.needed):
+            row = self.rows[place]
+            if wants.before[number] & ~row:
                 return set()
-            for other in needed[:number]:
-                if other != place and not self.rows[place] >> other & 1:
-                    return set()
-            beside &= self.rows[place] | 1 << place
+            beside &= row | 1 << place
         for place, count in rule.consume:
             if count > 1 and not self.rows[place] >> place & 1:
                 return set()
-        for place in rule.inhibit:
-            beside &= ~(1 << place)
+        beside &= ~wants.absent
         for place, _ in rule.consume:
             if not self.rows[place] >> place & 1:
                 beside &= ~(1 << place)
         self.live.add(rule.index)
-        made = 0
-        twice = 0
-        for place, count in rule.produce:
-            made |= 1 << place
-            if count > 1:
-                twice |= 1 << place
-        sources = 0
+        made = wants.made
         for source, target in (*rule.moves, *rule.copies):
             if beside >> source & 1:
                 made |= 1 << target
-                sources |= 1 << source
-        for place in rule.kill:
-            beside &= ~(1 << place)
-        return self._add(made, beside, twice)
+        return self._add(made, beside & ~wants.killed, wants.twice)
 
     def _add(self, made: int, beside: int, twice: int) -> set[int]:
         news: set[int] = set()

@@ -21,7 +21,10 @@ from m2pem.verify.reduction import Reduction
 from m2pem.verify.system import Flag, Kind, System
 
 _LOOK_EVERY = 128
-"""States between two looks at the clock."""
+"""States between two looks at the clock; of those that take longer, fewer."""
+_LOOK_EVERY_STEPS = 10_000
+_LOOK_EVERY_CHOICE = 4
+"""The same, where what is tried in a state has to be chosen first."""
 _BYTES_A_STATE = 250
 """About what a state costs in memory, beside its own bits."""
 _BYTES_AN_EDGE = 8
@@ -268,14 +271,15 @@ class _Search:
         add_state, add_parent, add_via = states.append, parents.append, via.append
         wait, setdefault = waiting.append, index.setdefault
         outside = [each == 2 for each in rank]
-        transitions = 0
+        transitions = looked = 0
+        look_every = _LOOK_EVERY if choose is None else _LOOK_EVERY_CHOICE
         partly: set[int] = set()
         self.closed_circle = False
         at = 0
         count = len(states)
         while at < count:
-            if at % _LOOK_EVERY == 0:
-                found.transitions = transitions
+            if at % look_every == 0 or transitions - looked > _LOOK_EVERY_STEPS:
+                found.transitions = looked = transitions
                 if self._stop(found, count, at, progress):
                     return
             state = states[at]

@@ -29,16 +29,13 @@ def _trim(rule: Rule, concurrency: Concurrency) -> Rule:
     if not needed or not (rule.inhibit or rule.kill):
         return rule
 
-    def possible(place: int) -> bool:
-        return all(concurrency.together(each, place) or each == place for each in needed)
-
-    inhibit = tuple(p for p in rule.inhibit if possible(p))
-    absent = set(rule.inhibit) - {t for _, t in (*rule.moves, *rule.copies)}
-    kill = tuple(
-        p
-        for p in rule.kill
-        if p not in absent and (possible(p) or any(p == t for _, t in (*rule.moves, *rule.copies)))
-    )
+    possible = -1
+    for place in needed:
+        possible &= concurrency.rows[place] | 1 << place
+    told = {t for _, t in (*rule.moves, *rule.copies)}
+    inhibit = tuple(p for p in rule.inhibit if possible >> p & 1)
+    absent = set(rule.inhibit) - told
+    kill = tuple(p for p in rule.kill if p not in absent and (possible >> p & 1 or p in told))
     return replace(rule, inhibit=inhibit, kill=kill)
 
 

@@ -117,7 +117,7 @@ class Place:
     resources: tuple[str, ...] = ()
     behavior: str = ""
     once: bool = False
-    """A second token there is a finding, and changes nothing else."""
+    """A token that it has no room for is lost; that is a finding, unless `several` are meant."""
 
 
 @dataclass(frozen=True, slots=True)

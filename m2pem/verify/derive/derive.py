@@ -227,7 +227,8 @@ def _from_outside(making: Making, what: str, ref: str) -> None:
             for effect in message_effects(making, ref, kept=False)
             if effect.consume or effect.produce
         ]
-        for effect in effects:
+        on = Effect(read=frozenset({making.running}))  # what it begins, it begins in the run
+        for effect in product([on], effects):
             named = effect.saying(_receiver(making, catchers, effect), Action.TRIGGERED, ref)
             making.net.rule(named, Kind.OUTSIDE, trigger, ref)
         return

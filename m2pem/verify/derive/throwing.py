@@ -1,6 +1,7 @@
 """Errors, escalations, signals and messages: who catches them, and what follows."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 from m2pem.model import elements as e
@@ -15,7 +16,7 @@ from m2pem.verify.derive.areas import begin, handler_host
 from m2pem.verify.derive.effect import Effect
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
-from m2pem.verify.system import Action, Flag, Kind, Role, Step
+from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step
 
 Catching = TypeVar("Catching", bound=e.Event)
 
@@ -257,18 +258,25 @@ def message_effects(making: Making, message: str, *, kept: bool = True) -> list[
     if not catchers:
         return [Effect()]
     if kept:
-        letter = making.net.place(
-            making.process, making.everything, Role.CONTROL, f":{message}", several=True
-        )
-        nobody = nobody.then(Effect(produce=(letter,))) or nobody
+        nobody = nobody.then(Effect(produce=(_letters(making, message),))) or nobody
     return [*found, nobody]
+
+
+def _letters(making: Making, message: str) -> int:
+    """Where copies of a message are kept until somebody waits: nothing limits how many come."""
+    making.net.approximate(
+        making.process, Exactness.BOUNDED, f"up to three copies of message {message} are kept"
+    )
+    place = making.net.place(
+        making.process, making.everything, Role.CONTROL, f":{message}", several=True
+    )
+    making.net.places[place] = replace(making.net.places[place], once=True)
+    return place
 
 
 def deliver_kept(making: Making, message: str) -> None:
     """Who waits for a message gets one that was kept."""
-    letter = making.net.place(
-        making.process, making.everything, Role.CONTROL, f":{message}", several=True
-    )
+    letter = _letters(making, message)
     for catcher in making.messages.get(message, ()):
         taken = Effect(
             steps=(Step(catcher.element, Action.TRIGGERED, message),),

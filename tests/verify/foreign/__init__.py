@@ -1,0 +1,1 @@
+"""What `m2pem verify` says of models that others drew, file by file, within time and memory."""

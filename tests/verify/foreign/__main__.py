@@ -1,0 +1,51 @@
+"""`python -m tests.verify.foreign FOLDER...`: checks each model in the folders within limits.
+
+Prints how many were decided, left undecided, refused and crashed, and what they took; ends with 1
+if any crashed or took too much. `--jsonl FILE` writes a line for each file.
+"""
+
+import argparse
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+from tests.foreign.models import models
+from tests.verify.foreign.counting import Counts
+from tests.verify.foreign.judging import Terms
+from tests.verify.foreign.measuring import Measured, measure_all
+
+
+def main() -> int:
+    """Check folders; the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m tests.verify.foreign", description=__doc__)
+    parser.add_argument("folders", nargs="+", type=Path)
+    parser.add_argument("--seconds", type=float, default=2.0, help="for a file")
+    parser.add_argument("--memory", type=float, default=500.0, help="MB for a file")
+    parser.add_argument("--every", type=int, default=1, help="take every Nth file")
+    parser.add_argument("--as-drawn", action="store_true", help="exactly as m2pem verify")
+    parser.add_argument("--closed", action="store_true", help="messages come from within only")
+    parser.add_argument("--jsonl", type=Path, help="write a line for each file")
+    options = parser.parse_args()
+    terms = Terms(options.seconds, options.memory, options.as_drawn, not options.closed)
+    counts = Counts(terms)
+    lines: list[str] = []
+    for folder in options.folders:
+        paths = models(folder)[:: options.every]
+        for found in measure_all(paths, terms):
+            counts.add(found)
+            lines.append(_line(found, folder))
+    if options.jsonl:
+        options.jsonl.write_text("".join(lines), encoding="utf-8")
+    print("\n".join(counts.lines()))
+    return 1 if counts.wrong else 0
+
+
+def _line(found: Measured, folder: Path) -> str:
+    said = asdict(found)
+    said["path"] = str(found.path.relative_to(folder))
+    return json.dumps(said, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

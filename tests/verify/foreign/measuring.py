@@ -1,0 +1,82 @@
+"""Judges each file in a forked process, and measures what it took: a crash costs one file."""
+
+import os
+import pickle
+import resource
+import select
+import signal
+import traceback
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+from tests.verify.foreign.judging import Judgement, Terms, judge
+
+_GRACE = 15.0
+"""How many times its seconds a file may take before it counts as a hang."""
+_SPARE_MB = 1_000.0
+"""Address space beyond the memory asked for: it is reserved, not used."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """`judgement` None: `crash` says why. `peak_mb`: all of its memory."""
+
+    path: Path
+    judgement: Judgement | None
+    crash: str
+    peak_mb: float
+
+
+def measure_all(paths: Iterable[Path], terms: Terms) -> Iterator[Measured]:
+    """Each file, in order, one at a time."""
+    for path in paths:
+        yield _measure(path, terms)
+
+
+def _measure(path: Path, terms: Terms) -> Measured:
+    reading, writing = os.pipe()
+    child = os.fork()
+    if not child:
+        os.close(reading)
+        _serve(path, terms, writing)
+    os.close(writing)
+    said = _read(reading, child, terms.seconds * _GRACE)
+    os.close(reading)
+    _, status, used = os.wait4(child, 0)
+    peak_mb = used.ru_maxrss / 1024
+    if not said:
+        code = os.waitstatus_to_exitcode(status)
+        return Measured(path, None, f"the process ended with {code}", peak_mb)
+    found = pickle.loads(said)
+    if isinstance(found, str):
+        return Measured(path, None, found, peak_mb)
+    return Measured(path, found, "", peak_mb)
+
+
+def _serve(path: Path, terms: Terms, writing: int) -> NoReturn:
+    address_space = int((terms.memory_mb + _SPARE_MB) * 1e6)
+    resource.setrlimit(resource.RLIMIT_AS, (address_space, address_space))
+    found: Judgement | str
+    try:
+        found = judge(path, terms)
+    except Exception:
+        found = traceback.format_exc()
+    with os.fdopen(writing, "wb") as stream:
+        pickle.dump(found, stream)
+    os._exit(0)
+
+
+def _read(reading: int, child: int, hang_s: float) -> bytes:
+    """What the process says; nothing, if it had to be stopped."""
+    said = b""
+    while True:
+        ready, _, _ = select.select([reading], [], [], hang_s)
+        if not ready:
+            os.kill(child, signal.SIGKILL)
+            return b""
+        part = os.read(reading, 1 << 16)
+        if not part:
+            return said
+        said += part
