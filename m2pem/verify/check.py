@@ -125,7 +125,7 @@ def too_large(mission: Mission, error: TooLargeError, process: str | None = None
     found = explore(system)
     found.stopped = Stopped.TIME if error.late else Stopped.RULES
     found.terminals.clear()
-    results = (each(Searched(mission, system, found)) for each in ALL)
+    results = (each(Searched(mission, system, found, watched=found)) for each in ALL)
     told = tuple(
         replace(each, covered=f"too large to search: {error}")
         if each.verdict is Verdict.UNDECIDED
