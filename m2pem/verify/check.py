@@ -1,12 +1,14 @@
 """Checking a mission: rules, search, properties, verdicts."""
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from m2pem.model.mission import Mission
 from m2pem.resources.fleet import Fleet
 from m2pem.resources.madeup import fleet_for
-from m2pem.verify.derive import Options, derive
+from m2pem.verify.derive import Bound, Options, TooLargeError, derive
+from m2pem.verify.derive.bound import MOST_RULES
 from m2pem.verify.explore import Exploration, Limits, Progress, Stopped, explore
 from m2pem.verify.interruption import watch_interruptions
 from m2pem.verify.properties import ALL, Searched
@@ -14,10 +16,14 @@ from m2pem.verify.properties.commands import INTERRUPTED
 from m2pem.verify.reduction import StubbornSets
 from m2pem.verify.results import Result, Verdict
 from m2pem.verify.simplify import simplify
-from m2pem.verify.system import System
+from m2pem.verify.system import Place, Role, Scope, System
 
 FULL_STATES = 30_000
 """States up to which nothing is left out: that gives the shortest runs."""
+FULL_TIME = 0.4
+"""Of the time that there is: what may be spent on that."""
+_BYTES_A_RULE = 2_500
+"""About what a rule costs in memory, from when it is derived until it is searched with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,15 +78,20 @@ def check(
     Raises:
         KeyError: the mission has no such process.
     """
+    began = time.monotonic()
     limits = limits or Limits(tokens=3)
     fleet = fleet or fleet_for(mission)
-    system = simplify(derive(mission, fleet, process=process, options=options))
-    found = search(system, limits, progress)
+    try:
+        bound = bound_of(limits)
+        system = simplify(derive(mission, fleet, process=process, options=options, bound=bound))
+    except TooLargeError as error:
+        return too_large(mission, error, process)
+    found = search(system, _rest(limits, began), progress)
     searched = Searched(mission, system, found)
     watched = watch_interruptions(system, fleet.vehicles)
     if watched is not None and found.stopped is not Stopped.INTERRUPTED:
         searched.resources = watched[1]
-        searched.watched = search(watched[0], limits, progress)
+        searched.watched = search(watched[0], _rest(limits, began), progress)
     results = tuple(each(searched) for each in ALL)
     return Report(
         system,
@@ -91,16 +102,56 @@ def check(
     )
 
 
+def bound_of(limits: Limits) -> Bound:
+    """How much may be derived within the limits, from now on."""
+    most = min(MOST_RULES, int(limits.memory_mb * 1e6 / _BYTES_A_RULE))
+    return Bound(time.monotonic() + limits.seconds, max(most, 1))
+
+
+def _rest(limits: Limits, began: float) -> Limits:
+    """The limits of a search that is a part of a check."""
+    return replace(limits, seconds=max(0.0, limits.seconds - (time.monotonic() - began)))
+
+
+def too_large(mission: Mission, error: TooLargeError, process: str | None = None) -> Report:
+    """What is known of a mission whose rules are too many: what needs no search."""
+    root = mission.process(process)
+    places = tuple(
+        Place(n, f"{root.id}:{name}", root.id, 0, Role.CONTROL if n == 0 else Role.END)
+        for n, name in enumerate(("running", "completed", "terminated", "failed"))
+    )
+    scopes = (Scope(0, root.id, None, (root.id,)),)
+    system = System(mission.file, root.id, scopes, places, (), (), ((0, 1),), 1, 2, 3)
+    found = explore(system)
+    found.stopped = Stopped.TIME if error.late else Stopped.RULES
+    found.terminals.clear()
+    results = (each(Searched(mission, system, found, watched=found)) for each in ALL)
+    told = tuple(
+        replace(each, covered=f"too large to search: {error}")
+        if each.verdict is Verdict.UNDECIDED
+        else each
+        for each in results
+    )
+    return Report(system, found, told, states=len(found.states))
+
+
 def search(
     system: System, limits: Limits, progress: Callable[[Progress], None] | None = None
 ) -> Exploration:
     """All of it if it is small; else without the orders that lead to the same."""
-    small = replace(limits, states=min(limits.states, FULL_STATES))
+    began = time.monotonic()
+    small = replace(
+        limits,
+        states=min(limits.states, FULL_STATES),
+        seconds=limits.seconds * FULL_TIME if limits.states > FULL_STATES else limits.seconds,
+    )
     found = explore(system, small, progress=progress)
-    if found.stopped is not Stopped.STATES or limits.states <= FULL_STATES:
+    more = found.stopped in (Stopped.STATES, Stopped.TIME) and limits.states > FULL_STATES
+    if not more:
         return found
     try:
-        return explore(system, limits, reduction=StubbornSets(system), progress=progress)
+        reduction = StubbornSets(system)
+        return explore(system, _rest(limits, began), reduction=reduction, progress=progress)
     except KeyboardInterrupt:  # before the other search had begun
         found.stopped = Stopped.INTERRUPTED
         return found

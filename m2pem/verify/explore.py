@@ -18,6 +18,7 @@ from enum import StrEnum
 
 from m2pem.verify.encoding import Encoding, Marking
 from m2pem.verify.reduction import Reduction
+from m2pem.verify.retesting import affected_rules, as_sets, tests_of
 from m2pem.verify.system import Flag, Kind, System
 
 _LOOK_EVERY = 128
@@ -32,7 +33,7 @@ _BYTES_AN_EDGE = 8
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Where a search stops undecided. `tokens`: on one place, where one is meant."""
+    """Where a check stops undecided. `tokens`: on one place, where one is meant."""
 
     states: int = 2_000_000
     seconds: float = 600.0
@@ -47,6 +48,7 @@ class Stopped(StrEnum):
     TIME = "the limit of time"
     MEMORY = "the limit of memory"
     TOKENS = "a place that gets more and more tokens"
+    RULES = "the limit of rules"
     DEPTH = "the limit of depth"
     BITSTATE = "a table that may take a new state for a known one"
     INTERRUPTED = "an interruption by hand"
@@ -199,7 +201,7 @@ class _Search:
         self.closed_circle = False
         rules = encoding.rules
         self.affected = affected_rules(encoding)
-        self.affected_sets = [frozenset(each) for each in self.affected]
+        self.affected_sets = as_sets(self.affected)
         self.rank = [
             0 if rule.kind is Kind.INTERNAL else 1 if rule.kind is Kind.JOIN else 2
             for rule in system.rules
@@ -266,7 +268,7 @@ class _Search:
         edge_start, edge_rule, edge_state = found.edge_start, found.edge_rule, found.edge_state
         enabled_now, fire = encoding.enabled, encoding.fire
         fast = [(keep, put) if plain else None for _, _, keep, put, plain in masks]
-        tests = [[(n, masks[n][0], masks[n][1], masks[n][4]) for n in each] for each in affected]
+        tests = tests_of(affected, masks)
         unfired = [True] * len(masks)
         add_state, add_parent, add_via = states.append, parents.append, via.append
         wait, setdefault = waiting.append, index.setdefault
@@ -374,24 +376,3 @@ class _Search:
         elif size > self.limits.memory_mb * 1e6:
             found.stopped = Stopped.MEMORY
         return found.stopped is not None
-
-
-def affected_rules(encoding: Encoding) -> list[list[int]]:
-    """By rule, those whose tests look at something that it changes."""
-    readers: dict[int, list[int]] = {}
-    for number, rule in enumerate(encoding.rules):
-        bits = rule.reads
-        while bits:
-            low = bits & -bits
-            readers.setdefault(low, []).append(number)
-            bits ^= low
-    result: list[list[int]] = []
-    for rule in encoding.rules:
-        touched: set[int] = set()
-        bits = rule.changes
-        while bits:
-            low = bits & -bits
-            touched.update(readers.get(low, ()))
-            bits ^= low
-        result.append(sorted(touched))
-    return result

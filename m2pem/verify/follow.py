@@ -12,7 +12,7 @@ from m2pem.engine.records import RunOutcome
 from m2pem.engine.state import RunState, RunStatus, Scope, Token
 from m2pem.model.elements import CallActivity, ComplexGateway, InclusiveGateway, ParallelGateway
 from m2pem.verify.encoding import Encoding
-from m2pem.verify.explore import affected_rules
+from m2pem.verify.retesting import affected_rules
 from m2pem.verify.system import Kind, Role, System
 
 Look = Counter[tuple[tuple[str, ...], str]]

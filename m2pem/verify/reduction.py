@@ -103,15 +103,13 @@ class _Bound:
         self.forbidding: dict[int, int] = {}
         self.clearing: dict[int, int] = {}
         self.setting: dict[int, int] = {}
-        for number in range(count):
-            for mask, register in (
-                (self.needs[number], self.needing),
-                (self.forbids[number], self.forbidding),
-                (self.clears[number], self.clearing),
-                (self.sets[number], self.setting),
-            ):
-                for low in bits_of(mask):
-                    register[low] = register.get(low, 0) | 1 << number
+        for masks, register in (
+            (self.needs, self.needing),
+            (self.forbids, self.forbidding),
+            (self.clears, self.clearing),
+            (self.sets, self.setting),
+        ):
+            _register(masks, self.kill if register is self.clearing else (), register)
         self.unsafe = encoding.places_mask(p.index for p in system.places if p.index not in safe)
         self.visible = encoding.places_mask(visible)
         self.seeing = 0
@@ -366,6 +364,21 @@ class _Bound:
             and not changes & (self.needs[number] | self.forbids[number])
             and not kill & self.visible
         )
+
+
+def _register(masks: Sequence[int], kill: Sequence[int], register: dict[int, int]) -> None:
+    """By bit, the rules whose masks have it. Many rules `kill` the same bits: those go together."""
+    alike: dict[int, int] = {}
+    for number, mask in enumerate(masks):
+        own = mask
+        if kill and kill[number]:
+            own &= ~kill[number]
+            alike[kill[number]] = alike.get(kill[number], 0) | 1 << number
+        for low in bits_of(own):
+            register[low] = register.get(low, 0) | 1 << number
+    for mask, numbers in alike.items():
+        for low in bits_of(mask):
+            register[low] = register.get(low, 0) | numbers
 
 
 def bits_of(mask: int) -> Iterable[int]:

@@ -9,42 +9,50 @@ from m2pem.model.bpmn.reading import MessageUse, Reading
 from m2pem.model.elements import ReceiveTask
 from m2pem.model.events import Message, MessageEventDefinition
 
+End = tuple[str, bool]
+"""Of a message flow: the element's id, and whether it is the one that the message comes to."""
+
 
 def resolve_messages(reading: Reading) -> None:
     """Give a message to every event and task that names none."""
     groups = _groups(reading)
-    uses = {use.node_id: use for use in reading.message_uses}
+    uses = {(use.node_id, use.catches): use for use in reading.message_uses}
     agreed: dict[int, Message] = {}
     for flow, message_ref in reading.message_flows:
-        group = groups[flow.source_id]
+        group = groups[flow.source_id, False]
         named = reading.messages.get(message_ref)
-        for end in (flow.source_id, flow.target_id):
+        for end in ((flow.source_id, False), (flow.target_id, True)):
             use = uses.get(end)
             named = named or (use.message if use else None)
         if named is not None:
             agreed.setdefault(group, named)
     for flow, _ in reading.message_flows:
-        group = groups[flow.source_id]
-        if group not in agreed and (flow.source_id in uses or flow.target_id in uses):
+        group = groups[flow.source_id, False]
+        ends = ((flow.source_id, False), (flow.target_id, True))
+        if group not in agreed and any(end in uses for end in ends):
             identifier = flow.id or f"{flow.source_id}~{flow.target_id}"
             message = Message(identifier, flow.name, flow.line)
             agreed[group] = reading.messages.setdefault(identifier, message)
     for use in reading.message_uses:
         if use.message is None:
-            _assign(reading, use, agreed.get(groups.get(use.node_id, -1)))
+            _assign(reading, use, agreed.get(groups.get((use.node_id, use.catches), -1)))
 
 
-def _groups(reading: Reading) -> dict[str, int]:
-    """The connected part of the message flows in which each of their ends is; pools join none."""
+def _groups(reading: Reading) -> dict[End, int]:
+    """The connected part of the message flows in which each of their ends is; pools join none.
+
+    What comes to an element and what goes out of it are different messages.
+    """
     pools = {participant.id for participant in reading.participants}
-    neighbors: dict[str, list[str]] = {}
+    neighbors: dict[End, list[End]] = {}
     for flow, _ in reading.message_flows:
-        neighbors.setdefault(flow.source_id, [])
-        neighbors.setdefault(flow.target_id, [])
+        source, target = (flow.source_id, False), (flow.target_id, True)
+        neighbors.setdefault(source, [])
+        neighbors.setdefault(target, [])
         if flow.source_id not in pools and flow.target_id not in pools:
-            neighbors[flow.source_id].append(flow.target_id)
-            neighbors[flow.target_id].append(flow.source_id)
-    groups: dict[str, int] = {}
+            neighbors[source].append(target)
+            neighbors[target].append(source)
+    groups: dict[End, int] = {}
     for number, start in enumerate(neighbors):
         waiting = [start]
         while waiting:

@@ -14,6 +14,7 @@ from m2pem.model.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, Stan
 from m2pem.model.mission import Mission
 from m2pem.model.values import Value
 from m2pem.resources.behaviors import SHARED
+from m2pem.verify.derive.bound import Bound
 from m2pem.verify.derive.domains import MOST_COMBINATIONS, Domains, Write, tells_apart
 from m2pem.verify.derive.effect import Effect
 from m2pem.verify.derive.net import Area
@@ -30,8 +31,9 @@ Outcome = TypeVar("Outcome", bound=Hashable)
 class Data:
     """The followed names of a mission."""
 
-    def __init__(self, mission: Mission, options: Options) -> None:
+    def __init__(self, mission: Mission, options: Options, bound: Bound | None = None) -> None:
         self._mission = mission
+        self._bound = bound or Bound()
         self._options = options
         self._hidden: dict[e.FlowNode, frozenset[str]] = {}
         self._initial = dict(_flat(options.data))
@@ -103,6 +105,7 @@ class Data:
         for combination in itertools.product(*ranges):
             options = [self._truths(c, names, combination, hidden) for c in conditions]
             for truths in itertools.product(*options):
+                self._bound.case(node.id)
                 where = chosen.setdefault(choose(truths), [])
                 if not where or where[-1] != combination:
                     where.append(combination)
@@ -181,6 +184,7 @@ class Data:
         found: list[Effect] = []
         for effect in effects:
             for guard, value in self._values(effect, key, source, area, node):
+                self._bound.case(node.id)
                 assign = {} if value is None else {target: value}
                 both = effect.then(Effect(guard=guard, assign=assign))
                 if both is not None and value is not None:
@@ -252,6 +256,7 @@ class Data:
             for guard, value in self._values(effect, key, source, inside, None):
                 if value is None:
                     continue
+                self._bound.case(node.id)
                 both = effect.then(Effect(guard=guard, assign={target: value}))
                 if both is not None:
                     found.append(both)

@@ -13,6 +13,7 @@ from m2pem.resources.fleet import Fleet
 from m2pem.resources.madeup import fleet_for
 from m2pem.verify.derive.activities import contend
 from m2pem.verify.derive.areas import begin
+from m2pem.verify.derive.bound import Bound
 from m2pem.verify.derive.containers import build, choose
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.events import after, awaited
@@ -37,6 +38,7 @@ def derive(
     *,
     process: str | None = None,
     options: Options | None = None,
+    bound: Bound | None = None,
 ) -> System:
     """The rules of a mission that begins with a process (else its main one), on a fleet.
 
@@ -44,9 +46,11 @@ def derive(
 
     Raises:
         KeyError: the mission has no such process.
+        TooLargeError: it stands for more than `bound` allows.
     """
     root = mission.process(process)
-    making = Making(mission, root, fleet or fleet_for(mission), options or Options())
+    bound = bound or Bound()
+    making = Making(mission, root, fleet or fleet_for(mission), options or Options(), bound)
     making.build_node = build_node
     making.root = making.net.area(root, making.everything, step=root.id, frame=(root.id,))
     making.data.follow(making.root.frame)

@@ -7,6 +7,7 @@ from m2pem.model import elements as e
 from m2pem.model.mission import Mission
 from m2pem.model.reach import following
 from m2pem.resources.fleet import Fleet
+from m2pem.verify.derive.bound import Bound
 from m2pem.verify.derive.data import Data
 from m2pem.verify.derive.effect import Effect
 from m2pem.verify.derive.net import Area, Net
@@ -56,14 +57,14 @@ class Making:
     """A derivation under way."""
 
     def __init__(
-        self, mission: Mission, process: e.Process, fleet: Fleet, options: Options
+        self, mission: Mission, process: e.Process, fleet: Fleet, options: Options, bound: Bound
     ) -> None:
         self.mission = mission
         self.process = process
         self.fleet = fleet
         self.options = options
-        self.net = Net()
-        self.data = Data(mission, options)
+        self.net = Net(bound)
+        self.data = Data(mission, options, bound)
         self.world = self.net.area(process, None)
         self.world.path = ()
         self.world.frame = ()
@@ -149,19 +150,14 @@ def _repeated_nodes(mission: Mission) -> frozenset[e.FlowNode]:
 
 def _ends_reached_again(mission: Mission) -> frozenset[e.FlowNode]:
     """End events that two tokens of one scope might come to."""
-    found: set[e.FlowNode] = set()
-    for node in mission.nodes:
-        if not forks(node):
-            continue
-        waiting: list[e.FlowNode] = [node]
-        reached: set[e.FlowNode] = set()
-        while waiting:
-            for each in following(waiting.pop()):
-                if each not in reached:
-                    reached.add(each)
-                    waiting.append(each)
-        found |= {each for each in reached if isinstance(each, e.EndEvent)}
-    return frozenset(found)
+    waiting = [node for node in mission.nodes if forks(node)]
+    reached: set[e.FlowNode] = set()
+    while waiting:
+        for each in following(waiting.pop()):
+            if each not in reached:
+                reached.add(each)
+                waiting.append(each)
+    return frozenset(each for each in reached if isinstance(each, e.EndEvent))
 
 
 def forks(node: e.FlowNode) -> bool:

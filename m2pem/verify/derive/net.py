@@ -12,6 +12,7 @@ from m2pem.model.elements import (
     ParallelGateway,
     SequenceFlow,
 )
+from m2pem.verify.derive.bound import Bound
 from m2pem.verify.derive.effect import Effect
 from m2pem.verify.outcomes import with_outcomes
 from m2pem.verify.system import (
@@ -73,7 +74,8 @@ class Timed:
 class Net:
     """Collects places, areas and rules; `finish` makes them a system."""
 
-    def __init__(self) -> None:
+    def __init__(self, bound: Bound) -> None:
+        self.bound = bound
         self.areas: list[Area] = []
         self.places: list[Place] = []
         self.drafts: list[Draft] = []
@@ -153,6 +155,7 @@ class Net:
         due_us: int | None = None,
     ) -> Draft:
         """A new rule."""
+        self.bound.rule(_spelled_out(effect))
         draft = Draft(effect, kind, trigger, detail, due_us)
         self.drafts.append(draft)
         return draft
@@ -217,6 +220,7 @@ class Net:
         inside: dict[int, tuple[frozenset[int], frozenset[int]]],
     ) -> Rule | None:
         effect = draft.effect
+        self.bound.look(_spelled_out(effect))
         kill, inhibit = set(effect.kill), set(effect.inhibit)
         for scope in effect.kill_scopes:
             kill |= inside[scope][0]
@@ -226,7 +230,7 @@ class Net:
         inhibit -= set(consume)
         if inhibit & effect.read:
             return None
-        element = effect.steps[0].element if effect.steps else "run"
+        element = _spelled_out(effect)
         names[element] += 1
         return Rule(
             number,
@@ -249,6 +253,10 @@ class Net:
             bool(effect.quiet_scopes),
             draft.due_us,
         )
+
+
+def _spelled_out(effect: Effect) -> str:
+    return effect.steps[0].element if effect.steps else "run"
 
 
 def is_join(node: FlowNode) -> bool:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from m2pem.model.mission import Mission
 from m2pem.resources.fleet import Fleet
 from m2pem.verify import product
-from m2pem.verify.check import FULL_STATES, Report
-from m2pem.verify.derive import Options, derive
+from m2pem.verify.check import FULL_STATES, Report, bound_of
+from m2pem.verify.derive import Options, TooLargeError, derive
 from m2pem.verify.explore import Exploration, Limits, Progress, Stopped, explore
 from m2pem.verify.ltl import propositions
 from m2pem.verify.ltl.formula import Active, Completed
@@ -91,7 +91,15 @@ def with_requirements(
         return report
     limits = limits or Limits(tokens=3)
     options = replace(options or Options(), conditions=conditions(requirements))
-    system = derive(mission, fleet, process=process, options=options)
+    try:
+        bound = bound_of(limits)
+        system = derive(mission, fleet, process=process, options=options, bound=bound)
+    except TooLargeError as error:
+        why = f"too large to search: {error}"
+        answers = (Answer(each, product.Result.UNDECIDED, why=why) for each in requirements)
+        return replace(
+            report, results=(*report.results, *(_result(each, mission) for each in answers))
+        )
     asking = _Asking(mission, fleet, system, limits, progress)
     spins: Found | None = None
     results: list[Result] = []

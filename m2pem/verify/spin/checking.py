@@ -13,9 +13,9 @@ from m2pem.errors import InternalError
 from m2pem.model.mission import Mission
 from m2pem.resources.fleet import Fleet
 from m2pem.resources.madeup import fleet_for
-from m2pem.verify.check import Report
+from m2pem.verify.check import Report, bound_of, too_large
 from m2pem.verify.check import search as search_built_in
-from m2pem.verify.derive import Options, derive
+from m2pem.verify.derive import Options, TooLargeError, derive
 from m2pem.verify.explore import Exploration, Limits, Progress, Stopped
 from m2pem.verify.interruption import watch_interruptions
 from m2pem.verify.properties import ALL, Searched
@@ -49,7 +49,11 @@ def check_with_spin(
     """
     limits = limits or Limits(tokens=3)
     fleet = fleet or fleet_for(mission)
-    system = simplify(derive(mission, fleet, process=process, options=options))
+    try:
+        bound = bound_of(limits)
+        system = simplify(derive(mission, fleet, process=process, options=options, bound=bound))
+    except TooLargeError as error:
+        return replace(too_large(mission, error, process), engine="spin")
     found = search(system, limits, storage=storage, progress=progress)
     searched = Searched(mission, system, as_exploration(found))
     watched = watch_interruptions(system, fleet.vehicles)

@@ -66,7 +66,8 @@ def judge(path: Path, terms: Terms) -> Judgement:
     def took() -> tuple[float, float]:
         return time.monotonic() - began, time.process_time() - cpu
 
-    data, filled = path.read_bytes(), ()
+    data = path.read_bytes()
+    filled: tuple[str, ...] = ()
     try:
         if terms.as_drawn:
             mission = parse_mission(data, str(path))

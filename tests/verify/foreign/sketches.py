@@ -73,10 +73,16 @@ def _at_work(data: bytes) -> bytes:
     """Plain tasks as services, which take time."""
     root = etree.fromstring(data, _PARSER)
     for element in root.iter(*(f"{BPMN}{name}" for name in _PLAIN)):
-        if not element.get("implementation"):
+        if _says_nothing(element):
             element.tag = f"{BPMN}serviceTask"
             element.set(f"{M2PEM}class", WORK)
     return etree.tostring(root)
+
+
+def _says_nothing(task: etree._Element) -> bool:
+    """Whether nothing but its name says what it does."""
+    said = [key for key in task.attrib if key == "implementation" or str(key).startswith("{")]
+    return not said and not any(str(each.tag).startswith(M2PEM) for each in task.iter())
 
 
 def _children(element: etree._Element, *names: str) -> list[etree._Element]:

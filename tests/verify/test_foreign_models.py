@@ -1,0 +1,89 @@
+"""Models that others drew are checked within limits: each is decided or undecided, or refused.
+
+`M2PEM_CORPORA` names a folder of them; without it only the project's own are checked.
+"""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.foreign.models import models
+from tests.verify.foreign.counting import Counts
+from tests.verify.foreign.judging import Terms
+from tests.verify.foreign.measuring import measure_all
+from tests.verify.foreign.sketches import read_sketch
+
+ROOT = Path(__file__).parents[2]
+CORPORA = os.environ.get("M2PEM_CORPORA", "")
+TERMS = Terms()
+SKETCH = b"""<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targetNamespace="t">
+  <process id="P">
+    <startEvent id="S"/><task id="Dig"/><endEvent id="E"/>
+    <boundaryEvent id="Late" attachedToRef="Dig"><timerEventDefinition/></boundaryEvent>
+    <sequenceFlow id="s" sourceRef="S" targetRef="Dig"/>
+    <sequenceFlow id="d" sourceRef="Dig" targetRef="E"/>
+    <sequenceFlow id="l" sourceRef="Late" targetRef="E"/>
+    <sequenceFlow id="nowhere" sourceRef="Late"/>
+  </process>
+</definitions>"""
+
+
+def checked(folder: Path, terms: Terms = TERMS) -> Counts:
+    """What became of the models of a folder."""
+    counts = Counts(terms)
+    for found in measure_all(models(folder), terms):
+        counts.add(found)
+    return counts
+
+
+def test_what_a_sketch_leaves_unsaid_is_filled_in(tmp_path: Path) -> None:
+    (tmp_path / "sketch.bpmn").write_bytes(SKETCH)
+    counts = checked(tmp_path)
+    assert counts.wrong == []
+    assert (counts.kinds["decided"], counts.kinds["no violation"]) == (1, 1)
+    assert dict(counts.filled) == {"timer-time": 1, "dangling-reference": 1}
+
+
+def test_as_drawn_a_sketch_is_refused_for_what_it_leaves_unsaid(tmp_path: Path) -> None:
+    (tmp_path / "sketch.bpmn").write_bytes(SKETCH)
+    counts = checked(tmp_path, Terms(as_drawn=True))
+    assert counts.kinds == {"refused": 1}
+    assert set(counts.refused) == {"timer-time", "dangling-reference"}
+
+
+def test_what_is_drawn_wrong_is_not_filled_in(tmp_path: Path) -> None:
+    wrong = SKETCH.replace(b'targetRef="E"/>', b'targetRef="S"/>', 1)
+    (tmp_path / "wrong.bpmn").write_bytes(wrong)
+    counts = checked(tmp_path)
+    assert counts.wrong == []
+    assert counts.kinds == {"refused": 1}
+
+
+def test_a_task_of_a_sketch_takes_time() -> None:
+    mission, _ = read_sketch(SKETCH, "sketch.bpmn")
+    assert type(mission.elements["Dig"]).__name__ == "ServiceTask"
+
+
+def test_a_file_that_takes_too_much_memory_is_told(tmp_path: Path) -> None:
+    (tmp_path / "sketch.bpmn").write_bytes(SKETCH)
+    counts = checked(tmp_path, Terms(memory_mb=1))
+    assert len(counts.wrong) == 1
+    assert " MB" in counts.wrong[0]
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not CORPORA, reason="M2PEM_CORPORA names no folder of foreign BPMN files")
+@pytest.mark.timeout(3_600)
+@pytest.mark.parametrize("terms", [TERMS, Terms(as_drawn=True)], ids=["filled in", "as drawn"])
+def test_every_foreign_model_is_decided_undecided_or_refused_within_limits(terms: Terms) -> None:
+    counts = checked(Path(CORPORA), terms)
+    assert counts.files
+    assert counts.wrong == []
+
+
+@pytest.mark.parametrize("folder", ["missions", "docs/broken"])
+def test_the_missions_of_the_repository_are_decided_within_limits(folder: str) -> None:
+    counts = checked(ROOT / folder, Terms(as_drawn=True))
+    assert counts.wrong == []
+    assert counts.kinds["decided"] == len(counts.files) > 0
