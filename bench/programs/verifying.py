@@ -131,7 +131,8 @@ def verdicts(results: Sequence[Result]) -> str:
         if each.verdict is not Verdict.HOLDS:
             warning = each.warning and each.verdict is Verdict.VIOLATED
             named.setdefault("warning" if warning else each.verdict, []).append(each.property)
-    said = [f"{kind}: {', '.join(names)}" for kind, names in sorted(named.items(), reverse=True)]
+    kinds = [kind for kind in ("violated", "undecided", "warning") if kind in named]
+    said = [f"{kind}: {', '.join(named[kind])}" for kind in kinds]
     if not named.keys() - {"warning"}:
         said.insert(0, "holds")
     return "; ".join(said)

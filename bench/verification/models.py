@@ -9,13 +9,16 @@ from bench.graphs import file
 
 SHAPES = ("plain", "timer", "error", "failures")
 """`timer`: all branches are in a subprocess that a timer interrupts; `error`: in one that an error
-end event in one more branch interrupts; `failures`: the tasks are behaviors of vehicles, and each
-of them that fails interrupts."""
+end event in one more branch interrupts; `failures`: the tasks are services, and each of them that
+fails interrupts."""
 
 TASK = (
     '<extensionElements><m2pem:prompt>?</m2pem:prompt><m2pem:decision value="done"/>'
     "</extensionElements>"
 )
+
+
+SERVICE = '<extensionElements><m2pem:service class="Detector"/></extensionElements>'
 
 
 def branches(count: int, tasks: int, shape: str = "plain") -> str:
@@ -29,7 +32,7 @@ def branches(count: int, tasks: int, shape: str = "plain") -> str:
         row = [f"t{number}_{place}" for place in range(tasks)]
         for name in row:
             if shape == "failures":
-                drawing.node("scriptTask", name, _behavior(number))
+                drawing.node("serviceTask", name, SERVICE)
             else:
                 drawing.node("userTask", name, TASK)
         for one, other in pairwise(["fork", *row, "join"]):
@@ -42,15 +45,6 @@ def branches(count: int, tasks: int, shape: str = "plain") -> str:
     if shape != "plain":
         inside = _around(inside, shape)
     return file(f'<process id="BENCH" isExecutable="true">{inside}</process>').decode()
-
-
-def _behavior(vehicle: int) -> str:
-    return (
-        '<extensionElements><m2pem:behavior type="vehicle" name="goto"><m2pem:properties>'
-        '<m2pem:property name="target" value="p"/></m2pem:properties><m2pem:resources>'
-        f'<m2pem:role name="driver" vehicle="v{vehicle}"/></m2pem:resources></m2pem:behavior>'
-        "</extensionElements>"
-    )
 
 
 def _perhaps_an_error(drawing: "_Drawing") -> None:
