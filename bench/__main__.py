@@ -14,6 +14,7 @@ from bench.plots import plot
 from bench.readme import rewritten
 from bench.table import JOURNALS, STOCK, table, wrongs
 from bench.targets import PROGRAMS, WORK, Program, Work
+from bench.verification import measuring, page
 
 README = REPOSITORY / "README.md"
 RESULTS = REPOSITORY / "bench" / "results"
@@ -24,7 +25,13 @@ OWN_RUNS, PEER_RUNS = 5, 3
 STOCK_SIZES = 2
 """Enough to see where SpiffWorkflow gives up when its users do not lift the limit of recursion."""
 
-NAMES = [*dict.fromkeys([*(w.name for w in WORK), *(p.command[0] for p in PROGRAMS)])]
+VERIFICATION = "verification"
+"""The name of `bench.verification`, and of the folder of its results in that of all others."""
+
+NAMES = [
+    *dict.fromkeys([*(w.name for w in WORK), *(p.command[0] for p in PROGRAMS)]),
+    VERIFICATION,
+]
 FIGURES = "figures.json"
 
 JOURNALS_FROM = 10_000
@@ -53,14 +60,19 @@ def main(words: Sequence[str] | None = None) -> int:
     programs = [program for program in wanted if ros or not program.ros]
     if len(programs) < len(wanted):
         print("bench: ROS is not installed here, and its programs are left out")
+    verifies = VERIFICATION in names
     if asked.quick:
-        return quick(others, works, programs)
+        wrong = quick(others, works, programs)
+        return wrong | quick_verification() if verifies else wrong
     found = machine(SPIFFWORKFLOW, MODULES, Path(ros))
-    try:
-        figures = kept(asked.results / FIGURES, found, names) if asked.only else Figures(found)
-    except OtherError as error:
-        parser.error(str(error))
-    return measure_all(figures, others, works, programs, asked.up_to, asked.results)
+    wrong = 0
+    if works or programs:
+        try:
+            figures = kept(asked.results / FIGURES, found, names) if asked.only else Figures(found)
+        except OtherError as error:
+            parser.error(str(error))
+        wrong = measure_all(figures, others, works, programs, asked.up_to, asked.results)
+    return wrong | measure_verification(asked.results, found) if verifies else wrong
 
 
 def ros_python(only_own: bool) -> str:
@@ -103,7 +115,7 @@ def quick(others: Sequence[Engine], works: Sequence[Work], programs: Sequence[Pr
     for name, figure in done:
         if figure.wrong:
             print(f"bench: {name}: {figure.wrong}", file=sys.stderr)
-    return any(figure.wrong for _, figure in done)
+    return int(any(figure.wrong for _, figure in done))
 
 
 def measure_all(
@@ -116,18 +128,34 @@ def measure_all(
 ) -> int:
     """Measure, print, and write after each step: an interrupted measurement is not lost."""
     installed = [peer.name for peer in others]
-    page = ""
+    text = ""
     for work in works:
         played = play_all(work, [size for size in work.sizes if size <= up_to], others)
         figures.add(work.name, played, installed)
-        page = write(folder, figures, installed)
+        text = write(folder, figures, installed)
     for program in programs:
         figures.programs[program.name] = measure(program.command, PEER_RUNS, _python(program))
         print(f"{program.name}: done", file=sys.stderr)
-        page = write(folder, figures, installed)
-    print(page)
+        text = write(folder, figures, installed)
+    print(text)
     mine = [each[M2PEM] for sizes in figures.graphs.values() for each in sizes.values()]
-    return any(figure.wrong for figure in [*mine, *figures.programs.values()])
+    return int(any(figure.wrong for figure in [*mine, *figures.programs.values()]))
+
+
+def quick_verification() -> int:
+    """Each kind of verification once; no time is looked at."""
+    wrong = measuring.quick()
+    for each in wrong:
+        print(f"bench: verification: {each}", file=sys.stderr)
+    return bool(wrong)
+
+
+def measure_verification(results: Path, found: dict[str, str]) -> int:
+    """Verify everything, print, and write after each step, into a folder of its own."""
+    folder = results if results.name == VERIFICATION else results / VERIFICATION
+    verified = measuring.measure(found, lambda so_far: page.write(folder, so_far))
+    print(page.write(folder, verified))
+    return bool(verified.wrongs())
 
 
 def play_all(
@@ -158,8 +186,8 @@ def write(folder: Path, figures: Figures, installed: Sequence[str]) -> str:
     folder.mkdir(parents=True, exist_ok=True)
     results, names = figures.graphs, figures.peers(installed)
     drawn_table = table(results, figures.programs, names)
-    page = _page(figures.machine, drawn_table, wrongs(results, figures.programs))
-    (folder / "table.md").write_text(page, encoding="utf-8")
+    text = _page(figures.machine, drawn_table, wrongs(results, figures.programs))
+    (folder / "table.md").write_text(text, encoding="utf-8")
     drawn = [M2PEM, *(name for name in names if not name.endswith(STOCK))]
     for work in WORK:
         drawing = plot(work, results.get(work.name, {}), drawn)
@@ -168,15 +196,15 @@ def write(folder: Path, figures: Figures, installed: Sequence[str]) -> str:
     if folder == RESULTS:
         old = README.read_text(encoding="utf-8")
         README.write_text(rewritten(old, results, names), encoding="utf-8")
-    return page
+    return text
 
 
 def _page(described: dict[str, str], figures: str, failures: str) -> str:
     words = ", ".join(f"{name}: {value}" for name, value in described.items())
-    page = f"# Measured\n\n{words}.\n\n{figures}"
+    text = f"# Measured\n\n{words}.\n\n{figures}"
     if failures:
-        page += f"\n## What did not end with the right result\n\n{failures}"
-    return page
+        text += f"\n## What did not end with the right result\n\n{failures}"
+    return text
 
 
 if __name__ == "__main__":

@@ -36,6 +36,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setattr(bench, "machine", lambda *_: HERE)
     monkeypatch.setattr(bench, "peers", lambda *_: [PEER])
     monkeypatch.setattr(bench, "ros_python", lambda **_: "python-with-ros")
+    monkeypatch.setattr(bench, "measure_verification", lambda *_: 0)
     return asked
 
 
