@@ -11,7 +11,7 @@ from m2pem.verify.explore import Exploration, explore
 from m2pem.verify.explore import Limits as ExploreLimits
 from m2pem.verify.explore import Stopped as ExploreStopped
 from m2pem.verify.labels import Labels, UnknownDataError
-from m2pem.verify.ltl import Observer, negated, propositions
+from m2pem.verify.ltl import propositions
 from m2pem.verify.ltl.formula import Data, needs_steps
 from m2pem.verify.mission_runs import MissionRuns
 from m2pem.verify.product import Limits, Progress, Result, Run, Stopped, Verdict, check
@@ -82,19 +82,15 @@ def reduction_for(
 ) -> Reduction | None:
     """What may be left out of the search for one requirement; None: nothing.
 
-    Only what is broken once and for all, if at all, can do with less: runs that go round for ever
-    in one part of the mission, and leave another where it is, may be missing then.
+    Runs that put something off for ever, and single steps, are kept only where all is tried.
     """
-    formula = requirement.formula
-    if requirement.fair or needs_steps(formula):
-        return None
-    if Observer(negated(formula)).automaton.needs_rounds:
+    if requirement.fair or needs_steps(requirement.formula):
         return None
     try:
-        places = Labels(system, mission, fleet, propositions(formula)).visible_places()
+        labels = Labels(system, mission, fleet, propositions(requirement.formula))
     except UnknownDataError:
         return None
-    return StubbornSets(system, places) if places is not None else None
+    return StubbornSets(system, labels.visible_rules())
 
 
 def check_requirement(
