@@ -18,6 +18,8 @@ from m2pem.verify.system import System
 
 FULL_STATES = 30_000
 """States up to which nothing is left out: that gives the shortest runs."""
+_FEWER_BEYOND = 100
+"""Rules of a system beyond which fewer states are searched so: each of them takes longer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +97,13 @@ def search(
     system: System, limits: Limits, progress: Callable[[Progress], None] | None = None
 ) -> Exploration:
     """All of it if it is small; else without the orders that lead to the same."""
-    small = replace(limits, states=min(limits.states, FULL_STATES))
+    small = replace(limits, states=min(limits.states, full_states(system)))
     found = explore(system, small, progress=progress)
-    if found.stopped is not Stopped.STATES or limits.states <= FULL_STATES:
+    if found.stopped is not Stopped.STATES or limits.states <= small.states:
         return found
     return explore(system, limits, reduction=StubbornSets(system), progress=progress)
+
+
+def full_states(system: System) -> int:
+    """States up to which a system is searched without leaving anything out."""
+    return FULL_STATES * _FEWER_BEYOND // max(_FEWER_BEYOND, len(system.rules))

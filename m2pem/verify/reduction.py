@@ -134,7 +134,7 @@ class _Bound:
     ) -> int | tuple[int] | None:
         """The same; or, in a tuple, rules that may not be left out."""
         candidates &= ~left_out
-        closed, own = 1 << seed, 0
+        closed, own = 1 << seed, Macro()
         waiting = [seed]
         fed: list[Feed] = []
         while waiting or fed:
@@ -144,7 +144,8 @@ class _Bound:
                 macro = self.macros.of(number, state)
                 if macro is None:
                     return None
-                own |= macro.clears
+                own.clears |= macro.clears
+                own.sets |= macro.sets
                 add, _ = self._disturbed(macro)
                 if add & left_out:
                     return (add,)
@@ -176,19 +177,20 @@ class _Bound:
                         return best
         return best if best >= 0 else prints.setting_any(feed.fields[0])
 
-    def _enabling(self, number: int, state: int, closed: int, own: int, candidates: int) -> int:
+    def _enabling(self, number: int, state: int, closed: int, own: Macro, candidates: int) -> int:
         """Rules one of which must fire before a disabled one can: few that are not in already.
 
-        `own`: bits that the rules that are in already clear.
+        `own`: what the rules that are in already clear and set: looked at first.
         """
         c = self.encoding.rules[number]
-        clearing = self.prints.clearing
-        present = c.test & ~c.need & state
-        for low in bits_of(present & own):
-            if not clearing.get(low, 0) & ~closed & candidates:
-                return 0
+        setting, clearing = self.prints.setting, self.prints.clearing
+        missing, present = c.need & ~state, c.test & ~c.need & state
+        for register, bits in ((setting, missing & own.sets), (clearing, present & own.clears)):
+            for low in bits_of(bits):
+                if not register.get(low, 0) & ~closed & candidates:
+                    return 0
         best = -1
-        for register, bits in ((self.prints.setting, c.need & ~state), (clearing, present)):
+        for register, bits in ((setting, missing), (clearing, present)):
             for low in bits_of(bits):
                 found = register.get(low, 0) & ~closed & candidates
                 if not found:

@@ -26,9 +26,10 @@ from m2pem.verify.ltl.formula import (
 from m2pem.verify.mission_runs import MissionRuns
 from m2pem.verify.product import Result, check
 from m2pem.verify.reduction import StubbornSets
+from m2pem.verify.simplify import simplify
 from m2pem.verify.system import Action, Role, System
 
-FEW = Limits(states=1_500, tokens=3, seconds=5.0)
+FEW = Limits(states=1_500, tokens=3, seconds=60.0)
 
 
 def atoms_of(dice: Random, system: System, count: int = 3) -> list[Formula]:
@@ -104,6 +105,9 @@ def both(system: System, formula: Formula, whole: Exploration | None = None) -> 
     if not whole.complete:
         return None
     labels = labels_of(system, formula)
-    reduced = explore(system, FEW, reduction=StubbornSets(system, labels.visible_rules()))
-    found = [check(MissionRuns(each, labels), formula).result for each in (whole, reduced)]
-    return Both(whole, reduced, (found[0], found[1]))
+    answers = [check(MissionRuns(whole, labels), formula).result]
+    small = simplify(system, labels.visible_places(), labels.visible_rules())
+    labels = labels_of(small, formula)
+    reduced = explore(small, FEW, reduction=StubbornSets(small, labels.visible_rules()))
+    answers.append(check(MissionRuns(reduced, labels), formula).result)
+    return Both(whole, reduced, (answers[0], answers[1]))

@@ -65,12 +65,13 @@ class _Draft:
         self.rule(Kind.INTERNAL, [source], [target], assign=self._assignment(30))
 
     def _row(self, source: int, target: int, depth: int) -> None:
-        between = self.place()
+        between = self.place(self.dice.choice([Role.ACTIVE, Role.ENTERING, Role.TRIGGERED]))
         self.block(source, between, depth + 1)
         self.block(between, target, depth + 1)
 
     def _fork(self, source: int, target: int, depth: int) -> None:
-        starts = [self.place() for _ in range(self.dice.choice((2, 2, 3)))]
+        role = self.dice.choice([Role.ACTIVE, Role.ENTERING])
+        starts = [self.place(role) for _ in range(self.dice.choice((2, 2, 3)))]
         ends = [self.place() for _ in starts]
         inside = set(starts)
         self.scopes.append(inside)

@@ -17,6 +17,7 @@ from m2pem.verify.mission_runs import MissionRuns
 from m2pem.verify.product import Limits, Progress, Result, Run, Stopped, Verdict, check
 from m2pem.verify.reduction import Reduction, StubbornSets
 from m2pem.verify.requirements.requirement import Requirement
+from m2pem.verify.simplify import simplify
 from m2pem.verify.system import Rule, System
 
 
@@ -49,6 +50,37 @@ def conditions(requirements: Sequence[Requirement]) -> tuple[Expression, ...]:
     )
 
 
+def system_for(
+    mission: Mission,
+    fleet: Fleet,
+    requirements: Sequence[Requirement],
+    *,
+    process: str | None = None,
+    options: Options | None = None,
+) -> System:
+    """The rules that requirements are asked of: as few as say the same to all of them.
+
+    Where one of them tells single steps apart, or asks what is fair to each, they stay as they are.
+
+    Raises:
+        KeyError: the mission has no such process.
+    """
+    options = replace(options or Options(), conditions=conditions(requirements))
+    system = derive(mission, fleet, process=process, options=options)
+    if any(each.fair or needs_steps(each.formula) for each in requirements):
+        return system
+    places: frozenset[int] = frozenset()
+    rules: frozenset[int] = frozenset()
+    for each in requirements:
+        try:
+            labels = Labels(system, mission, fleet, propositions(each.formula))
+        except UnknownDataError:
+            continue  # it is going to be undecided, whatever the rules are
+        places |= labels.visible_places()
+        rules |= labels.visible_rules()
+    return simplify(system, places, rules)
+
+
 def check_mission(
     mission: Mission,
     fleet: Fleet,
@@ -63,8 +95,7 @@ def check_mission(
 
     With `reduce`, orders that make no difference to a requirement are left out where they can be.
     """
-    options = replace(options or Options(), conditions=conditions(requirements))
-    system = derive(mission, fleet, process=process, options=options)
+    system = system_for(mission, fleet, requirements, process=process, options=options)
     whole: Exploration | None = None
     answers = []
     for each in requirements:
