@@ -24,6 +24,8 @@ FULL_TIME = 0.4
 """Of the time that there is: what may be spent on that."""
 _BYTES_A_RULE = 2_500
 """About what a rule costs in memory, from when it is derived until it is searched with."""
+_FEWER_BEYOND = 100
+"""Rules of a system beyond which fewer states are searched so: each of them takes longer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,14 +142,13 @@ def search(
 ) -> Exploration:
     """All of it if it is small; else without the orders that lead to the same."""
     began = time.monotonic()
+    whole = min(limits.states, full_states(system))
+    beyond = limits.states > whole
     small = replace(
-        limits,
-        states=min(limits.states, FULL_STATES),
-        seconds=limits.seconds * FULL_TIME if limits.states > FULL_STATES else limits.seconds,
+        limits, states=whole, seconds=limits.seconds * FULL_TIME if beyond else limits.seconds
     )
     found = explore(system, small, progress=progress)
-    more = found.stopped in (Stopped.STATES, Stopped.TIME) and limits.states > FULL_STATES
-    if not more:
+    if found.stopped not in (Stopped.STATES, Stopped.TIME) or not beyond:
         return found
     try:
         reduction = StubbornSets(system)
@@ -155,3 +156,8 @@ def search(
     except KeyboardInterrupt:  # before the other search had begun
         found.stopped = Stopped.INTERRUPTED
         return found
+
+
+def full_states(system: System) -> int:
+    """States up to which a system is searched without leaving anything out."""
+    return FULL_STATES * _FEWER_BEYOND // max(_FEWER_BEYOND, len(system.rules))

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from m2pem.verify.encoding import Encoding, Marking
+from m2pem.verify.ignoring import ignoring
 from m2pem.verify.reduction import Reduction
 from m2pem.verify.retesting import affected_rules, as_sets, tests_of
 from m2pem.verify.system import Flag, Kind, System
@@ -136,6 +137,8 @@ def explore(
 ) -> Exploration:
     """Search a system. `reduction`: which rules need not be tried now; None tries all.
 
+    With a reduction, edges are always kept: it needs them.
+
     KeyboardInterrupt ends the search; what was seen until then is returned (`Stopped`).
     """
     limits = limits or Limits()
@@ -144,9 +147,10 @@ def explore(
     runs: dict[int, tuple[int, ...]] = {}
     began = time.monotonic()
     while True:
-        search = _Search(system, Encoding(system, wider), limits, began, keep_edges)
+        edges = keep_edges or reduction is not None
+        search = _Search(system, Encoding(system, wider), limits, began, edges)
         found = search.run(reduction, progress)
-        while search.closed_circle and found.stopped is None:
+        while found.stopped is None and search.puts_off_for_ever(found):
             found = search.run(reduction, progress)
         again = False
         for place, (state, rule) in found.overflows.items():
@@ -198,7 +202,9 @@ class _Search:
         self.keep_edges = keep_edges
         self.whole: set[int] = set()
         """States that are on a circle: there, nothing may be put off, or it would be for ever."""
-        self.closed_circle = False
+        self.partly: set[int] = set()
+        self.inner: set[int] = set()
+        self.goes_back = False
         rules = encoding.rules
         self.affected = affected_rules(encoding)
         self.affected_sets = as_sets(self.affected)
@@ -275,8 +281,8 @@ class _Search:
         outside = [each == 2 for each in rank]
         transitions = looked = 0
         look_every = _LOOK_EVERY if choose is None else _LOOK_EVERY_CHOICE
-        partly: set[int] = set()
-        self.closed_circle = False
+        self.partly, self.inner = partly, inner = set(), set()
+        self.goes_back = False
         at = 0
         count = len(states)
         while at < count:
@@ -298,63 +304,60 @@ class _Search:
             if not all([outside[n] for n in enabled]):  # noqa: C419 (a list is faster)
                 best = min([rank[n] for n in enabled])
                 usable = [n for n in enabled if rank[n] == best]
-            whole = usable
+                if choose is not None:
+                    inner.add(at)
             if choose is not None and len(usable) > 1 and state not in self.whole:
-                usable = choose(state, usable)
-                if len(usable) < len(whole):
+                chosen = choose(state, usable)
+                if len(chosen) < len(usable):
                     partly.add(at)
-            before = transitions
+                    usable = chosen
             transitions += len(usable)
-            while True:
-                fresh = False
-                for number in usable:
-                    masks_of = fast[number]
-                    if masks_of is not None:
-                        after = state & masks_of[0]
-                        put = masks_of[1]
-                        if after & put:
-                            after, full = fire(number, state)
-                            overflows.setdefault(full, (at, number))
-                        else:
-                            after |= put
-                    else:
+            for number in usable:
+                masks_of = fast[number]
+                if masks_of is not None:
+                    after = state & masks_of[0]
+                    put = masks_of[1]
+                    if after & put:
                         after, full = fire(number, state)
-                        if full >= 0:
-                            overflows.setdefault(full, (at, number))
-                    if unfired[number]:
-                        unfired[number] = False
-                        fired[number] = at
-                    known = setdefault(after, count)
-                    if known == count:
-                        count += 1
-                        fresh = True
-                        add_state(after)
-                        add_parent(at)
-                        add_via(number)
-                        touched = affected_sets[number]
-                        new = [n for n in enabled if n not in touched]
-                        for n, test, need, plain in tests[number]:
-                            if after & test == need and (plain or enabled_now(n, after)):
-                                new.append(n)
-                        wait(tuple(new))
-                    elif known > at:
-                        fresh = True
-                    elif known in partly:
-                        self.whole.add(states[known])
-                        self.closed_circle = True
-                    if edge_rule is not None:
-                        edge_rule.append(number)
-                        edge_state.append(known)  # type: ignore[union-attr]
-                if fresh or len(usable) == len(whole):
-                    break
-                # Round a circle what was put off would be put off for ever: now it is tried.
+                        overflows.setdefault(full, (at, number))
+                    else:
+                        after |= put
+                else:
+                    after, full = fire(number, state)
+                    if full >= 0:
+                        overflows.setdefault(full, (at, number))
+                if unfired[number]:
+                    unfired[number] = False
+                    fired[number] = at
+                known = setdefault(after, count)
+                if known == count:
+                    count += 1
+                    add_state(after)
+                    add_parent(at)
+                    add_via(number)
+                    touched = affected_sets[number]
+                    new = [n for n in enabled if n not in touched]
+                    for n, test, need, plain in tests[number]:
+                        if after & test == need and (plain or enabled_now(n, after)):
+                            new.append(n)
+                    wait(tuple(new))
+                elif known <= at:
+                    self.goes_back = True
                 if edge_rule is not None:
-                    del edge_rule[before:]
-                    del edge_state[before:]  # type: ignore[union-attr]
-                usable = whole
-                transitions = before + len(whole)
+                    edge_rule.append(number)
+                    edge_state.append(known)  # type: ignore[union-attr]
             at += 1
         found.transitions = transitions
+
+    def puts_off_for_ever(self, found: Exploration) -> bool:
+        """Whether a reduced search would; if so, it is to begin anew, and then puts off less."""
+        if not self.partly or not self.goes_back:
+            return False
+        count = len(found.states)
+        targets = [[state for _, state in found.successors(n)] for n in range(count)]
+        more = ignoring(targets, self.inner, self.partly)
+        self.whole.update(found.states[n] for n in more)
+        return bool(more)
 
     def _stop(
         self,

@@ -91,19 +91,9 @@ class Labels:
             if now or places & _touched(rule) or any(v in variables for v, _ in rule.assign)
         )
 
-    def visible_places(self) -> frozenset[int] | None:
-        """Places such that whoever looks at them sees all visible rules fire; None: there are none.
-
-        Beside the places that propositions are about, those that visible rules consume.
-        """
-        places = set[int]().union(*self._places)
-        for number in self.visible_rules():
-            rule = self.system.rules[number]
-            if not places & _touched(rule):
-                if not rule.consume:
-                    return None
-                places.add(rule.consume[0][0])
-        return frozenset(places)
+    def visible_places(self) -> frozenset[int]:
+        """The places that propositions are about."""
+        return frozenset[int]().union(*self._places)
 
     # --- propositions ---------------------------------------------------------------------------
 

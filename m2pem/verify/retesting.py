@@ -5,7 +5,7 @@ What is said of those is shared: in a large mission there is no room to say it o
 """
 
 from m2pem.verify.encoding import Encoding
-from m2pem.verify.reduction import bits_of
+from m2pem.verify.footprints import bits_of
 
 
 def as_sets(affected: list[list[int]]) -> list[frozenset[int]]:

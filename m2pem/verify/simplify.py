@@ -5,6 +5,7 @@ what comes to the place goes straight to what follows it. The places that remain
 """
 
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import replace
 
 from m2pem.verify.concurrency import Concurrency, is_small
@@ -14,13 +15,17 @@ _MOST_PAIRS = 64
 """Rules that one passed place may be replaced by."""
 
 
-def simplify(system: System) -> System:
-    """The same, smaller."""
+def simplify(system: System, seen: Collection[int] = (), visible: Collection[int] = ()) -> System:
+    """The same, smaller.
+
+    `seen`: places that a property looks at; `visible`: rules that change those, or are looked at
+    themselves. Those places stay, and such a rule stays a step of its own after what it follows.
+    """
     concurrency = Concurrency(system) if is_small(system) else None
     rules = list(system.rules)
     if concurrency is not None:
         rules = [_trim(rule, concurrency) for rule in rules if concurrency.may_fire(rule)]
-    return renumbered(system, _fused(system, rules))
+    return renumbered(system, _fused(system, rules, frozenset(seen), frozenset(visible)))
 
 
 def _trim(rule: Rule, concurrency: Concurrency) -> Rule:
@@ -76,8 +81,10 @@ def renumbered(system: System, rules: list[Rule]) -> System:
 # --- passed places ------------------------------------------------------------------------------
 
 
-def _fused(system: System, rules: list[Rule]) -> list[Rule]:
-    looked_at: set[int] = set()
+def _fused(
+    system: System, rules: list[Rule], seen: frozenset[int], visible: frozenset[int]
+) -> list[Rule]:
+    looked_at: set[int] = set(seen)
     watched: set[int] = set()
     for rule in rules:
         sources = {source for source, _ in (*rule.moves, *rule.copies)}
@@ -103,6 +110,8 @@ def _fused(system: System, rules: list[Rule]) -> list[Rule]:
         eaters = [alive[n] for n in sorted(consumers.get(p, ()))]
         makers = sorted(producers.get(p, ()))
         if not eaters or not all(_passes(rule, p, watched) for rule in eaters):
+            continue
+        if any(rule.index in visible for rule in eaters):  # of joined ones, that of the first
             continue
         if len(eaters) * len(makers) > max(_MOST_PAIRS, len(eaters) + len(makers)):
             continue

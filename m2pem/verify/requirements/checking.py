@@ -7,16 +7,18 @@ from m2pem.model.expression import Expression
 from m2pem.model.mission import Mission
 from m2pem.resources.fleet import Fleet
 from m2pem.verify.derive import Options, derive
+from m2pem.verify.derive.bound import Bound
 from m2pem.verify.explore import Exploration, explore
 from m2pem.verify.explore import Limits as ExploreLimits
 from m2pem.verify.explore import Stopped as ExploreStopped
 from m2pem.verify.labels import Labels, UnknownDataError
-from m2pem.verify.ltl import Observer, negated, propositions
+from m2pem.verify.ltl import propositions
 from m2pem.verify.ltl.formula import Data, needs_steps
 from m2pem.verify.mission_runs import MissionRuns
 from m2pem.verify.product import Limits, Progress, Result, Run, Stopped, Verdict, check
 from m2pem.verify.reduction import Reduction, StubbornSets
 from m2pem.verify.requirements.requirement import Requirement
+from m2pem.verify.simplify import simplify
 from m2pem.verify.system import Rule, System
 
 
@@ -49,6 +51,39 @@ def conditions(requirements: Sequence[Requirement]) -> tuple[Expression, ...]:
     )
 
 
+def system_for(
+    mission: Mission,
+    fleet: Fleet,
+    requirements: Sequence[Requirement],
+    *,
+    process: str | None = None,
+    options: Options | None = None,
+    bound: Bound | None = None,
+) -> System:
+    """The rules that requirements are asked of: as few as say the same to all of them.
+
+    Where one of them tells single steps apart, or asks what is fair to each, they stay as they are.
+
+    Raises:
+        KeyError: the mission has no such process.
+        TooLargeError: it stands for more than `bound` allows.
+    """
+    options = replace(options or Options(), conditions=conditions(requirements))
+    system = derive(mission, fleet, process=process, options=options, bound=bound)
+    if any(each.fair or needs_steps(each.formula) for each in requirements):
+        return system
+    places: frozenset[int] = frozenset()
+    rules: frozenset[int] = frozenset()
+    for each in requirements:
+        try:
+            labels = Labels(system, mission, fleet, propositions(each.formula))
+        except UnknownDataError:
+            continue  # it is going to be undecided, whatever the rules are
+        places |= labels.visible_places()
+        rules |= labels.visible_rules()
+    return simplify(system, places, rules)
+
+
 def check_mission(
     mission: Mission,
     fleet: Fleet,
@@ -63,8 +98,7 @@ def check_mission(
 
     With `reduce`, orders that make no difference to a requirement are left out where they can be.
     """
-    options = replace(options or Options(), conditions=conditions(requirements))
-    system = derive(mission, fleet, process=process, options=options)
+    system = system_for(mission, fleet, requirements, process=process, options=options)
     whole: Exploration | None = None
     answers = []
     for each in requirements:
@@ -82,19 +116,15 @@ def reduction_for(
 ) -> Reduction | None:
     """What may be left out of the search for one requirement; None: nothing.
 
-    Only what is broken once and for all, if at all, can do with less: runs that go round for ever
-    in one part of the mission, and leave another where it is, may be missing then.
+    Runs that put something off for ever, and single steps, are kept only where all is tried.
     """
-    formula = requirement.formula
-    if requirement.fair or needs_steps(formula):
-        return None
-    if Observer(negated(formula)).automaton.needs_rounds:
+    if requirement.fair or needs_steps(requirement.formula):
         return None
     try:
-        places = Labels(system, mission, fleet, propositions(formula)).visible_places()
+        labels = Labels(system, mission, fleet, propositions(requirement.formula))
     except UnknownDataError:
         return None
-    return StubbornSets(system, places) if places is not None else None
+    return StubbornSets(system, labels.visible_rules())
 
 
 def check_requirement(

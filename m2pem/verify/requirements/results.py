@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 from m2pem.model.mission import Mission
 from m2pem.resources.fleet import Fleet
 from m2pem.verify import product
-from m2pem.verify.check import FULL_STATES, Report, bound_of
-from m2pem.verify.derive import Options, TooLargeError, derive
+from m2pem.verify.check import Report, bound_of, full_states
+from m2pem.verify.derive import Options, TooLargeError
 from m2pem.verify.explore import Exploration, Limits, Progress, Stopped, explore
 from m2pem.verify.ltl import propositions
 from m2pem.verify.ltl.formula import Active, Completed
 from m2pem.verify.requirements.checking import (
     Answer,
     check_requirement,
-    conditions,
     reduction_for,
+    system_for,
 )
 from m2pem.verify.requirements.requirement import Requirement
 from m2pem.verify.results import Result, Verdict, Violation
@@ -53,9 +53,10 @@ class _Asking:
     def _search(self, requirement: Requirement) -> Exploration:
         """All of it if it is small; else, if that can be, without orders that lead to the same."""
         if self.small is None:
-            least = replace(self.limits, states=min(self.limits.states, FULL_STATES))
-            self.small = explore(self.system, least, progress=self.progress)
-        if self.small.stopped is not Stopped.STATES or self.limits.states <= FULL_STATES:
+            least = min(self.limits.states, full_states(self.system))
+            limits = replace(self.limits, states=least)
+            self.small = explore(self.system, limits, progress=self.progress)
+        if self.small.stopped is not Stopped.STATES or len(self.small.states) > self.limits.states:
             return self.small
         reduction = reduction_for(self.system, self.mission, self.fleet, requirement)
         if reduction is not None:
@@ -90,10 +91,11 @@ def with_requirements(
     if not requirements:
         return report
     limits = limits or Limits(tokens=3)
-    options = replace(options or Options(), conditions=conditions(requirements))
     try:
         bound = bound_of(limits)
-        system = derive(mission, fleet, process=process, options=options, bound=bound)
+        system = system_for(
+            mission, fleet, requirements, process=process, options=options, bound=bound
+        )
     except TooLargeError as error:
         why = f"too large to search: {error}"
         answers = (Answer(each, product.Result.UNDECIDED, why=why) for each in requirements)

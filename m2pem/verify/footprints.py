@@ -1,0 +1,82 @@
+"""What each rule looks at and changes, as bits of states, and which rules do so to each bit."""
+
+from collections.abc import Iterable, Sequence
+
+from m2pem.verify.encoding import Encoding
+
+
+class Footprints:
+    """By rule, bits of states; by bit, rules as a mask of their numbers.
+
+    A rule `needs` bits that must be set or whose tokens it moves on, and `forbids` bits that must
+    not be set or, for the same reason, bear on what it does. It `clears` and `sets` bits, and the
+    places of `kill` are emptied whatever they hold.
+    """
+
+    def __init__(self, encoding: Encoding) -> None:
+        count = len(encoding.rules)
+        self.encoding = encoding
+        self.needs, self.forbids = [0] * count, [0] * count
+        self.clears, self.sets = [0] * count, [0] * count
+        self.kill = [encoding.places_mask(rule.kill) for rule in encoding.system.rules]
+        for number in range(count):
+            self._look_at(number)
+        self.needing = _registered(self.needs)
+        self.forbidding = _registered(self.forbids)
+        self.clearing = _registered(self.clears, self.kill)
+        self.setting = _registered(self.sets)
+
+    def _look_at(self, number: int) -> None:
+        encoding = self.encoding
+        c = encoding.rules[number]
+        needs, forbids = c.need, c.test & ~c.need
+        for mask in c.any_of:
+            needs |= mask
+            forbids |= mask
+        for mask, _, _ in c.at_least:
+            needs |= mask
+        clears, sets = c.clear, c.put
+        for place, _ in c.takes:
+            clears |= encoding.mask[place]
+        for source, target, _, gone in c.moves:
+            needs |= source
+            forbids |= source
+            sets |= target
+            if gone:
+                clears |= source
+        for mask, *_ in c.gives:
+            sets |= mask
+        self.needs[number], self.forbids[number] = needs, forbids
+        self.clears[number], self.sets[number] = clears, sets
+
+    def setting_any(self, mask: int) -> int:
+        """The rules that set any bit of a mask."""
+        found = 0
+        for low in bits_of(mask):
+            found |= self.setting.get(low, 0)
+        return found
+
+
+def _registered(masks: Sequence[int], kill: Sequence[int] = ()) -> dict[int, int]:
+    """By bit, the rules whose masks have it. Many rules `kill` the same bits: those go together."""
+    found: dict[int, int] = {}
+    alike: dict[int, int] = {}
+    for number, mask in enumerate(masks):
+        own = mask
+        if kill and kill[number] & ~mask == 0:
+            own &= ~kill[number]
+            alike[kill[number]] = alike.get(kill[number], 0) | 1 << number
+        for low in bits_of(own):
+            found[low] = found.get(low, 0) | 1 << number
+    for mask, numbers in alike.items():
+        for low in bits_of(mask):
+            found[low] = found.get(low, 0) | numbers
+    return found
+
+
+def bits_of(mask: int) -> Iterable[int]:
+    """Each bit of a mask, as a mask of its own."""
+    while mask:
+        low = mask & -mask
+        yield low
+        mask ^= low

@@ -1,0 +1,113 @@
+"""Answers to a formula about a system without a mission, with and without reduction."""
+
+from dataclasses import dataclass
+from random import Random
+from types import SimpleNamespace
+
+from m2pem.verify.explore import Exploration, Limits, explore
+from m2pem.verify.labels import Labels
+from m2pem.verify.ltl import propositions
+from m2pem.verify.ltl.formula import (
+    Active,
+    Always,
+    And,
+    Completed,
+    Count,
+    Eventually,
+    Formula,
+    Implies,
+    Not,
+    Once,
+    Or,
+    Since,
+    Until,
+    WeakUntil,
+)
+from m2pem.verify.mission_runs import MissionRuns
+from m2pem.verify.product import Result, check
+from m2pem.verify.reduction import StubbornSets
+from m2pem.verify.simplify import simplify
+from m2pem.verify.system import Action, Role, System
+
+FEW = Limits(states=1_500, tokens=3, seconds=60.0)
+
+
+def atoms_of(dice: Random, system: System, count: int = 3) -> list[Formula]:
+    """Some things that may be true in the system."""
+    active = sorted({p.element for p in system.places if p.role is not Role.END})
+    done = {s.element for r in system.rules for s in r.steps if s.action is Action.COMPLETED}
+    found: list[Formula] = []
+    for _ in range(count):
+        if done and dice.random() < 0.6:
+            found.append(Completed(dice.choice(sorted(done))))
+        else:
+            found.append(Active(dice.choice(active)))
+    return found
+
+
+def formula_of(dice: Random, atoms: list[Formula], depth: int = 3) -> Formula:
+    """A random formula in which no single steps are told apart; some that people write."""
+    a, b, c = (dice.choice(atoms) for _ in range(3))
+    if depth == 3 and dice.random() < 0.5:
+        return dice.choice(
+            (
+                Always(Implies(a, Eventually(b))),
+                WeakUntil(Not(a), b),
+                Always(Not(And((a, b)))),
+                Eventually(a),
+                Eventually(And((a, Eventually(b)))),
+                Always(Eventually(a)),
+                Eventually(Always(Not(a))),
+                Always(Implies(a, WeakUntil(Not(b), c))),
+                Always(Implies(a, Once(b))),
+                Implies(Always(Eventually(a)), Always(Eventually(b))),
+                Always(Implies(a, Or((Eventually(b), Always(c))))),
+                Always(Implies(a, Since(Not(b), c))),
+                Always(Count((a,), "<=", 1)),
+            )
+        )
+    if not depth or dice.random() < 0.15:
+        return a
+    one, other = (formula_of(dice, atoms, depth - 1) for _ in range(2))
+    return dice.choice(
+        (
+            Not(one),
+            And((one, other)),
+            Or((one, other)),
+            Implies(one, other),
+            Always(one),
+            Always(one),
+            Eventually(one),
+            Eventually(one),
+            Until(one, other),
+            WeakUntil(one, other),
+        )
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Both:
+    """What both searches answer; None: it is too large to be searched whole."""
+
+    whole: Exploration
+    reduced: Exploration
+    answers: tuple[Result, Result]
+
+
+def labels_of(system: System, formula: Formula) -> Labels:
+    world = SimpleNamespace(elements={}), SimpleNamespace(teams={})
+    return Labels(system, *world, propositions(formula))  # type: ignore[arg-type]
+
+
+def both(system: System, formula: Formula, whole: Exploration | None = None) -> Both | None:
+    """The formula's answers without and with reduction."""
+    whole = whole or explore(system, FEW)
+    if not whole.complete:
+        return None
+    labels = labels_of(system, formula)
+    answers = [check(MissionRuns(whole, labels), formula).result]
+    small = simplify(system, labels.visible_places(), labels.visible_rules())
+    labels = labels_of(small, formula)
+    reduced = explore(small, FEW, reduction=StubbornSets(small, labels.visible_rules()))
+    answers.append(check(MissionRuns(reduced, labels), formula).result)
+    return Both(whole, reduced, (answers[0], answers[1]))
