@@ -1,5 +1,6 @@
 """Writes what `m2pem verify` found to files: Markdown with pictures, JSON, SVG."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,7 @@ def write(file: Path, findings: "Findings") -> None:
             file.write_text(as_json(as_data(findings)) + "\n", encoding="utf-8")
         elif file.suffix == ".svg":
             first = next(iter(findings.violations), None)
-            file.write_text(_picture(findings, first), encoding="utf-8")
+            _write_pictures(file, _pictures(findings, first))
         else:
             _write_markdown(file, findings)
     except OSError as error:
@@ -35,24 +36,38 @@ def write(file: Path, findings: "Findings") -> None:
 def _write_markdown(file: Path, findings: "Findings") -> None:
     from m2pem.verify.report.markdown import as_markdown
 
-    pictures: dict[int, str] = {}
+    pictures: dict[int, list[str]] = {}
     for number, violation in enumerate(findings.violations):
         if violation.answer.warning and not findings.strict:
             continue
         beside = file.with_name(f"{file.stem}-{number + 1}.svg")
         try:
-            drawn = _picture(findings, violation)
+            drawn = _pictures(findings, violation)
         except UnusableError:  # the report is worth having without it
             break
-        beside.write_text(drawn, encoding="utf-8")
-        pictures[number] = beside.name
+        pictures[number] = _write_pictures(beside, drawn)
     file.write_text(as_markdown(findings, pictures), encoding="utf-8")
 
 
-def _picture(findings: "Findings", violation: "Violated | None") -> str:
-    from m2pem.verify.report.picture import picture
+def _write_pictures(file: Path, drawn: Mapping[str, str]) -> list[str]:
+    """The first one as `file`, the others beside it: `FILE-PROCESSES.svg`. Answers with names."""
+    names = []
+    for qualifier, picture in drawn.items():
+        each = file.with_stem(f"{file.stem}-{_plain(qualifier)}") if qualifier else file
+        each.write_text(picture, encoding="utf-8")
+        names.append(each.name)
+    return names
+
+
+def _plain(name: str) -> str:
+    """A part of a file's name: qualifiers come from strangers' files."""
+    return "".join(each if each.isalnum() or each in "-_" else "_" for each in name)
+
+
+def _pictures(findings: "Findings", violation: "Violated | None") -> Mapping[str, str]:
+    from m2pem.verify.report.picture import pictures
 
     try:
-        return picture(findings, violation)
+        return pictures(findings, violation)
     except ValueError as error:
         raise UnusableError(f"{findings.mission.file} cannot be drawn: {error}") from error

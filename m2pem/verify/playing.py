@@ -15,12 +15,16 @@ from typing import Any
 
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
+from m2pem.engine.conditions import definition_of
+from m2pem.engine.data import reader
 from m2pem.engine.run import MissionRun, Step
-from m2pem.engine.state import BehaviorPhase, RunStatus, Token
+from m2pem.engine.state import BehaviorPhase, RunStatus, Token, Wait
+from m2pem.engine.steps import Steps
 from m2pem.model.catalogue import BehaviorState
 from m2pem.model.mission import Mission
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
+from m2pem.verify.making_true import data_for
 from m2pem.verify.system import Trigger
 
 _SECOND_US = 1_000_000
@@ -34,6 +38,36 @@ class NotPlayableError(Exception):
     """The engine is not where the run says, or something in it cannot be brought about."""
 
 
+class _Patient(Steps):
+    """Steps of a run into which data may still be written from nowhere."""
+
+    __slots__ = ()
+
+    def _notice_a_stuck_run(self) -> None:
+        """A condition may still become true."""
+        if not self.state.conditions:
+            super()._notice_a_stuck_run()
+
+
+class _Run(MissionRun):
+    """A run into which data can be written that nothing in the mission writes.
+
+    The rules let a condition on such data become true at any time.
+    """
+
+    def __init__(self, mission: Mission, fleet: Fleet | None) -> None:
+        super().__init__(mission, fleet, "r1")
+        self._x = _Patient(self.state, fleet, 10_000)
+
+    def write(self, wait: Wait, data: dict[str, Value], now_us: int) -> Step:
+        """Write data where a condition is awaited that reads it."""
+        x = self._x
+        seq, t_us = self.state.seq + 1, self.state.mission_time_us(now_us)
+        x.begin(now_us)
+        x.write_in(wait.scope, wait.node, data)
+        return Step(i.Continue(), now_us, t_us, seq, x.finish(), ())
+
+
 class Player:
     """A run of the engine that is led along a run of the rules. `steps` has all that it did."""
 
@@ -44,7 +78,7 @@ class Player:
         process: str,
         data: Mapping[str, Value] | None = None,
     ) -> None:
-        self.run = MissionRun(mission, fleet, "r1")
+        self.run = _Run(mission, fleet)
         self.steps: list[Step] = []
         self._now_us = _START_US
         self._reports: Counter[str] = Counter()
@@ -102,9 +136,7 @@ class Player:
             case Trigger.TIMER:
                 self._time_is_up(element)
             case Trigger.CONDITION:
-                raise NotPlayableError(
-                    f"the condition of {element} becomes true by data that the rules do not know"
-                )
+                self._come_true(element, step["data"])
 
     def _end_work(self, element: str, code: str, writes: Mapping[str, Any]) -> None:
         token = self._token(element, "behavior", "service", "prompt")
@@ -132,14 +164,38 @@ class Player:
                 return
         raise NotPlayableError(f"no timer of {element} runs in the engine")
 
+    def _come_true(self, element: str, data: Mapping[str, Value]) -> None:
+        """Write what makes the condition true for which an element waits: nothing else does."""
+        state = self.run.state
+        for number, wait in list(state.waits.items()):
+            if number not in state.conditions or wait.node.id != element:
+                continue
+            before = [] if state.conditions[number] else [False]  # it must be seen false first
+            for truth in [*before, True]:
+                read = reader(wait.token or wait.scope)
+                known = {key for name in data for key in _endings(name)}
+                values = data_for(definition_of(wait).condition, truth, read, known)
+                if values is None:
+                    raise NotPlayableError(f"no data was found for the condition of {element}")
+                steps = self._after(self.run.write(wait, dict(values), self._now_us))
+            if self._fires(steps, element):
+                return
+        where = ", ".join(self.where) or "nowhere"
+        raise NotPlayableError(f"no condition of {element} is awaited now: tokens are {where}")
+
     def _fires(self, steps: Sequence[Step], element: str) -> bool:
         return any(
             getattr(record, "element", "") == element for step in steps for record in step.records
         )
 
     def _give(self, item: i.Input) -> Sequence[Step]:
+        return self._after(self.run.receive(item, self._now_us))
+
+    def _after(self, step: Step) -> Sequence[Step]:
+        """What an input led to, with all that it still leads to."""
+        item = step.input
         before = len(self.steps)
-        self.steps.append(self.run.receive(item, self._now_us))
+        self.steps.append(step)
         while self.run.wants_continue:
             self.steps.append(self.run.receive(i.Continue(), self._now_us))
         if not isinstance(item, i.BehaviorReported) or item.state is not BehaviorState.CANCELLED:
@@ -160,3 +216,9 @@ class Player:
                 return token
         where = ", ".join(self.where) or "nowhere"
         raise NotPlayableError(f"{element} does not work in the engine now: its tokens are {where}")
+
+
+def _endings(name: str) -> set[str]:
+    """A name with the calls that it is in before it, and without each of them."""
+    parts = name.split(".")
+    return {".".join(parts[at:]) for at in range(len(parts))}

@@ -174,6 +174,30 @@ def test_a_prompt_that_times_out_first_lets_no_later_timer_come() -> None:
         assert ("soon" in came) is (limit != "PT30S")
 
 
+def test_timers_of_several_tokens_on_one_task_are_not_taken_for_each_others() -> None:
+    """A second token's warning may still run when the first one's time is up."""
+    text = """<startEvent id="s"/><userTask id="u">ask on</userTask><endEvent id="e"/>
+<boundaryEvent id="b" attachedToRef="u" cancelActivity="false">cycle R3/PT1S</boundaryEvent>
+<userTask id="task">ask on</userTask><endEvent id="et"/>
+<boundaryEvent id="soon" attachedToRef="task" cancelActivity="false">timer PT2S</boundaryEvent>
+<boundaryEvent id="late" attachedToRef="task">timer PT3S</boundaryEvent>
+<endEvent id="es"/><endEvent id="el"/>
+s -> u -> e
+b -> task -> et
+soon -> es
+late -> el
+"""
+
+    def waits(text: str) -> bool:
+        system = derive(mission(text), options=IN_ORDER)
+        (late,) = [r for r in system.rules if r.element == "late" and r.trigger is not None]
+        return any(system.places[place].element == "soon" for place in late.inhibit)
+
+    assert not waits(text)
+    alone = text.replace("b -> task -> et", "b -> e").replace("u -> e", "u -> task -> et")
+    assert waits(alone)
+
+
 def several_timers(dice: Random) -> Mission:
     """Timers on activities, behind gateways and of event subprocesses, with close times."""
 

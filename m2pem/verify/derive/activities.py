@@ -5,6 +5,7 @@ from m2pem.model.behavior import Assignment, Behavior
 from m2pem.model.expression.expression import literal
 from m2pem.resources.units import Dimension, UnitError, quantity
 from m2pem.verify.derive import containers
+from m2pem.verify.derive.catching import catching
 from m2pem.verify.derive.compensation import undoable, undone
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.holding import behavior_of, held_by, resources
@@ -13,8 +14,8 @@ from m2pem.verify.derive.loops import looped
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
 from m2pem.verify.derive.throwing import catchable, message_effects, throw_error
-from m2pem.verify.derive.timers import runs, written
-from m2pem.verify.derive.waiting import boundaries, catching, due_us
+from m2pem.verify.derive.timers import due_us, runs, written
+from m2pem.verify.derive.waiting import boundaries
 from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step, Trigger
 
 

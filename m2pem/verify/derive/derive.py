@@ -14,6 +14,7 @@ from m2pem.resources.madeup import fleet_for
 from m2pem.verify.derive.activities import contend
 from m2pem.verify.derive.areas import begin
 from m2pem.verify.derive.bound import Bound
+from m2pem.verify.derive.catching import what_and_ref
 from m2pem.verify.derive.containers import build, choose
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.events import after, awaited
@@ -27,8 +28,7 @@ from m2pem.verify.derive.throwing import (
     signal_effects,
     thrown_by,
 )
-from m2pem.verify.derive.timers import put_in_order
-from m2pem.verify.derive.waiting import timer_us, what_and_ref
+from m2pem.verify.derive.timers import put_in_order, timer_us
 from m2pem.verify.system import Action, Exactness, Kind, Role, Step, System, Trigger
 
 

@@ -13,8 +13,10 @@ from m2pem.model.events import (
     TerminateEventDefinition,
     TimerEventDefinition,
 )
+from m2pem.verify.derive.catching import catching, first, what_and_ref
 from m2pem.verify.derive.compensation import cancel, compensate
 from m2pem.verify.derive.effect import Effect, product
+from m2pem.verify.derive.gathering import all_must_come, gather
 from m2pem.verify.derive.leaving import along, leave
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, Draft, at
@@ -24,8 +26,7 @@ from m2pem.verify.derive.throwing import (
     throw_error,
     throw_escalation,
 )
-from m2pem.verify.derive.timers import fixed, runs
-from m2pem.verify.derive.waiting import all_must_come, catching, timer_us, what_and_ref
+from m2pem.verify.derive.timers import fixed, runs, timer_us
 from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step, Trigger
 
 
@@ -78,33 +79,9 @@ def _wait(making: Making, node: e.Event, area: Area) -> None:
 
 def _wait_for_all(making: Making, node: e.Event, area: Area, waiting: int) -> None:
     """All of its triggers must come, in any order."""
-    net = making.net
-    came: list[int] = []
-    for number, definition in enumerate(node.definitions):
-        awaited_place = net.place(node, area, Role.CONTROL, f":awaits{number}")
-        told = net.place(node, area, Role.CONTROL, f":came{number}")
-        came.append(told)
-        seen = Effect(
-            steps=(Step(node.id, Action.TRIGGERED, "one of several"),),
-            consume=(awaited_place,),
-            produce=(told,),
-        )
-        match definition:
-            case TimerEventDefinition():
-                net.rule(seen, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
-            case SignalEventDefinition() | MessageEventDefinition():
-                what, ref = what_and_ref(definition)
-                catching(making, what, ref, awaited_place, told, False, node)
-            case ConditionalEventDefinition(condition=condition):
-                if making.data.is_followed([condition], node):
-                    for guard, truth in making.data.cases([condition], area, node, lambda t: t[0]):
-                        if truth is True:
-                            making.rules(product([seen], [Effect(guard=guard)]))
-                else:
-                    net.rule(seen, Kind.OUTSIDE, Trigger.CONDITION)
-            case _:
-                net.rule(seen)
-        net.rule(
+    gathering = gather(making, node, area, area)
+    for awaited_place, told in zip(gathering.awaited, gathering.came, strict=True):
+        making.net.rule(
             Effect(
                 steps=(Step(node.id, Action.ENTERED, "waits"),),
                 read=frozenset({waiting}),
@@ -112,7 +89,7 @@ def _wait_for_all(making: Making, node: e.Event, area: Area, waiting: int) -> No
                 produce=(awaited_place,),
             )
         )
-    done = Effect(steps=(Step(node.id, Action.COMPLETED),), consume=(waiting, *came))
+    done = Effect(steps=(Step(node.id, Action.COMPLETED),), consume=(waiting, *gathering.came))
     making.rules(product([done], _leave(making, node, area)))
 
 
@@ -146,7 +123,7 @@ def _trigger(
                 for effect in product([came], ways):
                     net.rule(effect, Kind.OUTSIDE, Trigger.CONDITION)
                 return []
-            for guard, truth in making.data.cases([condition], area, node, lambda t: t[0]):
+            for guard, truth in making.data.cases([condition], area, node, first):
                 if truth is True:
                     making.rules(product(product([came], [Effect(guard=guard)]), ways))
         case _:

@@ -10,12 +10,32 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.model.duration import fixed_us
+from m2pem.model.duration import duration_us, fixed_us
 from m2pem.model.events import TimerEventDefinition, TimerKind
 from m2pem.model.expression import Expression
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.making import Making
 from m2pem.verify.derive.net import Area, Draft, Timed
+
+_2026_US = 1_767_225_600_000_000
+
+
+def due_us(expression: Expression) -> int | None:
+    """A duration that is written in the mission, in microseconds; None: it is not."""
+    if not expression.constant:
+        return None
+    try:
+        value = expression.evaluate(lambda _: None)
+        return duration_us(value, _2026_US) if isinstance(value, str) else None
+    except (ExpressionError, ExpressionSyntaxError):
+        return None
+
+
+def timer_us(definition: TimerEventDefinition) -> int | None:
+    """The same, of a timer event."""
+    if definition.kind is not TimerKind.DURATION:
+        return None
+    return due_us(definition.expression)
 
 
 def fixed(definition: TimerEventDefinition) -> int | None:

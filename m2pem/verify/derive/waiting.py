@@ -1,10 +1,6 @@
 """What waits for something: boundary events, the starts of event subprocesses, catch events."""
 
-from collections.abc import Sequence
-
-from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.model import elements as e
-from m2pem.model.duration import duration_us
 from m2pem.model.events import (
     CancelEventDefinition,
     CompensateEventDefinition,
@@ -17,54 +13,16 @@ from m2pem.model.events import (
 )
 from m2pem.model.expression import Expression
 from m2pem.verify.derive.areas import handler_host
-from m2pem.verify.derive.data import ERROR, Truth
+from m2pem.verify.derive.catching import catching, first, what_and_ref
+from m2pem.verify.derive.data import ERROR
 from m2pem.verify.derive.effect import Effect, product
+from m2pem.verify.derive.gathering import all_must_come, can_be_gathered, gather
 from m2pem.verify.derive.leaving import leave
-from m2pem.verify.derive.making import Catcher, Host, Making
+from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at, is_join
 from m2pem.verify.derive.throwing import begin_handler, throw_error
-from m2pem.verify.derive.timers import fixed, holder_of, runs
+from m2pem.verify.derive.timers import fixed, holder_of, runs, timer_us
 from m2pem.verify.system import Action, Exactness, Kind, Role, Step, Trigger
-
-_2026_US = 1_767_225_600_000_000
-
-
-def due_us(expression: Expression) -> int | None:
-    """A duration that is written in the mission, in microseconds; None: it is not."""
-    if not expression.constant:
-        return None
-    try:
-        value = expression.evaluate(lambda _: None)
-        return duration_us(value, _2026_US) if isinstance(value, str) else None
-    except (ExpressionError, ExpressionSyntaxError):
-        return None
-
-
-def timer_us(definition: TimerEventDefinition) -> int | None:
-    """The same, of a timer event."""
-    if definition.kind is not TimerKind.DURATION:
-        return None
-    return due_us(definition.expression)
-
-
-def all_must_come(event: e.Event) -> bool:
-    """Whether an event waits for all of its triggers."""
-    return event.parallel_multiple and len(event.definitions) > 1
-
-
-def catching(
-    making: Making,
-    what: str,
-    ref: str,
-    waiting: int,
-    told: int,
-    keeps: bool,
-    node: e.FlowNode,
-) -> None:
-    """A signal or message of that id reaches a token on `waiting`."""
-    register = making.signals if what == "signal" else making.messages
-    register.setdefault(ref, []).append(Catcher(waiting, told, keeps, node.id))
-
 
 # --- boundary events ----------------------------------------------------------------------------
 
@@ -76,6 +34,9 @@ def boundaries(making: Making, host: Host) -> None:
         out = at(making.net, event, host.outer)
         _leave_boundary(making, host, event, out)
         if all_must_come(event):
+            if can_be_gathered(event):
+                _gathered(making, host, event, out)
+                continue
             making.net.approximate(
                 event, Exactness.MORE, "one of its triggers is enough, not all of them"
             )
@@ -145,6 +106,20 @@ def _boundary(
             pass  # errors and escalations look for their catcher
 
 
+def _gathered(making: Making, host: Host, event: e.BoundaryEvent, out: int) -> None:
+    """All of its triggers must come; what does not interrupt then awaits them all anew."""
+    gathering = gather(making, event, host.outer, host.inside)
+    host.armed += gathering.awaited
+    caught = Effect(
+        steps=(Step(event.id, Action.TRIGGERED),), consume=gathering.came, produce=(out,)
+    )
+    if event.interrupting:
+        stop = host.leave().saying(host.node.id, Action.INTERRUPTED)
+    else:
+        stop = Effect(read=frozenset({host.active}), produce=gathering.awaited)
+    making.rules(product([caught], [stop]))
+
+
 def _once(host: Host, comes: Effect, armed: int) -> Effect:
     """What does not interrupt comes once for each token on the activity."""
     host.armed.append(armed)
@@ -205,7 +180,7 @@ def _boundary_condition(
             comes = _again(making, host, event, comes)
         net.rule(comes, Kind.OUTSIDE, Trigger.CONDITION)
         return
-    for guard, truth in making.data.cases([condition], host.outer, event, _first):
+    for guard, truth in making.data.cases([condition], host.outer, event, first):
         if event.interrupting:
             if truth is True:
                 making.rules(product([comes], [Effect(guard=guard)]))
@@ -224,18 +199,6 @@ def _boundary_condition(
                 produce=(ready,),
             )
             net.rule(reset)
-
-
-def _first(truths: Sequence[Truth]) -> Truth:
-    return truths[0]
-
-
-def what_and_ref(definition: EventDefinition) -> tuple[str, str]:
-    """("signal" or "message", its id)."""
-    if isinstance(definition, SignalEventDefinition):
-        return "signal", definition.signal.id
-    assert isinstance(definition, MessageEventDefinition)
-    return "message", definition.message.id
 
 
 # --- event subprocesses -------------------------------------------------------------------------
@@ -313,7 +276,7 @@ def _handler_condition(
         for effect in product([when], begun):
             net.rule(effect, Kind.OUTSIDE, Trigger.CONDITION)
         return
-    for guard, truth in making.data.cases([condition], area, start, _first):
+    for guard, truth in making.data.cases([condition], area, start, first):
         asked = when.then(Effect(guard=guard))
         assert asked is not None
         if truth is True:

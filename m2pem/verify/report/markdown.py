@@ -1,6 +1,6 @@
 """The report as Markdown, with a picture for each violation."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from xml.sax.saxutils import escape
 
 from m2pem.verify.report.findings import Findings, Violated
@@ -9,12 +9,12 @@ from m2pem.verify.report.text import covered
 from m2pem.verify.results import Verdict
 
 
-def as_markdown(findings: Findings, pictures: Mapping[int, str]) -> str:
-    """The whole report. `pictures`: by violation, from 0, the name of its picture's file."""
+def as_markdown(findings: Findings, pictures: Mapping[int, Sequence[str]]) -> str:
+    """The whole report. `pictures`: by violation, from 0, the names of its pictures' files."""
     return "\n".join(_lines(findings, pictures)) + "\n"
 
 
-def _lines(findings: Findings, pictures: Mapping[int, str]) -> Iterator[str]:
+def _lines(findings: Findings, pictures: Mapping[int, Sequence[str]]) -> Iterator[str]:
     yield f"# {_plain(findings.mission.file)}: {findings.verdict.value}"
     yield ""
     yield f"Process `{findings.system.process}`. {_sentence(covered(findings.coverage))}"
@@ -32,7 +32,7 @@ def _lines(findings: Findings, pictures: Mapping[int, str]) -> Iterator[str]:
         yield f"| `{answer.property}` | {verdict} | {_plain(' '.join(said))} |"
     for number, violation in enumerate(findings.violations):
         yield ""
-        yield from _violation(violation, pictures.get(number, ""))
+        yield from _violation(violation, pictures.get(number, ()))
     rough = findings.system.approximations
     if rough:
         yield ""
@@ -42,7 +42,7 @@ def _lines(findings: Findings, pictures: Mapping[int, str]) -> Iterator[str]:
             yield f"- `{each.element}` ({each.exactness.value}): {_plain(each.what)}"
 
 
-def _violation(violation: Violated, picture: str) -> Iterator[str]:
+def _violation(violation: Violated, pictures: Sequence[str]) -> Iterator[str]:
     kind = "warning" if violation.answer.warning else "violated"
     yield f"## {violation.answer.property}: {kind}"
     yield ""
@@ -50,7 +50,7 @@ def _violation(violation: Violated, picture: str) -> Iterator[str]:
     if violation.found.elements:
         yield ""
         yield f"At {', '.join(f'`{each}`' for each in violation.found.elements)}."
-    if picture:
+    for picture in pictures:
         yield ""
         yield f"![{violation.answer.property}]({picture})"
     if violation.story:

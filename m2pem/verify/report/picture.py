@@ -1,24 +1,102 @@
-"""The diagram with what a report says marked on it."""
+"""The diagrams with what a report says marked on them, one for each file that a run passes."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from m2pem.drawing import Marks, draw
+from m2pem.model.elements import Element
+from m2pem.model.mission import Mission
 from m2pem.verify.report.findings import Findings, Violated, marks_of
 
 
-def picture(findings: Findings, violation: Violated | None = None, *, about: str = "") -> str:
-    """The mission's diagram as SVG: a violation, or (None) what is never reached.
+@dataclass(frozen=True, slots=True)
+class _File:
+    """A file of processes. `qualifier`: what the ids of its elements begin with; "" for the
+    mission's own."""
+
+    qualifier: str
+    source: bytes
+    elements: Mapping[str, Element]
+
+    def has(self, element: str) -> bool:
+        """Whether an element is in it; what is no element of a process is in the mission's own."""
+        known = self.elements.get(element)
+        return (known.qualifier if known is not None else "") == self.qualifier
+
+    def local(self, element: str) -> str:
+        """What an element is called in the file."""
+        known = self.elements.get(element)
+        return known.local_id if known is not None else element
+
+    def some(self, elements: Iterable[str]) -> list[str]:
+        """Those that are in it, by what they are called there."""
+        return [self.local(each) for each in elements if self.has(each)]
+
+    def marks(self, marks: Marks) -> Marks:
+        """What is marked in it. A step keeps its number."""
+
+        def mine(marked: Mapping[str, str]) -> dict[str, str]:
+            return {self.local(each): why for each, why in marked.items() if self.has(each)}
+
+        steps: Sequence[Sequence[str]] = [self.some(step) for step in marks.steps]
+        return Marks(
+            steps,
+            mine(marks.stuck),
+            mine(marks.waiting),
+            frozenset(self.some(marks.tokens)),
+            frozenset(self.some(marks.missing)),
+            frozenset(self.some(marks.unreached)),
+        )
+
+
+def pictures(
+    findings: Findings, violation: Violated | None = None, *, about: str = ""
+) -> dict[str, str]:
+    """SVG of the mission's diagram, by "", and of the other files that a run passes.
+
+    Those are by what the ids of their elements begin with. A violation is shown, or (None) what is
+    never reached.
 
     Raises:
-        ValueError: the file has no diagram, and cannot be laid out.
+        ValueError: a file has no diagram, and cannot be laid out.
     """
-    unreached = findings.unreached
+    files = _files(findings.mission)
     if violation is None:
-        marks = Marks(unreached=unreached)
         title = f"{findings.mission.file}: {findings.verdict.value}"
-        return draw(findings.mission.source, marks, title=title, about=about)
-    return draw(
-        findings.mission.source,
-        marks_of(violation, unreached),
-        title=f"Violated: {violation.answer.text.rstrip('.')}",
-        note=violation.found.message,
-        about=about,
-    )
+        marks = Marks(unreached=findings.unreached)
+        return {"": draw(files[""].source, files[""].marks(marks), title=title, about=about)}
+    marks = marks_of(violation, findings.unreached)
+    title = f"Violated: {violation.answer.text.rstrip('.')}"
+    shown = [each for each in files.values() if each.qualifier == "" or _passed(each, marks)]
+    return {
+        each.qualifier: draw(
+            each.source, each.marks(marks), title=title, note=violation.found.message, about=about
+        )
+        for each in shown
+    }
+
+
+def picture(findings: Findings, violation: Violated | None = None, *, about: str = "") -> str:
+    """The mission's own diagram as SVG.
+
+    Raises:
+        ValueError: as `pictures`.
+    """
+    return pictures(findings, violation, about=about)[""]
+
+
+def _passed(file: _File, marks: Marks) -> bool:
+    """Whether a run passes a file, or something is wrong there."""
+    shown = (*(each for step in marks.steps for each in step), *marks.stuck)
+    return any(file.has(each) for each in shown)
+
+
+def _files(mission: Mission) -> dict[str, _File]:
+    """The mission's own file first, then the others in the order of their processes."""
+    sources = {source.name: source.data for source in mission.library}
+    found = {"": _File("", mission.source, mission.elements)}
+    for process in mission.processes:
+        if process.qualifier and process.file in sources:
+            qualifier = process.qualifier
+            found[qualifier] = _File(qualifier, sources[process.file], mission.elements)
+    return found
