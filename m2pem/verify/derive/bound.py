@@ -59,4 +59,4 @@ class Bound:
             TooLargeError: it takes too long.
         """
         if self.until_s is not None and time.monotonic() > self.until_s:
-            raise TooLargeError(element, f"the limit of time, at {self.rules:,} rules", late=True)
+            raise TooLargeError(element, "the limit of time", late=True)
