@@ -12,7 +12,8 @@ be disturbed by, those. What is left out is only put off. That keeps
 
 An interruption disturbs everything in its scope. It is left out all the same where it absorbs: a
 step that changes nothing but what the interruption takes away, and does not bear on whether it
-may come, leads with it to the same state as the interruption alone.
+may come, leads with it to the same state as the interruption alone. For the same reason, one that
+must be tried, as it comes of the same task as another step, does not draw in all of its scope.
 
 What bears on a requirement is `visible`. Where anything is put off, all that is tried is invisible
 (Peled's condition): so whatever is left out is, to the requirement, a run that is tried, with steps
@@ -22,6 +23,7 @@ at last as for those of rounds that go on for ever, as nothing is put off all th
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from heapq import nsmallest
 from typing import Protocol
 
 from m2pem.verify.concurrency import Concurrency, is_small
@@ -86,7 +88,10 @@ class _Bound:
         self.unsafe = encoding.places_mask(p.index for p in system.places if p.index not in safe)
         self._bit = [1 << rule.index for rule in self.rules]
         self._visible = bytearray(rule.index in visible for rule in self.rules)
-        self._rank = [each.bit_count() for each in prints.kill]
+        self.joins = _mask(r.index for r in self.rules if r.kind is Kind.JOIN)
+        # The same in all states: what goes on at once is gone through branch by branch.
+        self._rank = [(each.bit_count(), n) for n, each in enumerate(prints.kill)]
+        self._rivals_of: dict[int, int] = {}
 
     # --- choosing -------------------------------------------------------------------------------
 
@@ -101,8 +106,9 @@ class _Bound:
         candidates = self.internal if first is Kind.INTERNAL else self.every
         best: Sequence[int] = usable
         order = [n for n in usable if not self._visible[n]]
-        order.sort(key=self._rank.__getitem__)
-        for seed in order[:_MOST_SEEDS]:
+        for seed in nsmallest(_MOST_SEEDS, order, key=self._rank.__getitem__):
+            if len(best) <= (self._rivals(seed) & together).bit_count():
+                continue
             closed = self._close(state, seed, together, candidates, len(best))
             if closed is None:
                 continue
@@ -113,56 +119,57 @@ class _Bound:
                     break
         return best
 
+    def _rivals(self, number: int) -> int:
+        """Rules that need what a rule takes, itself among them: they are in its set in any case."""
+        found = self._rivals_of.get(number)
+        if found is None:
+            prints, found = self.prints, 0
+            for low in bits_of(prints.clears[number] & ~prints.kill[number]):
+                found |= prints.needing.get(low, 0)
+            self._rivals_of[number] = found
+        return found
+
     def _close(self, state: int, seed: int, usable: int, candidates: int, most: int) -> int | None:
         """The stubborn set of a rule; None: it is not smaller than `most`.
 
-        Interruptions that absorb all that is tried are left out of account: what was put off
-        makes no difference after one of them.
+        Interruptions that absorb the seed are left out of account: whatever comes before one of
+        them, the seed could have come first, and what else is tried need not bear with them.
         """
         macro = self.macros.of(seed, state)
         if macro is None:
             return None
-        left_out = self._disturbed(macro)[1]
-        while True:
-            closed = self._close_without(state, seed, usable, candidates, left_out, most)
-            if not isinstance(closed, tuple):
-                return closed
-            left_out &= ~closed[0]
-
-    def _close_without(
-        self, state: int, seed: int, usable: int, candidates: int, left_out: int, most: int
-    ) -> int | tuple[int] | None:
-        """The same; or, in a tuple, rules that may not be left out."""
+        add, left_out = self._disturbed(macro)
         candidates &= ~left_out
-        closed, own = 1 << seed, Macro()
-        waiting = [seed]
-        fed: list[Feed] = []
-        while waiting or fed:
+        closed, clears, sets = 1 << seed, macro.clears, macro.sets
+        fed = self._fed(macro, state, left_out)
+        waiting: list[int] = []
+        while True:
+            add &= candidates & ~closed
+            closed |= add
+            if (closed & usable).bit_count() >= most:
+                return None
+            waiting += [low.bit_length() - 1 for low in bits_of(add)]
             if not waiting:
+                if not fed:
+                    return closed
                 add = self._feeding(fed.pop(), closed, candidates)
             elif usable >> (number := waiting.pop()) & 1:
                 macro = self.macros.of(number, state)
                 if macro is None:
                     return None
-                own.clears |= macro.clears
-                own.sets |= macro.sets
-                add, _ = self._disturbed(macro)
-                if add & left_out:
-                    return (add,)
-                if macro.feeds:
-                    excused = self.relays.excused(macro, state, left_out)
-                    fed += [each for each in macro.feeds if each not in excused]
+                clears, sets = clears | macro.clears, sets | macro.sets
+                add = self._disturbed(macro)[0] & (candidates | self.joins) & ~closed
+                add &= ~self._undone_by(number, macro, add)
+                fed += self._fed(macro, state, left_out)
             else:
-                add = self._enabling(number, state, closed, own, candidates)
-            add &= candidates & ~closed
-            closed |= add
-            if (closed & usable).bit_count() >= most:
-                return None
-            while add:
-                low = add & -add
-                add ^= low
-                waiting.append(low.bit_length() - 1)
-        return closed
+                add = self._enabling(number, state, closed, (clears, sets), candidates)
+
+    def _fed(self, macro: Macro, state: int, left_out: int) -> list[Feed]:
+        """What a macro might cause with others, unless somebody else can wait."""
+        if not macro.feeds:
+            return []
+        excused = self.relays.excused(macro, state, left_out)
+        return [each for each in macro.feeds if each not in excused]
 
     def _feeding(self, feed: Feed, closed: int, candidates: int) -> int:
         """Rules one of which must fire before what a macro might cause can be: few new ones."""
@@ -177,15 +184,17 @@ class _Bound:
                         return best
         return best if best >= 0 else prints.setting_any(feed.fields[0])
 
-    def _enabling(self, number: int, state: int, closed: int, own: Macro, candidates: int) -> int:
+    def _enabling(
+        self, number: int, state: int, closed: int, own: tuple[int, int], candidates: int
+    ) -> int:
         """Rules one of which must fire before a disabled one can: few that are not in already.
 
-        `own`: what the rules that are in already clear and set: looked at first.
+        `own`: bits that the rules that are in already clear, and set.
         """
         c = self.encoding.rules[number]
-        setting, clearing = self.prints.setting, self.prints.clearing
-        missing, present = c.need & ~state, c.test & ~c.need & state
-        for register, bits in ((setting, missing & own.sets), (clearing, present & own.clears)):
+        clearing, setting = self.prints.clearing, self.prints.setting
+        present, missing = c.test & ~c.need & state, c.need & ~state
+        for register, bits in ((clearing, present & own[0]), (setting, missing & own[1])):
             for low in bits_of(bits):
                 if not register.get(low, 0) & ~closed & candidates:
                     return 0
@@ -242,6 +251,27 @@ class _Bound:
         return changes & ~prints.kill[number] == 0 and not changes & (
             prints.needs[number] | prints.forbids[number]
         )
+
+    def _undone_by(self, number: int, macro: Macro, disturbed: int) -> int:
+        """Of the rules that a step disturbs, those that it makes undone if it interrupts.
+
+        Whether they come before it or not at all, the state after it is the same, and it can come
+        just as well. The seed of a set must not count on that: it would put them off for ever.
+        """
+        prints = self.prints
+        kill = prints.kill[number]
+        if not kill:
+            return 0
+        found = 0
+        for low in bits_of(disturbed):
+            rule = low.bit_length() - 1
+            changes = prints.clears[rule] | prints.sets[rule]
+            if self._visible[rule] or not self._absorbs(number, changes):
+                continue
+            # What happens by itself must not happen after the interruption in place of before it.
+            if self.rules[rule].kind is Kind.OUTSIDE or prints.needs[rule] & kill & ~macro.sets:
+                found |= low
+        return 0 if disturbed & self.joins & ~found else found
 
 
 def _mask(rules: Iterable[int]) -> int:

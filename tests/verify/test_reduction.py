@@ -1,5 +1,6 @@
 """What is left out of a search changes no verdict."""
 
+from itertools import pairwise
 from random import Random
 
 import pytest
@@ -11,6 +12,8 @@ from m2pem.verify.simplify import simplify
 from m2pem.verify.system import System
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
+from tests.model.bpmn_text import flow
+from tests.verify.missions import mission, task
 from tests.verify.models import branches
 
 SMALL = Limits(states=1_000, tokens=3, seconds=2.0)
@@ -61,6 +64,33 @@ def test_branches_are_searched_in_time_that_grows_with_their_number_alone() -> N
         assert found.complete
         assert len(found.states) < 320
         assert set(found.fired) == set(range(len(system.rules)))
+
+
+def failing(count: int) -> System:
+    """Branches of tasks in a subprocess, each of which may fail, which interrupts all of it."""
+    row = range(3)
+    inside = '<startEvent id="s"/><parallelGateway id="f"/><parallelGateway id="j"/>'
+    inside += f'<endEvent id="e"/>{flow("s", "f")}{flow("j", "e")}'
+    for branch in range(count):
+        names = ["f", *(f"t{branch}x{place}" for place in row), "j"]
+        inside += "".join(task(each, f"v{branch}", "goto", target="x") for each in names[1:-1])
+        inside += "".join(flow(one, other) for one, other in pairwise(names))
+    around = mission(
+        f'<startEvent id="S"/><subProcess id="SUB">{inside}</subProcess><endEvent id="E"/>',
+        '<boundaryEvent id="B" attachedToRef="SUB"><errorEventDefinition/></boundaryEvent>',
+        f'<endEvent id="EB"/>{flow("S", "SUB")}{flow("SUB", "E")}{flow("B", "EB")}',
+    )
+    return simplify(derive(around))
+
+
+def test_a_failure_that_interrupts_its_siblings_does_not_bring_their_orders_back() -> None:
+    few = failing(3)
+    assert seen(reduced(few)) == seen(explore(few))
+    many = failing(20)
+    found = reduced(many)
+    assert found.complete
+    assert len(found.states) < 70
+    assert set(found.fired) == set(range(len(many.rules)))
 
 
 def test_without_reduction_every_order_is_searched() -> None:
