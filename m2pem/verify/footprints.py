@@ -1,6 +1,6 @@
 """What each rule looks at and changes, as bits of states, and which rules do so to each bit."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from m2pem.verify.encoding import Encoding
 
@@ -25,6 +25,10 @@ class Footprints:
         self.forbidding = _registered(self.forbids)
         self.clearing = _registered(self.clears, self.kill)
         self.setting = _registered(self.sets)
+        self.needing_any = Union(self.needing)
+        self.forbidding_any = Union(self.forbidding)
+        self.clearing_any = Union(self.clearing)
+        self.setting_any = Union(self.setting)
 
     def _look_at(self, number: int) -> None:
         encoding = self.encoding
@@ -49,12 +53,23 @@ class Footprints:
         self.needs[number], self.forbids[number] = needs, forbids
         self.clears[number], self.sets[number] = clears, sets
 
-    def setting_any(self, mask: int) -> int:
-        """The rules that set any bit of a mask."""
-        found = 0
-        for low in bits_of(mask):
-            found |= self.setting.get(low, 0)
-        return found
+
+class Union:
+    """Of a register, the rules of any bit of a mask; the same few masks are asked for again."""
+
+    def __init__(self, register: Mapping[int, int]) -> None:
+        self._register = register
+        self._known: dict[int, int] = {}
+
+    def __call__(self, mask: int) -> int:
+        """Those rules, as a mask of their numbers."""
+        known = self._known.get(mask)
+        if known is None:
+            known = 0
+            for low in bits_of(mask):
+                known |= self._register.get(low, 0)
+            self._known[mask] = known
+        return known
 
 
 def _registered(masks: Sequence[int], kill: Sequence[int] = ()) -> dict[int, int]:

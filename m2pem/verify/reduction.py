@@ -83,7 +83,9 @@ class _Bound:
         self.prints = prints = Footprints(encoding)
         self.macros = Macros(encoding, prints, seen)
         self.relays = Relays(encoding, prints, seen, safe)
+        self.seen = seen
         self.internal = _mask(r.index for r in self.rules if r.kind is Kind.INTERNAL)
+        self.outside = _mask(r.index for r in self.rules if r.kind is Kind.OUTSIDE)
         self.every = (1 << len(self.rules)) - 1
         self.unsafe = encoding.places_mask(p.index for p in system.places if p.index not in safe)
         self._bit = [1 << rule.index for rule in self.rules]
@@ -92,6 +94,11 @@ class _Bound:
         # The same in all states: what goes on at once is gone through branch by branch.
         self._rank = [(each.bit_count(), n) for n, each in enumerate(prints.kill)]
         self._rivals_of: dict[int, int] = {}
+        self._known_within: dict[int, int] = {}
+        self._interruptions: dict[int, int] = {}
+        for number, kill in enumerate(prints.kill):
+            if kill:
+                self._interruptions[kill] = self._interruptions.get(kill, 0) | 1 << number
 
     # --- choosing -------------------------------------------------------------------------------
 
@@ -123,10 +130,8 @@ class _Bound:
         """Rules that need what a rule takes, itself among them: they are in its set in any case."""
         found = self._rivals_of.get(number)
         if found is None:
-            prints, found = self.prints, 0
-            for low in bits_of(prints.clears[number] & ~prints.kill[number]):
-                found |= prints.needing.get(low, 0)
-            self._rivals_of[number] = found
+            taken = self.prints.clears[number] & ~self.prints.kill[number]
+            found = self._rivals_of[number] = self.prints.needing_any(taken)
         return found
 
     def _close(self, state: int, seed: int, usable: int, candidates: int, most: int) -> int | None:
@@ -223,34 +228,21 @@ class _Bound:
     def _disturbed(self, macro: Macro) -> tuple[int, int]:
         """Rules whose order with a step matters, and interruptions that absorb it."""
         prints = self.prints
-        found = 0
-        for low in bits_of(macro.clears):
-            found |= prints.needing.get(low, 0) | prints.setting.get(low, 0)
-        for low in bits_of(macro.sets):
-            found |= prints.forbidding.get(low, 0)
-            if low & self.unsafe:
-                found |= prints.setting.get(low, 0)
-        killers = 0
-        for low in bits_of(macro.sets | macro.needs):
-            killers |= prints.clearing.get(low, 0)
-        for low in bits_of(macro.forbids):
-            found |= prints.setting.get(low, 0)
-        changes = macro.clears | macro.sets
-        left = killers & ~found
-        absorbing = 0
-        while left:
-            low = left & -left
-            left ^= low
-            if self._absorbs(low.bit_length() - 1, changes):
-                absorbing |= low
+        clears, sets = macro.clears, macro.sets
+        found = prints.needing_any(clears) | prints.setting_any(clears | macro.forbids)
+        found |= prints.forbidding_any(sets) | prints.setting_any(sets & self.unsafe)
+        killers = prints.clearing_any(sets) | prints.clearing_any(macro.needs)
+        absorbing = self._absorbing(clears | sets) & killers & ~found
         return found | (killers & ~absorbing), absorbing
 
-    def _absorbs(self, number: int, changes: int) -> bool:
-        """Whether an interruption makes a step before it undone, and is not kept from coming."""
+    def _absorbing(self, changes: int) -> int:
+        """Interruptions that make a step before them undone, and are not kept from coming."""
         prints = self.prints
-        return changes & ~prints.kill[number] == 0 and not changes & (
-            prints.needs[number] | prints.forbids[number]
-        )
+        found = 0
+        for kill, rules in self._interruptions.items():
+            if not changes & ~kill:
+                found |= rules
+        return found and found & ~(prints.needing_any(changes) | prints.forbidding_any(changes))
 
     def _undone_by(self, number: int, macro: Macro, disturbed: int) -> int:
         """Of the rules that a step disturbs, those that it makes undone if it interrupts.
@@ -262,16 +254,21 @@ class _Bound:
         kill = prints.kill[number]
         if not kill:
             return 0
-        found = 0
-        for low in bits_of(disturbed):
-            rule = low.bit_length() - 1
-            changes = prints.clears[rule] | prints.sets[rule]
-            if self._visible[rule] or not self._absorbs(number, changes):
-                continue
-            # What happens by itself must not happen after the interruption in place of before it.
-            if self.rules[rule].kind is Kind.OUTSIDE or prints.needs[rule] & kill & ~macro.sets:
-                found |= low
+        bearing = prints.needs[number] | prints.forbids[number]
+        found = disturbed & self._within(kill) & ~self.seen
+        found &= ~(prints.clearing_any(bearing) | prints.setting_any(bearing))
+        # What happens by itself must not happen after the interruption in place of before it.
+        found &= self.outside | prints.needing_any(kill & ~macro.sets)
         return 0 if disturbed & self.joins & ~found else found
+
+    def _within(self, kill: int) -> int:
+        """The rules that change nothing but what an interruption takes away."""
+        known = self._known_within.get(kill)
+        if known is None:
+            changes = map(int.__or__, self.prints.clears, self.prints.sets)
+            known = _mask(number for number, each in enumerate(changes) if not each & ~kill)
+            self._known_within[kill] = known
+        return known
 
 
 def _mask(rules: Iterable[int]) -> int:
