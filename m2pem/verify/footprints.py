@@ -25,6 +25,7 @@ class Footprints:
         self.forbidding = _registered(self.forbids)
         self.clearing = _registered(self.clears, self.kill)
         self.setting = _registered(self.sets)
+        self.killing = _registered(self.kill, self.kill)
         self.needing_any = Union(self.needing)
         self.forbidding_any = Union(self.forbidding)
         self.clearing_any = Union(self.clearing)
@@ -54,38 +55,66 @@ class Footprints:
         self.clears[number], self.sets[number] = clears, sets
 
 
+_PART = 64
+_FULL = (1 << _PART) - 1
+
+
 class Union:
-    """Of a register, the rules of any bit of a mask; the same few masks are asked for again."""
+    """Of a register, the rules of any bit of a mask.
+
+    The same few masks are asked for again, and others that differ from them in few bits.
+    """
 
     def __init__(self, register: Mapping[int, int]) -> None:
         self._register = register
         self._known: dict[int, int] = {}
+        self._parts: dict[tuple[int, int], int] = {}
 
     def __call__(self, mask: int) -> int:
         """Those rules, as a mask of their numbers."""
         known = self._known.get(mask)
         if known is None:
-            known = 0
-            for low in bits_of(mask):
-                known |= self._register.get(low, 0)
+            known, rest, at = 0, mask, 0
+            while rest:
+                if part := rest & _FULL:
+                    known |= self._of_part(part, at)
+                rest >>= _PART
+                at += _PART
             self._known[mask] = known
+        return known
+
+    def _of_part(self, part: int, at: int) -> int:
+        known = self._parts.get((part, at))
+        if known is None:
+            known = 0
+            for low in bits_of(part << at):
+                known |= self._register.get(low, 0)
+            self._parts[part, at] = known
         return known
 
 
 def _registered(masks: Sequence[int], kill: Sequence[int] = ()) -> dict[int, int]:
-    """By bit, the rules whose masks have it. Many rules `kill` the same bits: those go together."""
+    """By bit, the rules whose masks have it.
+
+    What rules `kill` differs little from one to the other, if at all: what they leave is noted.
+    """
     found: dict[int, int] = {}
-    alike: dict[int, int] = {}
+    leaving: dict[int, int] = {}
+    whole = most = 0
+    for each in kill:
+        whole |= each
     for number, mask in enumerate(masks):
         own = mask
-        if kill and kill[number] & ~mask == 0:
+        if kill and kill[number] and not kill[number] & ~mask:
+            most |= 1 << number
+            for low in bits_of(whole & ~kill[number]):
+                leaving[low] = leaving.get(low, 0) | 1 << number
             own &= ~kill[number]
-            alike[kill[number]] = alike.get(kill[number], 0) | 1 << number
         for low in bits_of(own):
             found[low] = found.get(low, 0) | 1 << number
-    for mask, numbers in alike.items():
-        for low in bits_of(mask):
-            found[low] = found.get(low, 0) | numbers
+    if most:
+        for low in bits_of(whole):
+            found[low] = found.get(low, 0) | (most & ~leaving.get(low, 0))
     return found
 
 

@@ -94,11 +94,7 @@ class _Bound:
         # The same in all states: what goes on at once is gone through branch by branch.
         self._rank = [(each.bit_count(), n) for n, each in enumerate(prints.kill)]
         self._rivals_of: dict[int, int] = {}
-        self._known_within: dict[int, int] = {}
-        self._interruptions: dict[int, int] = {}
-        for number, kill in enumerate(prints.kill):
-            if kill:
-                self._interruptions[kill] = self._interruptions.get(kill, 0) | 1 << number
+        self._all_bits = (1 << encoding.bits) - 1
 
     # --- choosing -------------------------------------------------------------------------------
 
@@ -238,11 +234,12 @@ class _Bound:
     def _absorbing(self, changes: int) -> int:
         """Interruptions that make a step before them undone, and are not kept from coming."""
         prints = self.prints
-        found = 0
-        for kill, rules in self._interruptions.items():
-            if not changes & ~kill:
-                found |= rules
-        return found and found & ~(prints.needing_any(changes) | prints.forbidding_any(changes))
+        found = self.every
+        for low in bits_of(changes):
+            found &= prints.killing.get(low, 0)
+            if not found:
+                return 0
+        return found & ~(prints.needing_any(changes) | prints.forbidding_any(changes))
 
     def _undone_by(self, number: int, macro: Macro, disturbed: int) -> int:
         """Of the rules that a step disturbs, those that it makes undone if it interrupts.
@@ -263,12 +260,8 @@ class _Bound:
 
     def _within(self, kill: int) -> int:
         """The rules that change nothing but what an interruption takes away."""
-        known = self._known_within.get(kill)
-        if known is None:
-            changes = map(int.__or__, self.prints.clears, self.prints.sets)
-            known = _mask(number for number, each in enumerate(changes) if not each & ~kill)
-            self._known_within[kill] = known
-        return known
+        beside = self._all_bits & ~kill
+        return self.every & ~(self.prints.clearing_any(beside) | self.prints.setting_any(beside))
 
 
 def _mask(rules: Iterable[int]) -> int:
