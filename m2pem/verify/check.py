@@ -18,7 +18,7 @@ from m2pem.verify.results import Result, Verdict
 from m2pem.verify.simplify import simplify
 from m2pem.verify.system import Place, Role, Scope, System
 
-FULL_STATES = 30_000
+FULL_STATES = 100_000
 """States up to which nothing is left out: that gives the shortest runs."""
 FULL_TIME = 0.4
 """Of the time that there is: what may be spent on that."""

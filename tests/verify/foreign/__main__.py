@@ -7,8 +7,10 @@ if any crashed or took too much. `--jsonl FILE` writes a line for each file.
 import argparse
 import json
 import sys
+from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
+from typing import TextIO
 
 from tests.foreign.models import models
 from tests.verify.foreign.counting import Counts
@@ -29,16 +31,23 @@ def main() -> int:
     options = parser.parse_args()
     terms = Terms(options.seconds, options.memory, options.as_drawn, not options.closed)
     counts = Counts(terms)
-    lines: list[str] = []
+    lines = options.jsonl.open("w", encoding="utf-8") if options.jsonl else nullcontext()
+    with lines as stream:
+        _check(options, terms, counts, stream)
+    print("\n".join(counts.lines()))
+    return 1 if counts.wrong else 0
+
+
+def _check(
+    options: argparse.Namespace, terms: Terms, counts: Counts, stream: TextIO | None
+) -> None:
     for folder in options.folders:
         paths = models(folder)[:: options.every]
         for found in measure_all(paths, terms):
             counts.add(found)
-            lines.append(_line(found, folder))
-    if options.jsonl:
-        options.jsonl.write_text("".join(lines), encoding="utf-8")
-    print("\n".join(counts.lines()))
-    return 1 if counts.wrong else 0
+            if stream is not None:
+                stream.write(_line(found, folder))
+                stream.flush()
 
 
 def _line(found: Measured, folder: Path) -> str:

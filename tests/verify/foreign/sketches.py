@@ -4,7 +4,7 @@ Most models that people draw say nothing of when a timer comes or what a conditi
 refuses them, since they cannot be executed. What is missing is filled in here with something that
 the check takes for unknown. A flow that is drawn from or to nothing joins nothing, and goes. A task
 of which nothing is said but its name does nothing in a mission; in a sketch it is work that takes
-time.
+time. A loop that does not say when it ends may end after any round.
 """
 
 from collections.abc import Callable, Sequence
@@ -70,12 +70,15 @@ def _filled_in(data: bytes, findings: Sequence[Finding]) -> tuple[bytes, list[st
 
 
 def _at_work(data: bytes) -> bytes:
-    """Plain tasks as services, which take time."""
+    """Plain tasks as services, which take time; and loops that may end."""
     root = etree.fromstring(data, _PARSER)
     for element in root.iter(*(f"{BPMN}{name}" for name in _PLAIN)):
         if _says_nothing(element):
             element.tag = f"{BPMN}serviceTask"
             element.set(f"{M2PEM}class", WORK)
+    for element in root.iter(f"{BPMN}standardLoopCharacteristics"):
+        if not element.get("loopMaximum") and not _children(element, "loopCondition"):
+            _put(element, "loopCondition", _UNKNOWN.format("again"))
     return etree.tostring(root)
 
 
