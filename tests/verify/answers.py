@@ -27,7 +27,7 @@ from m2pem.verify.mission_runs import MissionRuns
 from m2pem.verify.product import Result, check
 from m2pem.verify.reduction import StubbornSets
 from m2pem.verify.simplify import simplify
-from m2pem.verify.system import Action, Role, System
+from m2pem.verify.system import Action, Kind, Role, System
 
 FEW = Limits(states=1_500, tokens=3, seconds=60.0)
 
@@ -35,10 +35,15 @@ FEW = Limits(states=1_500, tokens=3, seconds=60.0)
 def atoms_of(dice: Random, system: System, count: int = 3) -> list[Formula]:
     """Some things that may be true in the system."""
     active = sorted({p.element for p in system.places if p.role is not Role.END})
-    done = {s.element for r in system.rules for s in r.steps if s.action is Action.COMPLETED}
+    done = [
+        step.element
+        for rule in system.rules
+        for step in rule.steps
+        if step.action is Action.COMPLETED and (rule.kind is Kind.OUTSIDE or dice.random() < 0.3)
+    ]
     found: list[Formula] = []
     for _ in range(count):
-        if done and dice.random() < 0.6:
+        if done and dice.random() < 0.7:
             found.append(Completed(dice.choice(sorted(done))))
         else:
             found.append(Active(dice.choice(active)))
@@ -56,6 +61,8 @@ def formula_of(dice: Random, atoms: list[Formula], depth: int = 3) -> Formula:
                 Always(Not(And((a, b)))),
                 Eventually(a),
                 Eventually(And((a, Eventually(b)))),
+                Always(Implies(a, Always(Not(b)))),
+                Always(Implies(a, Always(Not(b)))),
                 Always(Eventually(a)),
                 Eventually(Always(Not(a))),
                 Always(Implies(a, WeakUntil(Not(b), c))),

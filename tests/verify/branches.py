@@ -26,8 +26,12 @@ def _loop(number: int, before: str, after: str) -> str:
     )
 
 
-def branches(shapes: list[tuple[int, bool]]) -> Mission:
-    """A mission with a branch for each shape: so many tasks, and then a loop or none."""
+def branches(shapes: list[tuple[int, bool]], *, interruptible: bool = False) -> Mission:
+    """A mission with a branch for each shape: so many tasks, and then a loop or none.
+
+    `interruptible`: in a subprocess that a timer interrupts, after which it is begun once more, or
+    a task follows.
+    """
     body = [
         '<startEvent id="S"/><parallelGateway id="Fork"/><parallelGateway id="Join"/>',
         '<endEvent id="E"/>',
@@ -41,6 +45,15 @@ def branches(shapes: list[tuple[int, bool]]) -> Mission:
             body += [task(name, f"v{number}", "goto", target="x"), flow(last, name)]
             last = name
         body.append(_loop(number, last, "Join") if loops else flow(last, "Join"))
+    if interruptible:
+        body = [
+            f'<subProcess id="Sub">{"".join(body)}</subProcess><startEvent id="S0"/>',
+            '<exclusiveGateway id="M"/><exclusiveGateway id="W"/><task id="After"/>',
+            '<endEvent id="E0"/><boundaryEvent id="B" attachedToRef="Sub"><timerEventDefinition>'
+            "<timeDuration>PT5M</timeDuration></timerEventDefinition></boundaryEvent>",
+            *(flow("S0", "M"), flow("M", "Sub"), flow("Sub", "E0"), flow("B", "W")),
+            *(flow("W", "M"), flow("W", "After"), flow("After", "E0")),
+        ]
     return mission(*body)
 
 

@@ -16,14 +16,19 @@ from m2pem.verify.system import System
 CODES = ("FAILED", "LINK_LOST", "ROUTE_BLOCKED")
 
 
-def branches(count: int, tasks: int = 3, *, interruptible: bool = False) -> Mission:
-    """Parallel branches of user tasks, perhaps in a subprocess that a timer interrupts."""
+def branches(
+    count: int, tasks: int = 3, *, interruptible: bool = False, error: bool = False
+) -> Mission:
+    """Parallel branches of user tasks, perhaps in a subprocess that a timer interrupts.
+
+    `error`: another branch in there, of as many tasks, ends with an error that interrupts it.
+    """
     body = [
         '<startEvent id="s"/><parallelGateway id="f"/><parallelGateway id="j"/><endEvent id="e"/>',
         '<sequenceFlow id="a0" sourceRef="s" targetRef="f"/>',
         '<sequenceFlow id="a1" sourceRef="j" targetRef="e"/>',
     ]
-    for branch in range(count):
+    for branch in range(count + error):
         before = "f"
         for task in range(tasks):
             name = f"t{branch}_{task}"
@@ -33,13 +38,20 @@ def branches(count: int, tasks: int = 3, *, interruptible: bool = False) -> Miss
                 f'<sequenceFlow id="q{branch}_{task}" sourceRef="{before}" targetRef="{name}"/>'
             )
             before = name
-        body.append(f'<sequenceFlow id="q{branch}_e" sourceRef="{before}" targetRef="j"/>')
+        after = "j" if branch < count else "wrong"
+        body.append(f'<sequenceFlow id="q{branch}_e" sourceRef="{before}" targetRef="{after}"/>')
+    if error:
+        body.append('<endEvent id="wrong"><errorEventDefinition/></endEvent>')
     inside = "".join(body)
-    if interruptible:
+    if interruptible or error:
+        event = (
+            "<errorEventDefinition/>"
+            if error
+            else "<timerEventDefinition><timeDuration>PT5M</timeDuration></timerEventDefinition>"
+        )
         inside = (
             f'<startEvent id="S"/><subProcess id="SUB">{inside}</subProcess>'
-            '<boundaryEvent id="B" attachedToRef="SUB"><timerEventDefinition>'
-            "<timeDuration>PT5M</timeDuration></timerEventDefinition></boundaryEvent>"
+            f'<boundaryEvent id="B" attachedToRef="SUB">{event}</boundaryEvent>'
             '<endEvent id="E"/><endEvent id="EB"/>'
             '<sequenceFlow id="w0" sourceRef="S" targetRef="SUB"/>'
             '<sequenceFlow id="w1" sourceRef="SUB" targetRef="E"/>'

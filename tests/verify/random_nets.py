@@ -11,6 +11,7 @@ from random import Random
 from m2pem.verify.system import Action, Kind, Place, Role, Rule, Scope, Step, System, Variable
 
 _ENDS = 3
+_FIRST = ("row", "fork", "fork", "scope", "scope", "loop")
 _BLOCKS = ("task", "task", "task", "step", "row", "row", "fork", "fork", "choice", "loop", "scope")
 
 
@@ -37,7 +38,7 @@ class _Draft:
     def rule(self, kind: Kind, consume: list[int], produce: list[int], **more: object) -> int:
         number = len(self.rules)
         action = self.dice.choice([Action.COMPLETED, Action.COMPLETED, Action.ENTERED])
-        step = Step(f"e{consume[0]}", action)
+        step = Step(self.dice.choice([f"e{consume[0]}", f"r{number}"]), action)
         made = Rule(
             number,
             f"r{number}",
@@ -53,7 +54,7 @@ class _Draft:
     def block(self, source: int, target: int, depth: int) -> None:
         """Something that takes a token from one place to another."""
         self.budget -= 1
-        kind = self.dice.choice(_BLOCKS)
+        kind = self.dice.choice(_BLOCKS if depth else _FIRST)
         if depth > 4 or self.budget <= 0:
             kind = "task"
         getattr(self, f"_{kind}")(source, target, depth)
@@ -71,7 +72,7 @@ class _Draft:
 
     def _fork(self, source: int, target: int, depth: int) -> None:
         role = self.dice.choice([Role.ACTIVE, Role.ENTERING])
-        starts = [self.place(role) for _ in range(self.dice.choice((2, 2, 3)))]
+        starts = [self.place(role) for _ in range(self.dice.choice((2, 3, 3)))]
         ends = [self.place() for _ in starts]
         inside = set(starts)
         self.scopes.append(inside)
@@ -110,7 +111,7 @@ class _Draft:
         running, handler = self.place(Role.CONTROL), self.place()
         inside: set[int] = set()
         self.scopes.append(inside)
-        starts = [self.place() for _ in range(self.dice.choice((1, 2, 2, 3)))]
+        starts = [self.place() for _ in range(self.dice.choice((2, 2, 3)))]
         for start in starts:
             end = self.place(Role.CONTROL)
             self.block(start, end, depth + 1)
@@ -175,7 +176,7 @@ class _Draft:
 
 def random_net(dice: Random, size: int = 12, *, spoilt: int = 2) -> System:
     """`size`: of how many blocks, at most; `spoilt`: how many changes at most are made to it."""
-    draft = _Draft(dice, dice.randint(2, size))
+    draft = _Draft(dice, dice.randint(size // 2, size))
     for _ in range(_ENDS):
         draft.place(Role.END)
     start, last = draft.place(), draft.place()
@@ -194,5 +195,5 @@ def random_net(dice: Random, size: int = 12, *, spoilt: int = 2) -> System:
         completed=0,
         terminated=1,
         failed=2,
-        elements={each.element: each.element for each in draft.places},
+        elements={step.element: step.element for rule in draft.rules for step in rule.steps},
     )

@@ -1,18 +1,30 @@
 """Leaving out orders of steps changes no answer."""
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from m2pem.model.mission import Mission
 from m2pem.resources.madeup import fleet_for
-from m2pem.verify.derive import Options, derive
-from m2pem.verify.explore import explore
+from m2pem.verify.derive import Options
+from m2pem.verify.explore import Exploration, explore
+from m2pem.verify.ignoring import ignoring
 from m2pem.verify.ltl import parse
 from m2pem.verify.ltl.formula import Active, Completed, Formula, Proposition, rebuilt
 from m2pem.verify.product import Result
 from m2pem.verify.requirements import Requirement
-from m2pem.verify.requirements.checking import check_mission, check_requirement, reduction_for
+from m2pem.verify.requirements.checking import (
+    check_mission,
+    check_requirement,
+    reduction_for,
+    system_for,
+)
+from tests.model.bpmn_text import flow
 from tests.verify import formulas
 from tests.verify.branches import branches, shapes
+from tests.verify.missions import ask
+from tests.verify.missions import mission as build
+from tests.verify.models import branches as user_tasks
 
 CERTAIN = Options(failures=False)
 
@@ -24,11 +36,11 @@ def about(formula: Formula, atoms: dict[Proposition, Proposition]) -> Formula:
 
 
 @settings(max_examples=60, deadline=None)
-@given(shapes, formulas.formulas, st.data())
+@given(shapes, st.booleans(), formulas.formulas, st.data())
 def test_no_answer_changes(
-    shape: list[tuple[int, bool]], formula: Formula, data: st.DataObject
+    shape: list[tuple[int, bool]], interruptible: bool, formula: Formula, data: st.DataObject
 ) -> None:
-    mission = branches(shape)
+    mission = branches(shape, interruptible=interruptible)
     fleet = fleet_for(mission)
     ids = sorted(node.id for node in mission.nodes)
     atoms: dict[Proposition, Proposition] = {
@@ -52,13 +64,87 @@ def test_an_operator_who_goes_on_for_ever_in_one_branch_is_not_left_out() -> Non
     assert {step.element for rule in answer.cycle for step in rule.steps} >= {"A1", "D1"}
 
 
-def test_what_is_broken_once_and_for_all_needs_fewer_states() -> None:
-    mission = branches([(2, False)] * 4)
+ORDERS = (
+    "[](completed(t0_0) -> <> completed(t1_2))",
+    "!completed(t1_1) W completed(t0_2)",
+    "[] !(active(t0_1) && active(t1_1))",
+    "<> completed(t0_2)",
+)
+
+
+def searched(mission: Mission, text: str) -> tuple[Exploration, Result]:
+    """The reduced search for a requirement, and its answer."""
     fleet = fleet_for(mission)
-    system = derive(mission, fleet, options=CERTAIN)
-    requirement = Requirement("a", parse("!completed(T1x1) W completed(T1x0)"), "")
-    reduction = reduction_for(system, mission, fleet, requirement)
-    assert reduction is not None
-    found = explore(system, reduction=reduction)
-    assert len(found.states) < len(explore(system).states) / 2
-    assert check_requirement(found, mission, fleet, requirement).result is Result.HOLDS
+    requirement = Requirement("a", parse(text), "")
+    system = system_for(mission, fleet, [requirement], options=CERTAIN)
+    found = explore(system, reduction=reduction_for(system, mission, fleet, requirement))
+    return found, check_requirement(found, mission, fleet, requirement).result
+
+
+@pytest.mark.parametrize("kind", ["plain", "interruptible", "error"])
+@pytest.mark.parametrize("text", ORDERS)
+def test_states_grow_with_the_number_of_branches_alone(kind: str, text: str) -> None:
+    few, many = (
+        user_tasks(n, interruptible=kind == "interruptible", error=kind == "error")
+        for n in (3, 100)
+    )
+    found, result = searched(many, text)
+    assert len(found.states) < 3 * 100 + 50
+    whole = check_mission(few, fleet_for(few), [Requirement("a", parse(text), "")], options=CERTAIN)
+    assert result is whole[0].result
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        # The timer comes when one branch is done and another is not.
+        "[](completed(B) -> !once(completed(t0_2)))",
+        # The subprocess ends with the last of all branches, no matter which that is.
+        "[](completed(t0_2) -> <> completed(SUB))",
+        "[](completed(t0_2) -> (active(SUB) W completed(t1_2)))",
+        "[](completed(t0_2) && once(completed(t1_2)) -> !<> completed(B))",
+    ],
+)
+def test_what_ends_a_scope_is_not_brought_forward(text: str) -> None:
+    mission = user_tasks(3, 3, interruptible=True)
+    _, result = searched(mission, text)
+    assert result is Result.VIOLATED
+
+
+def test_what_follows_a_join_does_not_follow_before_its_time() -> None:
+    mission = in_fork(
+        ("A", ask("A", "ok")), ("B", ask("B", "ok")), beside=("C", ask("C", "ok")), after="X"
+    )
+    # A and C are done while B is not: X comes after C.
+    _, result = searched(mission, "[](completed(A) -> (!completed(C) W active(X)))")
+    assert result is Result.VIOLATED
+
+
+def in_fork(*joined: tuple[str, str], beside: tuple[str, str], after: str) -> Mission:
+    """Tasks that are joined before another one, and one beside all of that."""
+    body = [
+        '<startEvent id="S"/><parallelGateway id="F"/><parallelGateway id="J"/><endEvent id="E"/>',
+        '<endEvent id="E2"/>',
+        *(text for _, text in (*joined, beside)),
+        ask(after, "ok"),
+        *(flow("S", "F"), flow("J", after), flow(after, "E")),
+        *(flow("F", beside[0]), flow(beside[0], "E2")),
+    ]
+    for name, _ in joined:
+        body += [flow("F", name), flow(name, "J")]
+    return build(*body)
+
+
+def test_nothing_is_put_off_on_every_state_of_a_circle() -> None:
+    ring = [[1], [2, 3], [0], []]
+    assert ignoring(ring, inner=(), partly={1}) == set()  # there is another state on it
+    assert ignoring(ring, inner=(), partly={0, 1, 2}) == {0}
+    assert ignoring(ring, inner={0, 2}, partly={1}) == {1}
+    assert ignoring(ring, inner={0, 1, 2}, partly={0, 1}) == set()
+    assert ignoring(ring, inner={0, 1, 2}, partly={0, 1, 2}) == {0}
+    assert ignoring([[1], [2], []], inner=(), partly={0, 1}) == set()
+
+
+def test_several_circles_through_one_state_are_each_broken() -> None:
+    eight = [[1, 2], [0, 1], [0]]
+    assert ignoring(eight, inner=(), partly={0, 1, 2}) == {0, 1}

@@ -7,7 +7,7 @@ from m2pem.model.events import CompensateEventDefinition
 from m2pem.verify.fair_rounds import FairRounds
 from m2pem.verify.properties.searched import Searched
 from m2pem.verify.results import Result, Violation
-from m2pem.verify.system import Exactness, Flag
+from m2pem.verify.system import Exactness, Flag, Trigger
 
 FAIR = "It ends, if nothing that can happen again and again is put off for ever."
 IN_EACH_STATE = (
@@ -70,6 +70,13 @@ def _fails(searched: Searched, rule: int) -> bool:
     return searched.system.rules[rule].flag is Flag.UNCAUGHT_FAILURE
 
 
+def _begins(searched: Searched, rule: int) -> bool:
+    """Whether somebody outside begins a process of their own accord: nobody does so for ever."""
+    each = searched.system.rules[rule]
+    begins = each.trigger in (Trigger.MESSAGE, Trigger.SIGNAL)
+    return begins and not (each.consume or each.read or each.moves or each.copies)
+
+
 def _lost(searched: Searched, *, ends_only: bool) -> list[int]:
     """States from which no end (or nothing that ends at all) can be reached, in their order."""
     found = searched.found
@@ -112,7 +119,7 @@ def completes_if_fair(searched: Searched) -> Result:
     fairness, and the result says so.
     """
     found = searched.found
-    rounds = FairRounds(found, lambda rule: _fails(searched, rule))
+    rounds = FairRounds(found, lambda rule: _fails(searched, rule) or _begins(searched, rule))
     violations: list[Violation] = []
     note = ""
     if not found.reduced:

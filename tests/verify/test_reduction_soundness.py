@@ -1,0 +1,110 @@
+"""On random systems, what is left out of a search changes neither properties nor requirements."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from random import Random
+
+import pytest
+
+from m2pem.verify.derive import derive
+from m2pem.verify.explore import Exploration, explore
+from m2pem.verify.ltl.formula import needs_steps
+from m2pem.verify.product import Result
+from m2pem.verify.reduction import StubbornSets
+from m2pem.verify.system import System
+from tests.engine.notation import mission as notation
+from tests.engine.random_missions import graph, structured
+from tests.verify.answers import FEW, atoms_of, both, formula_of
+from tests.verify.random_nets import random_net
+from tests.verify.random_systems import random_system
+
+Make = Callable[[Random], System]
+FORMULAS = 5
+
+
+def nets(dice: Random) -> System:
+    return random_net(dice, 16)
+
+
+def sound_nets(dice: Random) -> System:
+    return random_net(dice, 20, spoilt=0)
+
+
+def rules(dice: Random) -> System:
+    made = random_system(dice, 12, 14)
+    start = sorted(dice.sample(range(3, 15), 5))
+    return replace(made, initial=tuple((place, 1) for place in start))
+
+
+def missions(dice: Random) -> System:
+    return derive(notation(dice.choice([structured, graph])(dice)))
+
+
+def seen(found: Exploration) -> tuple[object, ...]:
+    """What the properties of every mission are read from."""
+    return {found.states[n] for n in found.terminals}, set(found.fired)
+
+
+def compare(make: Make, seed: int, count: Counter[str]) -> list[str]:
+    """What differs; `count` says what was compared."""
+    dice = Random(seed)
+    system = make(dice)
+    whole = explore(system, FEW)
+    if not whole.complete:
+        return []
+    count["systems"] += 1
+    wrong = []
+    less = explore(system, FEW, reduction=StubbornSets(system))
+    if bool(whole.overflows) != bool(less.overflows):
+        wrong.append(f"{seed}: a second token")
+    elif not whole.overflows and seen(whole) != seen(less):
+        wrong.append(f"{seed}: states or rules")
+    kinds = {
+        "unsafe": bool(whole.overflows),
+        "circles": any(
+            after <= n for n in range(len(whole.states)) for _, after in _steps(whole, n)
+        ),
+        "interrupted": sum(len(rule.kill) > 2 for rule in system.rules) > 1,
+    }
+    count.update(name for name, found in kinds.items() if found)
+    for _ in range(FORMULAS):
+        formula = formula_of(dice, atoms_of(dice, system))
+        if needs_steps(formula):
+            continue
+        found = both(system, formula, whole)
+        assert found is not None
+        count["formulas"] += 1
+        count["smaller"] += len(found.reduced.states) < len(found.whole.states)
+        count["violated"] += found.answers[0] is Result.VIOLATED
+        if found.answers[0] is not found.answers[1]:
+            wrong.append(f"{seed}: {formula}: {found.answers}")
+    return wrong
+
+
+def _steps(found: Exploration, number: int) -> list[tuple[int, int]]:
+    return list(found.successors(number))
+
+
+@pytest.mark.parametrize(
+    ("make", "models"), [(nets, 30), (sound_nets, 25), (rules, 25), (missions, 10)]
+)
+def test_nothing_that_can_be_asked_is_answered_otherwise(make: Make, models: int) -> None:
+    count: Counter[str] = Counter()
+    assert not [each for seed in range(models) for each in compare(make, seed, count)]
+    assert count["systems"] > models / 2
+    assert 0 < count["violated"] < count["formulas"]
+    # What makes leaving things out hard is among them.
+    assert min(count["smaller"], count["circles"], count["interrupted"]) > 0
+    assert count["unsafe"] or make is not rules
+
+
+@pytest.mark.long
+@pytest.mark.timeout(14_400)
+@pytest.mark.parametrize(
+    ("make", "models"), [(nets, 9_000), (sound_nets, 6_000), (rules, 5_000), (missions, 1_500)]
+)
+def test_nor_of_twenty_thousand_models(make: Make, models: int) -> None:
+    count: Counter[str] = Counter()
+    seeds = range(1_000, 1_000 + models)
+    assert not [each for seed in seeds for each in compare(make, seed, count)]
