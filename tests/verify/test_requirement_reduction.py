@@ -135,6 +135,18 @@ def in_fork(*joined: tuple[str, str], beside: tuple[str, str], after: str) -> Mi
     return build(*body)
 
 
+@pytest.mark.parametrize("text", ["[] !completed(T)", "<> completed(T)"])
+def test_what_is_beside_a_branch_that_never_ends_is_not_put_off_for_ever(text: str) -> None:
+    mission = build(
+        '<startEvent id="S"/><parallelGateway id="F"/><exclusiveGateway id="M"/><endEvent id="E"/>',
+        *(ask("A", "ok"), ask("B", "ok"), ask("T", "ok")),
+        *(flow("S", "F"), flow("F", "M"), flow("M", "A"), flow("A", "B"), flow("B", "M")),
+        *(flow("F", "T"), flow("T", "E")),
+    )
+    _, result = searched(mission, text)
+    assert result is Result.VIOLATED
+
+
 def test_nothing_is_put_off_on_every_state_of_a_circle() -> None:
     ring = [[1], [2, 3], [0], []]
     assert ignoring(ring, inner=(), partly={1}) == set()  # there is another state on it
