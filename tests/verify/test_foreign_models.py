@@ -4,6 +4,8 @@
 """
 
 import os
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -70,6 +72,25 @@ def test_a_file_that_takes_too_much_memory_is_told(tmp_path: Path) -> None:
     counts = checked(tmp_path, Terms(memory_mb=1))
     assert len(counts.wrong) == 1
     assert " MB" in counts.wrong[0]
+
+
+@pytest.mark.parametrize(
+    ("does", "said"),
+    [
+        (lambda *_: os._exit(7), "the process ended with 7"),
+        (lambda *_: time.sleep(60), "it hangs"),
+        (lambda *_: int("gone"), "ValueError: invalid literal"),
+    ],
+    ids=["dies", "hangs", "raises"],
+)
+def test_a_crash_costs_one_file_and_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, does: Callable[..., object], said: str
+) -> None:
+    (tmp_path / "sketch.bpmn").write_bytes(SKETCH)
+    monkeypatch.setattr("tests.verify.foreign.measuring.judge", does)
+    counts = checked(tmp_path, Terms(seconds=0.02))
+    assert counts.kinds == {"crashed": 1}
+    assert said in counts.wrong[0]
 
 
 @pytest.mark.long

@@ -69,13 +69,13 @@ def _serve(path: Path, terms: Terms, writing: int) -> NoReturn:
 
 
 def _read(reading: int, child: int, hang_s: float) -> bytes:
-    """What the process says; nothing, if it had to be stopped."""
+    """What the process says; if it had to be stopped, that."""
     said = b""
     while True:
         ready, _, _ = select.select([reading], [], [], hang_s)
         if not ready:
             os.kill(child, signal.SIGKILL)
-            return b""
+            return pickle.dumps(f"it hangs: nothing is said for {hang_s:g} s")
         part = os.read(reading, 1 << 16)
         if not part:
             return said
