@@ -32,7 +32,12 @@ from m2pem.verify.product import Result as Answered
 from m2pem.verify.properties import ALL, Searched
 from m2pem.verify.reduction import StubbornSets
 from m2pem.verify.requirements import Requirement
-from m2pem.verify.requirements.checking import check_mission
+from m2pem.verify.requirements.checking import (
+    Answer,
+    check_requirement,
+    reduction_for,
+    system_for,
+)
 from m2pem.verify.results import Result, Verdict
 from m2pem.verify.simplify import simplify
 from m2pem.verify.spin.search import search as search_with_spin
@@ -94,11 +99,16 @@ def _seen(how: str, system: System, limits: Limits) -> Exploration:
 def required(how: str, xml: str, formula: str, limits: Limits, steps: Steps) -> tuple[int, str]:
     """States of the search, and of the product with what the requirement forbids; the answer."""
     mission = steps.step("read_s", lambda: parse_mission(xml.encode(), "bench.bpmn"))
-    asked = [Requirement("asked", parse(formula), "")]
-    fleet, reduce = fleet_for(mission), how == "reduced"
-    (answer,) = steps.step(
-        "search_s", lambda: check_mission(mission, fleet, asked, limits=limits, reduce=reduce)
-    )
+    asked = Requirement("asked", parse(formula), "")
+    fleet = fleet_for(mission)
+    system = steps.step("derive_s", lambda: system_for(mission, fleet, [asked]))
+
+    def search() -> Answer:
+        reduction = reduction_for(system, mission, fleet, asked) if how == "reduced" else None
+        found = explore(system, limits, reduction=reduction)
+        return check_requirement(found, mission, fleet, asked)
+
+    answer = steps.step("search_s", search)
     if answer.result is Answered.UNDECIDED:
         return answer.states, f"undecided: {answer.why}"
     return answer.states, str(answer.result)

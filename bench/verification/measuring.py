@@ -21,7 +21,7 @@ from bench.verification.works import (
 )
 
 OWN_LIMIT_S, PEER_LIMIT_S = 240.0, 60.0
-CASE_LIMIT_S = 60.0
+CASE_LIMIT_S = 180.0
 BUILT_IN = "builtin"
 EXPECTED = "holds"
 """The verdict on all models of branches."""
@@ -121,7 +121,7 @@ def growing(engines: Sequence[Engine]) -> list[tuple[int, dict[str, Found]]]:
         model, by_name = branches(size, TASKS), {}
         for engine in engines:
             if engine.name not in failed:
-                by_name[engine.name] = found = _of(engine, model, CASE_LIMIT_S)
+                by_name[engine.name] = found = _of(engine, model, PEER_LIMIT_S)
                 if found.wrong:
                     failed.add(engine.name)
         sizes.append((size, by_name))

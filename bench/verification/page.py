@@ -151,7 +151,8 @@ def _missions(found: Verified) -> Iterator[Sequence[str]]:
 
 
 def _milliseconds(seconds: float) -> str:
-    return f"{seconds * 1000:,.0f}" if seconds >= 0.1 else f"{seconds * 1000:.2g}"
+    value = seconds * 1000
+    return f"{value:,.0f}" if value >= 99.5 else f"{value:.2g}"
 
 
 def _seconds(seconds: float) -> str:

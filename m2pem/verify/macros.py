@@ -8,7 +8,7 @@ neither lets the other one cause more than it does alone (`Macro.feeds`).
 from dataclasses import dataclass, field
 
 from m2pem.verify.encoding import Encoding
-from m2pem.verify.footprints import Footprints, bits_of
+from m2pem.verify.footprints import Footprints, Union, bits_of
 from m2pem.verify.system import Kind
 
 _MOST_STATES = 64
@@ -61,6 +61,8 @@ class Macros:
         for rule in rules:
             if rule.kind is not Kind.OUTSIDE:
                 self._register(rule.index)
+        self._wanting_any = Union(self._wanting)
+        self._barred_any = Union(self._barred)
         self._readers: dict[int, list[int]] = {}
         for number in self._internal_rules:
             for low in bits_of(prints.needs[number] | prints.forbids[number]):
@@ -137,12 +139,8 @@ class Macros:
 
         What the macro's own changes keep from firing, they keep from it there too.
         """
-        fed = 0
         changed = before ^ now
-        for low in bits_of(now & changed):
-            fed |= self._wanting.get(low, 0)
-        for low in bits_of(before & changed):
-            fed |= self._barred.get(low, 0)
+        fed = self._wanting_any(now & changed) | self._barred_any(before & changed)
         while fed:
             low = fed & -fed
             fed ^= low
