@@ -170,7 +170,8 @@ class Encoding:
     def fire(self, number: int, state: int) -> tuple[int, int]:
         """The state after an enabled rule, and the place that got more than it can hold, or -1.
 
-        A place that is full stays full.
+        A place that is full stays full. Of several, one is told that can be given more room, if
+        there is one: it would never be known of otherwise.
         """
         c = self.rules[number]
         if c.plain:
@@ -202,17 +203,23 @@ class Encoding:
         for mask, offset, count, most, place in c.gives:
             now = (state & mask) >> offset
             if now + count > most:
-                full = place
+                if full < 0 or not self.system.places[place].once:
+                    full = place
                 state |= mask
             else:
                 state += count << offset
         return state, full
 
     def _full(self, number: int, bits: int) -> int:
+        full = -1
         for place, _ in self.system.rules[number].produce:
             if self.mask[place] & bits:
-                return place
-        raise AssertionError("a variable was assigned a value before its old one had gone")
+                if not self.system.places[place].once:
+                    return place
+                full = place
+        if full < 0:
+            raise AssertionError("a variable was assigned a value before its old one had gone")
+        return full
 
     # --- reading --------------------------------------------------------------------------------
 
