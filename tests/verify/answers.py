@@ -29,7 +29,7 @@ from m2pem.verify.reduction import StubbornSets
 from m2pem.verify.simplify import simplify
 from m2pem.verify.system import Action, Kind, Role, System
 
-FEW = Limits(states=1_500, tokens=3, seconds=60.0)
+FEW = Limits(states=1_500, tokens=3, seconds=1e9)
 
 
 def atoms_of(dice: Random, system: System, count: int = 3) -> list[Formula]:
