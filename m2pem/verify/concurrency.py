@@ -99,11 +99,12 @@ class Concurrency:
             if not self.rows[place] >> place & 1:
                 beside &= ~(1 << place)
         self.live.add(rule.index)
-        made = wants.made
+        moved = 0
         for source, target in (*rule.moves, *rule.copies):
             if beside >> source & 1:
-                made |= 1 << target
-        return self._add(made, beside & ~wants.killed, wants.twice)
+                moved |= 1 << target
+        twice = wants.twice | moved & wants.made
+        return self._add(wants.made | moved, beside & ~wants.killed, twice)
 
     def _add(self, made: int, beside: int, twice: int) -> set[int]:
         news: set[int] = set()
@@ -131,6 +132,11 @@ class Concurrency:
     def together(self, one: int, other: int) -> bool:
         """Whether two places may have a token at once; of the same place: two tokens."""
         return bool(self.rows[one] >> other & 1)
+
+    @property
+    def single(self) -> frozenset[int]:
+        """The places that have one token at most."""
+        return frozenset(n for n, row in enumerate(self.rows) if not row >> n & 1)
 
     def may_fire(self, rule: Rule) -> bool:
         """Whether a rule may ever fire."""

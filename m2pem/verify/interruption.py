@@ -31,7 +31,7 @@ def watch_interruptions(
         Place(number[r], f"{r}~interrupted", system.process, 0, Role.CONTROL) for r in resources
     ]
     rules = [_noting(system, rule, held, number) for rule in system.rules]
-    watched = replace(system, places=(*system.places, *places), rules=tuple(rules))
+    watched = replace(system, places=(*system.places, *places), rules=tuple(rules), single=None)
     return watched, {n: resource for resource, n in number.items()}
 
 

@@ -63,9 +63,10 @@ class StubbornSets:
 
 def safe_places(system: System) -> frozenset[int]:
     """Places that the structure proves to have one token at most, or to get them from one rule."""
+    if system.single is not None:
+        return system.single
     if is_small(system):
-        rows = Concurrency(system).rows
-        return frozenset(p.index for p in system.places if not rows[p.index] >> p.index & 1)
+        return Concurrency(system).single
     producers: dict[int, int] = {}
     for rule in system.rules:
         made = {place for place, _ in rule.produce}

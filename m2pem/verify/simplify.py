@@ -25,6 +25,8 @@ def simplify(system: System, seen: Collection[int] = (), visible: Collection[int
     rules = list(system.rules)
     if concurrency is not None:
         rules = [_trim(rule, concurrency) for rule in rules if concurrency.may_fire(rule)]
+        # What the smaller system does, this one can do as well: so that is true of it, too.
+        system = replace(system, single=concurrency.single)
     return renumbered(system, _fused(system, rules, frozenset(seen), frozenset(visible)))
 
 
@@ -75,6 +77,11 @@ def renumbered(system: System, rules: list[Rule]) -> System:
         completed=number[system.completed],
         terminated=number[system.terminated],
         failed=number[system.failed],
+        single=(
+            None
+            if system.single is None
+            else frozenset(number[p] for p in system.single if p in number)
+        ),
     )
 
 

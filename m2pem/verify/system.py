@@ -227,6 +227,7 @@ class System:
     `initial`: places with a token at first. `completed`, `terminated`, `failed`: the places that
     say how the run ended. `elements`: every element of the mission that has rules, by id, with
     its label. `dead`: elements that no rule can reach whatever happens (drawn, but not connected).
+    `single`: places that are known to have one token at most; None: nobody has looked.
     """
 
     mission: str
@@ -241,6 +242,7 @@ class System:
     failed: int
     approximations: tuple[Approximation, ...] = ()
     elements: Mapping[str, str] = field(default_factory=dict)
+    single: frozenset[int] | None = None
 
     @property
     def ends(self) -> frozenset[int]:
