@@ -7,7 +7,7 @@ from m2pem.model.events import CompensateEventDefinition
 from m2pem.verify.fair_rounds import FairRounds
 from m2pem.verify.properties.searched import Searched
 from m2pem.verify.results import Result, Violation
-from m2pem.verify.system import Exactness, Flag, Trigger
+from m2pem.verify.system import Exactness, Flag, Role, Trigger
 
 FAIR = "It ends, if nothing that can happen again and again is put off for ever."
 IN_EACH_STATE = (
@@ -72,9 +72,11 @@ def _fails(searched: Searched, rule: int) -> bool:
 
 def _begins(searched: Searched, rule: int) -> bool:
     """Whether somebody outside begins a process of their own accord: nobody does so for ever."""
-    each = searched.system.rules[rule]
-    begins = each.trigger in (Trigger.MESSAGE, Trigger.SIGNAL)
-    return begins and not (each.consume or each.read or each.moves or each.copies)
+    each, places = searched.system.rules[rule], searched.system.places
+    if each.trigger not in (Trigger.MESSAGE, Trigger.SIGNAL):
+        return False
+    waiting = [p for p in each.read if places[p].role is not Role.CONTROL]
+    return not (each.consume or waiting or each.moves or each.copies)
 
 
 def _lost(searched: Searched, *, ends_only: bool) -> list[int]:
