@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from pathlib import Path
 
 import pytest
@@ -10,11 +9,7 @@ import pytest
 from tests.command_line import CommandLine
 from tests.terminal import CTRL_C, Terminal
 
-needs_spin = pytest.mark.skipif(
-    not shutil.which("spin") or not (shutil.which("tcc") or shutil.which("gcc")),
-    reason="Spin or a C compiler is not installed",
-)
-ENGINES = ["builtin", pytest.param("spin", marks=needs_spin)]
+ENGINES = ["builtin", "spin"]
 
 BRANCHES = 14
 """So many that no engine here is through with them before a test has ended."""
@@ -173,7 +168,6 @@ def test_ctrl_c_ends_the_search_of_requirements_before_it_begins(
     assert re.search(r"^undecided  asked .* \(not begun, after an int", results(tmp_path), re.M)
 
 
-@needs_spin
 @pytest.mark.parametrize("how", ["Ctrl-C", "SIGTERM"])
 def test_what_ends_m2pem_ends_spin_and_what_it_saw_is_told(
     tmp_path: Path, mission: Path, how: str

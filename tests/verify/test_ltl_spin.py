@@ -1,6 +1,5 @@
 """Another translator's automata accept the same runs."""
 
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -9,8 +8,6 @@ from m2pem.verify.ltl.formula import Formula
 from m2pem.verify.ltl.lasso import Moment
 from tests.verify import formulas, never_claim
 from tests.verify.acceptance import accepts
-
-pytestmark = pytest.mark.skipif(never_claim.SPIN is None, reason="needs Spin (Debian: spin)")
 
 runs = st.lists(st.tuples(formulas.prefixes, formulas.cycles), min_size=10, max_size=30)
 

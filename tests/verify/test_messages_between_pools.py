@@ -1,7 +1,6 @@
 """Processes that talk by messages: what begins, what is kept, and what is one message."""
 
 import itertools
-import shutil
 
 import pytest
 
@@ -86,7 +85,6 @@ def test_it_is_said_that_only_so_many_messages_are_kept() -> None:
     assert "up to three copies of message News are kept" in bounded
 
 
-@pytest.mark.skipif(shutil.which("spin") is None, reason="Spin is not installed")
 @pytest.mark.parametrize("which", [ORDERED, CHATTY], ids=["ordered", "chatty"])
 def test_spin_agrees(which: Mission) -> None:
     report, spins = check(which), check_with_spin(which)
