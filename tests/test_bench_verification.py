@@ -131,7 +131,7 @@ def test_a_checker_that_gives_up_is_not_asked_for_more(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(measuring, "look", answer)
     monkeypatch.setattr(measuring, "SIZES", (1, 2, 4))
-    sizes = measuring.growing([Engine("A", ()), Engine("B", ())])
+    sizes = list(measuring.growing([Engine("A", ()), Engine("B", ())]))
     assert asked == [("A", 1), ("B", 1), ("A", 2), ("B", 2), ("B", 4)]
     assert [sorted(by_name) for _, by_name in sizes] == [["A", "B"], ["A", "B"], ["B"]]
 

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -67,7 +67,7 @@ def measure(machine: dict[str, str], done: Callable[[Verified], object]) -> Veri
         _said(case.name, found, done)
     for size, by_name in growing([*own(), *peers()]):
         found.branches[size] = by_name
-        _said(f"{size} branches", found, done)
+        _said(f"{size:,} branches with all checkers", found, done)
     for title, model in [*overlapping(), *corpora().items()]:
         found.overlap[title] = {each.name: _of(each, model) for each in [*own(), *peers()]}
         _said(title, found, done)
@@ -113,20 +113,18 @@ def overlapping() -> list[tuple[str, str]]:
     return [(f"{count}x{tasks}", branches(count, tasks)) for count, tasks in OVERLAP]
 
 
-def growing(engines: Sequence[Engine]) -> list[tuple[int, dict[str, Found]]]:
+def growing(engines: Sequence[Engine]) -> Iterator[tuple[int, dict[str, Found]]]:
     """More and more branches, with each checker up to the first number that it does not bear."""
     failed: set[str] = set()
-    sizes = []
     for size in SIZES:
-        model, by_name = branches(size, TASKS), {}
+        model = branches(size, TASKS)
+        by_name: dict[str, Found] = {}
         for engine in engines:
             if engine.name not in failed:
                 by_name[engine.name] = found = _of(engine, model, PEER_LIMIT_S)
                 if found.wrong:
                     failed.add(engine.name)
-        sizes.append((size, by_name))
-        print(f"{size} branches with all checkers: done", file=sys.stderr)
-    return sizes
+        yield size, by_name
 
 
 def _of(engine: Engine, model: str, limit_s: float = 0.0) -> Found:
