@@ -12,7 +12,6 @@ from m2pem.verify.check import check
 from m2pem.verify.derive import Options
 from m2pem.verify.report.findings import Findings, findings_of
 from m2pem.verify.spin.checking import check_with_spin
-from m2pem.verify.spin.programs import SpinMissingError, Tools
 from tests.broken.expected import EXPECTED, Expected
 from tests.broken.situations import Records, Situation, situations
 
@@ -84,10 +83,6 @@ def test_nothing_of_the_kind_is_found_when_it_is_mended(expected: Expected) -> N
 
 @every_one
 def test_spin_finds_it_at_the_same_elements(expected: Expected) -> None:
-    try:
-        Tools.find()
-    except SpinMissingError as missing:
-        pytest.skip(str(missing))
     text = SITUATIONS[expected.name].broken
     ours, spins = findings(text), findings(text, spin=True)
     assert where(spins, expected.asked) == where(ours, expected.asked)
