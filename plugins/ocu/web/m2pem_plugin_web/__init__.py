@@ -1,0 +1,17 @@
+"""Missions in a browser: the modeler and the operator page (docs/web.md)."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from m2pem import hookimpl
+
+if TYPE_CHECKING:
+    from m2pem.api.ocu import Ocu
+
+
+@hookimpl
+def m2pem_register_ocus(register: "Callable[[str, Callable[..., Ocu]], None]") -> None:
+    """Register `web`."""
+    from m2pem_plugin_web.ocu import WebOcu  # noqa: PLC0415  # starting up must be fast
+
+    register("web", WebOcu)

@@ -1,0 +1,3 @@
+export default function Editor({ mission }: { mission: string }) {
+  return <h1>{mission}</h1>;
+}

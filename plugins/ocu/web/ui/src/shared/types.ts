@@ -1,0 +1,237 @@
+// What the server and the page tell each other. Times in seconds or, with `_us`, in microseconds
+// since the Unix epoch; positions WGS-84 degrees; units as the names say.
+
+export type Role = "viewer" | "operator" | "commander";
+
+export interface Session {
+  user: string;
+  role: Role;
+  fleet: string;
+  simulated: boolean;
+  version: string;
+  missions_folder: string;
+}
+
+export interface Finding {
+  severity: "error" | "warning";
+  rule: string;
+  number: string;
+  line: number;
+  element: string;
+  message: string;
+  remedy: string;
+}
+
+export interface Parameter {
+  name: string;
+  kind: string;
+  unit: string;
+  required: boolean;
+  minimum: number | null;
+  maximum: number | null;
+  choices: string[];
+  default: number | string | boolean | null;
+  doc: string;
+}
+
+/** A behavior, with who of the fleet can do it. */
+export interface Behavior {
+  name: string;
+  type: "vehicle" | "payload" | "team";
+  doc: string;
+  ends: boolean;
+  writes: string[];
+  required_one_of: string[][];
+  parameters: Parameter[];
+  resources: string[];
+  teams: string[];
+}
+
+export interface Fleet {
+  name: string;
+  origin: { lat: number; lon: number; alt: number };
+  vehicles: {
+    id: string;
+    domain: "ground" | "air" | "surface" | "subsurface";
+    manned: boolean;
+    arbiter: string;
+    payloads: string[];
+  }[];
+  payloads: { id: string; vehicle: string; detector: boolean; arbiter: string }[];
+  teams: { name: string; members: string[]; lead: string }[];
+  fence?: GeoJSON.Geometry;
+}
+
+export interface Geometry {
+  name: string;
+  kind: "route" | "area" | "point";
+  geometry: GeoJSON.Geometry;
+  from: "fleet" | "operator";
+  by: string;
+  at_us: number | null;
+}
+
+export interface MissionLine {
+  name: string;
+  title: string;
+  version: string;
+  saved_at_us: number;
+  by: string;
+  runnable: boolean;
+}
+
+export interface MissionFile {
+  name: string;
+  xml: string;
+  version: string;
+  saved_at_us: number;
+  by: string;
+  notes: string[];
+}
+
+export interface OutlineElement {
+  id: string;
+  name: string;
+  type: string;
+  process: string;
+  parent: string;
+}
+
+export interface Outline {
+  processes: { id: string; name: string; executable: boolean; starts: boolean }[];
+  elements: OutlineElement[];
+  names: { name: string; from: string }[];
+  signals: { id: string; name: string; operators: boolean }[];
+  messages: { id: string; name: string; operators: boolean }[];
+}
+
+export interface Check {
+  findings: Finding[];
+  outline: Outline | null;
+}
+
+export type RunStatus =
+  | "running"
+  | "paused"
+  | "interrupted"
+  | "completed"
+  | "terminated"
+  | "failed"
+  | "stopped";
+
+export interface RunSummary {
+  run: string;
+  mission: string;
+  process: string;
+  status: RunStatus;
+  started_us: number;
+  ended_us: number | null;
+  records: number;
+  detail: string;
+}
+
+/** A record, with its own fields beside these (docs/records.md). */
+export interface RunRecord {
+  run: string;
+  seq: number;
+  t: number;
+  record: string;
+  token?: number;
+  process?: string;
+  element?: string;
+  scope?: number;
+  [more: string]: unknown;
+}
+
+export interface Prompt {
+  run: string;
+  prompt: string;
+  process: string;
+  element: string;
+  text: string;
+  decisions: { value: string; label: string }[];
+  role: string;
+}
+
+export interface ElementState {
+  active: number;
+  hits: number;
+  last: number;
+  failed: boolean;
+  asking: boolean;
+}
+
+export interface Command {
+  name: string;
+  resources: string[];
+  process: string;
+  element: string;
+  since: number;
+}
+
+export interface GeoPosition {
+  latitude_deg: number;
+  longitude_deg: number;
+  altitude_m: number;
+}
+
+export interface VehicleState {
+  resource: string;
+  time_us: number;
+  position: GeoPosition | null;
+  altitude_above_home_m: number | null;
+  velocity_enu_m_s: [number, number, number] | null;
+  yaw_rad: number | null;
+  battery_fraction: number | null;
+  mode: string;
+  armed: boolean | null;
+  ready: boolean | null;
+  not_ready_reasons: string[];
+  link: "connected" | "degraded" | "lost";
+  behavior: string;
+}
+
+export interface PayloadState {
+  resource: string;
+  time_us: number;
+  pan_rad: number | null;
+  tilt_rad: number | null;
+  zoom: number | null;
+  link: "connected" | "degraded" | "lost";
+  behavior: string;
+  footprint: GeoPosition[];
+}
+
+export interface TeamState {
+  behavior: string;
+  name: string;
+  time_us: number;
+  members: { resource: string; along_m: number | null; aside_m: number | null; gap_m: number | null }[];
+  spacing_m: number;
+}
+
+export type Elements = Record<string, Record<string, ElementState>>;
+
+/** What is new since the last frame; a snapshot has all of it. */
+export interface Live {
+  seq: number;
+  run: string | null;
+  t: number;
+  events: number;
+  elements: Elements;
+  vehicles: Record<string, VehicleState>;
+  payloads: Record<string, PayloadState>;
+  teams: Record<string, TeamState>;
+  commands: Record<string, Command | null>;
+  holders: Record<string, string>;
+  runs: RunSummary[];
+}
+
+export type ServerMessage =
+  | ({ type: "snapshot"; status: RunStatus | null; speed: number; prompts: Prompt[] } & Live)
+  | ({ type: "frame" } & Pick<Live, "seq" | "run" | "t" | "events"> & Partial<Live>)
+  | { type: "prompt"; seq: number; prompt: Prompt }
+  | { type: "prompt_closed"; seq: number; run: string; prompt: string; decision: string; by: string }
+  | { type: "run"; seq: number; run: RunSummary }
+  | { type: "fault"; seq: number; text: string }
+  | { type: "log"; seq: number; records: RunRecord[] };
