@@ -9,17 +9,28 @@ from fastapi.openapi.utils import get_openapi
 from m2pem.api import MissionControl
 from m2pem_plugin_web.access.entry import Entry
 from m2pem_plugin_web.access.guard import Guard
+from m2pem_plugin_web.live import socket
+from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.pages import add_pages
 from m2pem_plugin_web.problems import ProblemModel, handle_problems
-from m2pem_plugin_web.rest import session
+from m2pem_plugin_web.rest import prompts, resources, runs, session, steering
 from m2pem_plugin_web.settings import Settings
 
 OPENAPI = "/api/openapi.json"
 
 
-def routers_of(control: MissionControl, settings: Settings) -> list[APIRouter]:
+def routers_of(
+    control: MissionControl, settings: Settings, hub: Hub, entry: Entry
+) -> list[APIRouter]:
     """All that browsers may ask for."""
-    return [session.router(control, settings)]
+    return [
+        session.router(control, settings),
+        runs.router(control, settings.missions),
+        steering.router(control),
+        prompts.router(control, hub),
+        resources.router(control),
+        socket.router(hub, entry),
+    ]
 
 
 def create_app(routers: Iterable[APIRouter], entry: Entry) -> FastAPI:

@@ -31,11 +31,14 @@ class WebOcu:
         Raises:
             PluginError: the address is taken, or is none of this machine.
         """
-        import click  # noqa: PLC0415  # starting up must be fast
+        import asyncio  # noqa: PLC0415  # starting up must be fast
+
+        import click  # noqa: PLC0415
 
         from m2pem.api.operator import operator_name  # noqa: PLC0415
         from m2pem_plugin_web.access.entry import Entry, owner_of  # noqa: PLC0415
         from m2pem_plugin_web.app import create_app, routers_of  # noqa: PLC0415
+        from m2pem_plugin_web.live.hub import Hub  # noqa: PLC0415
         from m2pem_plugin_web.server import listen, serve  # noqa: PLC0415
 
         settings = self._settings
@@ -45,5 +48,9 @@ class WebOcu:
         entry = Entry(port, secure=settings.scheme == "https", owner=owner)
         address = f"{settings.scheme}://{f'[{host}]' if ':' in host else host}:{port}/"
         self.url = f"{address}?token={entry.token.value}" if entry.token else address
+        hub = Hub(self._control)
+        app = create_app(routers_of(self._control, settings, hub, entry), entry)
         click.echo(f"m2pem: the page is at {self.url}", err=True)
-        await serve(create_app(routers_of(self._control, settings), entry), listener, settings)
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(hub.run(), name="web: hub")
+            tasks.create_task(serve(app, listener, settings), name="web: server")

@@ -7,8 +7,10 @@ from contextlib import contextmanager, suppress
 
 import uvicorn
 from starlette.types import ASGIApp
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from m2pem.errors import PluginError
+from m2pem_plugin_web.live.socket import ABORT, LONGEST_MESSAGE
 from m2pem_plugin_web.settings import HOST, PORT, Settings
 
 LAST_WORDS_S = 1
@@ -43,6 +45,13 @@ def listen(settings: Settings) -> socket.socket:
     return listener
 
 
+class _WebSocket(WebSocketsSansIOProtocol):
+    async def run_asgi(self) -> None:
+        """Let the app end a connection that takes nothing any more."""
+        self.scope[ABORT] = self.transport.abort  # type: ignore[literal-required]
+        await super().run_asgi()
+
+
 class _Server(uvicorn.Server):
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -62,7 +71,8 @@ async def serve(app: ASGIApp, listener: socket.socket, settings: Settings) -> No
             server_header=False,
             proxy_headers=False,
             http="h11",
-            ws="websockets-sansio",
+            ws=_WebSocket,
+            ws_max_size=LONGEST_MESSAGE,
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=LAST_WORDS_S,
             ssl_certfile=settings.certificate,
