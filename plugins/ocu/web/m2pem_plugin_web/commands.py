@@ -29,7 +29,12 @@ def web() -> None:
 
 @web.command("add-user")
 @click.argument("name")
-@click.option("--role", type=click.Choice([each.value for each in Role]), required=True, help="What they may do.")
+@click.option(
+    "--role",
+    type=click.Choice([each.value for each in Role]),
+    required=True,
+    help="What they may do.",
+)
 @users_option
 def add_user(name: str, role: str, path: Path) -> None:
     """Name a user, or give one another role and password.
