@@ -6,9 +6,8 @@ import type EventBus from "diagram-js/lib/core/EventBus";
 import type { ElementLike, RootLike, ShapeLike } from "diagram-js/lib/core/Types";
 import type { Point } from "diagram-js/lib/util/Types";
 import type { ElementState } from "../../shared/types";
-import { keyOf } from "../mission/missionModel";
-import type { Element } from "../mission/moddle";
-import { processOf } from "../mission/views";
+import { processOf, type Element } from "../mission/moddle";
+import { keyIn, keyOf, qualified } from "../mission/names";
 import { Badges } from "./badges";
 import { lookOf, type Look, type Palette } from "./colours";
 import { Painter, type Outline, type Window } from "./painter";
@@ -45,9 +44,10 @@ export class Drawing {
     private readonly viewer: NavigatedViewer,
     private readonly host: HTMLElement,
     private readonly painter: Painter,
+    qualifier: string,
     listener: DrawingListener,
   ) {
-    this.index();
+    this.index(qualifier);
     this.root = this.canvas.getRootElement();
     const bus = viewer.get<EventBus>("eventBus");
     bus.on("canvas.viewbox.changing", () => this.follow());
@@ -59,7 +59,8 @@ export class Drawing {
     });
     bus.on<{ element: ElementLike }>("element.click", ({ element }) => {
       const about = element.businessObject as Element | undefined;
-      if (about?.$instanceOf("bpmn:FlowNode")) listener.chosen(processOf(about), about.id);
+      if (!about?.$instanceOf("bpmn:FlowNode")) return;
+      listener.chosen(qualified(qualifier, processOf(about)), qualified(qualifier, about.id));
     });
     this.observer = new ResizeObserver(() => this.resized());
     this.observer.observe(host);
@@ -67,19 +68,19 @@ export class Drawing {
 
   static async open(
     host: HTMLElement,
-    xml: string,
+    file: { xml: string; qualifier: string },
     diagram: string,
     palette: Palette,
     fading_ms: number,
     listener: DrawingListener,
   ): Promise<Drawing> {
     const viewer = new NavigatedViewer({ container: host });
-    await viewer.importXML(xml, diagram);
+    await viewer.importXML(file.xml, diagram);
     const canvas = document.createElement("canvas");
     canvas.className = "glow";
     host.querySelector(".djs-container")!.append(canvas);
     const painter = new Painter(canvas, { x: 0, y: 0, scale: 1 }, palette, fading_ms);
-    const drawing = new Drawing(viewer, host, painter, listener);
+    const drawing = new Drawing(viewer, host, painter, file.qualifier, listener);
     drawing.resized();
     drawing.fit();
     return drawing;
@@ -148,12 +149,12 @@ export class Drawing {
     return this.viewer.get<Canvas>("canvas");
   }
 
-  private index(): void {
+  private index(qualifier: string): void {
     const registry = this.viewer.get<ElementRegistry>("elementRegistry");
     registry.forEach((element, gfx) => {
       const about = element.businessObject as Element | undefined;
       if (!isShape(element) || !about?.$instanceOf("bpmn:FlowNode")) return;
-      const key = keyOf(processOf(about), about.id);
+      const key = keyIn(qualifier, about);
       const root = this.canvas.findRoot(element);
       const outline = outlineOf(element, about);
       this.figures.set(key, { key, id: element.id, root, outline, gfx, look: "idle", left_ms: 0 });

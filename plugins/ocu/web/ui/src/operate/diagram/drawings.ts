@@ -85,8 +85,8 @@ export class Drawings {
     box.className = "drawing";
     for (const other of this.host.children) other.toggleAttribute("hidden", true);
     this.host.append(box);
-    const xml = this.mission.files[view.file]!.xml;
-    const drawing = await Drawing.open(box, xml, view.diagram, palette.value, fading_ms.value, {
+    const file = this.mission.files[view.file]!;
+    const drawing = await Drawing.open(box, file, view.diagram, palette.value, fading_ms.value, {
       chosen: this.listener.chosen,
       wentTo: (root) => {
         const found = this.mission.views.find((each) => each.root === root && idOf(each) === id);

@@ -5,9 +5,9 @@ import { describe, expect, it } from "vitest";
 import { missionModel } from "./missionModel";
 import type { Definitions } from "./moddle";
 
-async function modelOf(xml: string, first = "") {
+async function modelOf(xml: string, first = "", qualifier = "") {
   const { rootElement } = await new BpmnModdle().fromXML(xml);
-  return missionModel([{ name: "m.bpmn", xml, definitions: rootElement as unknown as Definitions }], first);
+  return missionModel([{ name: "m.bpmn", qualifier, xml, definitions: rootElement as unknown as Definitions }], first);
 }
 
 const HEAD = `<bpmn:definitions xmlns:bpmn="http://www.omg.org/spec/BPMN/20100524/MODEL"
@@ -85,6 +85,14 @@ describe("mission model", () => {
     expect(model.viewOf("P", "C")!.root).toBe("S_plane");
     expect(model.viewOf("P", "E")!.root).toBe("T_plane");
     expect(model.viewOf("P", "E")!.inside).toBe("0/S_plane");
+  });
+
+  it("names what is in a called file as records do", async () => {
+    const model = await modelOf(`${NESTED}${diagram("P", shape("A"))}</bpmn:definitions>`, "", "sub");
+    expect(model.trees.map(({ id }) => id)).toEqual(["sub:P", "sub:Q"]);
+    expect(model.node("sub:P", "sub:E")!.label).toBe("E");
+    expect(model.viewOf("sub:P", "sub:A")!.root).toBe("P");
+    expect(model.definition("sub:s1")).toBe("Dust");
   });
 
   it("shows pools in one view", async () => {

@@ -1,6 +1,7 @@
 // A mission as it is shown: its elements as a tree, and the diagrams in which they are drawn.
 import { strings } from "../../strings";
 import type { Collaboration, Definitions, Element, FlowNode, Process } from "./moddle";
+import { keyOf, qualified } from "./names";
 import { viewsOf, type View } from "./views";
 
 export interface MissionNode {
@@ -22,7 +23,7 @@ export interface Definition {
 }
 
 export interface MissionModel {
-  files: readonly { name: string; xml: string }[];
+  files: readonly { name: string; qualifier: string; xml: string }[];
   trees: MissionNode[];
   views: View[];
   signals: Definition[];
@@ -34,8 +35,6 @@ export interface MissionModel {
   definition(id: string): string;
 }
 
-export const keyOf = (process: string, element: string): string => `${process}\n${element}`;
-
 const unnamed: Readonly<Record<string, string>> = strings.operate.outline.unnamed;
 
 export function labelOf(element: Element): string {
@@ -45,16 +44,15 @@ export function labelOf(element: Element): string {
 
 export interface MissionSource {
   name: string;
+  /** Before the ids of its elements in records; "": the mission's own file. */
+  qualifier: string;
   xml: string;
   definitions: Definitions;
 }
 
 export function missionModel(sources: readonly MissionSource[], first: string): MissionModel {
-  const roots = sources.flatMap(({ definitions }) => definitions.rootElements ?? []);
-  const processes = roots.filter((root) => root.$instanceOf("bpmn:Process")) as Process[];
-  const names = participantNames(roots);
-  const trees = processes
-    .map((process) => treeOf(process, names))
+  const trees = sources
+    .flatMap(treesOf)
     .sort((one, other) => Number(other.id === first) - Number(one.id === first));
   const nodes = new Map<string, MissionNode>();
   for (const tree of trees) index(tree, nodes);
@@ -63,7 +61,8 @@ export function missionModel(sources: readonly MissionSource[], first: string): 
   for (const view of views) {
     for (const key of view.elements) if (!viewByElement.has(key)) viewByElement.set(key, view);
   }
-  const definitions = new Map(roots.map((root) => [root.id, root.name || root.id]));
+  const roots = sources.flatMap(({ definitions }) => definitions.rootElements ?? []);
+  const definitions = definedIn(sources);
   return {
     files: sources,
     trees,
@@ -77,6 +76,34 @@ export function missionModel(sources: readonly MissionSource[], first: string): 
   };
 }
 
+function definedIn(sources: readonly MissionSource[]): Map<string, string> {
+  const names = new Map<string, string>();
+  for (const { qualifier, definitions } of sources) {
+    for (const { id, name } of definitions.rootElements ?? []) {
+      if (!id) continue;
+      names.set(id, name || id);
+      names.set(qualified(qualifier, id), name || id);
+    }
+  }
+  return names;
+}
+
+function treesOf({ qualifier, definitions }: MissionSource): MissionNode[] {
+  const roots = definitions.rootElements ?? [];
+  const pools = participantNames(roots);
+  return (roots.filter((root) => root.$instanceOf("bpmn:Process")) as Process[]).map((process) => {
+    const id = qualified(qualifier, process.id);
+    return {
+      process: id,
+      id,
+      type: "Process",
+      label: process.name || pools.get(process.id) || process.id,
+      children: childrenOf(process.flowElements, id, qualifier),
+      calls: "",
+    };
+  });
+}
+
 function participantNames(roots: readonly Element[]): Map<string, string> {
   const names = new Map<string, string>();
   for (const root of roots) {
@@ -87,26 +114,19 @@ function participantNames(roots: readonly Element[]): Map<string, string> {
   return names;
 }
 
-function treeOf(process: Process, names: Map<string, string>): MissionNode {
-  return {
-    process: process.id,
-    id: process.id,
-    type: "Process",
-    label: process.name || names.get(process.id) || process.id,
-    children: inOrder(process.flowElements ?? []).map((node) => nodeOf(node, process.id)),
-    calls: "",
-  };
-}
-
-function nodeOf(element: FlowNode, process: string): MissionNode {
-  return {
+function childrenOf(
+  elements: readonly Element[] | undefined,
+  process: string,
+  qualifier: string,
+): MissionNode[] {
+  return inOrder(elements ?? []).map((element) => ({
     process,
-    id: element.id,
+    id: qualified(qualifier, element.id),
     type: element.$type.replace("bpmn:", ""),
     label: labelOf(element),
-    children: inOrder(element.flowElements ?? []).map((child) => nodeOf(child, process)),
+    children: childrenOf(element.flowElements, process, qualifier),
     calls: (element.calledElement ?? "").replace(/^.*:/, ""),
-  };
+  }));
 }
 
 /** As tokens come to them: from the start along the flows, boundary events after their activity. */

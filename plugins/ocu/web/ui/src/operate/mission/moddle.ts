@@ -59,3 +59,11 @@ export async function readDefinitions(xml: string): Promise<Definitions> {
     viewer.destroy();
   }
 }
+
+/** The process that contains an element; "": none does. */
+export function processOf(element: Element): string {
+  for (let around: Element | undefined = element; around; around = around.$parent) {
+    if (around.$instanceOf("bpmn:Process")) return around.id;
+  }
+  return "";
+}

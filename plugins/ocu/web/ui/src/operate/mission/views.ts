@@ -1,6 +1,7 @@
 // The pictures of a file that can be shown one at a time: its diagrams, and what is inside its
 // collapsed subprocesses.
-import type { Collaboration, Definitions, Diagram, Element, Process } from "./moddle";
+import { processOf, type Collaboration, type Definitions, type Diagram, type Element, type Process } from "./moddle";
+import { keyIn } from "./names";
 
 export interface View {
   key: string;
@@ -12,16 +13,17 @@ export interface View {
   title: string;
   /** "": not inside of another view. */
   inside: string;
-  /** Keys (`keyOf`) of what is drawn in it. */
+  /** Keys (names.ts) of what is drawn in it. */
   elements: Set<string>;
 }
 
 interface Drawn {
   name: string;
+  qualifier: string;
   definitions: Definitions;
 }
 
-export function viewsOf({ name, definitions }: Drawn, file: number, several: boolean): View[] {
+export function viewsOf({ name, qualifier, definitions }: Drawn, file: number, several: boolean): View[] {
   const collapsed = collapsedIn(definitions);
   const views = new Map<string, View>();
   for (const diagram of definitions.diagrams ?? []) {
@@ -35,7 +37,7 @@ export function viewsOf({ name, definitions }: Drawn, file: number, several: boo
     for (const { bpmnElement } of diagram.plane?.planeElement ?? []) {
       if (!bpmnElement?.$instanceOf("bpmn:FlowNode")) continue;
       const view = viewFor(bpmnElement, diagram, collapsed, views, file);
-      view?.elements.add(`${processOf(bpmnElement)}\n${bpmnElement.id}`);
+      view?.elements.add(keyIn(qualifier, bpmnElement));
     }
   }
   return [...views.values()].filter(({ elements }) => elements.size > 0);
@@ -99,16 +101,7 @@ function viewAround(
   const around = viewFor(subprocess, diagram, collapsed, views, file);
   if (around) return around;
   const process = processOf(subprocess);
-  return [...views.values()].find(
-    ({ root, elements }) => root === process || elements.has(`${process}\n${subprocess.id}`),
-  );
-}
-
-export function processOf(element: Element): string {
-  for (let around: Element | undefined = element; around; around = around.$parent) {
-    if (around.$instanceOf("bpmn:Process")) return around.id;
-  }
-  return "";
+  return [...views.values()].find(({ root }) => root === process);
 }
 
 function titleOf(about: Element, diagram: Diagram): string {

@@ -7,7 +7,8 @@ import type { ElementState } from "../../shared/types";
 import { lookOf, type Look } from "../diagram/colours";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
-import { keyOf, type MissionNode } from "../mission/missionModel";
+import type { MissionNode } from "../mission/missionModel";
+import { keyOf } from "../mission/names";
 import { moved, rowsOf, type Row } from "./rows";
 import "./outline.css";
 

@@ -1,5 +1,6 @@
 // The tree of elements as the rows that are seen: what is folded or not looked for is left out.
-import { keyOf, type MissionNode } from "../mission/missionModel";
+import type { MissionNode } from "../mission/missionModel";
+import { keyOf } from "../mission/names";
 
 export interface Row {
   key: string;

@@ -4,13 +4,12 @@ import { get } from "../../shared/api";
 import * as executive from "../../shared/executive";
 import type {
   Command,
-  RunRecord,
   RunStatus,
   RunSummary,
   ServerMessage,
 } from "../../shared/types";
 import { ElementBoard } from "./elementBoard";
-import { RecordFeed } from "./recordFeed";
+import { RecordFeed, type Page } from "./recordFeed";
 import type { Scene } from "./scene";
 
 const TICK_MS = 200;
@@ -46,7 +45,7 @@ export class LiveScene implements Scene {
   constructor(readonly run: string) {
     const path = `/runs/${encodeURIComponent(run)}/records`;
     this.feed = new RecordFeed((after, limit) =>
-      get<{ records: RunRecord[]; next: number }>(`${path}?after=${after}&limit=${limit}`),
+      get<Page>(`${path}?after=${after}&limit=${limit}`),
     );
     this.stopListening = executive.listen((message) => this.take(message));
     this.ticking = setInterval(() => (this.time.value = this.now()), TICK_MS);

@@ -8,7 +8,7 @@ function journal(count: number) {
   const read = async (after: number, limit: number) => {
     asked.push(after);
     const page = records.slice(after, after + limit);
-    return { records: page, next: page.at(-1)?.seq ?? after };
+    return { records: page, next: page.length < limit ? null : page.at(-1)!.seq };
   };
   return { records, asked, read };
 }

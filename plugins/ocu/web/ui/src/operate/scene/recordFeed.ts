@@ -5,7 +5,13 @@ import { Spans } from "../../records/spans";
 import type { Command, RunRecord } from "../../shared/types";
 import type { LogPage } from "./scene";
 
-export type ReadPage = (after: number, limit: number) => Promise<{ records: RunRecord[]; next: number }>;
+/** `next`: where to go on; null: there are no more now. */
+export interface Page {
+  records: RunRecord[];
+  next: number | null;
+}
+
+export type ReadPage = (after: number, limit: number) => Promise<Page>;
 
 /** Kept for the log. */
 const KEPT = 20_000;
@@ -62,7 +68,7 @@ export class RecordFeed {
     for (;;) {
       const page = await this.read(after, PAGE);
       found.push(...page.records.filter(({ seq }) => seq < first));
-      if (page.records.length === 0 || page.next >= first - 1 || page.next <= after) break;
+      if (page.next === null || page.next >= first - 1) break;
       after = page.next;
     }
     this.records = [...found, ...this.records];
@@ -110,10 +116,10 @@ export class RecordFeed {
     let after = from;
     while (!this.over && this.last < count) {
       const page = await this.read(after, PAGE);
-      if (page.records.length === 0 || page.next <= after) break;
-      after = page.next;
       this.add(page.records);
       this.show();
+      if (page.next === null) break;
+      after = page.next;
     }
   }
 
