@@ -17,7 +17,7 @@ class Editable:
 
 @dataclass(frozen=True, slots=True)
 class OutlineProcess:
-    """A process of the file. `starts`: whether a run begins with it, unless it is told otherwise."""
+    """A process. `starts`: whether a run begins with it, unless it is told otherwise."""
 
     id: str
     name: str
@@ -42,7 +42,7 @@ class OutlineElement:
 
 @dataclass(frozen=True, slots=True)
 class DataName:
-    """A dotted name of the data store. `source`: the id of what writes it; "" if it is only read."""
+    """A dotted name of the data store. `source`: the id of what writes it, "" if nothing does."""
 
     name: str
     source: str

@@ -9,7 +9,9 @@ from typing import Any, Self
 
 import msgspec
 
+from m2pem.api.authoring import Editable, Outline
 from m2pem.api.control import (
+    HandedOver,
     Notice,
     OpenPrompt,
     PromptClosed,
@@ -40,7 +42,7 @@ _KINDS: dict[str, type] = {
 class RemoteControl:
     """Implements `m2pem.api.control.MissionControl`; enter it before use.
 
-    Missions cannot be started, checked or rehearsed through it.
+    Missions cannot be started, edited, checked, verified or rehearsed through it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -241,3 +243,23 @@ class RemoteControl:
     async def simulate(self, mission: Path | str | bytes, **options: Any) -> SimulationResult:
         """Refused."""
         raise OperatorError("missions are rehearsed where the executive runs: m2pem simulate")
+
+    async def verify(self, mission: Path | str | bytes, **options: Any) -> Mapping[str, Any]:
+        """Refused."""
+        raise OperatorError("missions are verified where the executive runs: m2pem verify")
+
+    def editable(self, mission: bytes, *, anew: bool = False) -> Editable:
+        """Refused."""
+        raise OperatorError("missions are edited where the executive runs")
+
+    def outline(self, mission: bytes) -> Outline:
+        """Refused."""
+        raise OperatorError("missions are edited where the executive runs")
+
+    def geometries(self) -> Mapping[str, HandedOver]:
+        """Refused."""
+        raise OperatorError("geometries are listed where the executive runs")
+
+    def services(self) -> Mapping[str, Sequence[str]]:
+        """Refused."""
+        raise OperatorError("services are listed where the executive runs")

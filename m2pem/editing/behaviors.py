@@ -25,7 +25,7 @@ def lift_behaviors(definitions: Element) -> None:
         if behavior is None:
             continue
         task.remove(scripts[0])
-        task.attrib.pop(_FORMAT[tag(task)], None)
+        task.attrib.pop(_FORMAT[tag(task)], "")
         extensions_of(task).append(behavior)
     for behavior in [*definitions.iter(f"{M2PEM}behavior")]:
         _in_one_form(behavior)

@@ -84,7 +84,7 @@ def _with_prefixes(root: Element) -> Element:
             number += 1
             prefix = f"{wanted}{number}"
         prefixes[prefix] = uri
-    made = etree.Element(root.tag, nsmap=prefixes)
+    made = etree.Element(root.tag, nsmap=prefixes)  # type: ignore[arg-type]  # None: the default
     for key, value in root.attrib.items():
         made.set(key, value)
     made.text = root.text

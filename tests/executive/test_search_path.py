@@ -72,7 +72,7 @@ def test_a_rehearsal_beside_missions_has_the_path_too(play, tmp_path: Path) -> N
     (tmp_path / "search.bpmn").write_bytes(mission(SEARCH))
     given = []
 
-    def rehearse(_mission, _fleet, **options):
+    async def rehearse(_mission, _fleet, **options):
         given.append(options["search_path"])
 
     async def story(world: World):

@@ -48,7 +48,5 @@ def _edge(block: Block, name: str, towards: Point) -> Point:
     if box is None:
         return x, y
     dx, dy = towards[0] - x, towards[1] - y
-    part = min(
-        box.width / 2 / abs(dx) if dx else 1.0, box.height / 2 / abs(dy) if dy else 1.0, 1.0
-    )
+    part = min(box.width / 2 / abs(dx) if dx else 1.0, box.height / 2 / abs(dy) if dy else 1.0, 1.0)
     return x + dx * part, y + dy * part
