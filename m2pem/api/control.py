@@ -217,6 +217,10 @@ class MissionControl(Protocol):
         """Whether nothing real moves: all vehicles are simulated, or software in the loop."""
         ...
 
+    def speed(self) -> float:
+        """Seconds of mission time in a real second."""
+        ...
+
     def check(
         self, mission: Path | str | bytes, *, process: str | None = None, data: Iterable[str] = ()
     ) -> Sequence[Finding]:

@@ -58,6 +58,7 @@ class RemoteControl:
         catalogue = await self._ask("catalogue")
         self._catalogue = msgspec.convert(catalogue, dict[ResourceId, tuple[BehaviorSpec, ...]])
         self._simulated = bool(await self._ask("simulated"))
+        self._speed = float(await self._ask("speed"))
         self._listening = asyncio.create_task(self._follow_prompts())
         return self
 
@@ -233,6 +234,10 @@ class RemoteControl:
     def simulated(self) -> bool:
         """Whether nothing real moves."""
         return self._simulated
+
+    def speed(self) -> float:
+        """Seconds of mission time in a real second."""
+        return self._speed
 
     def check(
         self, mission: Path | str | bytes, *, process: str | None = None, data: Iterable[str] = ()

@@ -227,6 +227,10 @@ class Control:
         """Whether nothing real moves."""
         return self._executive.arbiters.nothing_is_real
 
+    def speed(self) -> float:
+        """Seconds of mission time in a real second."""
+        return self._executive.speed
+
     def check(
         self, mission: Path | str | bytes, *, process: str | None = None, data: Iterable[str] = ()
     ) -> Sequence[Finding]:

@@ -101,7 +101,7 @@ class Executive:
         self.search_path = tuple(search_path)
         self._observed = observed
         self._script = script
-        self._speed = speed
+        self.speed = speed
         self._watch_links = watch_links
         self._max_steps = max_steps
         self.handed_over: dict[str, HandedOver] = {}
@@ -145,7 +145,7 @@ class Executive:
             self._listen(f"telemetry of {name}", partial(self._read_telemetry, arbiter))
         if self._watch_links:
             # On a fast clock our own hesitation would look like the silence of a vehicle.
-            stretch = max(1.0, self._speed)
+            stretch = max(1.0, self.speed)
             bounds = {
                 vehicle.id: stretch
                 * (
@@ -270,7 +270,7 @@ class Executive:
             process_id,
             dump(self.fleet),
             self.simulated,
-            self._speed,
+            self.speed,
             self.clock.now_us(),
             loaded.library,
         )
