@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     )
     from m2pem.api.authoring import (
         DataName,
+        Draft,
         Editable,
+        MissionSource,
         Outline,
         OutlineElement,
         OutlineProcess,
@@ -87,8 +89,8 @@ _MODULES = {
         " Connection Limits ResolvedValue SightedArbiter"
     ),
     "m2pem.api.authoring": (
-        "DataName Editable Outline OutlineElement OutlineProcess OutlineTrigger SearchLimits"
-        " SearchProgress"
+        "DataName Draft Editable MissionSource Outline OutlineElement OutlineProcess"
+        " OutlineTrigger SearchLimits SearchProgress"
     ),
     "m2pem.api.bus": "FleetBus",
     "m2pem.api.clock": "Clock",
@@ -141,6 +143,7 @@ __all__ = [
     "Decision",
     "Detection",
     "Dimension",
+    "Draft",
     "Editable",
     "Fence",
     "Finding",
@@ -155,6 +158,7 @@ __all__ = [
     "Mailbox",
     "Mission",
     "MissionControl",
+    "MissionSource",
     "Notice",
     "Ocu",
     "OpenPrompt",

@@ -1,6 +1,23 @@
 """What MissionControl tells people who draw a mission."""
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias, Union
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A mission as if it stood at `path`, where it need not be: that is what it is called.
+
+    It may call and import what is in the folder of `path` and on the search path, no other files.
+    """
+
+    path: Path
+    source: bytes
+
+
+MissionSource: TypeAlias = Union[Path, str, bytes, Draft]
+"""Where a mission is: a path, a path or `file:`/`http:` URL as a text, or the BPMN itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +109,9 @@ DEFAULT_LIMITS = SearchLimits()
 __all__ = [
     "DEFAULT_LIMITS",
     "DataName",
+    "Draft",
     "Editable",
+    "MissionSource",
     "Outline",
     "OutlineElement",
     "OutlineProcess",

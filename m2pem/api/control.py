@@ -3,10 +3,17 @@
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, Union
 
-from m2pem.api.authoring import DEFAULT_LIMITS, Editable, Outline, SearchLimits, SearchProgress
+from m2pem.api.authoring import (
+    DEFAULT_LIMITS,
+    Draft,
+    Editable,
+    MissionSource,
+    Outline,
+    SearchLimits,
+    SearchProgress,
+)
 from m2pem.api.telemetry import PayloadState, Telemetry, VehicleState
 from m2pem.engine.records import Record
 from m2pem.findings import Finding
@@ -103,13 +110,13 @@ class MissionControl(Protocol):
 
     async def start(
         self,
-        mission: Path | str | bytes,
+        mission: MissionSource,
         *,
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
         by: str = "",
     ) -> RunId:
-        """Start a mission from a path, a `file:`/`http:` URL or BPMN bytes.
+        """Start a mission.
 
         Raises:
             MissionError: with every finding, when it is not well or does not fit the fleet.
@@ -222,7 +229,7 @@ class MissionControl(Protocol):
         ...
 
     def check(
-        self, mission: Path | str | bytes, *, process: str | None = None, data: Iterable[str] = ()
+        self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
     ) -> Sequence[Finding]:
         """All findings of `m2pem check` for a mission and the fleet in use.
 
@@ -230,7 +237,7 @@ class MissionControl(Protocol):
         """
         ...
 
-    async def simulate(self, mission: Path | str | bytes, **options: Any) -> "SimulationResult":
+    async def simulate(self, mission: MissionSource, **options: Any) -> "SimulationResult":
         """Rehearse a mission with this fleet on a virtual clock. Cancelling ends it.
 
         Options: `process`, `data`, `answers` (path of an answers file, or its text as bytes),
@@ -244,7 +251,7 @@ class MissionControl(Protocol):
 
     async def verify(
         self,
-        mission: Path | str | bytes,
+        mission: MissionSource,
         *,
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
@@ -275,7 +282,7 @@ class MissionControl(Protocol):
         """
         ...
 
-    def outline(self, mission: bytes) -> Outline:
+    def outline(self, mission: bytes | Draft) -> Outline:
         """What a file has, also one with errors, as far as it can be read.
 
         Raises:

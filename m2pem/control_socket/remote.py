@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import msgspec
 
-from m2pem.api.authoring import Editable, Outline
+from m2pem.api.authoring import Draft, Editable, MissionSource, Outline
 from m2pem.api.control import (
     HandedOver,
     Notice,
@@ -112,7 +112,7 @@ class RemoteControl:
 
     async def start(
         self,
-        mission: Path | str | bytes,
+        mission: MissionSource,
         *,
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
@@ -240,16 +240,16 @@ class RemoteControl:
         return self._speed
 
     def check(
-        self, mission: Path | str | bytes, *, process: str | None = None, data: Iterable[str] = ()
+        self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
     ) -> Sequence[Finding]:
         """Refused."""
         raise OperatorError("missions are checked where the executive runs: m2pem check")
 
-    async def simulate(self, mission: Path | str | bytes, **options: Any) -> SimulationResult:
+    async def simulate(self, mission: MissionSource, **options: Any) -> SimulationResult:
         """Refused."""
         raise OperatorError("missions are rehearsed where the executive runs: m2pem simulate")
 
-    async def verify(self, mission: Path | str | bytes, **options: Any) -> Mapping[str, Any]:
+    async def verify(self, mission: MissionSource, **options: Any) -> Mapping[str, Any]:
         """Refused."""
         raise OperatorError("missions are verified where the executive runs: m2pem verify")
 
@@ -257,7 +257,7 @@ class RemoteControl:
         """Refused."""
         raise OperatorError("missions are edited where the executive runs")
 
-    def outline(self, mission: bytes) -> Outline:
+    def outline(self, mission: bytes | Draft) -> Outline:
         """Refused."""
         raise OperatorError("missions are edited where the executive runs")
 

@@ -13,10 +13,12 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import msgspec
 
+from m2pem.api.authoring import Draft, MissionSource
 from m2pem.errors import (
     AnswersError,
     FindingsError,
@@ -52,6 +54,36 @@ _KINDS: dict[str, Callable[[str, Sequence[Finding]], M2pemError]] = {
     "MissionError": MissionError,
     "RequirementsError": lambda _, findings: RequirementsError(findings),
 }
+
+
+class Given(msgspec.Struct):
+    """Where a mission is, as it travels. `kind`: of `MissionSource`; `source`: of the BPMN."""
+
+    kind: str
+    place: str = ""
+    source: bytes = b""
+
+    def source_of(self) -> MissionSource:
+        """What was given."""
+        if self.kind == "bytes":
+            return self.source
+        if self.kind == "str":
+            return self.place
+        path = Path(self.place)
+        return Draft(path, self.source) if self.kind == "Draft" else path
+
+
+def given(mission: MissionSource) -> Given:
+    """A mission, for its journey."""
+    match mission:
+        case bytes():
+            return Given("bytes", source=mission)
+        case Draft(path, source):
+            return Given("Draft", str(path), source)
+        case str():
+            return Given("str", mission)
+        case _:
+            return Given("Path", str(mission))
 
 
 async def apart(module: str, order: bytes, told: Tell | None = None) -> bytes:

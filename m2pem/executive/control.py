@@ -5,7 +5,15 @@ from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from m2pem.api.authoring import DEFAULT_LIMITS, Editable, Outline, SearchLimits, SearchProgress
+from m2pem.api.authoring import (
+    DEFAULT_LIMITS,
+    Draft,
+    Editable,
+    MissionSource,
+    Outline,
+    SearchLimits,
+    SearchProgress,
+)
 from m2pem.api.control import (
     HandedOver,
     Notice,
@@ -23,12 +31,11 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import MissionError, OperatorError
-from m2pem.executive.loading import findings_for, load_source
+from m2pem.executive.loading import findings_for, library_of, load_source
 from m2pem.executive.prover import verify_apart
 from m2pem.findings import Finding
 from m2pem.journal.base import RunLine
 from m2pem.journal.mission import mission_of
-from m2pem.model.bpmn.search_path import SearchPath
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
 from m2pem.model.events import Signal
 from m2pem.model.mission import Mission
@@ -52,7 +59,7 @@ class Control:
 
     async def start(
         self,
-        mission: Path | str | bytes,
+        mission: MissionSource,
         *,
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
@@ -232,7 +239,7 @@ class Control:
         return self._executive.speed
 
     def check(
-        self, mission: Path | str | bytes, *, process: str | None = None, data: Iterable[str] = ()
+        self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
     ) -> Sequence[Finding]:
         """All findings of `m2pem check` for a mission and the fleet in use."""
         executive = self._executive
@@ -249,7 +256,7 @@ class Control:
             simulated=executive.simulated,
         )
 
-    async def simulate(self, mission: Path | str | bytes, **options: Any) -> SimulationResult:
+    async def simulate(self, mission: MissionSource, **options: Any) -> SimulationResult:
         """Rehearse a mission with this fleet on a virtual clock."""
         executive = self._executive
         if executive.rehearse is None:
@@ -263,7 +270,7 @@ class Control:
 
     async def verify(
         self,
-        mission: Path | str | bytes,
+        mission: MissionSource,
         *,
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
@@ -293,9 +300,11 @@ class Control:
         """The same mission as an editor takes it."""
         return editable(mission, anew=anew)
 
-    def outline(self, mission: bytes) -> Outline:
+    def outline(self, mission: bytes | Draft) -> Outline:
         """What a file has, as far as it can be read."""
-        return outline(mission, SearchPath(None, self._executive.search_path), self.services())
+        draft = mission if isinstance(mission, Draft) else Draft(Path("mission.bpmn"), mission)
+        library = library_of(mission, self._executive.search_path)
+        return outline(draft.source, library, self.services())
 
     def geometries(self) -> Mapping[str, HandedOver]:
         """What operators have handed over for all runs."""

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from m2pem.api.arbiter import Arbiter, ArbiterContext, BehaviorReport
+from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import Clock
 from m2pem.api.control import HandedOver, RunId, SimulationResult
 from m2pem.api.service import ServiceContext
@@ -219,7 +220,7 @@ class Executive:
 
     def load(
         self,
-        mission: Path | str | bytes,
+        mission: MissionSource,
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
     ) -> tuple[Mission, str]:
@@ -250,7 +251,7 @@ class Executive:
 
     async def start(
         self,
-        mission: Path | str | bytes,
+        mission: MissionSource,
         process: str | None,
         data: Mapping[str, Value] | None,
         by: str,

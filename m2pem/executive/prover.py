@@ -9,8 +9,8 @@ from typing import Any
 import msgspec
 
 from m2pem.api.arbiter import ArbiterContext
-from m2pem.api.authoring import SearchLimits, SearchProgress
-from m2pem.executive.apart import Tell, apart, serve
+from m2pem.api.authoring import MissionSource, SearchLimits, SearchProgress
+from m2pem.executive.apart import Given, Tell, apart, given, serve
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.loading import load_source
@@ -27,10 +27,9 @@ _BETWEEN_S = 0.2
 
 
 class Order(msgspec.Struct):
-    """What is to be verified. `source`: the bytes of the mission, None: they are at `place`."""
+    """What is to be verified."""
 
-    source: bytes | None
-    place: str
+    mission: Given
     fleet: bytes
     simulated: bool
     search_path: list[str]
@@ -43,7 +42,7 @@ class Order(msgspec.Struct):
 
 
 async def verify_apart(
-    mission: Path | str | bytes,
+    mission: MissionSource,
     fleet: Fleet,
     *,
     simulated: bool,
@@ -58,8 +57,7 @@ async def verify_apart(
 ) -> dict[str, Any]:
     """The answers of `m2pem verify --format json`, from a process of its own."""
     order = Order(
-        mission if isinstance(mission, bytes) else None,
-        "" if isinstance(mission, bytes) else str(mission),
+        given(mission),
         dump(fleet),
         simulated,
         [str(each) for each in search_path],
@@ -99,7 +97,7 @@ def _work(content: bytes, tell: Tell) -> bytes:
             tell(msgspec.msgpack.encode(how_far))
 
     path = [Path(each) for each in order.search_path]
-    loaded = load_source(order.place if order.source is None else order.source, path)
+    loaded = load_source(order.mission.source_of(), path)
     plugins = PluginManager()
     asked = asked_of(
         loaded,

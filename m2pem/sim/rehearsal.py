@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
+from m2pem.api.authoring import MissionSource
 from m2pem.api.control import (
     RunStatus,
     RunSummary,
@@ -74,7 +75,7 @@ class RehearsalResult(SimulationResult):
 
 
 def rehearse(
-    mission: Path | str | bytes | Mission,
+    mission: MissionSource | Mission,
     fleet: Fleet | None,
     *,
     plugins: PluginManager,

@@ -6,19 +6,19 @@ from typing import Any
 
 import msgspec
 
+from m2pem.api.authoring import MissionSource
 from m2pem.api.control import RunSummary, SimulationResult, StampedRecord, TelemetrySample
 from m2pem.errors import OperatorError
-from m2pem.executive.apart import Tell, apart, serve
+from m2pem.executive.apart import Given, Tell, apart, given, serve
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
 from m2pem.resources.snapshot import dump, restore
 
 
 class Order(msgspec.Struct):
-    """What is to be rehearsed. `source`: the bytes of the mission, None: they are at `place`."""
+    """What is to be rehearsed."""
 
-    source: bytes | None
-    place: str
+    mission: Given
     fleet: bytes
     process: str | None
     data: dict[str, Any]
@@ -39,7 +39,7 @@ class Done(msgspec.Struct):
 
 
 async def rehearse_apart(
-    mission: Path | str | bytes,
+    mission: MissionSource,
     fleet: Fleet,
     *,
     max_steps: int,
@@ -59,8 +59,7 @@ async def rehearse_apart(
     if max_steps < 1 or (telemetry_every_s is not None and not telemetry_every_s > 0):
         raise OperatorError("max_steps and telemetry_every_s are greater than 0")
     order = Order(
-        mission if isinstance(mission, bytes) else None,
-        "" if isinstance(mission, bytes) else str(mission),
+        given(mission),
         dump(fleet),
         process,
         dict(data or {}),
@@ -82,7 +81,7 @@ def _work(content: bytes, _: Tell) -> bytes:
 
     order = msgspec.msgpack.decode(content, type=Order)
     result = rehearse(
-        order.place if order.source is None else order.source,
+        order.mission.source_of(),
         restore(order.fleet),
         plugins=PluginManager(),
         process=order.process,
