@@ -12,7 +12,15 @@ from m2pem_plugin_web.access.people import Commander, Viewer
 from m2pem_plugin_web.live.words import record_of
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.lookup import find_run
-from m2pem_plugin_web.rest.models import Body, Data, Name, RecordPage, RunModel, run_model
+from m2pem_plugin_web.rest.models import (
+    Body,
+    Data,
+    MissionName,
+    Name,
+    RecordPage,
+    RunModel,
+    run_model,
+)
 
 MOST_RUNS = 1000
 MOST_RECORDS = 5000
@@ -24,7 +32,7 @@ _encode = msgspec.json.Encoder().encode
 class StartModel(Body):
     """What to start. `version`: of the mission, None for its newest; `process`: None, its main."""
 
-    mission: Name
+    mission: MissionName
     version: str | None = None
     process: Name | None = None
     data: Data | None = None
