@@ -37,8 +37,8 @@ class WebOcu:
         """Where it is served; with the token that is valid, if there is one."""
         try:
             entry = self._entry(settings)
-            self._hub = Hub(control)
-            routers = routers_of(control, settings, self._hub, entry)
+            self.hub = Hub(control)
+            routers = routers_of(control, settings, self.hub, entry)
             self._app = create_app(routers, entry, settings)
         except BaseException:
             self._server.close()
@@ -55,7 +55,7 @@ class WebOcu:
         click.echo(f"m2pem: the page is at {self.url}", err=True)
         try:
             async with asyncio.TaskGroup() as tasks:
-                tasks.create_task(self._hub.run(), name="web: hub")
+                tasks.create_task(self.hub.run(), name="web: hub")
                 tasks.create_task(self._server.serve(self._app), name="web: server")
         finally:
             self._server.close()

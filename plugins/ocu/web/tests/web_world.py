@@ -147,6 +147,7 @@ async def connect(
         additional_headers=headers,
         origin=websockets.Origin(base) if origin == "" else origin,  # type: ignore[arg-type]
         compression=None,
+        close_timeout=1,
         **options,
     )
 
@@ -178,9 +179,10 @@ class World:
         """Start a mission, and wait for its question."""
         run = await self.control.start(mission or scenarios.question(), by="test")
         async with asyncio.timeout(WITHIN_S):
-            while not (found := [each for each in self.control.prompts() if each.run == run]):
-                await asyncio.sleep(0.01)
-        return found[0]
+            async for notice in self.control.subscribe(run):
+                if isinstance(notice, OpenPrompt):
+                    return notice
+        raise AssertionError("the executive has ended")
 
 
 @asynccontextmanager
