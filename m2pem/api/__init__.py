@@ -19,9 +19,22 @@ if TYPE_CHECKING:
         ResolvedValue,
         SightedArbiter,
     )
+    from m2pem.api.authoring import (
+        DataName,
+        Draft,
+        Editable,
+        MissionSource,
+        Outline,
+        OutlineElement,
+        OutlineProcess,
+        OutlineTrigger,
+        SearchLimits,
+        SearchProgress,
+    )
     from m2pem.api.bus import FleetBus
     from m2pem.api.clock import Clock
     from m2pem.api.control import (
+        HandedOver,
         MissionControl,
         Notice,
         OpenPrompt,
@@ -31,6 +44,7 @@ if TYPE_CHECKING:
         RunSummary,
         SimulationResult,
         StampedRecord,
+        TelemetrySample,
     )
     from m2pem.api.goals import GoalArbiter
     from m2pem.api.ledger import Ledger
@@ -74,11 +88,15 @@ _MODULES = {
         "AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport BehaviorRequest"
         " Connection Limits ResolvedValue SightedArbiter"
     ),
+    "m2pem.api.authoring": (
+        "DataName Draft Editable MissionSource Outline OutlineElement OutlineProcess"
+        " OutlineTrigger SearchLimits SearchProgress"
+    ),
     "m2pem.api.bus": "FleetBus",
     "m2pem.api.clock": "Clock",
     "m2pem.api.control": (
-        "MissionControl Notice OpenPrompt PromptClosed RunId RunStatus RunSummary"
-        " SimulationResult StampedRecord"
+        "HandedOver MissionControl Notice OpenPrompt PromptClosed RunId RunStatus RunSummary"
+        " SimulationResult StampedRecord TelemetrySample"
     ),
     "m2pem.api.goals": "GoalArbiter",
     "m2pem.api.ledger": "Ledger",
@@ -121,24 +139,33 @@ __all__ = [
     "BehaviorType",
     "Clock",
     "Connection",
+    "DataName",
     "Decision",
     "Detection",
     "Dimension",
+    "Draft",
+    "Editable",
     "Fence",
     "Finding",
     "Fleet",
     "FleetBus",
     "GeoPosition",
     "GoalArbiter",
+    "HandedOver",
     "Ledger",
     "Limits",
     "LinkState",
     "Mailbox",
     "Mission",
     "MissionControl",
+    "MissionSource",
     "Notice",
     "Ocu",
     "OpenPrompt",
+    "Outline",
+    "OutlineElement",
+    "OutlineProcess",
+    "OutlineTrigger",
     "ParameterKind",
     "ParameterSpec",
     "PayloadState",
@@ -152,6 +179,8 @@ __all__ = [
     "RunId",
     "RunStatus",
     "RunSummary",
+    "SearchLimits",
+    "SearchProgress",
     "Service",
     "ServiceContext",
     "ServiceError",
@@ -159,6 +188,10 @@ __all__ = [
     "SightedArbiter",
     "SimulationResult",
     "StampedRecord",
+    "TeamMemberState",
+    "TeamState",
+    "Telemetry",
+    "TelemetrySample",
     "UnitError",
     "Value",
     "VehiclePosition",
@@ -167,9 +200,6 @@ __all__ = [
     "longest_edge_yaw",
     "parse_mission",
     "quantity",
-    "TeamMemberState",
-    "Telemetry",
-    "TeamState",
 ]
 
 
