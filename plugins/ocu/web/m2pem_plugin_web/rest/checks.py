@@ -1,11 +1,12 @@
 """/api/checks, /api/editable: what is wrong with a drawing, and drawings for the editor."""
 
 import asyncio
+from collections.abc import Iterable
 
 from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 
-from m2pem.api import Draft, MissionControl, Outline
+from m2pem.api import Draft, MissionControl, Outline, OutlineTrigger
 from m2pem.errors import MissionError
 from m2pem_plugin_web.access.people import Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
@@ -51,7 +52,7 @@ class DataNameModel(BaseModel):
     model_config = ConfigDict(populate_by_name=True)
 
     name: str
-    source: str = Field(alias="from")
+    source: str = Field(validation_alias="from", serialization_alias="from")
 
 
 class OutlineModel(BaseModel):
@@ -139,3 +140,7 @@ def outline_model(outline: Outline) -> OutlineModel:
             TriggerModel(id=m.id, name=m.name, operators=m.operators) for m in outline.messages
         ],
     )
+
+
+def _triggers(found: Iterable[OutlineTrigger]) -> list[TriggerModel]:
+    return [TriggerModel(id=each.id, name=each.name, operators=each.operators) for each in found]

@@ -13,6 +13,7 @@ from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.lookup import find_run
 from m2pem_plugin_web.rest.models import Body, Name
 
+Kind = Literal["route", "area", "point"]
 GeometryName = Annotated[str, InPath(min_length=1, max_length=100, pattern=r"^[\w\-][\w\-. ]*$")]
 
 
@@ -22,10 +23,12 @@ class GeometryModel(BaseModel):
     model_config = ConfigDict(populate_by_name=True)
 
     name: str
-    kind: Literal["route", "area", "point"]
+    kind: Kind
     geometry: dict[str, Any]
     altitude_frame: str
-    source: Literal["fleet", "operator"] = Field(alias="from")
+    source: Literal["fleet", "operator"] = Field(
+        validation_alias="from", serialization_alias="from"
+    )
     by: str
     at_us: int | None
 
@@ -71,12 +74,15 @@ def router(control: MissionControl) -> APIRouter:
 def _model(
     name: str, geometry: Route | Area | Point, by: str = "", at_us: int | None = None
 ) -> GeometryModel:
-    feature = as_geojson(geometry)
-    kind = "point" if isinstance(geometry, Point) else "area"
+    kind: Kind = "area"
+    if isinstance(geometry, Route):
+        kind = "route"
+    elif isinstance(geometry, Point):
+        kind = "point"
     return GeometryModel(
         name=name,
-        kind="route" if isinstance(geometry, Route) else kind,
-        geometry=feature["geometry"],
+        kind=kind,
+        geometry=as_geojson(geometry)["geometry"],
         altitude_frame=geometry.altitude_frame,
         source="fleet" if at_us is None else "operator",
         by=by,

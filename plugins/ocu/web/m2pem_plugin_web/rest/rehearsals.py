@@ -17,8 +17,7 @@ from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of
 from m2pem_plugin_web.rest.findings import FindingModel, finding_models
 from m2pem_plugin_web.rest.models import RecordPage, RunModel, run_model
-from m2pem_plugin_web.rest.runs import LARGEST, MOST_RECORDS, FileModel, RunMissionModel
-from m2pem_plugin_web.rest.shown import shown
+from m2pem_plugin_web.rest.runs import LARGEST, MOST_RECORDS, RunMissionModel, file_models
 from m2pem_plugin_web.rest.verifications import JobModel
 
 LONGEST_ANSWERS = 1_000_000
@@ -120,14 +119,7 @@ def router(
         return RunMissionModel(
             name=result.summary.mission,
             process=result.summary.process,
-            files=[
-                FileModel(
-                    name=each.name,
-                    qualifier=each.qualifier,
-                    xml=await shown(control, each.source),
-                )
-                for each in result.files
-            ],
+            files=await file_models(control, result.files),
         )
 
     @routes.get("/{identifier}/telemetry", response_model=list[SampleModel])

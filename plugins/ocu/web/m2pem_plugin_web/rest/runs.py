@@ -1,12 +1,13 @@
 """/api/runs: start them, list them, and read what happened in them."""
 
+from collections.abc import Iterable
 from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel
 
-from m2pem.api import Draft, MissionControl
+from m2pem.api import Draft, MissionControl, MissionFile
 from m2pem_plugin_web.access.people import Commander, Viewer
 from m2pem_plugin_web.live.words import record_of
 from m2pem_plugin_web.missions.folder import MissionFolder
@@ -114,3 +115,11 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         return RunMissionModel(name=found.file, process=summary.process, files=files)
 
     return routes
+
+
+async def file_models(control: MissionControl, files: Iterable[MissionFile]) -> list[FileModel]:
+    """Files as the page can draw them."""
+    return [
+        FileModel(name=each.name, qualifier=each.qualifier, xml=await shown(control, each.source))
+        for each in files
+    ]
