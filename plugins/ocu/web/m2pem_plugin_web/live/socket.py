@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 
 import msgspec
 from fastapi import APIRouter, WebSocket
@@ -151,10 +152,10 @@ async def _look_after(viewer: Viewer, may_stay: Callable[[], bool]) -> None:
 
 
 async def _close(socket: WebSocket, leave: _Leave) -> None:
-    try:
+    """Say why, and hang up soon, whether or not it was heard: it may be read behind a flood."""
+    abort = socket.scope.get(ABORT)
+    if abort is not None:
+        asyncio.get_running_loop().call_later(LAST_WORDS_S, abort)
+    with suppress(TimeoutError, RuntimeError, WebSocketDisconnect):
         async with asyncio.timeout(LAST_WORDS_S):
             await socket.close(leave.code, leave.reason)
-    except (TimeoutError, RuntimeError, WebSocketDisconnect):
-        abort = socket.scope.get(ABORT)
-        if abort is not None:
-            abort()
