@@ -28,7 +28,7 @@ export interface Reference {
 }
 
 export function referencesOf(element: ModdleElement): Reference[] {
-  const holders = list(element, "eventDefinitions");
+  const holders = [...list(element, "eventDefinitions")];
   if (isA(element, "bpmn:SendTask") || isA(element, "bpmn:ReceiveTask")) holders.push(element);
   return holders.flatMap((holder) => {
     const kind = kindOf(holder);
