@@ -61,8 +61,10 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
 class ProblemError(HTTPException):
     """A refusal with more to say than its text: `more` goes beside it."""
 
-    def __init__(self, status: int, detail: str, **more: Any) -> None:
-        super().__init__(status, detail)
+    def __init__(
+        self, status: int, detail: str, *, headers: dict[str, str] | None = None, **more: Any
+    ) -> None:
+        super().__init__(status, detail, headers)
         self.more = more
 
 

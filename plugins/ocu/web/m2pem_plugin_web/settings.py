@@ -37,6 +37,8 @@ class Settings:
     port: int = DEFAULT_PORT
     names: frozenset[str] = LOCAL_NAMES
     """By which browsers may call this machine, without ports."""
+    called: str = DEFAULT_HOST
+    """The one of them that is told to people."""
     missions: Path = Path(DEFAULT_MISSIONS)
     users: Path | None = None
     certificate: Path | None = None
@@ -46,6 +48,11 @@ class Settings:
     def scheme(self) -> str:
         """`https` with a certificate, else `http`."""
         return "https" if self.certificate else "http"
+
+    def address(self, port: int) -> str:
+        """What to open in a browser."""
+        name = f"[{self.called}]" if ":" in self.called else self.called
+        return f"{self.scheme}://{name}:{port}/"
 
 
 def read_settings(environment: Mapping[str, str] = os.environ) -> Settings:
@@ -62,11 +69,12 @@ def read_settings(environment: Mapping[str, str] = os.environ) -> Settings:
         return Path(said(name)).expanduser() if said(name) else None
 
     host = said(HOST).strip("[]") or DEFAULT_HOST
-    more = {name.strip().strip("[]").lower() for name in said(NAMES).split(",")} - {""}
+    more = [name.strip().strip("[]").lower() for name in said(NAMES).split(",") if name.strip()]
     settings = Settings(
         host=host,
         port=_port(said(PORT)),
         names=frozenset({*_names_of(host), *more}),
+        called=more[0] if more and _is_unspecified(host) else host,
         missions=path(MISSIONS) or Path(DEFAULT_MISSIONS),
         users=path(USERS),
         certificate=path(CERTIFICATE),

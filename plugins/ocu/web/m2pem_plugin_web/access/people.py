@@ -1,37 +1,18 @@
 """Who asks, and what they may do: a router names the least role that each of its routes needs."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from enum import StrEnum
 from typing import Annotated
 
 from fastapi import Depends
 from fastapi.requests import HTTPConnection
 from starlette.exceptions import HTTPException
 
+from m2pem_plugin_web.access.roles import Person, Role
+
+__all__ = ["Commander", "Operator", "Person", "Role", "Viewer", "needs", "person_of"]
+
 SCOPE_KEY = "m2pem.person"
 """Where the guard puts who asks, in the ASGI scope of a connection."""
-
-
-class Role(StrEnum):
-    """A role may do all that those before it may."""
-
-    VIEWER = "viewer"
-    OPERATOR = "operator"
-    COMMANDER = "commander"
-
-    def covers(self, other: "Role") -> bool:
-        """Whether this role may do what `other` may."""
-        order = list(Role)
-        return order.index(self) >= order.index(other)
-
-
-@dataclass(frozen=True, slots=True)
-class Person:
-    """Somebody who has signed in; `name` is journaled with what they do."""
-
-    name: str
-    role: Role
 
 
 def person_of(connection: HTTPConnection) -> Person | None:

@@ -1,10 +1,15 @@
 """Who has signed in: a random key in a cookie of the browser, and its hash here."""
 
 import hashlib
+import logging
 import secrets
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from m2pem_plugin_web.access.private_files import NotPrivateError, read_private, write_private
 
 IDLE_S = 12 * 3600.0
 """A session ends when it was not used for this long."""
@@ -17,46 +22,54 @@ MOST = 1000
 
 KEY_BYTES = 32
 
+log = logging.getLogger("m2pem.ocu.web")
 
-@dataclass(slots=True)
-class Session:
-    """`name`: who signed in. Times are of the sessions' own clock, in seconds."""
+
+class Session(msgspec.Struct):
+    """`name`: who signed in. `proof`: what they knew; if that has changed, it is over.
+
+    Times are seconds since the Unix epoch.
+    """
 
     name: str
+    proof: str
     began: float
     used: float
 
 
 class Sessions:
-    """Sessions by the hashes of their keys: whoever reads this memory cannot use it."""
+    """Sessions by the hashes of their keys: whoever reads them cannot use them.
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+    `kept`: a file, so that a page that is open goes on after the executive was started again.
+    """
+
+    def __init__(self, kept: Path | None = None, clock: Callable[[], float] = time.time) -> None:
         self._clock = clock
-        self._sessions: dict[str, Session] = {}
+        self._kept = kept
+        self._sessions: dict[str, Session] = _read(kept) if kept is not None else {}
+        self._tidy()
 
-    def begin(self, name: str) -> str:
+    def begin(self, name: str, proof: str = "") -> str:
         """A new session; the key that its cookie holds."""
         key = secrets.token_urlsafe(KEY_BYTES)
         now = self._clock()
-        self._sessions[hash_of(key)] = Session(name, now, now)
+        self._sessions[hash_of(key)] = Session(name, proof, now, now)
         self._tidy()
+        self._keep()
         return key
 
     def find(self, key: str) -> Session | None:
         """The session of a key, which has been used just now."""
-        digest = hash_of(key)
-        session = self._sessions.get(digest)
-        if session is None:
-            return None
-        if self._is_over(session):
-            del self._sessions[digest]
+        session = self._sessions.get(hash_of(key))
+        if session is None or self._is_over(session):
             return None
         session.used = self._clock()
         return session
 
     def end(self, key: str) -> None:
         """Somebody signs out."""
-        self._sessions.pop(hash_of(key), None)
+        if self._sessions.pop(hash_of(key), None) is not None:
+            self._keep()
 
     def _is_over(self, session: Session) -> bool:
         now = self._clock()
@@ -68,6 +81,24 @@ class Sessions:
         }
         while len(self._sessions) > MOST:
             del self._sessions[min(self._sessions, key=lambda each: self._sessions[each].used)]
+
+    def _keep(self) -> None:
+        if self._kept is None:
+            return
+        try:
+            write_private(self._kept, msgspec.json.encode(self._sessions).decode())
+        except NotPrivateError as error:
+            log.warning("who has signed in is forgotten at the next start: %s", error)
+
+
+def _read(path: Path) -> dict[str, Session]:
+    try:
+        return msgspec.json.decode(read_private(path), type=dict[str, Session])
+    except FileNotFoundError:
+        return {}
+    except (NotPrivateError, msgspec.DecodeError) as error:
+        log.warning("everybody has to sign in again: %s", error)
+        return {}
 
 
 def hash_of(key: str) -> str:

@@ -1,40 +1,57 @@
 // The frame around every page: where one is, who one is, what moves, and how to stop it.
 import { render } from "preact";
 import { lazy, Suspense } from "preact/compat";
+import { useEffect } from "preact/hooks";
+import { connect } from "./shared/executive";
 import { Header } from "./shared/Header";
 import { route } from "./shared/router";
+import { loadSession, session, toSignIn } from "./shared/session";
+import { Toasts } from "./shared/Toasts";
 import { strings } from "./strings";
 import "./theme.css";
 
 const Home = lazy(() => import("./home/Home"));
 const Editor = lazy(() => import("./editor/Editor"));
 const Operate = lazy(() => import("./operate/Operate"));
+const SignIn = lazy(() => import("./signin/SignIn"));
 
 function Page() {
   const at = route.value;
   switch (at.page) {
     case "home":
       return <Home />;
+    case "signIn":
+      return <SignIn />;
     case "editor":
       return <Editor key={at.mission} mission={at.mission} />;
     case "run":
       return <Operate key={at.run} source={{ kind: "run", run: at.run }} />;
     case "rehearsal":
       return <Operate key={at.id} source={{ kind: "rehearsal", id: at.id }} />;
-    default:
-      return <p>{strings.home.nothing}</p>;
+    case "nothing":
+      return <p class="nothing">{strings.home.nothing}</p>;
   }
 }
 
+async function begin(): Promise<void> {
+  const answered = await loadSession();
+  if (!answered) setTimeout(() => void begin(), 2000);
+  else if (session.value === null) toSignIn();
+  else connect();
+}
+
 function App() {
+  useEffect(() => void begin(), []);
+  const known = session.value !== undefined;
+  const mayLook = session.value !== null || route.value.page === "signIn";
   return (
     <>
       <Header />
-      <main id="main">
-        <Suspense fallback={null}>
-          <Page />
-        </Suspense>
+      <main id="main" tabIndex={-1}>
+        <Suspense fallback={null}>{known && mayLook && <Page />}</Suspense>
       </main>
+      <div id="dialogs" />
+      <Toasts />
     </>
   );
 }

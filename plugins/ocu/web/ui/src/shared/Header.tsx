@@ -1,10 +1,145 @@
-// On every page.
+// On every page: which fleet, who looks, whether what moves is real, and how to stop it.
+import { effect } from "@preact/signals";
 import { strings } from "../strings";
+import { post } from "./api";
+import { connect, connection, prompts } from "./executive";
+import { go } from "./router";
+import { may, session, signOut } from "./session";
+import { StopButton } from "./StopButton";
+import { switchTheme, theme } from "./theme";
+import { attempt, toast } from "./Toasts";
+import "./header.css";
+
+const text = strings.shell;
+
+// A question is seen from another tab of the browser as well.
+effect(() => {
+  const count = prompts.value.length;
+  const fleet = session.value?.fleet;
+  document.title = [count > 0 ? `(${count}?)` : "", text.title, fleet ? `– ${fleet}` : ""]
+    .filter(Boolean)
+    .join(" ");
+});
+
+async function stopAll(): Promise<void> {
+  const done = await attempt(() => post("/stop", { reason: text.stopReason }));
+  if (done) toast(text.stopped, "good");
+}
 
 export function Header() {
+  const who = session.value;
   return (
-    <header>
-      <a href="/">{strings.shell.title}</a>
-    </header>
+    <>
+      <a class="skip" href="#main">
+        {text.skip}
+      </a>
+      <header class="header">
+        <a class="brand" href="/" onClick={leave("/")}>
+          <svg viewBox="0 0 24 24" width="22" height="22" aria-hidden="true">
+            <path d="M4 12h5m6 0h5" stroke="currentColor" stroke-width="2" fill="none" />
+            <path d="M9 12 12 8l3 4-3 4z" fill="currentColor" />
+            <circle cx="4" cy="12" r="2.6" fill="currentColor" />
+            <circle cx="20" cy="12" r="2.6" fill="currentColor" />
+          </svg>
+          {text.title}
+        </a>
+        {who && (
+          <>
+            <span class="fleet" title={text.fleet}>
+              {who.fleet}
+            </span>
+            <Reality simulated={who.simulated} />
+            <Link />
+          </>
+        )}
+        <span class="space" />
+        {who && <Questions />}
+        {who && (
+          <span class="who" title={text.signedInAs}>
+            {who.user} <small>{text.roles[who.role]}</small>
+          </span>
+        )}
+        <button
+          type="button"
+          class="plain"
+          aria-label={theme.value === "dark" ? text.light : text.dark}
+          title={theme.value === "dark" ? text.light : text.dark}
+          onClick={switchTheme}
+        >
+          <svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true">
+            <circle cx="12" cy="12" r="8" fill="none" stroke="currentColor" stroke-width="2" />
+            <path d="M12 4a8 8 0 0 1 0 16z" fill="currentColor" />
+          </svg>
+        </button>
+        {who && (
+          <button type="button" class="plain" onClick={() => void attempt(signOut)}>
+            {text.signOut}
+          </button>
+        )}
+        {who && (
+          <StopButton
+            class="stop-all"
+            label={text.stop}
+            again={text.stopAgain}
+            hint={may("operator") ? text.stopHint : text.stopNotAllowed}
+            disabled={!may("operator")}
+            hotkey
+            onStop={() => void stopAll()}
+          />
+        )}
+      </header>
+      {who && connection.value === "lost" && (
+        <div class="offline" role="alert">
+          {text.offline}
+          <button type="button" onClick={connect}>
+            {text.retry}
+          </button>
+        </div>
+      )}
+    </>
   );
+}
+
+function Reality({ simulated }: { simulated: boolean }) {
+  return simulated ? (
+    <span class="reality" title={text.simulatedHint}>
+      {text.simulated}
+    </span>
+  ) : (
+    <strong class="reality reality-real" title={text.realHint}>
+      {text.real}
+    </strong>
+  );
+}
+
+function Link() {
+  const state = connection.value;
+  const said = { open: text.connected, connecting: text.connecting }[state as "open"];
+  return (
+    <span class={`link link-${state}`} title={said ?? text.offline}>
+      <i aria-hidden="true" />
+      <span class="for-readers">{said ?? text.offlineShort}</span>
+    </span>
+  );
+}
+
+/** Questions of runs, wherever one is in the page. */
+function Questions() {
+  const standing = prompts.value;
+  const first = standing[0];
+  if (!first) return null;
+  const path = `/runs/${encodeURIComponent(first.run)}`;
+  return (
+    <a class="questions" href={path} onClick={leave(path)}>
+      {standing.length} {standing.length === 1 ? text.question : text.questions}
+    </a>
+  );
+}
+
+function leave(path: string) {
+  return (event: MouseEvent) => {
+    if (event.ctrlKey || event.metaKey || event.shiftKey || event.button !== 0) return;
+    event.preventDefault();
+    go(path);
+  };
 }

@@ -1,0 +1,70 @@
+// When a sequence flow is taken, a gateway's default, and what conditional events wait for.
+import { strings } from "../../../strings";
+import { child, isA, list, text, type ModdleElement } from "../../moddle/moddle";
+import { expressionProperties, expressionText } from "../expressions";
+import { CheckField } from "../fields/SelectField";
+import { factoryOf, objectOf, set, type FormProps } from "../form";
+import { ExpressionField } from "./ExpressionField";
+
+const words = strings.editor.condition;
+const CHOOSING = ["bpmn:ExclusiveGateway", "bpmn:InclusiveGateway", "bpmn:ComplexGateway", "bpmn:Activity"];
+
+/** Whether a condition may stand on a flow. */
+export function isConditional(flow: ModdleElement): boolean {
+  const source = child(flow, "sourceRef");
+  return CHOOSING.some((type) => isA(source, type));
+}
+
+export function conditionalEventOf(element: ModdleElement): ModdleElement | undefined {
+  return list(element, "eventDefinitions").find((each) =>
+    isA(each, "bpmn:ConditionalEventDefinition"),
+  );
+}
+
+export function ConditionForm(form: FormProps) {
+  const flow = objectOf(form);
+  const source = child(flow, "sourceRef")!;
+  const isDefault = source.get("default") === flow;
+  const findings = form.editor.checks.of(text(flow, "id"));
+  return (
+    <>
+      <ExpressionField
+        form={form}
+        id="m2-condition"
+        label={words.label}
+        value={expressionText(flow, "conditionExpression")}
+        hint={isDefault ? words.defaultHint : words.hint}
+        rows={3}
+        error={findings.map(({ message, remedy }) => [message, remedy].filter(Boolean).join("; ")).join("\n") || undefined}
+        write={(body) =>
+          set(form, flow, expressionProperties(factoryOf(form), flow, "conditionExpression", body))
+        }
+      />
+      <CheckField
+        id="m2-default"
+        label={words.isDefault}
+        hint={words.isDefaultHint}
+        value={isDefault}
+        write={(chosen) => set(form, source, { default: chosen ? flow : undefined })}
+      />
+    </>
+  );
+}
+
+export function ConditionalEventForm(form: FormProps) {
+  const event = conditionalEventOf(objectOf(form));
+  if (!event) return null;
+  return (
+    <ExpressionField
+      form={form}
+      id="m2-event-condition"
+      label={words.event}
+      value={expressionText(event, "condition")}
+      hint={words.eventHint}
+      rows={3}
+      write={(body) =>
+        set(form, event, expressionProperties(factoryOf(form), event, "condition", body))
+      }
+    />
+  );
+}

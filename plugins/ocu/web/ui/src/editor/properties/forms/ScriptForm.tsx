@@ -1,0 +1,29 @@
+// The statements of a script task that commands no behavior.
+import { strings } from "../../../strings";
+import { text } from "../../moddle/moddle";
+import { objectOf, set, type FormProps } from "../form";
+import { ExpressionField } from "./ExpressionField";
+
+const words = strings.editor.script;
+
+export function ScriptForm(form: FormProps) {
+  const task = objectOf(form);
+  const findings = form.editor.checks.of(text(task, "id"));
+  return (
+    <ExpressionField
+      form={form}
+      id="m2-script"
+      label={words.label}
+      value={text(task, "script")}
+      hint={words.hint}
+      rows={5}
+      error={findings.map(({ message }) => message).join("\n") || undefined}
+      write={(script) =>
+        set(form, task, {
+          script: script.trim() === "" ? undefined : script,
+          scriptFormat: script.trim() === "" ? undefined : "m2pem",
+        })
+      }
+    />
+  );
+}

@@ -1,0 +1,49 @@
+// When a timer fires.
+import { strings } from "../../../strings";
+import { isA, list, type ModdleElement } from "../../moddle/moddle";
+import { expressionProperties, expressionText } from "../expressions";
+import { SelectField } from "../fields/SelectField";
+import { TextField } from "../fields/TextField";
+import { factoryOf, objectOf, set, type FormProps } from "../form";
+
+const words = strings.editor.timer;
+const KINDS = ["timeDuration", "timeDate", "timeCycle"] as const;
+type Kind = (typeof KINDS)[number];
+
+export function timerOf(element: ModdleElement): ModdleElement | undefined {
+  return list(element, "eventDefinitions").find((each) => isA(each, "bpmn:TimerEventDefinition"));
+}
+
+export function TimerForm(form: FormProps) {
+  const timer = timerOf(objectOf(form));
+  if (!timer) return null;
+  const kind: Kind = KINDS.find((each) => timer.get(each) !== undefined) ?? "timeDuration";
+  const body = expressionText(timer, kind);
+  const write = (next: Kind, said: string) => {
+    const cleared = Object.fromEntries(KINDS.map((each) => [each, undefined]));
+    const written = expressionProperties(factoryOf(form), timer, next, said || " ");
+    set(form, timer, { ...cleared, ...(said === "" && next === kind ? {} : written) });
+  };
+  return (
+    <>
+      <SelectField
+        id="m2-timer-kind"
+        label={words.kind}
+        value={kind}
+        options={KINDS.map((value) => ({ value, label: words.kinds[value] }))}
+        write={(next) => write(next as Kind, words.examples[next as Kind])}
+      />
+      <TextField
+        id="m2-timer-value"
+        label={words.kinds[kind]}
+        required
+        mono
+        value={body}
+        placeholder={words.examples[kind]}
+        hint={words.hints[kind]}
+        error={body === "" ? words.missing : undefined}
+        write={(said) => write(kind, said.trim())}
+      />
+    </>
+  );
+}

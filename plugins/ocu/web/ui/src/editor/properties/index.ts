@@ -1,0 +1,6 @@
+import { MissionProperties } from "./provider";
+
+export const propertiesModule = {
+  __init__: ["missionProperties"],
+  missionProperties: ["type", MissionProperties],
+};

@@ -1,0 +1,129 @@
+// One mission that is being drawn: the modeler, and what the page shows of its state.
+import { signal } from "@preact/signals";
+import type { EditorContext } from "../panels/panel";
+import type { Catalogue } from "./catalogue";
+import { Checks } from "./checks";
+import { Diagrams } from "./diagrams";
+import { fitTo } from "./fitting";
+import { Locator } from "./Locator";
+import { Marks } from "./marks";
+import { makeModeler, type MissionModeler } from "./modeler";
+import type { Element, Services } from "./services";
+
+export class EditorSession implements EditorContext {
+  readonly modeler: MissionModeler;
+  readonly checks: Checks;
+  readonly diagrams: Diagrams;
+  readonly changes = signal(0);
+  readonly isDirty = signal(false);
+  readonly canUndo = signal(false);
+  readonly canRedo = signal(false);
+  readonly selected = signal<readonly Element[]>([]);
+  readonly warnings = signal<readonly string[]>([]);
+  private readonly locator: Locator;
+  private readonly marks: Marks;
+  /** Where the command stack stood when the mission was saved; null: what is saved is not on it. */
+  private savedAt: number | null = -1;
+
+  constructor(
+    readonly mission: string,
+    readonly catalogue: Catalogue,
+    private readonly saving: () => Promise<boolean>,
+  ) {
+    this.modeler = makeModeler(catalogue, { editorContext: ["value", this] });
+    this.checks = new Checks(() => this.xml());
+    this.diagrams = new Diagrams(this.modeler, () => this.detachFromStack());
+    this.locator = new Locator(this.modeler, this.diagrams);
+    this.marks = new Marks(this.modeler);
+    this.follow();
+  }
+
+  private follow(): void {
+    this.modeler.on("commandStack.changed", () => this.stackChanged());
+    this.modeler.on("selection.changed", ({ newSelection }: { newSelection: Element[] }) => {
+      this.selected.value = newSelection;
+    });
+    this.modeler.on("import.done", () => {
+      this.diagrams.refresh();
+      this.showFindings();
+    });
+    this.modeler.on("root.set", () => this.showFindings());
+    this.checks.findings.subscribe(() => this.showFindings());
+  }
+
+  /** Draws a mission. `isSaved`: whether it is what the server has. */
+  async open(xml: string, isSaved: boolean): Promise<void> {
+    const { warnings } = await this.modeler.importXML(xml);
+    this.warnings.value = warnings.map(String);
+    this.savedAt = isSaved ? -1 : null;
+    this.stackChanged();
+    this.fit();
+  }
+
+  async xml(): Promise<string> {
+    const { xml, error } = await this.modeler.saveXML({ format: true });
+    if (xml === undefined) throw error ?? new Error("the mission could not be written");
+    return xml;
+  }
+
+  service<Name extends keyof Services>(name: Name): Services[Name] {
+    return this.modeler.get(name);
+  }
+
+  async select(element: string): Promise<boolean> {
+    return this.locator.show(element);
+  }
+
+  mark(layer: string, classes: Readonly<Record<string, string>>): void {
+    this.marks.set(layer, classes);
+  }
+
+  save(): Promise<boolean> {
+    return this.saving();
+  }
+
+  /** What is drawn now is what the server has. */
+  saved(): void {
+    this.savedAt = this.stackIndex();
+    this.isDirty.value = false;
+  }
+
+  fit(): void {
+    fitTo(this.service("canvas"));
+  }
+
+  /** Something changed that cannot be undone: a process was added or removed. */
+  changedBeside(): void {
+    this.savedAt = null;
+    this.stackChanged();
+  }
+
+  end(): void {
+    this.checks.end();
+    this.modeler.destroy();
+  }
+
+  private stackChanged(): void {
+    const stack = this.service("commandStack");
+    this.canUndo.value = stack.canUndo();
+    this.canRedo.value = stack.canRedo();
+    this.isDirty.value = this.savedAt === null || this.stackIndex() !== this.savedAt;
+    this.changes.value += 1;
+    this.checks.soon();
+  }
+
+  /** Another diagram is about to be drawn, with a command stack of its own. */
+  private detachFromStack(): void {
+    this.savedAt = this.isDirty.value ? null : -1;
+  }
+
+  private stackIndex(): number {
+    return (this.service("commandStack") as unknown as { _stackIdx: number })._stackIdx;
+  }
+
+  private showFindings(): void {
+    const marks = this.modeler.get("findingMarks");
+    marks.show(this.checks.findings.value, (element) => void this.select(element));
+    this.marks.refresh();
+  }
+}

@@ -1,0 +1,88 @@
+// Changes of the mission that are undone and redone as one.
+import type { Change } from "../moddle/extensions";
+import type { Factory, ModdleElement } from "../moddle/moddle";
+import type { BpmnReplace, CommandStack, Element, Modeling } from "./services";
+
+const CHANGE = "m2pem.change";
+const REPLACE = "m2pem.replace";
+
+interface ChangeContext {
+  element: Element;
+  changes: readonly Change[];
+}
+
+interface ReplaceContext {
+  element: Element;
+  type: string;
+  changes(task: ModdleElement): readonly Change[];
+  result?: Element;
+}
+
+class ChangeHandler {
+  static readonly $inject = ["modeling"];
+
+  constructor(private readonly modeling: Modeling) {}
+
+  preExecute({ element, changes }: ChangeContext): void {
+    for (const { target, properties } of changes) {
+      this.modeling.updateModdleProperties(element, target, properties);
+    }
+  }
+}
+
+class ReplaceHandler {
+  static readonly $inject = ["modeling", "bpmnReplace"];
+
+  constructor(
+    private readonly modeling: Modeling,
+    private readonly bpmnReplace: BpmnReplace,
+  ) {}
+
+  preExecute(context: ReplaceContext): void {
+    const isSame = context.element.businessObject.$type === context.type;
+    const target = { type: context.type } as Parameters<BpmnReplace["replaceElement"]>[1];
+    const element = isSame
+      ? context.element
+      : (this.bpmnReplace.replaceElement(context.element, target) as Element);
+    for (const { target, properties } of context.changes(element.businessObject)) {
+      this.modeling.updateModdleProperties(element, target, properties);
+    }
+    context.result = element;
+  }
+}
+
+export class Edits {
+  static readonly $inject = ["commandStack", "bpmnFactory"];
+  readonly factory: Factory;
+
+  constructor(
+    private readonly commandStack: CommandStack,
+    bpmnFactory: unknown,
+  ) {
+    this.factory = bpmnFactory as Factory;
+    commandStack.registerHandler(CHANGE, ChangeHandler);
+    commandStack.registerHandler(REPLACE, ReplaceHandler);
+  }
+
+  apply(element: Element, changes: readonly Change[]): void {
+    const context: ChangeContext = { element, changes };
+    this.commandStack.execute(CHANGE, context);
+  }
+
+  set(element: Element, target: ModdleElement, properties: Record<string, unknown>): void {
+    this.apply(element, [{ target, properties }]);
+  }
+
+  /** Another type of element in the same place, with changes of its own. */
+  replace(
+    element: Element,
+    type: string,
+    changes: (task: ModdleElement) => readonly Change[],
+  ): Element {
+    const context: ReplaceContext = { element, type, changes };
+    this.commandStack.execute(REPLACE, context);
+    return context.result ?? element;
+  }
+}
+
+export const editsModule = { __init__: ["edits"], edits: ["type", Edits] };

@@ -1,0 +1,44 @@
+import { describe, expect, it } from "vitest";
+import { PROMPTS, SERVICES, Spans } from "./spans";
+import { RECORDS } from "./testing";
+
+function after(seq: number): Spans {
+  const spans = new Spans();
+  for (const record of RECORDS.slice(0, seq)) spans.add(record);
+  return spans;
+}
+
+describe("spans", () => {
+  it("has a bar for each behavior on each of its vehicles", () => {
+    const spans = new Spans();
+    spans.add({ ...RECORDS[6]!, resources: ["v1", "v2/cam"] });
+    expect(spans.all.map(({ row, from, to }) => [row, from, to])).toEqual([
+      ["v1", 4, null],
+      ["v2/cam", 4, null],
+    ]);
+  });
+
+  it("ends bars as their records say", () => {
+    const [prompt, behavior, service] = after(14).all;
+    expect(prompt).toMatchObject({ row: PROMPTS, to: 4, end: "succeeded", reason: "y (anna)" });
+    expect(behavior).toMatchObject({ row: "v1", from: 4, to: 9, end: "failed", reason: "BLOCKED" });
+    expect(service).toMatchObject({ row: SERVICES, from: 4, to: 9, end: "cancelled" });
+  });
+
+  it("takes over what is commanded where records are missing", () => {
+    const spans = after(2);
+    const command = { name: "go", resources: ["v1"], process: "P", element: "Drive", since: 3 };
+    spans.settle({ "r1.b7": command }, 8);
+    spans.settle({ "r1.b7": command }, 9);
+    expect(spans.all).toHaveLength(1);
+    expect(spans.all[0]).toMatchObject({ row: "v1", from: 3, to: null, end: "" });
+    spans.settle({}, 12);
+    expect(spans.all[0]).toMatchObject({ to: 12, end: "unknown" });
+  });
+
+  it("keeps a bar that both told of once", () => {
+    const spans = after(7);
+    spans.settle({ "r1.b1": { name: "go", resources: ["v1"], process: "P", element: "Drive", since: 4 } }, 5);
+    expect(spans.all.filter((span) => span.kind === "behavior")).toHaveLength(1);
+  });
+});

@@ -1,0 +1,72 @@
+// A question or form in front of the page, below the header: STOP stays in reach. What is behind it
+// cannot be used meanwhile. Escape closes; the focus goes back to where it was.
+import type { ComponentChildren } from "preact";
+import { createPortal } from "preact/compat";
+import { useEffect, useId, useRef } from "preact/hooks";
+import { strings } from "../strings";
+import "./dialog.css";
+
+export interface DialogProps {
+  title: string;
+  onClose: () => void;
+  children: ComponentChildren;
+  /** Buttons at the foot. */
+  actions?: ComponentChildren;
+  wide?: boolean;
+}
+
+const FOCUSABLE = "input, select, textarea, button, a[href], [tabindex='0']";
+
+let open = 0;
+
+/** What is behind is out of use while a dialog is open. */
+function keepBehind(): () => void {
+  const main = document.getElementById("main");
+  open += 1;
+  main?.toggleAttribute("inert", true);
+  return () => {
+    open -= 1;
+    if (open === 0) main?.toggleAttribute("inert", false);
+  };
+}
+
+export function Dialog({ title, onClose, children, actions, wide = false }: DialogProps) {
+  const dialog = useRef<HTMLDivElement>(null);
+  const heading = useId();
+  useEffect(() => {
+    const before = document.activeElement;
+    const release = keepBehind();
+    const body = dialog.current?.querySelector(".dialog-body");
+    const first = body?.querySelector<HTMLElement>(FOCUSABLE);
+    (first ?? dialog.current)?.focus();
+    return () => {
+      release();
+      if (before instanceof HTMLElement) before.focus();
+    };
+  }, []);
+  return createPortal(
+    <div class="dialog-layer">
+      <div
+        ref={dialog}
+        class={wide ? "dialog dialog-wide" : "dialog"}
+        role="dialog"
+        tabIndex={-1}
+        aria-labelledby={heading}
+        onKeyDown={(event) => {
+          event.stopPropagation();
+          if (event.key === "Escape" && !event.shiftKey) onClose();
+        }}
+      >
+        <header>
+          <h2 id={heading}>{title}</h2>
+          <button type="button" class="plain" aria-label={strings.shell.close} onClick={onClose}>
+            ×
+          </button>
+        </header>
+        <div class="dialog-body">{children}</div>
+        {actions && <footer>{actions}</footer>}
+      </div>
+    </div>,
+    document.getElementById("dialogs")!,
+  );
+}

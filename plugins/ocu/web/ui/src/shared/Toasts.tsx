@@ -1,0 +1,62 @@
+// Short messages that come and go by themselves; those that are bad stay until they are dismissed.
+import { signal } from "@preact/signals";
+import { strings } from "../strings";
+import { ApiError } from "./api";
+import "./toasts.css";
+
+export type Tone = "good" | "plain" | "bad";
+
+interface Toast {
+  id: number;
+  text: string;
+  tone: Tone;
+}
+
+const SHOWN_MS = 6000;
+const MOST = 5;
+
+const toasts = signal<Toast[]>([]);
+let count = 0;
+
+export function toast(text: string, tone: Tone = "plain"): void {
+  const id = ++count;
+  toasts.value = [...toasts.value, { id, text, tone }].slice(-MOST);
+  if (tone !== "bad") setTimeout(() => dismiss(id), SHOWN_MS);
+}
+
+/** Do what may be refused, and say so if it was. */
+export async function attempt(action: () => Promise<unknown>): Promise<boolean> {
+  try {
+    await action();
+    return true;
+  } catch (error) {
+    toast(error instanceof ApiError ? error.message : strings.shell.offline, "bad");
+    return false;
+  }
+}
+
+function dismiss(id: number): void {
+  toasts.value = toasts.value.filter((other) => other.id !== id);
+}
+
+export function Toasts() {
+  const shown = (tone: "bad" | "other") =>
+    toasts.value.filter((each) => (each.tone === "bad") === (tone === "bad"));
+  return (
+    <div class="toasts">
+      <div role="alert">{shown("bad").map(line)}</div>
+      <div role="status">{shown("other").map(line)}</div>
+    </div>
+  );
+}
+
+function line({ id, text, tone }: Toast) {
+  return (
+    <div key={id} class={`toast toast-${tone}`}>
+      <span>{text}</span>
+      <button type="button" aria-label={strings.shell.dismiss} onClick={() => dismiss(id)}>
+        ×
+      </button>
+    </div>
+  );
+}

@@ -1,0 +1,31 @@
+// What a live connection needs of the browser.
+import type { Socket, Surroundings } from "./live";
+
+/** A page in the background does not paint; what it is told is applied all the same. */
+function paint(callback: () => void): void {
+  if (document.hidden) queueMicrotask(callback);
+  else {
+    let done = false;
+    const once = () => {
+      if (done) return;
+      done = true;
+      removeEventListener("visibilitychange", once);
+      callback();
+    };
+    addEventListener("visibilitychange", once);
+    requestAnimationFrame(once);
+  }
+}
+
+export const browser: Surroundings = {
+  connect: () => {
+    const scheme = location.protocol === "https:" ? "wss:" : "ws:";
+    return new WebSocket(`${scheme}//${location.host}/api/live`) as unknown as Socket;
+  },
+  paint,
+  after: (callback, delay_ms) => {
+    const timer = setTimeout(callback, delay_ms);
+    return () => clearTimeout(timer);
+  },
+  chance: Math.random,
+};

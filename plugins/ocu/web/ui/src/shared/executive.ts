@@ -1,0 +1,148 @@
+// What the executive tells the whole page: its runs, the questions that stand, and the fleet.
+// Who wants all of one run listens to the messages themselves.
+import { batch, computed, signal } from "@preact/signals";
+import { browser } from "./browser";
+import { LiveClient, type Connection } from "./live";
+import { loadSession, session, toSignIn } from "./session";
+import { toast } from "./Toasts";
+import { strings } from "../strings";
+import type {
+  PayloadState,
+  Prompt,
+  RunSummary,
+  ServerMessage,
+  TeamState,
+  VehicleState,
+} from "./types";
+
+export const connection = signal<Connection>("connecting");
+export const runs = signal<RunSummary[]>([]);
+export const prompts = signal<Prompt[]>([]);
+export const holders = signal<Record<string, string>>({});
+export const vehicles = signal<Record<string, VehicleState>>({});
+export const payloads = signal<Record<string, PayloadState>>({});
+export const teams = signal<Record<string, TeamState>>({});
+
+const OVER = new Set(["completed", "terminated", "failed", "stopped"]);
+
+export const isOver = (run: RunSummary): boolean => OVER.has(run.status);
+
+/** Runs that are driven now. */
+export const activeRuns = computed(() =>
+  runs.value.filter(({ status }) => status === "running" || status === "paused"),
+);
+
+const heardAt = new Map<string, number>();
+
+/** Seconds since a vehicle or payload was heard, by this browser's clock; null: never. */
+export function silentFor_s(resource: string): number | null {
+  const at = heardAt.get(resource);
+  return at === undefined ? null : (performance.now() - at) / 1000;
+}
+
+type Listener = (message: ServerMessage) => void;
+const listeners = new Set<Listener>();
+
+/** Be told every message; what is returned ends it. */
+export function listen(listener: Listener): () => void {
+  listeners.add(listener);
+  return () => void listeners.delete(listener);
+}
+
+const client = new LiveClient(browser, {
+  received: (message) => {
+    batch(() => {
+      take(message);
+      for (const listener of listeners) listener(message);
+    });
+  },
+  connection: (state) => {
+    connection.value = state;
+    if (state === "lost") void afterLoss();
+    if (state === "refused") signedOut();
+  },
+});
+
+export const connect = (): void => client.start();
+export const disconnect = (): void => client.stop();
+export const watch = (run: string | null): void => client.watch(run);
+
+/** A page that is not signed in is refused before it is connected, which a browser does not tell. */
+async function afterLoss(): Promise<void> {
+  if ((await loadSession()) && session.value === null) signedOut();
+}
+
+function signedOut(): void {
+  client.stop();
+  session.value = null;
+  toSignIn();
+}
+
+function take(message: ServerMessage): void {
+  switch (message.type) {
+    case "snapshot":
+      runs.value = message.runs;
+      prompts.value = message.prompts;
+      holders.value = message.holders;
+      teams.value = message.teams;
+      heardBefore(message.vehicles);
+      heardBefore(message.payloads);
+      vehicles.value = message.vehicles;
+      payloads.value = message.payloads;
+      break;
+    case "frame":
+      if (message.runs) message.runs.forEach(takeRun);
+      if (message.holders) holders.value = { ...holders.value, ...message.holders };
+      if (message.teams) teams.value = { ...teams.value, ...message.teams };
+      if (message.vehicles) {
+        heardNow(message.vehicles);
+        vehicles.value = { ...vehicles.value, ...message.vehicles };
+      }
+      if (message.payloads) {
+        heardNow(message.payloads);
+        payloads.value = { ...payloads.value, ...message.payloads };
+      }
+      break;
+    case "prompt": {
+      const { run, prompt } = message.prompt;
+      prompts.value = [...without(run, prompt), message.prompt];
+      break;
+    }
+    case "prompt_closed":
+      prompts.value = without(message.run, message.prompt);
+      break;
+    case "run":
+      takeRun(message.run);
+      break;
+    case "fault":
+      toast(`${strings.shell.fault}: ${message.text}`, "bad");
+      break;
+    case "log":
+      break;
+  }
+}
+
+const without = (run: string, prompt: string): Prompt[] =>
+  prompts.value.filter((other) => other.run !== run || other.prompt !== prompt);
+
+function takeRun(summary: RunSummary): void {
+  const known = runs.value.some(({ run }) => run === summary.run);
+  runs.value = known
+    ? runs.value.map((other) => (other.run === summary.run ? summary : other))
+    : [...runs.value, summary];
+  if (isOver(summary)) prompts.value = prompts.value.filter(({ run }) => run !== summary.run);
+}
+
+function heardNow(states: Record<string, unknown>): void {
+  const now = performance.now();
+  for (const resource of Object.keys(states)) heardAt.set(resource, now);
+}
+
+/** Of a snapshot the clocks are the server's: old is what is older than the newest. */
+function heardBefore(states: Record<string, { time_us: number }>): void {
+  const newest_us = Math.max(0, ...Object.values(states).map(({ time_us }) => time_us));
+  const now = performance.now();
+  for (const [resource, { time_us }] of Object.entries(states)) {
+    heardAt.set(resource, now - (newest_us - time_us) / 1000);
+  }
+}

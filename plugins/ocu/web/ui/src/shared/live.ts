@@ -1,0 +1,128 @@
+// The connection on which the server pushes: one for the whole page, made again whenever it breaks.
+// Frames are applied when the browser is about to paint, and acknowledged only then: the server
+// sends no more of them than this page can show.
+import type { ServerMessage } from "./types";
+
+export type Connection = "connecting" | "open" | "lost" | "refused";
+
+/** The part of a WebSocket that is used. */
+export interface Socket {
+  send(text: string): void;
+  close(): void;
+  onopen: (() => void) | null;
+  onmessage: ((event: { data: unknown }) => void) | null;
+  onclose: ((event: { code: number }) => void) | null;
+}
+
+export interface Surroundings {
+  connect(): Socket;
+  /** Call back when something may be drawn. */
+  paint(callback: () => void): void;
+  /** Call back after some milliseconds; what is returned prevents it. */
+  after(callback: () => void, delay_ms: number): () => void;
+  /** 0 ... 1, so that not all pages come back at once. */
+  chance(): number;
+}
+
+export interface Listener {
+  received(message: ServerMessage): void;
+  connection(state: Connection): void;
+}
+
+const FIRST_DELAY_MS = 500;
+const LONGEST_DELAY_MS = 10_000;
+/** Not signed in (any more): to ask again is of no use. 1008 is a policy violation. */
+const REFUSED = new Set([1008, 4001, 4401, 4403]);
+
+export class LiveClient {
+  private socket: Socket | null = null;
+  private waiting: ServerMessage[] = [];
+  private failures = 0;
+  private cancelRetry: (() => void) | null = null;
+  private watched: string | null = null;
+  private isOpen = false;
+
+  constructor(
+    private readonly around: Surroundings,
+    private readonly listener: Listener,
+  ) {}
+
+  start(): void {
+    if (this.socket) return;
+    this.cancelRetry?.();
+    this.cancelRetry = null;
+    this.listener.connection("connecting");
+    const socket = this.around.connect();
+    this.socket = socket;
+    socket.onopen = () => {
+      this.failures = 0;
+      this.isOpen = true;
+      this.say({ type: "watch", run: this.watched });
+      this.listener.connection("open");
+    };
+    socket.onmessage = (event) => this.take(String(event.data));
+    socket.onclose = (event) => this.closed(event.code);
+  }
+
+  stop(): void {
+    this.cancelRetry?.();
+    this.cancelRetry = null;
+    const socket = this.socket;
+    this.forget();
+    socket?.close();
+  }
+
+  /** Which run is told in full; null: none. A snapshot of it comes. */
+  watch(run: string | null): void {
+    if (this.watched === run) return;
+    this.watched = run;
+    if (this.isOpen) this.say({ type: "watch", run });
+  }
+
+  private take(text: string): void {
+    const message = JSON.parse(text) as ServerMessage;
+    if (message.type !== "snapshot" && message.type !== "frame") {
+      // Urgent ones come at once; but never before the frames that were sent before them.
+      this.apply();
+      this.listener.received(message);
+      return;
+    }
+    this.waiting.push(message);
+    if (this.waiting.length === 1) this.around.paint(() => this.apply());
+  }
+
+  private apply(): void {
+    const messages = this.waiting;
+    this.waiting = [];
+    for (const message of messages) {
+      if ("run" in message && message.run === this.watched) this.listener.received(message);
+      this.say({ type: "ack", seq: message.seq });
+    }
+  }
+
+  private say(message: object): void {
+    if (this.isOpen) this.socket?.send(JSON.stringify(message));
+  }
+
+  private forget(): void {
+    if (this.socket) {
+      this.socket.onopen = this.socket.onmessage = this.socket.onclose = null;
+    }
+    this.socket = null;
+    this.isOpen = false;
+    this.waiting = [];
+  }
+
+  private closed(code: number): void {
+    this.forget();
+    if (REFUSED.has(code)) {
+      this.listener.connection("refused");
+      return;
+    }
+    this.listener.connection("lost");
+    const longest = Math.min(LONGEST_DELAY_MS, FIRST_DELAY_MS * 2 ** this.failures);
+    this.failures += 1;
+    const delay_ms = longest * (0.5 + this.around.chance() / 2);
+    this.cancelRetry = this.around.after(() => this.start(), delay_ms);
+  }
+}
