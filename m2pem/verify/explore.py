@@ -192,7 +192,7 @@ def _exact(found: Exploration, run: Sequence[int], limits: Limits) -> bool:
 
 
 def _complete_only(*columns: "list[int] | array[int]") -> None:
-    """Leave out the last row if it is there in part: an interruption comes between any two steps."""
+    """Leave out the last row if it is there in part: interruptions come between any two steps."""
     rows = min(map(len, columns))
     for column in columns:
         del column[rows:]

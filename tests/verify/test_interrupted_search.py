@@ -1,4 +1,4 @@
-"""A search that is interrupted by hand, wherever it is just then, leaves behind what it has seen."""
+"""A search that is interrupted by hand, wherever it is, leaves behind what it has seen."""
 
 import sys
 from types import FrameType

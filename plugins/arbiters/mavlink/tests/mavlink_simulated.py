@@ -85,7 +85,9 @@ class Bench(ArbiterBench):
         truth = self.truth(number)
         places = [self.level(number)]
         async with asyncio.timeout(AMPLE_S / 20):
-            while len(places) < 6 or max(math.dist(places[-1], each) for each in places[-6:]) > 0.02:
+            while (
+                len(places) < 6 or max(math.dist(places[-1], each) for each in places[-6:]) > 0.02
+            ):
                 stepped_s = truth.autopilot.now_s
                 await self.simulator.until(lambda: truth.autopilot.now_s > stepped_s + 0.5)  # noqa: B023
                 places.append(self.level(number))

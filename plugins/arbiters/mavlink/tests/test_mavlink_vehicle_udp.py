@@ -53,7 +53,9 @@ async def test_a_copter_waits_for_its_estimator_takes_off_goes_and_returns() -> 
         driver = vehicle.driver
         await driver.take_off(10.0)
         assert (truth.armed, truth.takeoffs) == (True, 1)
-        assert await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0) > 9.0, AMPLE_S)
+        assert await vehicle.until(
+            lambda: (vehicle.heard.altitude_above_home_m or 0) > 9.0, AMPLE_S
+        )
         assert vehicle.heard.landed is False
         await driver.go_to(Place(47.3982, 8.545594, 20.0), 8.0)
         there = 47.3982 - 2e-6
@@ -72,7 +74,9 @@ async def test_a_takeoff_that_was_stopped_on_the_ground_can_be_begun_again() -> 
         assert await vehicle.until(lambda: vehicle.heard.armed is False, AMPLE_S)
         assert truth.mode == "BRAKE"
         await vehicle.driver.take_off(6.0)
-        assert await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0) > 5.0, AMPLE_S)
+        assert await vehicle.until(
+            lambda: (vehicle.heard.altitude_above_home_m or 0) > 5.0, AMPLE_S
+        )
 
 
 async def test_a_copter_stands_soon_after_a_stop() -> None:

@@ -242,4 +242,6 @@ async def test_closing_leaves_no_thread_and_no_socket(domain: int, echo: Peer) -
     before = resources()
     await live_and_close()
     async with asyncio.timeout(AMPLE_S):  # what has ended may be listed for a moment
-        await connected(lambda: all(now <= was for now, was in zip(resources(), before)))
+        await connected(
+            lambda: all(now <= was for now, was in zip(resources(), before, strict=True))
+        )
