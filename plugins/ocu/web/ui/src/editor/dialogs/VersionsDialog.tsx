@@ -3,7 +3,7 @@ import { useEffect, useState } from "preact/hooks";
 import { Dialog } from "../../shared/Dialog";
 import { toast } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
-import { versionsOf, type Version } from "../session/files";
+import { versionsOf, type Version } from "../../missions/files";
 import type { MissionWork } from "../session/MissionWork";
 
 const words = strings.editor.versions;
