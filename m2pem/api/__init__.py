@@ -74,11 +74,13 @@ if TYPE_CHECKING:
         ResumePolicy,
     )
     from m2pem.model.geometry import Area, Point, Route, VehiclePosition
+    from m2pem.model.library import MissionFile
     from m2pem.model.mission import Mission
     from m2pem.model.values import Value
     from m2pem.resources.behaviors import SHARED
     from m2pem.resources.fence import Fence
     from m2pem.resources.fleet import Fleet
+    from m2pem.resources.geojson import as_geojson, parse_geojson
     from m2pem.resources.lawn_mower import lawn_mower, longest_edge_yaw
     from m2pem.resources.units import Dimension, UnitError, quantity
 
@@ -89,8 +91,8 @@ _MODULES = {
         " Connection Limits ResolvedValue SightedArbiter"
     ),
     "m2pem.api.authoring": (
-        "DataName Draft Editable MissionSource Outline OutlineElement OutlineProcess"
-        " OutlineTrigger SearchLimits SearchProgress"
+        "DataName Draft Editable MissionSource Outline OutlineElement"
+        " OutlineProcess OutlineTrigger SearchLimits SearchProgress"
     ),
     "m2pem.api.bus": "FleetBus",
     "m2pem.api.clock": "Clock",
@@ -114,12 +116,14 @@ _MODULES = {
     "m2pem.model.catalogue": (
         "BehaviorSpec BehaviorState ParameterKind ParameterSpec ResourceId ResumePolicy"
     ),
+    "m2pem.model.library": "MissionFile",
     "m2pem.model.mission": "Mission",
     "m2pem.model.geometry": "Area Point Route VehiclePosition",
     "m2pem.model.values": "Value",
     "m2pem.resources.behaviors": "SHARED",
     "m2pem.resources.fence": "Fence",
     "m2pem.resources.fleet": "Fleet",
+    "m2pem.resources.geojson": "as_geojson parse_geojson",
     "m2pem.resources.lawn_mower": "lawn_mower longest_edge_yaw",
     "m2pem.resources.units": "Dimension UnitError quantity",
 }
@@ -158,6 +162,7 @@ __all__ = [
     "Mailbox",
     "Mission",
     "MissionControl",
+    "MissionFile",
     "MissionSource",
     "Notice",
     "Ocu",
@@ -196,8 +201,10 @@ __all__ = [
     "Value",
     "VehiclePosition",
     "VehicleState",
+    "as_geojson",
     "lawn_mower",
     "longest_edge_yaw",
+    "parse_geojson",
     "parse_mission",
     "quantity",
 ]

@@ -19,6 +19,7 @@ from m2pem.engine.records import Record
 from m2pem.findings import Finding
 from m2pem.model.behavior import Decision
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.model.library import MissionFile
 from m2pem.model.values import Value
 
 if TYPE_CHECKING:
@@ -319,8 +320,12 @@ class TelemetrySample:
 
 @dataclass(frozen=True, slots=True)
 class SimulationResult:
-    """What a rehearsal did. `telemetry`: at even intervals; long ones have longer intervals."""
+    """What a rehearsal did. `telemetry`: at even intervals; long ones have longer intervals.
+
+    `files`: of the mission, its own first.
+    """
 
     summary: RunSummary
     records: Sequence[StampedRecord] = field(default_factory=tuple)
     telemetry: Sequence[TelemetrySample] = field(default_factory=tuple)
+    files: Sequence[MissionFile] = field(default_factory=tuple)

@@ -121,7 +121,9 @@ def rehearse(
         telemetry_every_s,
     )
     summary = run_virtual(lambda clock: rehearsal.run(clock, process, data), start_us)
-    return RehearsalResult(summary, tuple(collected), tuple(rehearsal.samples))
+    return RehearsalResult(
+        summary, tuple(collected), tuple(rehearsal.samples), tuple(loaded.files())
+    )
 
 
 def _load(answers: Path | str | bytes | None) -> Answers:

@@ -10,6 +10,7 @@ from m2pem.api.authoring import MissionSource
 from m2pem.api.control import RunSummary, SimulationResult, StampedRecord, TelemetrySample
 from m2pem.errors import OperatorError
 from m2pem.executive.apart import Given, Tell, apart, given, serve
+from m2pem.model.library import MissionFile
 from m2pem.model.values import Value
 from m2pem.resources.fleet import Fleet
 from m2pem.resources.snapshot import dump, restore
@@ -36,6 +37,7 @@ class Done(msgspec.Struct):
     summary: RunSummary
     records: list[StampedRecord]
     telemetry: list[TelemetrySample]
+    files: list[MissionFile]
 
 
 async def rehearse_apart(
@@ -72,7 +74,9 @@ async def rehearse_apart(
     )
     answer = await apart(__name__, msgspec.msgpack.encode(order))
     done = msgspec.msgpack.decode(answer, type=Done)
-    return SimulationResult(done.summary, tuple(done.records), tuple(done.telemetry))
+    return SimulationResult(
+        done.summary, tuple(done.records), tuple(done.telemetry), tuple(done.files)
+    )
 
 
 def _work(content: bytes, _: Tell) -> bytes:
@@ -93,7 +97,7 @@ def _work(content: bytes, _: Tell) -> bytes:
         search_path=[Path(each) for each in order.search_path],
         telemetry_every_s=order.telemetry_every_s,
     )
-    done = Done(result.summary, list(result.records), list(result.telemetry))
+    done = Done(result.summary, list(result.records), list(result.telemetry), list(result.files))
     return msgspec.msgpack.encode(done)
 
 

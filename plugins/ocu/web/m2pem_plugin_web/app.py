@@ -7,7 +7,6 @@ from fastapi import APIRouter, FastAPI
 from fastapi.openapi.utils import get_openapi
 from starlette.types import ASGIApp
 
-from m2pem.api import MissionControl
 from m2pem_plugin_web import pages
 from m2pem_plugin_web.access.bodies import BoundedBodies
 from m2pem_plugin_web.access.entry import Entry
@@ -17,22 +16,42 @@ from m2pem_plugin_web.live import socket
 from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.pages import Pages
 from m2pem_plugin_web.problems import ProblemModel, handle_problems
-from m2pem_plugin_web.rest import prompts, resources, runs, session, steering
+from m2pem_plugin_web.rest import (
+    catalogue,
+    checks,
+    geometries,
+    missions,
+    prompts,
+    rehearsals,
+    resources,
+    runs,
+    session,
+    steering,
+    templates,
+    verifications,
+)
+from m2pem_plugin_web.services import Services
 from m2pem_plugin_web.settings import Settings
 
 OPENAPI = "/api/openapi.json"
 
 
-def routers_of(
-    control: MissionControl, settings: Settings, hub: Hub, entry: Entry
-) -> list[APIRouter]:
+def routers_of(services: Services, settings: Settings, hub: Hub, entry: Entry) -> list[APIRouter]:
     """All that browsers may ask for."""
+    control, folder = services.control, services.folder
     return [
         session.router(control, settings, entry),
-        runs.router(control, settings.missions),
+        runs.router(control, folder),
         steering.router(control),
         prompts.router(control, hub),
         resources.router(control),
+        missions.router(control, folder),
+        templates.router(),
+        checks.router(control, folder),
+        verifications.router(control, folder, services.verifications),
+        rehearsals.router(control, folder, services.rehearsals),
+        catalogue.router(control),
+        geometries.router(control),
         socket.router(hub, entry),
         pages.router(entry, Pages()),
     ]

@@ -29,6 +29,7 @@ class WebOcu:
         from m2pem_plugin_web.app import create_app, routers_of  # noqa: PLC0415
         from m2pem_plugin_web.live.hub import Hub  # noqa: PLC0415
         from m2pem_plugin_web.server import Server  # noqa: PLC0415
+        from m2pem_plugin_web.services import services_of  # noqa: PLC0415
 
         settings = read_settings(environment)
         self._where = places.folder(environment)
@@ -38,7 +39,8 @@ class WebOcu:
         try:
             entry = self._entry(settings)
             self.hub = Hub(control)
-            routers = routers_of(control, settings, self.hub, entry)
+            self._services = services_of(control, settings.missions)
+            routers = routers_of(self._services, settings, self.hub, entry)
             self._app = create_app(routers, entry, settings)
         except BaseException:
             self._server.close()
@@ -60,6 +62,7 @@ class WebOcu:
         finally:
             self._server.close()
             places.withdraw(self._where, self._server.port)
+            await self._services.close()
 
     def _entry(self, settings: Settings) -> "Entry":
         """Who may come in; where it is served is told to `m2pem web url`."""

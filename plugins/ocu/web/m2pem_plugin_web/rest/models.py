@@ -7,9 +7,6 @@ from pydantic import BaseModel, ConfigDict, Field
 from m2pem.api import RunStatus, RunSummary
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
-MissionName = Annotated[str, Field(pattern=r"^\w[\w .-]{0,99}$")]
-"""It is that of a file, so that it has nothing which leads elsewhere."""
-
 Reason = Annotated[str, Field(max_length=1000)]
 Data = Annotated[dict[Name, Any], Field(max_length=1000)]
 """Names and values for the data store of a run."""

@@ -1,26 +1,21 @@
 """/api/runs: start them, list them, and read what happened in them."""
 
-from pathlib import Path
+from collections.abc import Iterable
 from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel
 
-from m2pem.api import Mission, MissionControl
+from m2pem.api import Draft, MissionControl, MissionFile
 from m2pem_plugin_web.access.people import Commander, Viewer
 from m2pem_plugin_web.live.words import record_of
+from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.rest.drafts import WrittenName, of_folder
 from m2pem_plugin_web.rest.lookup import find_run
-from m2pem_plugin_web.rest.models import (
-    Body,
-    Data,
-    MissionName,
-    Name,
-    RecordPage,
-    RunModel,
-    run_model,
-)
+from m2pem_plugin_web.rest.models import Body, Data, Name, RecordPage, RunModel, run_model
+from m2pem_plugin_web.rest.shown import shown
 
 MOST_RUNS = 1000
 MOST_RECORDS = 5000
@@ -32,7 +27,7 @@ _encode = msgspec.json.Encoder().encode
 class StartModel(Body):
     """What to start. `version`: of the mission, None for its newest; `process`: None, its main."""
 
-    mission: MissionName
+    mission: WrittenName
     version: str | None = None
     process: Name | None = None
     data: Data | None = None
@@ -45,7 +40,10 @@ class StartedModel(BaseModel):
 
 
 class FileModel(BaseModel):
-    """A file of BPMN. `qualifier`: what ids of its elements begin with in records, before ":"."""
+    """A file of BPMN, as the editor takes it.
+
+    `qualifier`: what ids of its elements begin with in records, before ":".
+    """
 
     name: str
     qualifier: str
@@ -60,15 +58,16 @@ class RunMissionModel(BaseModel):
     files: list[FileModel]
 
 
-def router(control: MissionControl, missions: Path) -> APIRouter:
-    """The routes of runs. `missions`: the folder that missions are started from."""
+def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
+    """The routes of runs. `folder`: what missions are started from."""
     routes = APIRouter(prefix="/api/runs", tags=["runs"], responses=RESPONSES)
 
     @routes.post("", status_code=201)
     async def start(person: Commander, wanted: StartModel) -> StartedModel:
         """Start a mission."""
-        path = missions / f"{wanted.mission}.bpmn"
-        run = await control.start(path, process=wanted.process, data=wanted.data, by=person.name)
+        source = await of_folder(folder.source, wanted.mission, wanted.version)
+        draft = Draft(folder.file(wanted.mission), source)
+        run = await control.start(draft, process=wanted.process, data=wanted.data, by=person.name)
         return StartedModel(run=run)
 
     @routes.get("")
@@ -107,16 +106,20 @@ def router(control: MissionControl, missions: Path) -> APIRouter:
         """What a run executes, as it was when it began."""
         summary = await find_run(control, run)
         found = await control.mission(run)
-        return RunMissionModel(name=found.file, process=summary.process, files=_files(found))
+        files = [
+            FileModel(
+                name=each.name, qualifier=each.qualifier, xml=await shown(control, each.source)
+            )
+            for each in found.files()
+        ]
+        return RunMissionModel(name=found.file, process=summary.process, files=files)
 
     return routes
 
 
-def _files(mission: Mission) -> list[FileModel]:
-    qualifiers = {each.file: each.qualifier for each in mission.processes if each.file}
-    sources = [(mission.file, "", mission.source)]
-    sources += [(each.name, qualifiers.get(each.name, ""), each.data) for each in mission.library]
+async def file_models(control: MissionControl, files: Iterable[MissionFile]) -> list[FileModel]:
+    """Files as the page can draw them."""
     return [
-        FileModel(name=name, qualifier=qualifier, xml=data.decode(errors="replace"))
-        for name, qualifier, data in sources
+        FileModel(name=each.name, qualifier=each.qualifier, xml=await shown(control, each.source))
+        for each in files
     ]
