@@ -14,6 +14,9 @@ from m2pem.verify.system import Kind, Role, Rule, System
 _MOST_PAIRS = 64
 """Rules that one passed place may be replaced by."""
 
+_WORTH_TRIMMING = 0.5
+"""Of what a rule kills, what may be left. It is more use if all rules of a scope kill alike."""
+
 
 def simplify(system: System, seen: Collection[int] = (), visible: Collection[int] = ()) -> System:
     """The same, smaller.
@@ -43,6 +46,8 @@ def _trim(rule: Rule, concurrency: Concurrency) -> Rule:
     inhibit = tuple(p for p in rule.inhibit if possible >> p & 1)
     absent = set(rule.inhibit) - told
     kill = tuple(p for p in rule.kill if p not in absent and (possible >> p & 1 or p in told))
+    if len(kill) > len(rule.kill) * _WORTH_TRIMMING:
+        kill = rule.kill
     return replace(rule, inhibit=inhibit, kill=kill)
 
 
