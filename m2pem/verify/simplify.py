@@ -7,6 +7,7 @@ what comes to the place goes straight to what follows it. The places that remain
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import replace
+from functools import cache
 
 from m2pem.verify.concurrency import Concurrency, is_small
 from m2pem.verify.system import Kind, Role, Rule, System
@@ -60,6 +61,11 @@ def renumbered(system: System, rules: list[Rule]) -> System:
             used |= {one, other}
     order = [place for place in system.places if place.index in used]
     number = {place.index: n for n, place in enumerate(order)}
+
+    @cache  # what ends one scope says the same, and as much as the scope is large
+    def killed(places: tuple[int, ...]) -> tuple[int, ...]:
+        return tuple(number[p] for p in places if p in number)
+
     made = tuple(
         replace(
             rule,
@@ -68,7 +74,7 @@ def renumbered(system: System, rules: list[Rule]) -> System:
             produce=tuple((number[p], c) for p, c in rule.produce),
             read=tuple(number[p] for p in rule.read),
             inhibit=tuple(number[p] for p in rule.inhibit if p in number),
-            kill=tuple(number[p] for p in rule.kill if p in number),
+            kill=killed(rule.kill),
             moves=tuple((number[a], number[b]) for a, b in rule.moves),
             copies=tuple((number[a], number[b]) for a, b in rule.copies),
         )
