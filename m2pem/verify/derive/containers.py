@@ -4,12 +4,11 @@ from dataclasses import replace
 from itertools import combinations
 
 from m2pem.model import elements as e
-from m2pem.model.events import CompensateEventDefinition
 from m2pem.verify.derive.areas import begin, handler_host, quiet
-from m2pem.verify.derive.compensation import forget
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
+from m2pem.verify.derive.undoable import ended, forget, noted
 from m2pem.verify.derive.waiting import arm_handler
 from m2pem.verify.system import Action, Exactness, Kind, Place, Role, Step, Trigger
 
@@ -29,20 +28,20 @@ def ends_with_its_inside(making: Making, host: Host) -> None:
     over = host.leave().then(quiet(host.inside))
     assert over is not None
     over = over.saying(host.node.id, Action.COMPLETED)
-    making.rules(product([over], host.done()))
+    making.rules(ended(making, host, host.inside, [over]))
 
 
 def event_subprocess(making: Making, container: e.SubProcess, area: Area) -> None:
     """Its inside, and how it begins."""
     host = handler_host(making, area, container)
+    host.done = lambda: [noted(making, host)]
+    host.cut = lambda: [Effect()]
     host.inside.several = area.several or any(not s.interrupting for s in container.starts)
     if host.inside.several:
         making.net.places[host.active] = _several(making.net.places[host.active])
     build(making, container, host.inside)
     ends_with_its_inside(making, host)
     for start in container.starts:
-        if any(isinstance(d, CompensateEventDefinition) for d in start.definitions):
-            making.net.approximate(container, Exactness.BOUNDED, "when it undoes is not followed")
         arm_handler(making, area, start)
 
 
@@ -97,6 +96,7 @@ def ad_hoc(making: Making, host: Host) -> list[Effect]:
         ends_with_its_inside(making, host)
         begun = host.begin().then(begin(making, node, inside))
         assert begun is not None
+        begun = replace(begun, kill=forget(making, inside, node).kill)
         bare = replace(
             begun,
             produce=tuple(
@@ -141,6 +141,7 @@ def ad_hoc(making: Making, host: Host) -> list[Effect]:
             making.rules(product([looked], going))
     begun = host.begin().then(begin(making, node, inside))
     assert begun is not None
+    begun = replace(begun, kill=forget(making, inside, node).kill)
     entries = {at(net, x, inside) for x in node.entries}
     return [replace(begun, produce=tuple(n for n in begun.produce if n not in entries))]
 
@@ -197,5 +198,5 @@ def call(making: Making, host: Host) -> list[Effect]:
     overs = [over.saying(node.id, Action.COMPLETED)]
     for mapping in node.mappings.outputs:
         overs = data.write_out(overs, mapping.target, mapping.source, inside, host.outer, node)
-    making.rules(product(overs, host.done()))
+    making.rules(ended(making, host, inside, overs))
     return product([host.begin()], ways)

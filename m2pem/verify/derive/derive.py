@@ -15,6 +15,7 @@ from m2pem.verify.derive.activities import contend
 from m2pem.verify.derive.areas import begin
 from m2pem.verify.derive.bound import Bound
 from m2pem.verify.derive.catching import what_and_ref
+from m2pem.verify.derive.compensation import give_back
 from m2pem.verify.derive.containers import build, choose
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.events import after, awaited
@@ -62,11 +63,10 @@ def derive(
     initial = (making.running, *first.produce)
     for late in making.later:
         late()
-    for late in making.at_last:
-        late()
     contend(making)
     choose(making)
     _outside(making)
+    give_back(making)
     if making.options.timers_in_order:
         put_in_order(making)
     _completes(making)
@@ -114,10 +114,11 @@ def _instances(making: Making, process: e.Process) -> None:
         area = making.net.area(process, making.everything, step=step, frame=(process.id, step))
         build(making, process, area)
         alive = making.net.place(process, area, Role.CONTROL, ":alive")
+        notes = making.kept.get(area.index, area)
         over = Effect(
             steps=(Step(process.id, Action.COMPLETED),),
             consume=(alive,),
-            kill_scopes=frozenset({area.index}),
+            kill_scopes=frozenset({area.index, notes.index}),
             quiet_scopes=frozenset({area.index}),
         )
         making.net.rule(over)

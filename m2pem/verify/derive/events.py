@@ -264,7 +264,7 @@ def _terminate(making: Making, area: Area) -> list[Effect]:
         return [stop]
     left = host.leave().then(stop)
     assert left is not None
-    return product([left], host.done())
+    return product([left], host.cut() if host.cut is not None else host.done())
 
 
 __all__ = ["along", "catch", "end", "event_based", "start", "throw"]
