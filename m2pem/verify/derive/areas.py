@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from m2pem.model import elements as e
 from m2pem.model.events import ConditionalEventDefinition, TimerEventDefinition, TimerKind
 from m2pem.verify.derive.effect import Effect
+from m2pem.verify.derive.gathering import all_must_come, gathering
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
 from m2pem.verify.system import Action, Role, Step
@@ -59,6 +60,9 @@ def armed_handlers(making: Making, container: e.Container, area: Area) -> list[i
     armed: list[int] = []
     for each in container.event_subprocesses:
         for start in each.starts:
+            if all_must_come(start):
+                armed += gathering(making, start, area).awaited
+                continue
             if start.interrupting:
                 continue
             for number, definition in enumerate(start.definitions):

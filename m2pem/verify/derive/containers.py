@@ -6,6 +6,7 @@ from itertools import combinations
 from m2pem.model import elements as e
 from m2pem.verify.derive.areas import begin, handler_host, quiet
 from m2pem.verify.derive.effect import Effect, product
+from m2pem.verify.derive.gathering import all_must_come, gathering
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
 from m2pem.verify.derive.undoable import ended, forget, noted
@@ -55,7 +56,11 @@ def _completing(making: Making, container: e.Container, area: Area) -> None:
     assert area.open is not None
     others: set[int] = {n for n in area.places if net.places[n].role is not Role.CONTROL}
     hosts = []
+    awaited: set[int] = set()
     for each in container.event_subprocesses:
+        for start in each.starts:
+            if all_must_come(start):
+                awaited.update(gathering(making, start, area).places)
         host = handler_host(making, area, each)
         others.discard(host.active)
         hosts.append(host)
@@ -66,6 +71,7 @@ def _completing(making: Making, container: e.Container, area: Area) -> None:
                 consume=(area.open,),
                 read=frozenset({host.active}),
                 inhibit=frozenset(others),
+                kill=frozenset(awaited),
             )
         )
 

@@ -19,6 +19,7 @@ from m2pem.verify.derive.compensation import give_back
 from m2pem.verify.derive.containers import build, choose
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.events import after, awaited
+from m2pem.verify.derive.gathering import AWAITED, all_must_come, gathering
 from m2pem.verify.derive.making import Catcher, Making
 from m2pem.verify.derive.net import Area, at
 from m2pem.verify.derive.nodes import build_node
@@ -152,7 +153,9 @@ def _begun_by(
             produce=(alive,),
         )
         inside = [Effect(produce=tuple(begin_without_entries(making, process, area)))]
-        if isinstance(start, e.StartEvent):
+        if isinstance(start, e.StartEvent) and all_must_come(start):
+            more = [_first_of_several(making, start, definition, area)]
+        elif isinstance(start, e.StartEvent):
             more = [Effect(produce=(at(making.net, start, area),))]
         else:
             more = after(making, start, area)
@@ -174,6 +177,20 @@ def _begun_by(
                 )
         case _:
             pass
+
+
+def _first_of_several(
+    making: Making, start: e.StartEvent, definition: EventDefinition, area: Area
+) -> Effect:
+    """One of the triggers that must all come has come: the others are awaited in the instance."""
+    places = gathering(making, start, area)
+    waiting = making.net.place(start, area, Role.ACTIVE)
+    triggers = [each for each in awaited(start) if isinstance(each, AWAITED)]
+    came = [
+        there if each is definition else yet
+        for each, there, yet in zip(triggers, places.came, places.awaited, strict=True)
+    ]
+    return Effect(produce=(waiting, *came))
 
 
 def begin_without_entries(making: Making, process: e.Process, area: Area) -> list[int]:
