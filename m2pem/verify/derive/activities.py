@@ -256,6 +256,6 @@ def _receive(making: Making, host: Host, node: e.ReceiveTask) -> list[Effect]:
     assert node.message is not None
     catching(making, "message", node.message.id, host.active, told, False, node)
     stop = Effect(consume=(told,), kill_scopes=frozenset({host.inside.index}))
-    for effect in product([_ended(host, stop)], host.done()):
-        making.net.rule(effect)
+    come = making.data.receive([_ended(host, stop)], host.outer, node)
+    making.rules(product(come, host.done()))
     return [host.begin()]

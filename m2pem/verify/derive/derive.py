@@ -144,6 +144,7 @@ def _begun_by(
     definition: EventDefinition,
     areas: list[tuple[Area, int]],
 ) -> None:
+    brings = isinstance(definition, SignalEventDefinition | MessageEventDefinition)
     ways: list[Effect] = []
     for number, (area, alive) in enumerate(areas):
         free = Effect(
@@ -159,7 +160,8 @@ def _begun_by(
             more = [Effect(produce=(at(making.net, start, area),))]
         else:
             more = after(making, start, area)
-        ways += product(product([free], inside), more)
+        come = making.data.receive([free], area, start) if brings else [free]
+        ways += product(product(come, inside), more)
     full = Effect(read=frozenset(alive for _, alive in areas))
     match definition:
         case SignalEventDefinition() | MessageEventDefinition():

@@ -99,7 +99,8 @@ def _all_have_come(
     making: Making, node: e.Event, area: Area, waiting: int, gathering: Gathering
 ) -> None:
     done = Effect(steps=(Step(node.id, Action.COMPLETED),), consume=(waiting, *gathering.came))
-    making.rules(product([done], _leave(making, node, area)))
+    ways = making.data.receive([done], area, node)
+    making.rules(product(ways, _leave(making, node, area)))
 
 
 def _trigger(
@@ -125,7 +126,7 @@ def _trigger(
             what, ref = what_and_ref(definition)
             catching(making, what, ref, waiting, told, False, node)
             came = Effect(steps=came.steps, consume=(told,))
-            making.rules(product([came], ways))
+            making.rules(product(making.data.receive([came], area, node), ways))
         case ConditionalEventDefinition(condition=condition):
             if not making.data.is_followed([condition], node):
                 net.approximate(node, Exactness.MORE, "its condition may become true at any time")
@@ -181,7 +182,9 @@ def awaited(node: e.FlowNode) -> tuple[EventDefinition, ...]:
 def after(making: Making, node: e.FlowNode, area: Area) -> list[Effect]:
     """What follows a catch event or receive task whose trigger has come already."""
     if isinstance(node, e.Activity):
-        done = Effect(steps=(Step(node.id, Action.COMPLETED),))
+        done = [Effect(steps=(Step(node.id, Action.COMPLETED),))]
+        for mapping in node.data_flow.outputs:
+            done = making.data.write(done, mapping.target, None, area, node)
         out = leave(
             making,
             area,
@@ -190,7 +193,7 @@ def after(making: Making, node: e.FlowNode, area: Area) -> list[Effect]:
             lambda code: throw_error(making, area, node, None, code),
             times=node.completion_quantity,
         )
-        return product([done], out)
+        return product(done, out)
     return _leave(making, node, area)
 
 

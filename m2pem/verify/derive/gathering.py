@@ -86,6 +86,10 @@ def gather(making: Making, event: e.Event, area: Area, inside: Area) -> Gatherin
     places are in `inside`."""
     net = making.net
     found = gathering(making, event, inside)
+    if making.data.receives(event):
+        net.approximate(
+            event, Exactness.BOUNDED, "what its triggers bring is written when all have come"
+        )
     for number, definition in enumerate(_awaited(event)):
         waiting, told, spent = found.awaited[number], found.came[number], found.again[number]
         seen = Effect(

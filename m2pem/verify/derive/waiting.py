@@ -94,7 +94,7 @@ def _boundary(
             catching(making, what, ref, host.active, told, not event.interrupting, event)
             both = told_comes.then(Effect(consume=(told,)))
             assert both is not None
-            net.rule(both)
+            making.rules(making.data.receive([both], host.outer, event))
         case ConditionalEventDefinition(condition=condition):
             _boundary_condition(making, host, event, condition, comes, number)
         case CancelEventDefinition():
@@ -114,7 +114,7 @@ def _gathered(making: Making, host: Host, event: e.BoundaryEvent, out: int) -> N
         stop = host.leave().saying(host.node.id, Action.INTERRUPTED)
     else:
         stop = Effect(read=frozenset({host.active}), produce=gathering.again)
-    making.rules(product([caught], [stop]))
+    making.rules(product(making.data.receive([caught], host.outer, event), [stop]))
 
 
 def _once(host: Host, comes: Effect, armed: int) -> Effect:
@@ -238,7 +238,7 @@ def arm_handler(making: Making, area: Area, start: e.StartEvent) -> None:
                     net.rule(
                         Effect(steps=come.steps, consume=(told,), read=frozenset({host.active}))
                     )
-                making.rules(product([come], begun))
+                making.rules(product(making.data.receive([come], area, start), begun))
             case ConditionalEventDefinition(condition=condition):
                 _handler_condition(making, area, start, condition, when, begun, number)
             case _:
@@ -262,7 +262,8 @@ def _gathered_start(making: Making, area: Area, start: e.StartEvent) -> None:
             replace(come, produce=gathering.again).then(_once_at_a_time(making, area, start))
             or come
         )
-    making.rules(product([come], begin_handler(making, area, start)))
+    ways = making.data.receive([come], area, start)
+    making.rules(product(ways, begin_handler(making, area, start)))
 
 
 def _once_at_a_time(making: Making, area: Area, start: e.StartEvent) -> Effect:
