@@ -16,6 +16,15 @@ def free_port() -> str:
         return str(one.getsockname()[1])
 
 
+def left_by_a_crash(folder: Path) -> Path:
+    """A copy of the journal from before anything was wound up."""
+    copy = folder / "crashed"
+    copy.mkdir()
+    for file in folder.glob("journal.db*"):
+        (copy / file.name).write_bytes(file.read_bytes())
+    return copy
+
+
 async def begun(stack: AsyncExitStack, folder: Path, port: str) -> tuple[World, SqliteJournal]:
     """An executive with its page, until the stack is closed; runs of before are taken up."""
     journal = SqliteJournal.open(folder / "journal.db")
@@ -56,11 +65,7 @@ async def test_a_run_that_was_interrupted_is_shown_as_it_stands(tmp_path: Path) 
     journal = SqliteJournal.open(tmp_path / "journal.db")
     async with executive(journal) as crashed:
         run = await crashed.control.start(scenarios.question("Still there?"))
-        # What a crash leaves: a copy of the journal from before anything was wound up.
-        copy = tmp_path / "crashed"
-        copy.mkdir()
-        for file in tmp_path.glob("journal.db*"):
-            (copy / file.name).write_bytes(file.read_bytes())
+        copy = left_by_a_crash(tmp_path)
     await journal.close()
     async with AsyncExitStack() as stack:
         world, _ = await begun(stack, copy, "0")
