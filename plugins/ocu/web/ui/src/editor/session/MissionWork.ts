@@ -9,7 +9,7 @@ import { Autosave } from "./Autosave";
 import type { Catalogue } from "./catalogue";
 import { dropDraft, readDraft, type Draft } from "./drafts";
 import { EditorSession } from "./EditorSession";
-import { makeEditable, openMission, openVersion, saveMission, type SavedVersion } from "./files";
+import { makeEditable, openMission, openVersion, saveMission, type SavedVersion } from "../../missions/files";
 
 const words = strings.editor;
 
