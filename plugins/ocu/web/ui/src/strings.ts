@@ -49,6 +49,32 @@ export const strings = {
     nothing: "There is no such page.",
   },
   editor: {},
+  begin: {
+    process: "Process",
+    main: "{process}, as the mission says",
+    mainUnknown: "As the mission says",
+    data: "Data at the start",
+    name: "name",
+    value: "value",
+    valueOf: "Value of {name}",
+    add: "Add data",
+    remove: "Remove {name}",
+    wanted: "The mission reads, and nothing in it writes:",
+    kinds: {
+      nothing: "nothing (null)",
+      yesno: "yes or no",
+      number: "number",
+      text: "text",
+      list: "list",
+      map: "map",
+      unreadable: "",
+    },
+    problems: {
+      name: "A name has letters, digits and _, with dots between its parts.",
+      twice: "This name is given twice.",
+      value: "This cannot be read. Quotes and brackets must be closed; a list is written as [1, 2].",
+    },
+  },
   operate: {
     panes: {
       outline: "Elements",
