@@ -27,7 +27,7 @@ export class Beginning {
 
   /** Whether all that was typed can be read. */
   isReadable(): boolean {
-    return this.given.value.every((row, index) => problemOf(this.given.value, index) === undefined);
+    return this.given.value.every((_, index) => problemOf(this.given.value, index) === undefined);
   }
 }
 
