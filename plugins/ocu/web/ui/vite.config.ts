@@ -1,9 +1,30 @@
 import preact from "@preact/preset-vite";
+import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
+
+const NOTHING = "/src/editor/stubs/nothing.ts";
+const NEVER_SHOWN = /^@bpmn-io\/(feel-editor|feelers-editor)$|^@codemirror\//;
+
+/**
+ * The properties panel brings a Preact of its own; two of them do not see each other's components.
+ * It also brings editors for FEEL and JSON that missions have no use for.
+ */
+function leanPropertiesPanel(): Plugin {
+  return {
+    name: "lean-properties-panel",
+    enforce: "pre",
+    resolveId(source, importer) {
+      if (!importer?.includes("properties-panel")) return null;
+      if (NEVER_SHOWN.test(source)) return this.resolve(NOTHING, undefined, { skipSelf: true });
+      const own = /^(?:\.\.|@bpmn-io\/properties-panel)\/preact(\/.*)?$/.exec(source);
+      return own ? this.resolve(`preact${own[1] ?? ""}`, importer, { skipSelf: true }) : null;
+    },
+  };
+}
 
 // The page is served by m2pem_plugin_web, from the folder that is built here.
 export default defineConfig({
-  plugins: [preact()],
+  plugins: [leanPropertiesPanel(), preact()],
   build: {
     outDir: "../m2pem_plugin_web/static",
     emptyOutDir: true,

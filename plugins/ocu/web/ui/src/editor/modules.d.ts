@@ -8,3 +8,21 @@ declare module "bpmn-moddle" {
     toXML(element: Element, options?: { format?: boolean }): Promise<{ xml: string }>;
   }
 }
+
+declare module "@bpmn-io/properties-panel" {
+  export const Group: import("preact").ComponentType<Record<string, unknown>>;
+}
+
+declare module "bpmn-js-properties-panel" {
+  export const BpmnPropertiesPanelModule: object;
+  export const BpmnPropertiesProviderModule: object;
+}
+
+declare module "bpmn-js-create-append-anything" {
+  export const CreateAppendAnythingModule: object;
+}
+
+declare module "diagram-js-minimap" {
+  const MinimapModule: object;
+  export default MinimapModule;
+}

@@ -11,9 +11,11 @@ import { COLORS, ICONS } from "./icons";
 
 const BEFORE_BPMN = 1500;
 const SVG = "http://www.w3.org/2000/svg";
-const STRIP_HEIGHT = 16;
+const BAR_HEIGHT = 18;
 const CORNER = 10;
-const SHOWN_CHARACTERS = 16;
+const ICON_WIDTH = 22;
+const CHARACTER_WIDTH = 6;
+const MISSING = "#b3261e";
 
 interface Drawn {
   group: BlockGroup;
@@ -22,7 +24,13 @@ interface Drawn {
   missing: boolean;
 }
 
-type Handler = (gfx: SVGElement, element: Element, attrs?: object) => SVGElement;
+interface Size {
+  width: number;
+  height: number;
+}
+
+type Handler = (gfx: SVGElement, element: Drawable, attrs?: object) => SVGElement;
+type Drawable = Parameters<BaseRenderer["drawShape"]>[1];
 
 export class BlockRenderer extends BaseRenderer {
   static readonly $inject = ["eventBus", "bpmnRenderer", "catalogue"];
@@ -39,15 +47,14 @@ export class BlockRenderer extends BaseRenderer {
     return isCommanding(element) && drawnOf(this.catalogue, element.businessObject) !== undefined;
   }
 
-  override drawShape(gfx: SVGElement, element: Element & { width: number; height: number }) {
-    const drawn = drawnOf(this.catalogue, element.businessObject)!;
+  override drawShape(gfx: SVGElement, element: Drawable): SVGElement {
+    const drawn = drawnOf(this.catalogue, element.businessObject as ModdleElement)!;
     const task = this.bpmnRenderer.handlers["bpmn:Task"]!(gfx, element);
-    gfx.append(icon(drawn.group));
-    if (drawn.who !== undefined) gfx.append(strip(element, drawn));
+    gfx.append(bar(element as unknown as Size, drawn));
     return task;
   }
 
-  override getShapePath(element: Element) {
+  override getShapePath(element: Drawable): string {
     return this.bpmnRenderer.getShapePath(element as never);
   }
 }
@@ -91,41 +98,41 @@ function svg(name: string, attributes: Record<string, string | number>): SVGElem
   return made;
 }
 
-function icon(group: BlockGroup): SVGElement {
-  return svg("path", {
-    d: ICONS[group],
-    fill: COLORS[group],
-    "fill-rule": "evenodd",
-    transform: "translate(4 3) scale(0.8)",
-  });
-}
-
-/** A strip along the lower edge: white on the colour of the kind; dashed where nobody is chosen. */
-function strip({ width, height }: { width: number; height: number }, drawn: Drawn): SVGElement {
-  const top = height - STRIP_HEIGHT;
+/** A bar along the upper edge: white on the colour of the kind; hollow where nobody is chosen. */
+function bar({ width }: Size, drawn: Drawn): SVGElement {
   const color = COLORS[drawn.group];
   const made = svg("g", {});
+  const inner = CORNER - 1;
   const outline =
-    `M1 ${top}H${width - 1}V${height - CORNER}a${CORNER - 1} ${CORNER - 1} 0 0 1 -${CORNER - 1} ` +
-    `${CORNER - 1}H${CORNER}a${CORNER - 1} ${CORNER - 1} 0 0 1 -${CORNER - 1} -${CORNER - 1}z`;
-  const paint = drawn.missing
-    ? { fill: "#fff4f3", stroke: "#b3261e", "stroke-dasharray": "3 2" }
-    : { fill: color };
-  made.append(svg("path", { d: outline, ...paint }));
-  const label = svg("text", {
-    x: width / 2,
-    y: top + STRIP_HEIGHT / 2 + 3.5,
-    "text-anchor": "middle",
-    "font-family": "Arial, sans-serif",
-    "font-size": 10,
-    "font-weight": "bold",
-    fill: drawn.missing ? "#b3261e" : "#ffffff",
-  });
-  label.textContent = shortened(drawn.who ?? "");
-  made.append(label);
+    `M1 ${BAR_HEIGHT}V${CORNER}a${inner} ${inner} 0 0 1 ${inner} -${inner}H${width - CORNER}` +
+    `a${inner} ${inner} 0 0 1 ${inner} ${inner}V${BAR_HEIGHT}z`;
+  const hollow = { fill: "#fff4f3", stroke: MISSING, "stroke-dasharray": "3 2" };
+  made.append(svg("path", { d: outline, ...(drawn.missing ? hollow : { fill: color }) }));
+  made.append(icon(drawn.group, drawn.missing ? MISSING : "#ffffff"));
+  if (drawn.who) made.append(name(drawn.who, width, drawn.missing ? MISSING : "#ffffff"));
   return made;
 }
 
-function shortened(who: string): string {
-  return who.length > SHOWN_CHARACTERS ? `${who.slice(0, SHOWN_CHARACTERS - 1)}…` : who;
+function icon(group: BlockGroup, fill: string): SVGElement {
+  return svg("path", {
+    d: ICONS[group],
+    fill,
+    "fill-rule": "evenodd",
+    transform: "translate(6 2.5) scale(0.6)",
+  });
+}
+
+function name(who: string, width: number, fill: string): SVGElement {
+  const made = svg("text", {
+    x: ICON_WIDTH + (width - ICON_WIDTH) / 2 - 4,
+    y: BAR_HEIGHT - 5.5,
+    "text-anchor": "middle",
+    "font-family": "Arial, sans-serif",
+    "font-size": 10.5,
+    "font-weight": "bold",
+    fill,
+  });
+  const room = Math.floor((width - ICON_WIDTH) / CHARACTER_WIDTH);
+  made.textContent = who.length > room ? `${who.slice(0, room - 1)}…` : who;
+  return made;
 }

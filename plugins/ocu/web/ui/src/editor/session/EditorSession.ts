@@ -4,6 +4,7 @@ import type { EditorContext } from "../panels/panel";
 import type { Catalogue } from "./catalogue";
 import { Checks } from "./checks";
 import { Diagrams } from "./diagrams";
+import { fitTo } from "./fitting";
 import { Locator } from "./Locator";
 import { Marks } from "./marks";
 import { makeModeler, type MissionModeler } from "./modeler";
@@ -88,7 +89,7 @@ export class EditorSession implements EditorContext {
   }
 
   fit(): void {
-    this.service("canvas").zoom("fit-viewport", "auto" as never);
+    fitTo(this.service("canvas"));
   }
 
   /** Something changed that cannot be undone: a process was added or removed. */

@@ -2,6 +2,7 @@
 // within them.
 import { signal } from "@preact/signals";
 import { adopt, child, isA, list, text, type Factory, type ModdleElement } from "../moddle/moddle";
+import { fitTo } from "./fitting";
 import type { MissionModeler } from "./modeler";
 
 export interface Diagram {
@@ -37,7 +38,7 @@ export class Diagrams {
     this.beforeOpening();
     await this.modeler.open(id);
     this.current.value = id;
-    this.modeler.get("canvas").zoom("fit-viewport", "auto" as never);
+    fitTo(this.modeler.get("canvas"));
   }
 
   /** The diagram on which an element is drawn, or that of the process around it. */

@@ -39,10 +39,11 @@ class ReplaceHandler {
   ) {}
 
   preExecute(context: ReplaceContext): void {
-    const { type } = context.element.businessObject.$type === context.type ? { type: null } : context;
-    const element = type
-      ? (this.bpmnReplace.replaceElement(context.element, { type }) as Element)
-      : context.element;
+    const isSame = context.element.businessObject.$type === context.type;
+    const target = { type: context.type } as Parameters<BpmnReplace["replaceElement"]>[1];
+    const element = isSame
+      ? context.element
+      : (this.bpmnReplace.replaceElement(context.element, target) as Element);
     for (const { target, properties } of context.changes(element.businessObject)) {
       this.modeling.updateModdleProperties(element, target, properties);
     }

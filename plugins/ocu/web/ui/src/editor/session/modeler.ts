@@ -10,8 +10,8 @@ import type { Catalogue } from "./catalogue";
 import { clipboardModule } from "./clipboard";
 import { editsModule } from "./edits";
 import { findingMarksModule } from "./findingMarks";
-import type { Services } from "./services";
 import { foreignCopyModule } from "./foreignCopy";
+import type { Services } from "./services";
 
 export type MissionModeler = Modeler<Services>;
 
@@ -32,7 +32,5 @@ export function makeModeler(catalogue: Catalogue, extra: object): MissionModeler
       CreateAppendAnythingModule,
       MinimapModule,
     ] as never[],
-    // Texts on the canvas are black on white in either theme: the canvas stays light.
-    textRenderer: { defaultStyle: { fontFamily: "Arial, sans-serif" } },
   });
 }

@@ -15,6 +15,7 @@ import type PopupMenu from "diagram-js/lib/features/popup-menu/PopupMenu";
 import type Selection from "diagram-js/lib/features/selection/Selection";
 import type { Catalogue } from "./catalogue";
 import type { Edits } from "./edits";
+import type { FindingMarks } from "./findingMarks";
 
 export type { Element };
 export type { AutoPlace, BpmnFactory, BpmnReplace, Canvas, CommandStack, ElementFactory };
@@ -52,6 +53,7 @@ export interface Services {
   elementFactory: ElementFactory;
   elementRegistry: ElementRegistry;
   eventBus: EventBus;
+  findingMarks: FindingMarks;
   minimap: Minimap;
   modeling: Modeling;
   overlays: Overlays;

@@ -56,7 +56,14 @@ export function ComboField(props: ComboFieldProps) {
   };
 
   return (
-    <Field id={id} label={props.label} required={required ?? false} hint={hint} error={error}>
+    <Field
+      id={id}
+      label={props.label}
+      required={required ?? false}
+      unit={props.unit}
+      hint={hint}
+      error={error}
+    >
       <div class="m2-combo">
         <input
           id={id}

@@ -6,16 +6,18 @@ export interface FieldProps {
   id: string;
   label: string;
   required?: boolean;
+  unit?: string | undefined;
   hint?: ComponentChildren;
   error?: string | undefined;
   children: ComponentChildren;
 }
 
-export function Field({ id, label, required, hint, error, children }: FieldProps) {
+export function Field({ id, label, required, unit, hint, error, children }: FieldProps) {
   return (
     <div class={error ? "m2-field m2-field-wrong" : "m2-field"} data-field={id}>
       <label for={id}>
         {label}
+        {unit && <span class="m2-unit">{unit}</span>}
         {required && (
           <span class="m2-required" title={strings.editor.fields.required} aria-hidden="true">
             *

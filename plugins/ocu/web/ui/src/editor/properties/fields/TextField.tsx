@@ -9,6 +9,7 @@ export interface TextFieldProps {
   write(value: string): void;
   rows?: number;
   required?: boolean;
+  unit?: string | undefined;
   placeholder?: string | undefined;
   hint?: ComponentChildren;
   error?: string | undefined;
@@ -31,7 +32,14 @@ export function TextField(props: TextFieldProps) {
     onBlur: () => draft.commit(),
   };
   return (
-    <Field id={id} label={props.label} required={required ?? false} hint={hint} error={error}>
+    <Field
+      id={id}
+      label={props.label}
+      required={required ?? false}
+      unit={props.unit}
+      hint={hint}
+      error={error}
+    >
       {rows ? <textarea rows={rows} {...common} /> : <input type="text" {...common} />}
     </Field>
   );

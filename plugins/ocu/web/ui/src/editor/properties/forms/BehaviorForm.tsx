@@ -1,4 +1,5 @@
 // Which behavior a task commands, and with what parameters.
+import { useMemo } from "preact/hooks";
 import type { Behavior, Parameter } from "../../../shared/types";
 import { fill, strings } from "../../../strings";
 import { titleOf, useOf } from "../../blocks/blocks";
@@ -56,9 +57,22 @@ interface ParametersProps {
 function Parameters({ form, use, meant, write }: ParametersProps) {
   const known = meant?.parameters ?? [];
   const unknown = use.parameters.filter(({ name }) => !known.some((each) => each.name === name));
-  const specs = [...known.filter(isNeeded(meant)), ...known.filter((each) => !isNeeded(meant)(each))];
+  const needed = isNeeded(meant);
+  // Sorted when the behavior is chosen, not while values are typed: fields would jump away.
+  const given = useMemo(() => new Set(use.parameters.map(({ name }) => name)), [form.element, use.name]);
+  const first = known.filter((each) => needed(each) || given.has(each.name));
+  const further = known.filter((each) => !first.includes(each));
   const change = (name: string, value: string) => write(withParameter(use, name, value));
   const valueOf = (name: string) => use.parameters.find((each) => each.name === name)?.value ?? "";
+  const field = (spec: Parameter) => (
+    <ParameterField
+      key={`${use.name} ${spec.name}`}
+      editor={form.editor}
+      parameter={spec}
+      value={valueOf(spec.name)}
+      write={(value) => change(spec.name, value)}
+    />
+  );
   return (
     <>
       {missingGroups(meant, use).map((groups) => (
@@ -66,15 +80,13 @@ function Parameters({ form, use, meant, write }: ParametersProps) {
           {fill(words.oneOf, { groups })}
         </p>
       ))}
-      {specs.map((spec) => (
-        <ParameterField
-          key={`${use.name} ${spec.name}`}
-          editor={form.editor}
-          parameter={spec}
-          value={valueOf(spec.name)}
-          write={(value) => change(spec.name, value)}
-        />
-      ))}
+      {first.map(field)}
+      {further.length > 0 && (
+        <details class="m2-further">
+          <summary>{fill(words.further, { count: further.length })}</summary>
+          {further.map(field)}
+        </details>
+      )}
       {unknown.map(({ name, value }) => (
         <ParameterField
           key={`${use.name} ${name}`}

@@ -27,6 +27,7 @@ export function ParameterField({ editor, parameter, value, write, error }: Param
     id: `m2-parameter-${parameter.name}`,
     label: titleOf(parameter.name),
     required: parameter.required,
+    unit: unitsOf(parameter.kind)[0],
     value,
     write,
     placeholder: defaultOf(parameter) || exampleOf(parameter),
@@ -87,10 +88,7 @@ function hintOf(parameter: Parameter): string {
     minimum === null ? "" : fill(words.least, { bound: written(kind, minimum) }),
     maximum === null ? "" : fill(words.most, { bound: written(kind, maximum) }),
   ].filter(Boolean);
-  const units = unitsOf(kind);
-  return [parameter.doc, units.length ? fill(words.units, { units: units.join(", ") }) : "", range.join(", ")]
-    .filter(Boolean)
-    .join(" · ");
+  return [parameter.doc, range.join(", ")].filter(Boolean).join(" · ");
 }
 
 function describe(wrong: Wrong): string {

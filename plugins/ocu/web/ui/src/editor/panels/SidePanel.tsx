@@ -1,0 +1,115 @@
+// Tabs beside the canvas. Panels stay mounted, so that nothing that was typed or found is lost.
+import { useRef, useState } from "preact/hooks";
+import { remember, remembered } from "../../shared/memory";
+import { strings } from "../../strings";
+import type { EditorContext, Panel } from "./panel";
+import { panels } from "./panels";
+
+const words = strings.editor.panel;
+const LEAST = 240;
+const MOST = 720;
+const USUAL = 340;
+const STEP = 24;
+
+export function SidePanel({ editor }: { editor: EditorContext }) {
+  const [shown, setShown] = useState("properties");
+  const [width, setWidth] = useState(() => remembered("editor-panel-width", USUAL));
+  const resize = (next: number) => {
+    const bounded = Math.min(MOST, Math.max(LEAST, next));
+    setWidth(bounded);
+    remember("editor-panel-width", bounded);
+  };
+  return (
+    <aside class="m2-side" style={{ width: `${width}px` }} aria-label={strings.editor.panels.label}>
+      <Grip width={width} resize={resize} />
+      <div role="tablist" aria-label={strings.editor.panels.label} class="m2-tablist">
+        {panels.map((panel, index) => (
+          <PanelTab
+            key={panel.id}
+            editor={editor}
+            panel={panel}
+            isShown={panel.id === shown}
+            show={() => setShown(panel.id)}
+            step={(offset) => {
+              const next = panels[(index + offset + panels.length) % panels.length];
+              if (!next) return;
+              setShown(next.id);
+              document.getElementById(`m2-panel-tab-${next.id}`)?.focus();
+            }}
+          />
+        ))}
+      </div>
+      {panels.map((panel) => (
+        <div
+          key={panel.id}
+          id={`m2-panel-${panel.id}`}
+          role="tabpanel"
+          aria-labelledby={`m2-panel-tab-${panel.id}`}
+          class="m2-panel"
+          tabIndex={0}
+          hidden={panel.id !== shown}
+        >
+          {panel.render(editor)}
+        </div>
+      ))}
+    </aside>
+  );
+}
+
+interface PanelTabProps {
+  editor: EditorContext;
+  panel: Panel;
+  isShown: boolean;
+  show(): void;
+  step(offset: number): void;
+}
+
+function PanelTab({ editor, panel, isShown, show, step }: PanelTabProps) {
+  const count = panel.badge?.(editor) ?? 0;
+  return (
+    <button
+      id={`m2-panel-tab-${panel.id}`}
+      type="button"
+      role="tab"
+      aria-selected={isShown}
+      aria-controls={`m2-panel-${panel.id}`}
+      tabIndex={isShown ? 0 : -1}
+      onClick={show}
+      onKeyDown={(event) => {
+        if (event.key === "ArrowRight") step(1);
+        if (event.key === "ArrowLeft") step(-1);
+      }}
+    >
+      {panel.title}
+      {count > 0 && <span class="m2-count">{count}</span>}
+    </button>
+  );
+}
+
+function Grip({ width, resize }: { width: number; resize(width: number): void }) {
+  const from = useRef<{ x: number; width: number } | null>(null);
+  return (
+    <div
+      class="m2-grip"
+      role="separator"
+      aria-orientation="vertical"
+      aria-label={words.resize}
+      aria-valuenow={Math.round(width)}
+      aria-valuemin={LEAST}
+      aria-valuemax={MOST}
+      tabIndex={0}
+      onKeyDown={(event) => {
+        if (event.key === "ArrowLeft") resize(width + STEP);
+        if (event.key === "ArrowRight") resize(width - STEP);
+      }}
+      onPointerDown={(event) => {
+        event.currentTarget.setPointerCapture(event.pointerId);
+        from.current = { x: event.clientX, width };
+      }}
+      onPointerMove={(event) => {
+        if (from.current) resize(from.current.width + from.current.x - event.clientX);
+      }}
+      onPointerUp={() => (from.current = null)}
+    />
+  );
+}

@@ -1,0 +1,6 @@
+// The tabs beside the canvas, in order. A further one is a module here and a line below.
+import type { Panel } from "./panel";
+import { problemsPanel } from "./ProblemsPanel";
+import { propertiesPanel } from "./PropertiesPanel";
+
+export const panels: readonly Panel[] = [propertiesPanel, problemsPanel];

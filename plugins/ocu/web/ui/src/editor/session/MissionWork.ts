@@ -1,0 +1,154 @@
+// Work on one mission: what the server has, what is drawn here, and how the two come together.
+import { signal } from "@preact/signals";
+import { ApiError } from "../../shared/api";
+import { go } from "../../shared/router";
+import { may } from "../../shared/session";
+import { toast } from "../../shared/Toasts";
+import { fill, strings } from "../../strings";
+import { Autosave } from "./Autosave";
+import type { Catalogue } from "./catalogue";
+import { dropDraft, readDraft, type Draft } from "./drafts";
+import { EditorSession } from "./EditorSession";
+import { makeEditable, openMission, openVersion, saveMission, type SavedVersion } from "./files";
+
+const words = strings.editor;
+
+export type Question =
+  | { kind: "conflict"; current: SavedVersion }
+  | { kind: "recovery"; draft: Draft; isOlder: boolean }
+  | { kind: "versions" }
+  | { kind: "saveAs" }
+  | { kind: "layout" }
+  | { kind: "shortcuts" };
+
+export class MissionWork {
+  readonly session: EditorSession;
+  readonly question = signal<Question | null>(null);
+  readonly notes = signal<readonly string[]>([]);
+  readonly saved = signal<SavedVersion | null>(null);
+  readonly isSaving = signal(false);
+  /** Brings back where everything was before it was laid out anew. */
+  readonly putBack = signal<(() => Promise<void>) | null>(null);
+  private readonly autosave: Autosave;
+
+  constructor(
+    readonly mission: string,
+    catalogue: Catalogue,
+  ) {
+    this.session = new EditorSession(mission, catalogue, () => this.save());
+    this.autosave = new Autosave(
+      mission,
+      () => this.session.xml(),
+      () => this.saved.value?.version ?? null,
+    );
+    this.session.changes.subscribe(() => {
+      if (this.session.isDirty.peek()) this.autosave.soon();
+    });
+  }
+
+  /** Draws what the server has, and asks what to do with a draft that was not saved. */
+  async begin(): Promise<void> {
+    const draft = await readDraft(this.mission).catch(() => undefined);
+    const file = await openMission(this.mission);
+    this.saved.value = file;
+    this.notes.value = file.notes;
+    await this.session.open(file.xml, true);
+    if (draft && draft.xml !== (await this.session.xml())) {
+      this.question.value = { kind: "recovery", draft, isOlder: draft.base !== file.version };
+    }
+  }
+
+  async recover(draft: Draft): Promise<void> {
+    await this.session.open(draft.xml, false);
+    // Somebody's newer version is not overwritten unasked.
+    if (this.saved.value && draft.base) this.saved.value = { ...this.saved.value, version: draft.base };
+  }
+
+  discardDraft(): void {
+    this.autosave.drop();
+  }
+
+  async save(): Promise<boolean> {
+    if (!may("commander")) {
+      toast(words.viewerHint, "bad");
+      return false;
+    }
+    if (!this.session.isDirty.peek() && this.saved.peek()) return true;
+    return this.put(this.mission, this.saved.peek()?.version ?? null);
+  }
+
+  /** Over a version that somebody else saved: theirs is kept as an older one. */
+  async overwrite(current: SavedVersion): Promise<boolean> {
+    return this.put(this.mission, current.version);
+  }
+
+  /** Under a name that is free: the page goes there. */
+  async saveAs(name: string): Promise<boolean> {
+    if (!(await this.put(name, null))) return false;
+    await dropDraft(this.mission).catch(() => undefined);
+    go(`/missions/${encodeURIComponent(name)}`);
+    return true;
+  }
+
+  async takeTheirs(): Promise<void> {
+    const file = await openMission(this.mission);
+    this.saved.value = file;
+    this.notes.value = file.notes;
+    await this.session.open(file.xml, true);
+    this.autosave.drop();
+  }
+
+  async openVersion(number: number): Promise<void> {
+    const { xml } = await openVersion(this.mission, number);
+    await this.session.open(xml, false);
+    toast(fill(words.versions.opened, { number }));
+  }
+
+  /** Another file in place of this mission; it is saved only when somebody says so. */
+  async replaceBy(name: string, content: string): Promise<void> {
+    try {
+      const { xml, notes } = await makeEditable(content);
+      await this.session.open(xml, false);
+      this.notes.value = notes;
+      toast(fill(words.file.replaced, { name }));
+    } catch (error) {
+      const reason = error instanceof Error ? error.message : String(error);
+      toast(fill(words.unreadable, { reason }), "bad");
+    }
+  }
+
+  /** New places for everything. */
+  async layOut(): Promise<void> {
+    const before = await this.session.xml();
+    const bare = before.replace(/<(\w+:)?BPMNDiagram\b[\s\S]*<\/\1BPMNDiagram>/, "");
+    const { xml } = await makeEditable(bare);
+    await this.session.open(xml, false);
+    this.putBack.value = () => this.session.open(before, false);
+  }
+
+  end(): void {
+    this.autosave.end();
+    this.session.end();
+  }
+
+  private async put(name: string, base: string | null): Promise<boolean> {
+    this.isSaving.value = true;
+    try {
+      const outcome = await saveMission(name, await this.session.xml(), base);
+      if (outcome.kind === "conflict") {
+        this.question.value = { kind: "conflict", current: outcome.current };
+        return false;
+      }
+      this.saved.value = outcome.saved;
+      this.session.saved();
+      this.autosave.drop();
+      toast(words.saved, "good");
+      return true;
+    } catch (error) {
+      toast(error instanceof ApiError ? error.message : strings.home.failed, "bad");
+      return false;
+    } finally {
+      this.isSaving.value = false;
+    }
+  }
+}

@@ -1,0 +1,61 @@
+// What one must know before going on: what the editor cannot keep, what the file had wrong.
+import { fill, strings } from "../../strings";
+import type { MissionWork } from "../session/MissionWork";
+
+const words = strings.editor;
+
+export function Notices({ work }: { work: MissionWork }) {
+  const { notes, session, putBack } = work;
+  const warnings = session.warnings.value;
+  const undo = putBack.value;
+  return (
+    <>
+      {undo && (
+        <Notice
+          text={words.file.laidOut}
+          action={words.file.putBack}
+          act={() => {
+            putBack.value = null;
+            void undo();
+          }}
+          close={() => (putBack.value = null)}
+        />
+      )}
+      {notes.value.length > 0 && (
+        <Notice
+          text={`${words.notes}: ${notes.value.join(" ")}`}
+          close={() => (notes.value = [])}
+        />
+      )}
+      {warnings.length > 0 && (
+        <Notice
+          text={fill(words.importWarnings, { warnings: warnings.slice(0, 3).join("; ") })}
+          close={() => (session.warnings.value = [])}
+        />
+      )}
+    </>
+  );
+}
+
+interface NoticeProps {
+  text: string;
+  action?: string;
+  act?(): void;
+  close(): void;
+}
+
+function Notice({ text, action, act, close }: NoticeProps) {
+  return (
+    <div class="m2-notice" role="note">
+      <span>{text}</span>
+      {action && (
+        <button type="button" class="secondary" onClick={act}>
+          {action}
+        </button>
+      )}
+      <button type="button" class="plain" aria-label={strings.shell.close} onClick={close}>
+        ×
+      </button>
+    </div>
+  );
+}
