@@ -19,8 +19,9 @@ from statistics import median
 from typing import Any, TypeVar
 
 from bench.measured import peak_kb
-from m2pem.cli.proving import Engine, asked_of, findings
+from m2pem.cli.proving import asked_of, findings
 from m2pem.executive.loading import load_source
+from m2pem.executive.proving import Engine
 from m2pem.model.bpmn import parse_mission
 from m2pem.model.mission import Mission
 from m2pem.resources.madeup import fleet_for

@@ -19,9 +19,22 @@ if TYPE_CHECKING:
         ResolvedValue,
         SightedArbiter,
     )
+    from m2pem.api.authoring import (
+        DataName,
+        Draft,
+        Editable,
+        MissionSource,
+        Outline,
+        OutlineElement,
+        OutlineProcess,
+        OutlineTrigger,
+        SearchLimits,
+        SearchProgress,
+    )
     from m2pem.api.bus import FleetBus
     from m2pem.api.clock import Clock
     from m2pem.api.control import (
+        HandedOver,
         MissionControl,
         Notice,
         OpenPrompt,
@@ -31,6 +44,7 @@ if TYPE_CHECKING:
         RunSummary,
         SimulationResult,
         StampedRecord,
+        TelemetrySample,
     )
     from m2pem.api.goals import GoalArbiter
     from m2pem.api.ledger import Ledger
@@ -60,11 +74,13 @@ if TYPE_CHECKING:
         ResumePolicy,
     )
     from m2pem.model.geometry import Area, Point, Route, VehiclePosition
+    from m2pem.model.library import MissionFile
     from m2pem.model.mission import Mission
     from m2pem.model.values import Value
     from m2pem.resources.behaviors import SHARED
     from m2pem.resources.fence import Fence
     from m2pem.resources.fleet import Fleet
+    from m2pem.resources.geojson import as_geojson, parse_geojson
     from m2pem.resources.lawn_mower import lawn_mower, longest_edge_yaw
     from m2pem.resources.units import Dimension, UnitError, quantity
 
@@ -74,11 +90,15 @@ _MODULES = {
         "AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport BehaviorRequest"
         " Connection Limits ResolvedValue SightedArbiter"
     ),
+    "m2pem.api.authoring": (
+        "DataName Draft Editable MissionSource Outline OutlineElement"
+        " OutlineProcess OutlineTrigger SearchLimits SearchProgress"
+    ),
     "m2pem.api.bus": "FleetBus",
     "m2pem.api.clock": "Clock",
     "m2pem.api.control": (
-        "MissionControl Notice OpenPrompt PromptClosed RunId RunStatus RunSummary"
-        " SimulationResult StampedRecord"
+        "HandedOver MissionControl Notice OpenPrompt PromptClosed RunId RunStatus RunSummary"
+        " SimulationResult StampedRecord TelemetrySample"
     ),
     "m2pem.api.goals": "GoalArbiter",
     "m2pem.api.ledger": "Ledger",
@@ -96,12 +116,14 @@ _MODULES = {
     "m2pem.model.catalogue": (
         "BehaviorSpec BehaviorState ParameterKind ParameterSpec ResourceId ResumePolicy"
     ),
+    "m2pem.model.library": "MissionFile",
     "m2pem.model.mission": "Mission",
     "m2pem.model.geometry": "Area Point Route VehiclePosition",
     "m2pem.model.values": "Value",
     "m2pem.resources.behaviors": "SHARED",
     "m2pem.resources.fence": "Fence",
     "m2pem.resources.fleet": "Fleet",
+    "m2pem.resources.geojson": "as_geojson parse_geojson",
     "m2pem.resources.lawn_mower": "lawn_mower longest_edge_yaw",
     "m2pem.resources.units": "Dimension UnitError quantity",
 }
@@ -121,24 +143,34 @@ __all__ = [
     "BehaviorType",
     "Clock",
     "Connection",
+    "DataName",
     "Decision",
     "Detection",
     "Dimension",
+    "Draft",
+    "Editable",
     "Fence",
     "Finding",
     "Fleet",
     "FleetBus",
     "GeoPosition",
     "GoalArbiter",
+    "HandedOver",
     "Ledger",
     "Limits",
     "LinkState",
     "Mailbox",
     "Mission",
     "MissionControl",
+    "MissionFile",
+    "MissionSource",
     "Notice",
     "Ocu",
     "OpenPrompt",
+    "Outline",
+    "OutlineElement",
+    "OutlineProcess",
+    "OutlineTrigger",
     "ParameterKind",
     "ParameterSpec",
     "PayloadState",
@@ -152,6 +184,8 @@ __all__ = [
     "RunId",
     "RunStatus",
     "RunSummary",
+    "SearchLimits",
+    "SearchProgress",
     "Service",
     "ServiceContext",
     "ServiceError",
@@ -159,17 +193,20 @@ __all__ = [
     "SightedArbiter",
     "SimulationResult",
     "StampedRecord",
+    "TeamMemberState",
+    "TeamState",
+    "Telemetry",
+    "TelemetrySample",
     "UnitError",
     "Value",
     "VehiclePosition",
     "VehicleState",
+    "as_geojson",
     "lawn_mower",
     "longest_edge_yaw",
+    "parse_geojson",
     "parse_mission",
     "quantity",
-    "TeamMemberState",
-    "Telemetry",
-    "TeamState",
 ]
 
 

@@ -1,16 +1,25 @@
 """MissionControl: the one face of the executive to operators, scripts and OCU plugins."""
 
-from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, Union
 
-from m2pem.api.telemetry import Telemetry
+from m2pem.api.authoring import (
+    DEFAULT_LIMITS,
+    Draft,
+    Editable,
+    MissionSource,
+    Outline,
+    SearchLimits,
+    SearchProgress,
+)
+from m2pem.api.telemetry import PayloadState, Telemetry, VehicleState
 from m2pem.engine.records import Record
 from m2pem.findings import Finding
 from m2pem.model.behavior import Decision
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.model.library import MissionFile
 from m2pem.model.values import Value
 
 if TYPE_CHECKING:
@@ -102,13 +111,13 @@ class MissionControl(Protocol):
 
     async def start(
         self,
-        mission: Path | str | bytes,
+        mission: MissionSource,
         *,
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
         by: str = "",
     ) -> RunId:
-        """Start a mission from a path, a `file:`/`http:` URL or BPMN bytes.
+        """Start a mission.
 
         Raises:
             MissionError: with every finding, when it is not well or does not fit the fleet.
@@ -216,8 +225,12 @@ class MissionControl(Protocol):
         """Whether nothing real moves: all vehicles are simulated, or software in the loop."""
         ...
 
+    def speed(self) -> float:
+        """Seconds of mission time in a real second."""
+        ...
+
     def check(
-        self, mission: Path | str | bytes, *, process: str | None = None, data: Iterable[str] = ()
+        self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
     ) -> Sequence[Finding]:
         """All findings of `m2pem check` for a mission and the fleet in use.
 
@@ -225,14 +238,94 @@ class MissionControl(Protocol):
         """
         ...
 
-    async def simulate(self, mission: Path | str | bytes, **options: Any) -> "SimulationResult":
-        """Rehearse a mission on a virtual clock."""
+    async def simulate(self, mission: MissionSource, **options: Any) -> "SimulationResult":
+        """Rehearse a mission with this fleet on a virtual clock. Cancelling ends it.
+
+        Options: `process`, `data`, `answers` (path of an answers file, or its text as bytes),
+        `start_us` (microseconds since the Unix epoch), `max_steps` (100,000: all records are kept
+        in memory), `telemetry_every_s` (None: the result has no telemetry).
+
+        Raises:
+            FindingsError: the mission or the answers cannot be used.
+        """
+        ...
+
+    async def verify(
+        self,
+        mission: MissionSource,
+        *,
+        process: str | None = None,
+        data: Mapping[str, Value] | None = None,
+        spec: str | None = None,
+        strict: bool = False,
+        timers_in_order: bool = False,
+        limits: SearchLimits = DEFAULT_LIMITS,
+        on_progress: Callable[[SearchProgress], None] | None = None,
+    ) -> Mapping[str, Any]:
+        """Verify a mission with this fleet, as `m2pem verify --format json` does.
+
+        `spec`: the text of a file of requirements. `timers_in_order`: `--timers in-order`. It takes
+        a processor for up to `limits.seconds`, and is done in a process of its own; cancelling ends
+        that. The answer has the shape of docs/verification.schema.json.
+
+        Raises:
+            FindingsError: the mission or the requirements cannot be used.
+        """
+        ...
+
+    def editable(self, mission: bytes, *, anew: bool = False) -> Editable:
+        """The same mission as an editor takes it, with a diagram of everything in it.
+
+        `anew`: what it has of diagrams is laid out again.
+
+        Raises:
+            MissionError: it is no BPMN 2.0.
+        """
+        ...
+
+    def outline(self, mission: bytes | Draft) -> Outline:
+        """What a file has, also one with errors, as far as it can be read.
+
+        Raises:
+            MissionError: it is no BPMN 2.0.
+        """
+        ...
+
+    def geometries(self) -> Mapping[str, "HandedOver"]:
+        """The routes, areas and points that operators have handed over for all runs."""
+        ...
+
+    def services(self) -> Mapping[str, Sequence[str]]:
+        """The service-task classes that there are, with the names of data that each writes."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
+class HandedOver:
+    """A geometry (GeoJSON) from an operator, `at_us` microseconds since the Unix epoch."""
+
+    geometry: Mapping[str, Value]
+    by: str
+    at_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class TelemetrySample:
+    """How the vehicles and payloads of a rehearsal were at one moment of mission time."""
+
+    t_s: float
+    vehicles: Mapping[ResourceId, VehicleState]
+    payloads: Mapping[ResourceId, PayloadState] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
 class SimulationResult:
-    """What a rehearsal did."""
+    """What a rehearsal did. `telemetry`: at even intervals; long ones have longer intervals.
+
+    `files`: of the mission, its own first.
+    """
 
     summary: RunSummary
     records: Sequence[StampedRecord] = field(default_factory=tuple)
+    telemetry: Sequence[TelemetrySample] = field(default_factory=tuple)
+    files: Sequence[MissionFile] = field(default_factory=tuple)

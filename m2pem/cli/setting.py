@@ -71,7 +71,7 @@ def make_executive(
         raise UnusableError(f"{fleet.file}: {error}") from error
 
 
-def _rehearse(*arguments: Any, **options: Any) -> SimulationResult:
-    from m2pem.sim.rehearsal import rehearse
+async def _rehearse(*arguments: Any, **options: Any) -> SimulationResult:
+    from m2pem.sim.rehearser import rehearse_apart
 
-    return rehearse(*arguments, **options)
+    return await rehearse_apart(*arguments, **options)

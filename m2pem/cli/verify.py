@@ -118,13 +118,20 @@ def verify(
     what was seen until then is told.
     """
     _refuse_what_does_not_go_together(engine, storage, emit, reports)
-    from m2pem.cli.proving import Engine, asked_of, findings, promela, with_timers
+    from m2pem.cli.proving import asked_of, findings, promela
     from m2pem.executive.loading import load_source
+    from m2pem.executive.proving import Engine
     from m2pem.verify.explore import Limits
     from m2pem.verify.report.data import as_data
 
-    asked = asked_of(load_source(mission, search_path), fleet_file, process, data, spec)
-    asked = with_timers(asked, in_order=timers == "in-order")
+    asked = asked_of(
+        load_source(mission, search_path),
+        fleet_file,
+        process,
+        data,
+        spec,
+        timers_in_order=timers == "in-order",
+    )
     if emit is not None:
         _emit(promela(asked), emit.partition("=")[2])
         return 0

@@ -97,6 +97,10 @@ async def _simulated(control: MissionControl, _: Nothing) -> Any:
     return control.simulated()
 
 
+async def _speed(control: MissionControl, _: Nothing) -> Any:
+    return control.speed()
+
+
 async def _mission(control: MissionControl, p: OfRun) -> Any:
     mission = await control.mission(p.run)
     return {"file": mission.file, "source": mission.source, "library": mission.library}
@@ -122,6 +126,7 @@ METHODS: dict[str, Method] = {
     "fleet": (Nothing, _fleet),
     "catalogue": (Nothing, _catalogue),
     "simulated": (Nothing, _simulated),
+    "speed": (Nothing, _speed),
 }
 """Calls, answered once."""
 

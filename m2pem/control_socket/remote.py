@@ -9,7 +9,9 @@ from typing import Any, Self
 
 import msgspec
 
+from m2pem.api.authoring import Draft, Editable, MissionSource, Outline
 from m2pem.api.control import (
+    HandedOver,
     Notice,
     OpenPrompt,
     PromptClosed,
@@ -40,7 +42,7 @@ _KINDS: dict[str, type] = {
 class RemoteControl:
     """Implements `m2pem.api.control.MissionControl`; enter it before use.
 
-    Missions cannot be started, checked or rehearsed through it.
+    Missions cannot be started, edited, checked, verified or rehearsed through it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -56,6 +58,7 @@ class RemoteControl:
         catalogue = await self._ask("catalogue")
         self._catalogue = msgspec.convert(catalogue, dict[ResourceId, tuple[BehaviorSpec, ...]])
         self._simulated = bool(await self._ask("simulated"))
+        self._speed = float(await self._ask("speed"))
         self._listening = asyncio.create_task(self._follow_prompts())
         return self
 
@@ -109,7 +112,7 @@ class RemoteControl:
 
     async def start(
         self,
-        mission: Path | str | bytes,
+        mission: MissionSource,
         *,
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
@@ -232,12 +235,36 @@ class RemoteControl:
         """Whether nothing real moves."""
         return self._simulated
 
+    def speed(self) -> float:
+        """Seconds of mission time in a real second."""
+        return self._speed
+
     def check(
-        self, mission: Path | str | bytes, *, process: str | None = None, data: Iterable[str] = ()
+        self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
     ) -> Sequence[Finding]:
         """Refused."""
         raise OperatorError("missions are checked where the executive runs: m2pem check")
 
-    async def simulate(self, mission: Path | str | bytes, **options: Any) -> SimulationResult:
+    async def simulate(self, mission: MissionSource, **options: Any) -> SimulationResult:
         """Refused."""
         raise OperatorError("missions are rehearsed where the executive runs: m2pem simulate")
+
+    async def verify(self, mission: MissionSource, **options: Any) -> Mapping[str, Any]:
+        """Refused."""
+        raise OperatorError("missions are verified where the executive runs: m2pem verify")
+
+    def editable(self, mission: bytes, *, anew: bool = False) -> Editable:
+        """Refused."""
+        raise OperatorError("missions are edited where the executive runs")
+
+    def outline(self, mission: bytes | Draft) -> Outline:
+        """Refused."""
+        raise OperatorError("missions are edited where the executive runs")
+
+    def geometries(self) -> Mapping[str, HandedOver]:
+        """Refused."""
+        raise OperatorError("geometries are listed where the executive runs")
+
+    def services(self) -> Mapping[str, Sequence[str]]:
+        """Refused."""
+        raise OperatorError("services are listed where the executive runs")

@@ -1,12 +1,21 @@
 """`MissionControl` over an executive: what OCUs, scripts and the command line call."""
 
 import asyncio
-from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
-from functools import partial
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from m2pem.api.authoring import (
+    DEFAULT_LIMITS,
+    Draft,
+    Editable,
+    MissionSource,
+    Outline,
+    SearchLimits,
+    SearchProgress,
+)
 from m2pem.api.control import (
+    HandedOver,
     Notice,
     OpenPrompt,
     RunId,
@@ -16,11 +25,14 @@ from m2pem.api.control import (
     StampedRecord,
 )
 from m2pem.api.telemetry import Telemetry
+from m2pem.editing.editable import editable
+from m2pem.editing.outline import outline
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import MissionError, OperatorError
-from m2pem.executive.loading import findings_for, load_source
+from m2pem.executive.loading import findings_for, library_of, load_source
+from m2pem.executive.prover import verify_apart
 from m2pem.findings import Finding
 from m2pem.journal.base import RunLine
 from m2pem.journal.mission import mission_of
@@ -47,7 +59,7 @@ class Control:
 
     async def start(
         self,
-        mission: Path | str | bytes,
+        mission: MissionSource,
         *,
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
@@ -222,8 +234,12 @@ class Control:
         """Whether nothing real moves."""
         return self._executive.arbiters.nothing_is_real
 
+    def speed(self) -> float:
+        """Seconds of mission time in a real second."""
+        return self._executive.speed
+
     def check(
-        self, mission: Path | str | bytes, *, process: str | None = None, data: Iterable[str] = ()
+        self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
     ) -> Sequence[Finding]:
         """All findings of `m2pem check` for a mission and the fleet in use."""
         executive = self._executive
@@ -240,25 +256,64 @@ class Control:
             simulated=executive.simulated,
         )
 
-    async def simulate(self, mission: Path | str | bytes, **options: Any) -> SimulationResult:
-        """Rehearse a mission with this fleet on a virtual clock, in a thread of its own.
-
-        Options: `process`, `data`, `answers` (path of an answers file), `start_us` (microseconds
-        since the Unix epoch), `max_steps` (100,000: all records are kept in memory).
-
-        Raises:
-            FindingsError: the mission or the answers cannot be used.
-        """
+    async def simulate(self, mission: MissionSource, **options: Any) -> SimulationResult:
+        """Rehearse a mission with this fleet on a virtual clock."""
         executive = self._executive
         if executive.rehearse is None:
             raise OperatorError("this executive cannot rehearse missions")
-        rehearse = partial(executive.rehearse, plugins=executive.plugins, observed=False)
         settings = {
             "max_steps": REHEARSED_STEPS,
             "search_path": executive.search_path,
             **options,
         }
-        return await asyncio.to_thread(rehearse, mission, executive.fleet, **settings)
+        return await executive.rehearse(mission, executive.fleet, **settings)
+
+    async def verify(
+        self,
+        mission: MissionSource,
+        *,
+        process: str | None = None,
+        data: Mapping[str, Value] | None = None,
+        spec: str | None = None,
+        strict: bool = False,
+        timers_in_order: bool = False,
+        limits: SearchLimits = DEFAULT_LIMITS,
+        on_progress: Callable[[SearchProgress], None] | None = None,
+    ) -> Mapping[str, Any]:
+        """Verify a mission with this fleet, in a process of its own."""
+        executive = self._executive
+        return await verify_apart(
+            mission,
+            executive.fleet,
+            simulated=executive.simulated,
+            search_path=executive.search_path,
+            process=process,
+            data=data or {},
+            spec=spec,
+            strict=strict,
+            timers_in_order=timers_in_order,
+            limits=limits,
+            on_progress=on_progress,
+        )
+
+    def editable(self, mission: bytes, *, anew: bool = False) -> Editable:
+        """The same mission as an editor takes it."""
+        return editable(mission, anew=anew)
+
+    def outline(self, mission: bytes | Draft) -> Outline:
+        """What a file has, as far as it can be read."""
+        draft = mission if isinstance(mission, Draft) else Draft(Path("mission.bpmn"), mission)
+        library = library_of(mission, self._executive.search_path)
+        return outline(draft.source, library, self.services())
+
+    def geometries(self) -> Mapping[str, HandedOver]:
+        """What operators have handed over for all runs."""
+        return self._executive.handed_over
+
+    def services(self) -> Mapping[str, Sequence[str]]:
+        """The service-task classes that there are, with what each writes."""
+        plugins = self._executive.plugins
+        return {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
 
 
 def _named(name: str, signals: Mapping[str, Signal]) -> list[str]:

@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any, Self
 
 from m2pem.api.arbiter import Arbiter, ArbiterContext, BehaviorReport
+from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import Clock
-from m2pem.api.control import RunId, SimulationResult
+from m2pem.api.control import HandedOver, RunId, SimulationResult
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import LinkState, TeamState
 from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
@@ -66,7 +67,7 @@ class Executive:
 
     `speed`: of the clock against the wall clock, kept in the journal for a resume. `watch_links`:
     whether silence of a vehicle ends its behaviors. `max_steps` as in `Runner`. `observed`: whether
-    plugins are told of records. `rehearse`: what `MissionControl.simulate` calls, in a thread.
+    plugins are told of records. `rehearse`: what `MissionControl.simulate` awaits.
     `search_path`: folders of processes that missions call.
     """
 
@@ -85,7 +86,7 @@ class Executive:
         max_steps: int | None = None,
         observed: bool = True,
         search_path: Sequence[Path] = (),
-        rehearse: Callable[..., SimulationResult] | None = None,
+        rehearse: Callable[..., Awaitable[SimulationResult]] | None = None,
     ) -> None:
         self.fleet = fleet
         self.journal = journal
@@ -101,10 +102,10 @@ class Executive:
         self.search_path = tuple(search_path)
         self._observed = observed
         self._script = script
-        self._speed = speed
+        self.speed = speed
         self._watch_links = watch_links
         self._max_steps = max_steps
-        self._handed_over: dict[str, dict[str, Value]] = {}
+        self.handed_over: dict[str, HandedOver] = {}
         self._tasks: dict[RunId, asyncio.Task[None]] = {}
         self._listeners: list[asyncio.Task[None]] = []
         self._lost: set[ResourceId] = set()
@@ -145,7 +146,7 @@ class Executive:
             self._listen(f"telemetry of {name}", partial(self._read_telemetry, arbiter))
         if self._watch_links:
             # On a fast clock our own hesitation would look like the silence of a vehicle.
-            stretch = max(1.0, self._speed)
+            stretch = max(1.0, self.speed)
             bounds = {
                 vehicle.id: stretch
                 * (
@@ -219,7 +220,7 @@ class Executive:
 
     def load(
         self,
-        mission: Path | str | bytes,
+        mission: MissionSource,
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
     ) -> tuple[Mission, str]:
@@ -250,7 +251,7 @@ class Executive:
 
     async def start(
         self,
-        mission: Path | str | bytes,
+        mission: MissionSource,
         process: str | None,
         data: Mapping[str, Value] | None,
         by: str,
@@ -270,7 +271,7 @@ class Executive:
             process_id,
             dump(self.fleet),
             self.simulated,
-            self._speed,
+            self.speed,
             self.clock.now_us(),
             loaded.library,
         )
@@ -278,8 +279,8 @@ class Executive:
         batch = min(STEPS_AT_ONCE, self._max_steps or STEPS_AT_ONCE)
         runner = self._runner(MissionRun(loaded, self.fleet, number, batch), 1)
         begun = runner.tell(StartRun(process_id, dict(data or {}), by, self.handover.by_name()))
-        for name, geometry in self._handed_over.items():
-            runner.post(GeometrySet(name, geometry))
+        for name, given in self.handed_over.items():
+            runner.post(GeometrySet(name, dict(given.geometry), given.by))
         self._drive(runner)
         await begun
         return number
@@ -373,7 +374,7 @@ class Executive:
             raise OperatorError(f"geometry {name!r} {error}") from error
         item = GeometrySet(name, dict(geometry), by)
         if run is None:
-            self._handed_over[name] = dict(geometry)
+            self.handed_over[name] = HandedOver(dict(geometry), by, self.clock.now_us())
         for runner in self.runners.values() if run is None else [self.runner(run)]:
             if not runner.done.is_set():
                 runner.post(item)
@@ -393,7 +394,8 @@ class Executive:
     def _geometry(self, run: str, name: str) -> Geometry | None:
         runner = self.runners.get(run)
         given = runner.run.state.geometries.get(name) if runner is not None else None
-        given = given or self._handed_over.get(name)
         if given is not None:
             return parse_geojson(given)
+        if name in self.handed_over:
+            return parse_geojson(self.handed_over[name].geometry)
         return self.fleet.geometries.get(name)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
+from m2pem.api.authoring import Draft, MissionSource
 from m2pem.errors import MissionError
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.findings import Finding, Severity, has_errors
@@ -25,8 +26,8 @@ FETCH_TIMEOUT_S = 10.0
 MAX_BYTES = 20_000_000
 
 
-def load_source(mission: Path | str | bytes, search_path: Iterable[Path] = ()) -> Mission:
-    """Read a mission, and the files that it uses. `str` is a path or a file:, http:, https: URL.
+def load_source(mission: MissionSource, search_path: Iterable[Path] = ()) -> Mission:
+    """Read a mission, and the files that it uses.
 
     `search_path`: folders to look in for what it calls, after its own; one that did not come from a
     file has none of its own.
@@ -35,7 +36,9 @@ def load_source(mission: Path | str | bytes, search_path: Iterable[Path] = ()) -
         MissionError: it cannot be read, is too big, or is wrong; with every finding.
     """
     if isinstance(mission, bytes):
-        return parse_mission(mission, "mission.bpmn", SearchPath(None, search_path))
+        return parse_mission(mission, "mission.bpmn", library_of(mission, search_path))
+    if isinstance(mission, Draft):
+        return parse_mission(mission.source, str(mission.path), library_of(mission, search_path))
     if isinstance(mission, str):
         parts = urlsplit(mission)
         if parts.scheme in ("http", "https"):
@@ -49,6 +52,12 @@ def load_source(mission: Path | str | bytes, search_path: Iterable[Path] = ()) -
     except OSError as error:
         raise _unreadable(str(mission), error.strerror or str(error)) from error
     return parse_mission(source, str(mission), SearchPath(mission, search_path))
+
+
+def library_of(mission: bytes | Draft, search_path: Iterable[Path]) -> SearchPath:
+    """The files that a mission may use which did not come from a file."""
+    folders = [mission.path.parent] if isinstance(mission, Draft) else []
+    return SearchPath(None, [*folders, *search_path])
 
 
 def _fetch(url: str) -> bytes:

@@ -21,6 +21,15 @@ class Source:
     answers: tuple[Question, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class MissionFile:
+    """A file of a mission. `qualifier`: what the ids of its elements begin with, before a colon."""
+
+    name: str
+    qualifier: str
+    source: bytes
+
+
 class LibraryError(Exception):
     """A file that was asked for cannot be given."""
 

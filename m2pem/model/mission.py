@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from m2pem.findings import Finding
 from m2pem.model.elements import Activity, CallActivity, Element, FlowNode, Process, SequenceFlow
 from m2pem.model.events import CorrelationProperty, Error, Escalation, Message, RootElement, Signal
-from m2pem.model.library import Source
+from m2pem.model.library import MissionFile, Source
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,6 +90,13 @@ class Mission:
         if isinstance(element, FlowNode):
             element = element.container.process
         return element.file or self.file
+
+    def files(self) -> Iterator[MissionFile]:
+        """Its own file, and those that it uses."""
+        yield MissionFile(self.file, "", self.source)
+        qualifiers = {each.file: each.qualifier for each in self.processes if each.file}
+        for each in self.library:
+            yield MissionFile(each.name, qualifiers.get(each.name, ""), each.data)
 
     def activities(self) -> Iterator[Activity]:
         """Every activity, in the order of the XML."""

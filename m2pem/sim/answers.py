@@ -211,13 +211,13 @@ class Answers:
             log.warning("scripted %s %s at %g s: %s", kind[:-1], entry.id, entry.at, error)
 
 
-def load_answers(path: str | Path) -> Answers:
-    """Read an answers file.
+def load_answers(answers: str | Path | bytes) -> Answers:
+    """Read an answers file, or its text.
 
     Raises:
         AnswersError: with every finding.
     """
-    return Answers(*read_answers(Path(path)))
+    return Answers(*read_answers(answers if isinstance(answers, bytes) else Path(answers)))
 
 
 def check_answers(answers: Answers, mission: Mission) -> list[Finding]:

@@ -19,7 +19,10 @@ from pydantic import (
 from m2pem.errors import AnswersError
 from m2pem.resources.shape_findings import note_shape_findings
 from m2pem.resources.units import Dimension, quantity
-from m2pem.resources.yaml_source import YamlSource, read_yaml
+from m2pem.resources.yaml_source import YamlSource, parse_yaml, read_yaml
+
+_NAME = "answers.yaml"
+"""What findings call a text that did not come from a file."""
 
 
 def _seconds(value: object) -> float:
@@ -85,13 +88,13 @@ class AnswersModel(_Model):
     behaviors: dict[Text, list[BehaviorEntry]] = Field(default_factory=dict)
 
 
-def read_answers(path: Path) -> tuple[AnswersModel, YamlSource]:
-    """What a file says, and where in the file it says so.
+def read_answers(answers: Path | bytes) -> tuple[AnswersModel, YamlSource]:
+    """What a file says, or its text, and where in it it says so.
 
     Raises:
         AnswersError: with every finding, each with its line and the dotted path of the key.
     """
-    source = read_yaml(path)
+    source = parse_yaml(answers, _NAME) if isinstance(answers, bytes) else read_yaml(answers)
     model = AnswersModel()
     if not source.findings and source.data is not None:
         try:
@@ -99,5 +102,5 @@ def read_answers(path: Path) -> tuple[AnswersModel, YamlSource]:
         except ValidationError as error:
             note_shape_findings(source, error, AnswersModel)
     if source.findings:
-        raise AnswersError(f"{path} is no answers file that can be used", source.findings)
+        raise AnswersError(f"{source.file} is no answers file that can be used", source.findings)
     return model, source

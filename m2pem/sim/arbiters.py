@@ -44,8 +44,8 @@ class SimArbiter:
     `telemetry_hz`: of every resource that does not say its own; 0 tells of changes alone, so that
     nothing happens while nothing moves, and then links can't be watched by silence.
 
-    Beside the protocol, tests and rehearsals look at `effects`, `expects` and `searching`, and use
-    `script`, `inject`, `lose_link` and `restore_link`.
+    Beside the protocol, tests and rehearsals look at `effects`, `expects`, `searching` and
+    `broadcast`, and use `script`, `inject`, `lose_link` and `restore_link`.
     """
 
     def __init__(
@@ -79,9 +79,7 @@ class SimArbiter:
         self._agenda = Agenda(context.clock, context.logger)
         self._links = Links()
         self._memory = Memory()
-        self._broadcast = Broadcast(
-            self._bodies, self._rates_hz, frame, self._agenda, self._audible
-        )
+        self.broadcast = Broadcast(self._bodies, self._rates_hz, frame, self._agenda, self._audible)
         self._launcher = Launcher(self._connections, context, frame, self._bodies)
         self._conductor = Conductor(
             agenda=self._agenda,
@@ -138,9 +136,9 @@ class SimArbiter:
         self._links.muted = True
         self._agenda.run_due(now_us)
         self._links.muted = False
-        self._broadcast.begin(now_us)
+        self.broadcast.begin(now_us)
         for payload, detection in self._late:
-            self._broadcast.tell(payload, now_us, (detection,))
+            self.broadcast.tell(payload, now_us, (detection,))
         self._late.clear()
         self._connected = True
         self._agenda.wake()
@@ -222,7 +220,7 @@ class SimArbiter:
 
     def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
         """States as they come, for one reader, until `close`; a slow one misses old states."""
-        return self._broadcast.states.read()
+        return self.broadcast.states.read()
 
     async def close(self) -> None:
         """Stop simulating. Without a state file the vehicles are gone."""
@@ -232,7 +230,7 @@ class SimArbiter:
             listener.cancel()
             await asyncio.gather(listener, return_exceptions=True)
         self._links.reports.close()
-        self._broadcast.states.close()
+        self.broadcast.states.close()
         for file in dict.fromkeys(self._memory.files.values()):
             file.close()
         self._memory.files = {}
@@ -288,7 +286,7 @@ class SimArbiter:
         vehicle = carrier_of(resource)
         self._links.mend(vehicle, now_us)
         for body in self._of_vehicle(vehicle):
-            self._broadcast.tell(body, now_us)
+            self.broadcast.tell(body, now_us)
 
     # --- behind it ------------------------------------------------------------------------------
 
@@ -345,7 +343,7 @@ class SimArbiter:
         return self._links.up(carrier_of(resource))
 
     def _moved(self, body: Body, now_us: int) -> None:
-        self._broadcast.tell(body, now_us)
+        self.broadcast.tell(body, now_us)
         if isinstance(body, SimVehicle):
             self._detectors.moved(body.id, now_us)
 
@@ -354,7 +352,7 @@ class SimArbiter:
             # What was found while nobody was there is told when somebody is.
             self._late.append((payload, detection))
         elif self._links.up(payload.carrier):
-            self._broadcast.tell(payload, now_us, (detection,))
+            self.broadcast.tell(payload, now_us, (detection,))
         else:
             self._links.defer(
                 payload.carrier,

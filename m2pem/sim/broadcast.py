@@ -1,6 +1,6 @@
 """Telemetry of simulated resources: at a rate while they work, seldom while they stand."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from m2pem.api.mailbox import Mailbox
 from m2pem.api.telemetry import Detection, GeoPosition, PayloadState, VehicleState
@@ -74,6 +74,16 @@ class Broadcast:
                 lambda at_us: self.tell(body, at_us),
                 background=True,
             )
+
+    def all_at(self, time_us: int) -> Iterator[VehicleState | PayloadState]:
+        """How everybody is at a time, before which nothing changes from what is planned now."""
+        for body in self._bodies.values():
+            if not self._audible(body.id):
+                continue
+            if isinstance(body, SimPayload):
+                yield body.state(time_us, (), self._footprint(body, time_us))
+            else:
+                yield body.state(time_us, self._frame)
 
     def _footprint(self, payload: SimPayload, now_us: int) -> tuple[GeoPosition, ...]:
         """None of a payload whose vehicle is not simulated."""

@@ -6,11 +6,20 @@ The same mission, fleet and answers give the same records, byte for byte.
 """
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
-from m2pem.api.control import RunStatus, RunSummary, SimulationResult, StampedRecord
+from m2pem.api.authoring import MissionSource
+from m2pem.api.control import (
+    RunStatus,
+    RunSummary,
+    SimulationResult,
+    StampedRecord,
+    TelemetrySample,
+)
+from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.engine.inputs import GiveUp
 from m2pem.engine.records import Record, ServiceEnded, ServiceWithdrawn
 from m2pem.engine.state import BehaviorPhase
@@ -32,6 +41,7 @@ from m2pem.resources.fleet import Fleet
 from m2pem.sim.answers import Answers, check_answers, load_answers
 from m2pem.sim.arbiters import SimArbiter
 from m2pem.sim.no_fleet import NO_FLEET, refuse_commands
+from m2pem.sim.sampling import Sampler
 
 START_US = 1_767_225_600_000_000
 """2026-01-01T00:00:00Z, when a rehearsal begins unless said otherwise."""
@@ -65,26 +75,28 @@ class RehearsalResult(SimulationResult):
 
 
 def rehearse(
-    mission: Path | str | bytes | Mission,
+    mission: MissionSource | Mission,
     fleet: Fleet | None,
     *,
     plugins: PluginManager,
     process: str | None = None,
     data: Mapping[str, Value] | None = None,
-    answers: Answers | Path | str | None = None,
+    answers: Answers | Path | str | bytes | None = None,
     start_us: int = START_US,
     max_steps: int = MAX_STEPS,
     on_record: OnRecord | None = None,
     observed: bool = True,
     search_path: Sequence[Path] = (),
+    telemetry_every_s: float | None = None,
 ) -> RehearsalResult:
     """Run a mission to its end on a virtual clock that begins at `start_us` (since the epoch).
 
     `mission`: a path, a `file:` or `http:` URL, BPMN bytes, or one that was loaded. `fleet` None:
-    for a mission that commands no resource. `answers`: a file, or one that was loaded and has not
-    been used. `on_record` gets each record as soon as it is committed; what it raises ends the
-    rehearsal. `observed`: whether observers among the plugins are told.
-    `search_path`: folders of processes that the mission calls.
+    for a mission that commands no resource. `answers`: a file, its text as bytes, or one that was
+    loaded and has not been used. `on_record` gets each record as soon as it is committed; what it
+    raises ends the rehearsal. `observed`: whether observers among the plugins are told.
+    `search_path`: folders of processes that the mission calls. `telemetry_every_s`: of mission
+    time, how often the result tells where the vehicles are; None: never.
 
     Raises:
         MissionError: the mission cannot be loaded, does not fit the fleet, or needs one.
@@ -99,13 +111,22 @@ def rehearse(
     _refuse_misfits(script, loaded)
     collected: list[StampedRecord] = []
     rehearsal = _Rehearsal(
-        loaded, fleet, plugins, script, max_steps, on_record or collected.append, observed
+        loaded,
+        fleet,
+        plugins,
+        script,
+        max_steps,
+        on_record or collected.append,
+        observed,
+        telemetry_every_s,
     )
     summary = run_virtual(lambda clock: rehearsal.run(clock, process, data), start_us)
-    return RehearsalResult(summary, tuple(collected))
+    return RehearsalResult(
+        summary, tuple(collected), tuple(rehearsal.samples), tuple(loaded.files())
+    )
 
 
-def _load(answers: Path | str | None) -> Answers:
+def _load(answers: Path | str | bytes | None) -> Answers:
     return Answers() if answers is None else load_answers(answers)
 
 
@@ -127,7 +148,10 @@ class _Rehearsal:
         max_steps: int,
         on_record: OnRecord,
         observed: bool,
+        telemetry_every_s: float | None,
     ) -> None:
+        self.samples: Sequence[TelemetrySample] = ()
+        self._every_s = telemetry_every_s
         self._mission = mission
         self._fleet = fleet
         self._plugins = plugins
@@ -158,7 +182,16 @@ class _Rehearsal:
         async with executive:
             run = await executive.begin(self._mission, process_id, data, "")
             runner = executive.runner(run)
-            clock.when_idle(lambda ahead_s: self._give_up(executive, runner, ahead_s))
+            sampler = self._sampler(executive, clock)
+
+            def before_a_jump(ahead_s: float | None) -> bool:
+                if self._give_up(executive, runner, ahead_s):
+                    return True
+                if sampler is not None and ahead_s is not None:
+                    sampler.before(clock.now_us() + round(ahead_s * US_PER_S))
+                return False
+
+            clock.when_idle(before_a_jump)
             acting = asyncio.ensure_future(
                 self._answers.act(executive.control, run, clock, default_first_decision=True)
             )
@@ -170,10 +203,25 @@ class _Rehearsal:
                 for first in (journal.broken, acting):
                     if first.done():
                         first.result()
-                return await ending
+                summary = await ending
+                if sampler is not None:
+                    sampler.at(clock.now_us())
+                    self.samples = sampler.samples
+                return summary
             finally:
                 acting.cancel()
                 ending.cancel()
+
+    def _sampler(self, executive: Executive, clock: VirtualClock) -> Sampler | None:
+        if self._every_s is None:
+            return None
+
+        def states_at(time_us: int) -> Iterator[VehicleState | PayloadState]:
+            return chain.from_iterable(
+                each.broadcast.all_at(time_us) for each in _arbiters(executive)
+            )
+
+        return Sampler(self._every_s, clock.now_us(), states_at)
 
     # --- nothing can happen any more ------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from m2pem.api.authoring import Draft
 from m2pem.api.control import RunStatus
 from m2pem.journal import MemoryJournal
 
@@ -72,7 +73,7 @@ def test_a_rehearsal_beside_missions_has_the_path_too(play, tmp_path: Path) -> N
     (tmp_path / "search.bpmn").write_bytes(mission(SEARCH))
     given = []
 
-    def rehearse(_mission, _fleet, **options):
+    async def rehearse(_mission, _fleet, **options):
         given.append(options["search_path"])
 
     async def story(world: World):
@@ -80,3 +81,36 @@ def test_a_rehearsal_beside_missions_has_the_path_too(play, tmp_path: Path) -> N
 
     play(story, search_path=[tmp_path], rehearse=rehearse)
     assert given == [(tmp_path,)]
+
+
+def test_a_draft_calls_what_is_beside_the_place_it_is_for(play, tmp_path: Path) -> None:
+    folder = tmp_path / "missions"
+    folder.mkdir()
+    (folder / "search.bpmn").write_bytes(mission(SEARCH))
+
+    async def story(world: World):
+        control = world.executive.control
+        draft = Draft(folder / "new.bpmn", mission(CALL))
+        await control.wait(await control.start(draft))
+        alone = [each.rule for each in control.check(mission(CALL))]
+        return alone, list(control.check(draft)), (await control.runs())[0].mission
+
+    alone, beside, called = play(story)
+    assert alone == ["dangling-reference"] and beside == []
+    assert called == str(folder / "new.bpmn")
+
+
+def test_a_draft_imports_nothing_from_elsewhere(play, tmp_path: Path) -> None:
+    folder = tmp_path / "missions"
+    folder.mkdir()
+    (tmp_path / "secret.bpmn").write_bytes(mission(SEARCH))
+    namespace = "http://www.omg.org/spec/BPMN/20100524/MODEL"
+    source = mission(
+        f'<import importType="{namespace}" location="../secret.bpmn" namespace="x"/>'
+        + sequence(("Ask", question("Ask")))
+    )
+
+    async def story(world: World):
+        return world.executive.control.check(Draft(folder / "new.bpmn", source))
+
+    assert "import-unreadable" in [each.rule for each in play(story)]

@@ -35,6 +35,7 @@ from m2pem.resources.fleet import Domain, Fleet, Payload, Vehicle
 from m2pem.resources.fleet_file import load_fleet
 from m2pem.sim.answers import load_answers
 from m2pem.sim.rehearsal import START_US, RehearsalResult, rehearse
+from m2pem.sim.rehearser import rehearse_apart
 
 REPOSITORY = Path(__file__).parents[2]
 VIGNETTE = REPOSITORY / "missions" / "vignette1.bpmn"
@@ -557,6 +558,7 @@ from pathlib import Path
 from m2pem.journal.codec import record_line
 from m2pem.plugins import PluginManager
 from m2pem.resources.fleet_file import load_fleet
+from m2pem.sim.rehearser import rehearse_apart
 from m2pem.sim.rehearsal import rehearse
 
 def show(stamped):
@@ -602,7 +604,7 @@ def test_an_executive_rehearses_a_mission_with_its_fleet(tmp_path: Path) -> None
 
     async def main(clock: Any) -> tuple[RehearsalResult, list[Any]]:
         executive = Executive(
-            fleet(), MemoryJournal(), plugins, clock, simulated=True, rehearse=rehearse
+            fleet(), MemoryJournal(), plugins, clock, simulated=True, rehearse=rehearse_apart
         )
         async with executive:
             result: Any = await executive.control.simulate(mission, answers=answers)

@@ -1,6 +1,7 @@
 """What of a BPMN file has a symbol or a line, container by container."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 from lxml import etree
 
@@ -81,12 +82,41 @@ def data_lines(container: Element) -> Iterator[tuple[str, str, str]]:
                 yield name_of(line), source, target
 
 
-def lanes(process: Element) -> tuple[list[Element], dict[str, int]]:
-    """The lanes of the process, and the number of each node's; the innermost are not looked at."""
-    found = [lane for each in children(process, "laneSet") for lane in children(each, "lane")]
-    where = {
-        local(ref.text): number
-        for number, lane in enumerate(found)
-        for ref in children(lane, "flowNodeRef")
-    }
-    return found, where
+@dataclass(frozen=True, slots=True)
+class LaneTree:
+    """The lanes of a process, an outer one before those in it.
+
+    `leaves`: those without others in them, in their order. `depth`: of each, from 0. `within`: of
+    each, its leaves. `of_node`: the number of the leaf that a node is in.
+    """
+
+    leaves: tuple[str, ...]
+    depth: Mapping[str, int]
+    within: Mapping[str, tuple[str, ...]]
+    of_node: Mapping[str, int]
+
+
+def lanes(process: Element) -> LaneTree:
+    """The lanes of a process. Of several lane sets beside each other, the first one's are drawn."""
+    leaves: list[str] = []
+    depth: dict[str, int] = {}
+    within: dict[str, tuple[str, ...]] = {}
+    of_node: dict[str, int] = {}
+
+    def add(lane: Element, level: int) -> None:
+        name = name_of(lane)
+        depth[name] = level
+        first = len(leaves)
+        for inner in children(lane, "childLaneSet"):
+            for each in children(inner, "lane"):
+                add(each, level + 1)
+        if len(leaves) == first:
+            leaves.append(name)
+            refs = (local(ref.text) for ref in children(lane, "flowNodeRef"))
+            of_node.update(dict.fromkeys(refs, first))
+        within[name] = tuple(leaves[first:])
+
+    for lane_set in [*children(process, "laneSet")][:1]:
+        for lane in children(lane_set, "lane"):
+            add(lane, 0)
+    return LaneTree(tuple(leaves), depth, within, of_node)

@@ -3,7 +3,7 @@
 from m2pem.drawing.layout import model
 from m2pem.drawing.layout.block import Block, Box
 from m2pem.drawing.layout.grid import Link, arrange
-from m2pem.drawing.layout.model import Element, name_of, tag
+from m2pem.drawing.layout.model import Element, LaneTree, name_of, tag
 from m2pem.drawing.layout.route import Router
 
 _EVENT = 36
@@ -15,6 +15,8 @@ _DATA_SIZES = {
     "textAnnotation": (100, 50),
 }
 PADDING = 30
+LANE_HEADER = 30
+_EMPTY_LANE = 120
 _BOUNDARY_PITCH = 46
 
 
@@ -28,8 +30,8 @@ def lay_out(container: Element) -> Block:
         if activity not in nodes:
             raise ValueError(f"{event} is attached to {activity!r}, which is not beside it")
     links = _links(container, nodes, host)
-    lanes, lane_of = model.lanes(container)
-    grid = arrange([*nodes], links, {n: k for n, k in lane_of.items() if n in nodes})
+    lanes = model.lanes(container)
+    grid = arrange([*nodes], links, {n: k for n, k in lanes.of_node.items() if n in nodes})
     ties = _ties(container, {**nodes, **host, **surfaces})
     bottom = max(grid.rows, 1)
     taken: set[int] = set()
@@ -64,13 +66,30 @@ def lay_out(container: Element) -> Block:
             block.boxes[name_of(each)] = Box(
                 centre - _EVENT / 2, y + height - _EVENT / 2, _EVENT, _EVENT
             )
-    for (first, last), lane in zip(grid.lane_rows, lanes, strict=False):
-        top, end = router.band(first, last)
-        if lane is lanes[-1]:
-            end = block.height
-        block.boxes[name_of(lane)] = Box(0, top, block.width, end - top, horizontal=True)
     block.lines |= router.lines(block.boxes, reverse=_reversed(container))
-    return block
+    bands = [router.band(first, last) for first, last in grid.lane_rows]
+    return _in_lanes(block, lanes, bands) if lanes.leaves else block
+
+
+def _in_lanes(block: Block, lanes: LaneTree, bands: list[tuple[float, float]]) -> Block:
+    """With the lanes below it; inner ones are in the outer ones, beside these' names."""
+    names = LANE_HEADER * max(lanes.depth.values())
+    ends = dict(zip(lanes.leaves, bands, strict=False))
+    below = block.height
+    for lane in lanes.leaves[len(bands) :]:
+        ends[lane] = (below, below + _EMPTY_LANE)
+        below += _EMPTY_LANE
+    if bands:
+        last = lanes.leaves[min(len(bands), len(lanes.leaves)) - 1]
+        ends[last] = (ends[last][0], block.height)
+    found = Block(block.width + names, below)
+    for lane, depth in lanes.depth.items():
+        leaves = lanes.within[lane]
+        x, top = LANE_HEADER * depth, ends[leaves[0]][0]
+        height = ends[leaves[-1]][1] - top
+        found.boxes[lane] = Box(x, top, found.width - x, height, horizontal=True)
+    found.put(block, names, 0)
+    return found
 
 
 def _links(container: Element, nodes: dict[str, Element], host: dict[str, str]) -> list[Link]:

@@ -22,7 +22,7 @@ def lay_out_file(definitions: Element) -> Block:
     collaboration = next(model.children(definitions, "collaboration"), None)
     if collaboration is None:
         return _stacked(processes)
-    return _pools(collaboration, processes)
+    return lay_out_pools(collaboration, processes)
 
 
 def _stacked(processes: dict[str, Element]) -> Block:
@@ -38,13 +38,22 @@ def _stacked(processes: dict[str, Element]) -> Block:
     return block
 
 
-def _pools(collaboration: Element, processes: dict[str, Element]) -> Block:
+def lay_out_pools(collaboration: Element, processes: dict[str, Element]) -> Block:
+    """The pools of a collaboration, with the corner of the upper one at 0, 0.
+
+    Of a process that has several pools, the first one shows it.
+
+    Raises:
+        ValueError: there are dangling references.
+    """
     pools = [*model.children(collaboration, "participant")]
-    insides = {
-        name_of(pool): lay_out(processes[local(pool.get("processRef"))])
-        for pool in pools
-        if local(pool.get("processRef")) in processes
-    }
+    insides: dict[str, Block] = {}
+    shown: set[str] = set()
+    for pool in pools:
+        process = local(pool.get("processRef"))
+        if process in processes and process not in shown:
+            shown.add(process)
+            insides[name_of(pool)] = lay_out(processes[process])
     width = max([_LEAST_WIDTH, *(inside.width for inside in insides.values())])
     flows = [*model.children(collaboration, "messageFlow")]
     between = _BETWEEN + _TRACK * len(flows)
@@ -54,8 +63,8 @@ def _pools(collaboration: Element, processes: dict[str, Element]) -> Block:
         lanes = [] if inside is None else _lanes(processes[local(pool.get("processRef"))])
         for lane in lanes:
             assert inside is not None
-            inside.boxes[lane].width = width
-        height = inside.height if inside is not None else _CLOSED
+            inside.boxes[lane].width = width - inside.boxes[lane].x
+        height = max(inside.height if inside is not None else 0, _CLOSED)
         block.boxes[name_of(pool)] = Box(0, block.height, block.width, height, horizontal=True)
         if inside is not None:
             block.put(inside, _HEADER, block.height)
@@ -67,7 +76,7 @@ def _pools(collaboration: Element, processes: dict[str, Element]) -> Block:
 
 
 def _lanes(process: Element) -> list[str]:
-    return [name_of(lane) for lane in model.lanes(process)[0]]
+    return [*model.lanes(process).depth]
 
 
 def _message(flow: Element, number: int, block: Block, pools: list[Element]) -> list[Point]:

@@ -23,6 +23,7 @@ from m2pem.model.bpmn.loop_data import join_default_signals, resolve_loops
 from m2pem.model.bpmn.merge import merge
 from m2pem.model.bpmn.messages import resolve_messages
 from m2pem.model.bpmn.prompts import resolve_prompts
+from m2pem.model.bpmn.reading import Reading
 from m2pem.model.bpmn.rules import check_rules
 from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.bpmn.search_path import SearchPath
@@ -31,7 +32,14 @@ from m2pem.model.bpmn.xml import MAX_BYTES
 from m2pem.model.library import Library
 from m2pem.model.mission import Mission
 
-__all__ = ["MAX_BYTES", "MAX_DEPTH", "NO_BPMN_RULES", "parse_mission", "read_mission"]
+__all__ = [
+    "MAX_BYTES",
+    "MAX_DEPTH",
+    "NO_BPMN_RULES",
+    "parse_mission",
+    "read_mission",
+    "read_partly",
+]
 
 NO_BPMN_RULES = frozenset(
     {"doctype", "encoding", "not-bpmn", "not-xml", "too-large", "unreadable-file"}
@@ -77,6 +85,20 @@ def parse_mission(data: bytes, file: str, library: Library | None = None) -> Mis
     """
     with collector.paused():
         return _parse(data, file, library)
+
+
+def read_partly(data: bytes, file: str, library: Library | None = None) -> Reading:
+    """What can be read of a mission's own file, whatever is wrong with it.
+
+    Raises:
+        MissionError: it is no BPMN 2.0 at all.
+    """
+    with collector.paused():
+        files = Files(open_part(data, file), library)
+        find_called(files)
+        for part in [each for each in files.parts if each.is_read]:
+            _resolve(part)
+        return files.main.reading
 
 
 def _parse(data: bytes, file: str, library: Library | None) -> Mission:

@@ -15,6 +15,7 @@ from m2pem.model.bpmn.reading import PendingCall, Reading
 from m2pem.model.bpmn.report import Report
 from m2pem.model.bpmn.roots import read_roots
 from m2pem.model.bpmn.rules.registry import code
+from m2pem.model.bpmn.type_names import call_by_role
 from m2pem.model.bpmn.xml import Document, XmlError, parse_xml
 from m2pem.model.elements import CallActivity, Container, Process, SubProcess
 from m2pem.model.events import CorrelationProperty
@@ -127,6 +128,7 @@ def open_part(data: bytes, name: str, qualifier: str = "") -> Part:
     if document.root.tag != BPMN + "definitions":
         _not_bpmn(report, document)
         raise MissionError(f"{name}: no BPMN 2.0 file", report.findings)
+    call_by_role(document.root)
     return Part(name, data, document, Reading(report), qualifier)
 
 

@@ -24,13 +24,14 @@ def data_names(
         if flow.condition is not None:
             found |= flow.condition.names
     for node in mission.nodes:
-        found.update(_written(node, service_writes or {}))
-        for expression in _read(node):
+        found.update(written_by(node, service_writes or {}))
+        for expression in read_by(node):
             found |= expression.names
     return frozenset(name for name in found if name)
 
 
-def _written(node: e.FlowNode, services: Mapping[str, Sequence[str]]) -> Iterator[str]:
+def written_by(node: e.FlowNode, services: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """Names that a node writes, or declares; `services`: what services write, by class."""
     if isinstance(node, e.SubProcess):
         yield from (each.key for each in node.data)
     if isinstance(node, e.Activity | e.Event):
@@ -50,7 +51,8 @@ def _written(node: e.FlowNode, services: Mapping[str, Sequence[str]]) -> Iterato
         yield node.loop.output_collection
 
 
-def _read(node: e.FlowNode) -> Iterator[Expression]:
+def read_by(node: e.FlowNode) -> Iterator[Expression]:
+    """The expressions that a node reads."""
     parameters: Iterable[Parameter] = ()
     behavior = getattr(node, "behavior", None)
     if behavior is not None:

@@ -6,11 +6,14 @@ from m2pem.findings import Finding, Severity
 from m2pem.verify.requirements.mission_file import read_mission_requirements
 from m2pem.verify.requirements.names import Names
 from m2pem.verify.requirements.requirement import Requirement, RequirementsError
-from m2pem.verify.requirements.spec_file import read_spec
+from m2pem.verify.requirements.spec_file import parse_spec, read_spec
+
+TEXT_NAME = "requirements.yaml"
+"""What findings call a text that did not come from a file."""
 
 
-def gather(names: Names, spec: Path | None = None) -> list[Requirement]:
-    """Those in the mission's file, then those of a spec file.
+def gather(names: Names, spec: Path | bytes | None = None) -> list[Requirement]:
+    """Those in the mission's file, then those of a spec file, or of its text.
 
     Raises:
         RequirementsError: tells all that is wrong in both, and ids that stand in both.
@@ -24,7 +27,10 @@ def gather(names: Names, spec: Path | None = None) -> list[Requirement]:
     if spec is not None:
         known = {each.id for each in found}
         try:
-            of_spec = read_spec(spec, names)
+            if isinstance(spec, bytes):
+                of_spec = parse_spec(spec, TEXT_NAME, names)
+            else:
+                of_spec = read_spec(spec, names)
         except RequirementsError as error:
             findings += error.findings
             of_spec = []

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 from m2pem import hookimpl
 
 if TYPE_CHECKING:
+    import click
+
     from m2pem.api.ocu import Ocu
 
 
@@ -15,3 +17,11 @@ def m2pem_register_ocus(register: "Callable[[str, Callable[..., Ocu]], None]") -
     from m2pem_plugin_web.ocu import WebOcu  # noqa: PLC0415  # starting up must be fast
 
     register("web", WebOcu)
+
+
+@hookimpl
+def m2pem_register_commands(cli: "click.Group") -> None:
+    """Add `web`."""
+    from m2pem_plugin_web.commands import add_to  # noqa: PLC0415  # starting up must be fast
+
+    add_to(cli.commands)

@@ -1,17 +1,94 @@
 """The web page as an operator control unit."""
 
+import os
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from m2pem_plugin_web.settings import Settings, read_settings
+
 if TYPE_CHECKING:
-    from m2pem.api.control import MissionControl
+    from m2pem.api import MissionControl
+    from m2pem_plugin_web.access.entry import Entry
 
 
 class WebOcu:
-    """Serves browsers until cancelled."""
+    """Serves browsers until cancelled. `environment`: the variables of `settings`.
 
-    def __init__(self, control: "MissionControl") -> None:
-        self._control = control
+    It listens from the moment it is made, and answers when it serves.
+
+    Raises:
+        PluginError: a variable has a value that it may not have, the address is taken, or files
+            of secrets are not what they ought to be.
+    """
+
+    def __init__(
+        self, control: "MissionControl", *, environment: Mapping[str, str] = os.environ
+    ) -> None:
+        from m2pem_plugin_web.access import places  # noqa: PLC0415  # starting up must be fast
+        from m2pem_plugin_web.app import create_app, routers_of  # noqa: PLC0415
+        from m2pem_plugin_web.live.hub import Hub  # noqa: PLC0415
+        from m2pem_plugin_web.server import Server  # noqa: PLC0415
+        from m2pem_plugin_web.services import services_of  # noqa: PLC0415
+
+        settings = read_settings(environment)
+        self._where = places.folder(environment)
+        self._server = Server(settings)
+        self.url = ""
+        """Where it is served; with the token that is valid, if there is one."""
+        try:
+            entry = self._entry(settings)
+            self.hub = Hub(control)
+            self._services = services_of(control, settings.missions)
+            routers = routers_of(self._services, settings, self.hub, entry)
+            self._app = create_app(routers, entry, settings)
+        except BaseException:
+            self._server.close()
+            raise
 
     async def serve(self) -> None:
         """Serve browsers until cancelled."""
-        raise NotImplementedError
+        import asyncio  # noqa: PLC0415
+
+        import click  # noqa: PLC0415
+
+        from m2pem_plugin_web.access import places  # noqa: PLC0415
+
+        click.echo(f"m2pem: the page is at {self.url}", err=True)
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self.hub.run(), name="web: hub")
+                tasks.create_task(self._server.serve(self._app), name="web: server")
+        finally:
+            self._server.close()
+            places.withdraw(self._where, self._server.port)
+            await self._services.close()
+
+    def _entry(self, settings: Settings) -> "Entry":
+        """Who may come in; where it is served is told to `m2pem web url`."""
+        from m2pem.api.operator import operator_name  # noqa: PLC0415
+        from m2pem_plugin_web.access import places  # noqa: PLC0415
+        from m2pem_plugin_web.access.entry import Entry, owner_of  # noqa: PLC0415
+        from m2pem_plugin_web.access.users import Users  # noqa: PLC0415
+
+        where, port = self._where, self._server.port
+        address = settings.address(port)
+
+        def renewed(token: str) -> None:
+            page = places.Page(os.getpid(), port, address, token)
+            places.announce(where, page)
+            self.url = page.url
+
+        users = Users(settings.users) if settings.users is not None else None
+        if users is not None:
+            users.all()
+            renewed("")
+        kept: Path | None = places.sessions_of(where, port) if settings.port else None
+        return Entry(
+            port,
+            secure=settings.scheme == "https",
+            owner=owner_of(operator_name()) if users is None else None,
+            users=users,
+            kept=kept,
+            renewed=renewed,
+        )

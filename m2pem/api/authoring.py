@@ -1,0 +1,121 @@
+"""What MissionControl tells people who draw a mission."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias, Union
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A mission as if it stood at `path`, where it need not be: that is what it is called.
+
+    It may call and import what is in the folder of `path` and on the search path, no other files.
+    """
+
+    path: Path
+    source: bytes
+
+
+MissionSource: TypeAlias = Union[Path, str, bytes, Draft]
+"""Where a mission is: a path, a path or `file:`/`http:` URL as a text, or the BPMN itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Editable:
+    """A mission as an editor takes it: UTF-8, with a diagram of everything (docs/missions.md).
+
+    `notes`: what the file has that an editor does not keep, and what was added to it, as sentences
+    for people.
+    """
+
+    source: bytes
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class OutlineProcess:
+    """A process. `starts`: whether a run begins with it, unless it is told otherwise."""
+
+    id: str
+    name: str
+    executable: bool
+    starts: bool
+
+
+@dataclass(frozen=True, slots=True)
+class OutlineElement:
+    """Something that is drawn, or a flow. `type`: its BPMN name (`scriptTask`).
+
+    `process`: the process that it is in, "" outside of all. `parent`: the id of what it is in, a
+    subprocess or its process.
+    """
+
+    id: str
+    name: str
+    type: str
+    process: str
+    parent: str
+
+
+@dataclass(frozen=True, slots=True)
+class DataName:
+    """A dotted name of the data store. `source`: the id of what writes it, "" if nothing does."""
+
+    name: str
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class OutlineTrigger:
+    """A signal or message. `operators`: whether operators may send it."""
+
+    id: str
+    name: str
+    operators: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """What a file has, as far as it can be read."""
+
+    processes: tuple[OutlineProcess, ...] = ()
+    elements: tuple[OutlineElement, ...] = ()
+    names: tuple[DataName, ...] = ()
+    signals: tuple[OutlineTrigger, ...] = ()
+    messages: tuple[OutlineTrigger, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SearchLimits:
+    """Where a verification ends undecided."""
+
+    states: int = 2_000_000
+    seconds: float = 600.0
+
+
+@dataclass(frozen=True, slots=True)
+class SearchProgress:
+    """How far a verification is: `waiting` of the `states` found are still to be searched."""
+
+    seconds: float
+    states: int = 0
+    waiting: int = 0
+
+
+DEFAULT_LIMITS = SearchLimits()
+"""Those of `m2pem verify`."""
+
+
+__all__ = [
+    "DEFAULT_LIMITS",
+    "DataName",
+    "Draft",
+    "Editable",
+    "MissionSource",
+    "Outline",
+    "OutlineElement",
+    "OutlineProcess",
+    "OutlineTrigger",
+    "SearchLimits",
+    "SearchProgress",
+]

@@ -1,0 +1,130 @@
+"""The process of its own in which a mission is verified for an executive."""
+
+import logging
+import time
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from m2pem.api.arbiter import ArbiterContext
+from m2pem.api.authoring import MissionSource, SearchLimits, SearchProgress
+from m2pem.executive.apart import Given, Tell, apart, given, serve
+from m2pem.executive.arbiters import FleetArbiters
+from m2pem.executive.clock import SystemClock
+from m2pem.executive.loading import load_source
+from m2pem.gateway.bus import Bus
+from m2pem.model.values import Value
+from m2pem.resources.fleet import Fleet
+from m2pem.resources.snapshot import dump, restore
+
+TOKENS = 3
+"""On one place, where one is meant: as `m2pem verify` has it."""
+
+_BETWEEN_S = 0.2
+"""Of two tellings how far it is."""
+
+
+class Order(msgspec.Struct):
+    """What is to be verified."""
+
+    mission: Given
+    fleet: bytes
+    simulated: bool
+    search_path: list[str]
+    process: str | None
+    data: dict[str, Any]
+    spec: bytes | None
+    strict: bool
+    timers_in_order: bool
+    limits: SearchLimits
+
+
+async def verify_apart(
+    mission: MissionSource,
+    fleet: Fleet,
+    *,
+    simulated: bool,
+    search_path: Iterable[Path],
+    process: str | None,
+    data: Mapping[str, Value],
+    spec: str | None,
+    strict: bool,
+    timers_in_order: bool,
+    limits: SearchLimits,
+    on_progress: Callable[[SearchProgress], None] | None,
+) -> dict[str, Any]:
+    """The answers of `m2pem verify --format json`, from a process of its own."""
+    order = Order(
+        given(mission),
+        dump(fleet),
+        simulated,
+        [str(each) for each in search_path],
+        process,
+        dict(data),
+        None if spec is None else spec.encode(),
+        strict,
+        timers_in_order,
+        limits,
+    )
+
+    def told(content: bytes) -> None:
+        if on_progress is not None:
+            on_progress(msgspec.msgpack.decode(content, type=SearchProgress))
+
+    answer = await apart(__name__, msgspec.msgpack.encode(order), told)
+    found: dict[str, Any] = msgspec.json.decode(answer)
+    return found
+
+
+def _work(content: bytes, tell: Tell) -> bytes:
+    # What searches is loaded here: the executive has no use for it.
+    from m2pem.executive.proving import Engine, asked_of, prove  # noqa: PLC0415
+    from m2pem.plugins import PluginManager  # noqa: PLC0415
+    from m2pem.verify.explore import Limits, Progress  # noqa: PLC0415
+    from m2pem.verify.report.data import as_data  # noqa: PLC0415
+
+    order = msgspec.msgpack.decode(content, type=Order)
+    shown_at = 0.0
+
+    def progress(searched: Progress) -> None:
+        nonlocal shown_at
+        now = time.monotonic()
+        if now >= shown_at + _BETWEEN_S:
+            shown_at = now
+            how_far = SearchProgress(searched.seconds, searched.states, searched.waiting)
+            tell(msgspec.msgpack.encode(how_far))
+
+    path = [Path(each) for each in order.search_path]
+    loaded = load_source(order.mission.source_of(), path)
+    plugins = PluginManager()
+    asked = asked_of(
+        loaded,
+        _arbiters(restore(order.fleet), plugins, simulated=order.simulated),
+        plugins,
+        order.process,
+        order.data,
+        order.spec,
+        simulated=order.simulated,
+        timers_in_order=order.timers_in_order,
+    )
+    limits = Limits(states=order.limits.states, seconds=order.limits.seconds, tokens=TOKENS)
+    found = prove(asked, Engine("builtin", "exact", limits), strict=order.strict, progress=progress)
+    return msgspec.json.encode(as_data(found))
+
+
+def _arbiters(fleet: Fleet, plugins: Any, *, simulated: bool) -> FleetArbiters:
+    """For questions alone."""
+    context = ArbiterContext(
+        SystemClock(),
+        Bus(),
+        logging.getLogger("m2pem.arbiter"),
+        fleet.origin,
+        {team.name: team.members for team in fleet.teams.values()},
+    )
+    return FleetArbiters(fleet, plugins, context, simulated=simulated)
+
+
+if __name__ == "__main__":
+    serve(_work)

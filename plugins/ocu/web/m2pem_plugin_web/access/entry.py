@@ -1,0 +1,135 @@
+"""How one gets in: a one-time token, or a name with its password; and who a cookie stands for."""
+
+import logging
+from collections.abc import Callable, Hashable, Mapping
+from pathlib import Path
+
+from m2pem_plugin_web.access.passwords import BusyError, PasswordChecker
+from m2pem_plugin_web.access.private_files import NotPrivateError
+from m2pem_plugin_web.access.roles import Person, Role
+from m2pem_plugin_web.access.sessions import Sessions, hash_of
+from m2pem_plugin_web.access.throttle import Throttle
+from m2pem_plugin_web.access.tokens import OneTimeToken
+from m2pem_plugin_web.access.users import Users
+
+OF_A_NAME_HERE = 5
+OF_AN_ADDRESS = 20
+OF_A_NAME = 50
+"""Failures within five minutes: of one name at one address, of one address, of one name."""
+
+BUSY_S = 2.0
+
+log = logging.getLogger("m2pem.ocu.web")
+
+
+class ThrottledError(Exception):
+    """Nothing is looked at for a while."""
+
+    def __init__(self, wait_s: float) -> None:
+        self.wait_s = wait_s
+        super().__init__(f"too many attempts: try again in {wait_s:.0f} s")
+
+
+class Entry:
+    """Either `users` sign in by name, or `owner`, who started the executive, by a token.
+
+    `port` is part of the cookie's name: browsers do not tell the ports of a machine apart.
+    `renewed` is told of each token. `kept`: a file for sessions.
+    """
+
+    def __init__(
+        self,
+        port: int,
+        *,
+        secure: bool = False,
+        owner: Person | None = None,
+        users: Users | None = None,
+        kept: Path | None = None,
+        renewed: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self.cookie = f"m2pem_{port}"
+        self.secure = secure
+        self.by_name = users is not None
+        self._sessions = Sessions(kept)
+        self._owner = owner if users is None else None
+        self._users = users
+        self._token = OneTimeToken(renewed) if self._owner is not None else None
+        self._checker = PasswordChecker() if users is not None else None
+        self._throttle = Throttle()
+
+    def redeem(self, token: str, address: str) -> str | None:
+        """The key of a new session for who has the token; None: it is not the token.
+
+        Raises:
+            ThrottledError: there were too many attempts.
+        """
+        bounds: dict[Hashable, int] = {("token", address): OF_AN_ADDRESS}
+        self._wait(bounds)
+        if self._token is None or self._owner is None or not self._token.redeem(token):
+            self._throttle.failed(bounds)
+            return None
+        return self._sessions.begin(self._owner.name)
+
+    async def sign_in(self, name: str, password: str, address: str) -> tuple[Person, str] | None:
+        """Who signs in, and the key of their session; None: the name or the password is wrong.
+
+        Raises:
+            ThrottledError: there were too many attempts.
+            NotPrivateError: the file of users cannot be read.
+        """
+        if self._users is None or self._checker is None:
+            return None
+        here = (name, address)
+        bounds: dict[Hashable, int] = {
+            here: OF_A_NAME_HERE,
+            ("address", address): OF_AN_ADDRESS,
+            ("name", name): OF_A_NAME,
+        }
+        self._wait(bounds)
+        user = self._users.all().get(name)
+        # Counted before it is checked: many at once must not all slip through.
+        self._throttle.failed(bounds)
+        try:
+            matches = await self._checker.matches(user.password if user else None, password)
+        except BusyError:
+            raise ThrottledError(BUSY_S) from None
+        if user is None or not matches:
+            log.warning("%r at %s could not sign in", name, address)
+            return None
+        self._throttle.succeeded(bounds)
+        self._throttle.forget(here)
+        key = self._sessions.begin(name, hash_of(user.password))
+        return Person(name, user.role), key
+
+    def leave(self, cookies: Mapping[str, str]) -> None:
+        """Somebody signs out."""
+        if key := cookies.get(self.cookie):
+            self._sessions.end(key)
+
+    def person(self, cookies: Mapping[str, str]) -> Person | None:
+        """Who asks, by the cookies of their browser."""
+        key = cookies.get(self.cookie)
+        session = self._sessions.find(key) if key else None
+        if session is None:
+            return None
+        if self._users is None:
+            owner = self._owner
+            return owner if owner is not None and owner.name == session.name else None
+        try:
+            user = self._users.all().get(session.name)
+        except NotPrivateError as error:
+            log.error("nobody can be let in: %s", error)
+            return None
+        if user is None or hash_of(user.password) != session.proof:
+            return None
+        return Person(session.name, user.role)
+
+    def _wait(self, bounds: Mapping[Hashable, int]) -> None:
+        wait_s = self._throttle.wait_s(bounds)
+        if wait_s > 0:
+            raise ThrottledError(wait_s)
+
+
+def owner_of(name: str) -> Person:
+    """Who started the executive may do everything."""
+    return Person(name, Role.COMMANDER)

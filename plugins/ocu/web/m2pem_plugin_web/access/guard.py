@@ -1,0 +1,51 @@
+"""Looks at every request before anything else does: where it comes from, and who asks."""
+
+from collections.abc import Collection
+
+from starlette.datastructures import Headers
+from starlette.requests import HTTPConnection
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from m2pem_plugin_web.access.entry import Entry
+from m2pem_plugin_web.access.origins import SAFE_METHODS, foreign, wrong_host
+from m2pem_plugin_web.access.people import SCOPE_KEY
+from m2pem_plugin_web.problems import problem
+
+API = "/api"
+SIGN_IN = "/api/session"
+
+
+class Guard:
+    """Below /api it lets in nobody who has not signed in, but to sign in. `names`: our own."""
+
+    def __init__(self, app: ASGIApp, *, entry: Entry, names: Collection[str], scheme: str) -> None:
+        self._app = app
+        self._entry = entry
+        self._names = names
+        self._scheme = scheme
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, or refuse it."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        refused = self._refused(scope)
+        if refused is not None:
+            status, why = refused
+            await problem(status, why)(scope, receive, send)
+            return
+        await self._app(scope, receive, send)
+
+    def _refused(self, scope: Scope) -> tuple[int, str] | None:
+        headers = Headers(scope=scope)
+        if why := wrong_host(headers, self._names):
+            return 400, why
+        method = scope.get("method", "")
+        changes = scope["type"] == "websocket" or method not in SAFE_METHODS
+        of_api = scope["path"] == API or scope["path"].startswith(f"{API}/")
+        if (changes or of_api) and (why := foreign(headers, self._scheme, strict=changes)):
+            return 403, why
+        person = scope[SCOPE_KEY] = self._entry.person(HTTPConnection(scope).cookies)
+        if of_api and person is None and not (scope["path"] == SIGN_IN and method == "POST"):
+            return 401, "sign in first"
+        return None

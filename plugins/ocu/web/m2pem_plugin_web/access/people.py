@@ -1,0 +1,40 @@
+"""Who asks, and what they may do: a router names the least role that each of its routes needs."""
+
+from collections.abc import Callable
+from typing import Annotated
+
+from fastapi import Depends
+from fastapi.requests import HTTPConnection
+from starlette.exceptions import HTTPException
+
+from m2pem_plugin_web.access.roles import Person, Role
+
+__all__ = ["Commander", "Operator", "Person", "Role", "Viewer", "needs", "person_of"]
+
+SCOPE_KEY = "m2pem.person"
+"""Where the guard puts who asks, in the ASGI scope of a connection."""
+
+
+def person_of(connection: HTTPConnection) -> Person | None:
+    """Who asks; None: somebody who has not signed in."""
+    person = connection.scope.get(SCOPE_KEY)
+    return person if isinstance(person, Person) else None
+
+
+def needs(role: Role) -> Callable[[HTTPConnection], Person]:
+    """A dependency of FastAPI: the person who asks, if their role covers `role`."""
+
+    def person(connection: HTTPConnection) -> Person:
+        found = person_of(connection)
+        if found is None:
+            raise HTTPException(401, "sign in first")
+        if not found.role.covers(role):
+            raise HTTPException(403, f"this needs the role {role}; {found.name} is {found.role}")
+        return found
+
+    return person
+
+
+Viewer = Annotated[Person, Depends(needs(Role.VIEWER))]
+Operator = Annotated[Person, Depends(needs(Role.OPERATOR))]
+Commander = Annotated[Person, Depends(needs(Role.COMMANDER))]

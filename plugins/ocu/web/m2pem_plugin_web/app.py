@@ -1,0 +1,78 @@
+"""Puts the app together: what looks at requests first, the routers, and the page."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from fastapi import APIRouter, FastAPI
+from fastapi.openapi.utils import get_openapi
+from starlette.types import ASGIApp
+
+from m2pem_plugin_web import pages
+from m2pem_plugin_web.access.bodies import BoundedBodies
+from m2pem_plugin_web.access.entry import Entry
+from m2pem_plugin_web.access.guard import Guard
+from m2pem_plugin_web.access.headers import SafeHeaders
+from m2pem_plugin_web.live import socket
+from m2pem_plugin_web.live.hub import Hub
+from m2pem_plugin_web.pages import Pages
+from m2pem_plugin_web.problems import ProblemModel, handle_problems
+from m2pem_plugin_web.rest import (
+    catalogue,
+    checks,
+    geometries,
+    missions,
+    prompts,
+    rehearsals,
+    resources,
+    runs,
+    session,
+    steering,
+    templates,
+    verifications,
+)
+from m2pem_plugin_web.services import Services
+from m2pem_plugin_web.settings import Settings
+
+OPENAPI = "/api/openapi.json"
+
+
+def routers_of(services: Services, settings: Settings, hub: Hub, entry: Entry) -> list[APIRouter]:
+    """All that browsers may ask for."""
+    control, folder = services.control, services.folder
+    return [
+        session.router(control, settings, entry),
+        runs.router(control, folder),
+        steering.router(control),
+        prompts.router(control, hub),
+        resources.router(control),
+        missions.router(control, folder),
+        templates.router(),
+        checks.router(control, folder),
+        verifications.router(control, folder, services.verifications),
+        rehearsals.router(control, folder, services.rehearsals),
+        catalogue.router(control),
+        geometries.router(control),
+        socket.router(hub, entry),
+        pages.router(entry, Pages()),
+    ]
+
+
+def create_app(routers: Iterable[APIRouter], entry: Entry, settings: Settings) -> ASGIApp:
+    """The app. `entry` says who may come in."""
+    # The pages of FastAPI about an API load scripts from elsewhere.
+    app = FastAPI(title="m2pem", openapi_url=OPENAPI, docs_url=None, redoc_url=None)
+    for router in routers:
+        app.include_router(router)
+    handle_problems(app)
+    app.openapi = lambda: _described(app)  # type: ignore[method-assign]
+    guard = Guard(BoundedBodies(app), entry=entry, names=settings.names, scheme=settings.scheme)
+    return SafeHeaders(guard)
+
+
+def _described(app: FastAPI) -> dict[str, Any]:
+    if app.openapi_schema is None:
+        described = get_openapi(title=app.title, version=app.version, routes=app.routes)
+        schemas = described.setdefault("components", {}).setdefault("schemas", {})
+        schemas["Problem"] = ProblemModel.model_json_schema()
+        app.openapi_schema = described
+    return app.openapi_schema

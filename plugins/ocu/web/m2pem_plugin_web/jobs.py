@@ -1,0 +1,122 @@
+"""Work that browsers order and come back for: verifications and rehearsals."""
+
+import asyncio
+import logging
+import secrets
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Generic, TypeVar
+
+from m2pem.errors import FindingsError, M2pemError
+from m2pem_plugin_web.problems import ProblemError
+
+T = TypeVar("T")
+
+AT_ONCE = 2
+"""Jobs of a kind that work; each takes a processor. Others wait."""
+MOST_WAITING = 20
+KEPT = 20
+"""Results of a kind; the oldest are forgotten."""
+
+log = logging.getLogger("m2pem.ocu.web")
+
+
+class JobState(StrEnum):
+    """Where a job is; one that waits for others is running too."""
+
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+
+@dataclass(slots=True, eq=False)
+class Job(Generic[T]):
+    """One of them. `problem`: why it failed, with all `findings` if a file cannot be used."""
+
+    id: str
+    by: str
+    state: JobState = JobState.RUNNING
+    result: T | None = None
+    problem: str = ""
+    findings: tuple[object, ...] = ()
+    task: "asyncio.Task[None] | None" = field(default=None, repr=False)
+
+
+class Jobs(Generic[T]):
+    """Those of one kind; `kind` is what messages call them."""
+
+    def __init__(self, kind: str) -> None:
+        self._kind = kind
+        self._jobs: dict[str, Job[T]] = {}
+        self._free = asyncio.Semaphore(AT_ONCE)
+
+    def begin(self, by: str, work: Callable[[str], Awaitable[T]]) -> Job[T]:
+        """Begin a job, now or when others have ended. `work` is told its id.
+
+        Raises:
+            ProblemError: too many wait already.
+        """
+        running = [each for each in self._jobs.values() if each.state is JobState.RUNNING]
+        if len(running) >= AT_ONCE + MOST_WAITING:
+            raise ProblemError(429, f"too many {self._kind}s wait: come back later")
+        job: Job[T] = Job(secrets.token_hex(8), by)
+        self._jobs[job.id] = job
+        job.task = asyncio.get_running_loop().create_task(
+            self._do(job, work), name=f"web: {self._kind} {job.id}"
+        )
+        self._forget()
+        return job
+
+    def get(self, identifier: str) -> Job[T]:
+        """The job of an id.
+
+        Raises:
+            ProblemError: 404, there is none.
+        """
+        job = self._jobs.get(identifier)
+        if job is None:
+            raise ProblemError(404, f"there is no {self._kind} {identifier}")
+        return job
+
+    async def cancel(self, identifier: str) -> None:
+        """End a job; nothing happens to one that has ended.
+
+        Raises:
+            ProblemError: 404, there is none.
+        """
+        job = self.get(identifier)
+        if job.task is not None and not job.task.done():
+            job.task.cancel()
+            with suppress(asyncio.CancelledError):
+                await asyncio.wait([job.task])
+
+    async def close(self) -> None:
+        """End all."""
+        tasks = [each.task for each in self._jobs.values() if each.task is not None]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _do(self, job: Job[T], work: Callable[[str], Awaitable[T]]) -> None:
+        try:
+            async with self._free:
+                job.result = await work(job.id)
+            job.state = JobState.DONE
+        except asyncio.CancelledError:
+            job.state = JobState.CANCELLED
+            raise
+        except FindingsError as error:
+            job.state, job.problem, job.findings = JobState.FAILED, error.what, error.findings
+        except M2pemError as error:
+            job.state, job.problem = JobState.FAILED, str(error)
+        except Exception:  # one job must not end the page
+            log.exception("%s %s", self._kind, job.id)
+            job.state, job.problem = JobState.FAILED, "the server failed; its log says how"
+
+    def _forget(self) -> None:
+        over = [each.id for each in self._jobs.values() if each.state is not JobState.RUNNING]
+        for identifier in over[:-KEPT]:
+            del self._jobs[identifier]

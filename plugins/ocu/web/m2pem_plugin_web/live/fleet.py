@@ -1,0 +1,77 @@
+"""What vehicles, payloads and teams said last, and which of it is new."""
+
+from collections.abc import Callable
+
+import msgspec
+
+from m2pem.api import (
+    LinkState,
+    MissionControl,
+    PayloadState,
+    ResourceId,
+    TeamState,
+    Telemetry,
+    VehicleState,
+)
+
+BACKLOG = 1000
+"""States that may wait; of one resource, only the last counts."""
+
+_encode = msgspec.json.Encoder().encode
+
+
+class Heard:
+    """The latest state by name, each encoded once for however many browsers."""
+
+    def __init__(self) -> None:
+        self.states: dict[str, Telemetry] = {}
+        self.dirty: set[str] = set()
+        self._encoded: dict[str, msgspec.Raw] = {}
+
+    def put(self, name: str, state: Telemetry) -> None:
+        """It is the latest."""
+        self.states[name] = state
+        self._encoded.pop(name, None)
+        self.dirty.add(name)
+
+    def forget(self, name: str) -> None:
+        """It says nothing any more."""
+        self.states.pop(name, None)
+        self._encoded.pop(name, None)
+        self.dirty.discard(name)
+
+    def encoded(self, name: str) -> msgspec.Raw | None:
+        """The latest state as JSON; None: there is none."""
+        if name not in self._encoded and name in self.states:
+            self._encoded[name] = msgspec.Raw(_encode(self.states[name]))
+        return self._encoded.get(name)
+
+
+class FleetPicture:
+    """`lost` is told of each vehicle or payload that is no longer heard."""
+
+    def __init__(self, control: MissionControl, lost: Callable[[ResourceId], None]) -> None:
+        self.vehicles = Heard()
+        self.payloads = Heard()
+        self.teams = Heard()
+        """By the behavior that they do."""
+        self._lost = lost
+        self._telemetry = control.telemetry(size=BACKLOG)
+
+    async def follow(self) -> None:
+        """Follow until the executive ends."""
+        async for state in self._telemetry:
+            match state:
+                case VehicleState():
+                    self._take(self.vehicles, state)
+                case PayloadState():
+                    self._take(self.payloads, state)
+                case TeamState():
+                    self.teams.put(state.behavior, state)
+
+    def _take(self, heard: Heard, state: VehicleState | PayloadState) -> None:
+        before = heard.states.get(state.resource)
+        was = before.link if isinstance(before, VehicleState | PayloadState) else None
+        heard.put(state.resource, state)
+        if state.link is LinkState.LOST and was is not LinkState.LOST:
+            self._lost(state.resource)

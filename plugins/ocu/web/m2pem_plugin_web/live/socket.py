@@ -1,0 +1,161 @@
+"""/api/live: a WebSocket to each browser. What it sends is bounded in size and in rate."""
+
+import asyncio
+import logging
+from collections.abc import Callable
+from contextlib import suppress
+
+import msgspec
+from fastapi import APIRouter, WebSocket
+from starlette.websockets import WebSocketDisconnect
+
+from m2pem.errors import M2pemError
+from m2pem_plugin_web.access.entry import Entry
+from m2pem_plugin_web.access.people import person_of
+from m2pem_plugin_web.live import words
+from m2pem_plugin_web.live.hub import MOST_VIEWERS, Hub
+from m2pem_plugin_web.live.viewer import Viewer
+
+LONGEST_MESSAGE = 4096
+"""Bytes of a message of a browser; the server refuses more."""
+
+ABORT = "m2pem.abort"
+"""What ends a connection at once, in the ASGI scope: one that takes nothing cannot be closed."""
+
+LAST_WORDS_S = 1.0
+
+RATE = 200
+BURST = 400
+"""Messages that a browser may send in a second, and at once: it acknowledges 25 in a second."""
+
+LOOK_EVERY_S = 1.0
+
+SILENT = 4008
+FLOOD = 4029
+SIGNED_OUT = 4401
+MALFORMED = 4400
+FULL = 1013
+
+_encode = msgspec.json.Encoder().encode
+log = logging.getLogger("m2pem.ocu.web")
+
+
+class _Watch(msgspec.Struct, tag="watch", frozen=True):
+    run: str | None = None
+
+
+class _Ack(msgspec.Struct, tag="ack", frozen=True):
+    seq: int
+
+
+_decoder: msgspec.json.Decoder[_Watch | _Ack] = msgspec.json.Decoder(_Watch | _Ack)
+
+
+class _Leave(Exception):  # noqa: N818  # nothing went wrong here
+    """The connection is to be closed, with a code and a reason."""
+
+    def __init__(self, code: int, reason: str) -> None:
+        self.code = code
+        self.reason = reason
+        super().__init__(reason)
+
+
+def router(hub: Hub, entry: Entry) -> APIRouter:
+    """The WebSocket's route. Everybody who has signed in may see everything."""
+    routes = APIRouter()
+
+    @routes.websocket("/api/live")
+    async def live(socket: WebSocket) -> None:
+        person = person_of(socket)
+        if person is None:
+            await socket.close(SIGNED_OUT, "sign in first")
+            return
+        await socket.accept()
+        if len(hub.viewers) >= MOST_VIEWERS:
+            await socket.close(FULL, "too many pages are open")
+            return
+        viewer = Viewer()
+        hub.viewers.add(viewer)
+        try:
+            await _converse(socket, hub, viewer, lambda: entry.person(socket.cookies) == person)
+        except _Leave as leave:
+            await _close(socket, leave)
+        finally:
+            hub.viewers.discard(viewer)
+
+    return routes
+
+
+async def _converse(
+    socket: WebSocket, hub: Hub, viewer: Viewer, may_stay: Callable[[], bool]
+) -> None:
+    """Until the browser goes, or has to."""
+    tasks = [
+        asyncio.create_task(_speak(socket, hub, viewer)),
+        asyncio.create_task(_listen(socket, hub, viewer)),
+        asyncio.create_task(_look_after(viewer, may_stay)),
+    ]
+    try:
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            task.result()
+    except WebSocketDisconnect:
+        return
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def _speak(socket: WebSocket, hub: Hub, viewer: Viewer) -> None:
+    loop = asyncio.get_running_loop()
+    while True:
+        await viewer.wake.wait()
+        viewer.wake.clear()
+        if viewer.overrun:
+            raise _Leave(SILENT, "too slow")
+        for message in hub.next_messages(viewer, loop.time()):
+            await socket.send_text(_encode(message).decode())
+
+
+async def _listen(socket: WebSocket, hub: Hub, viewer: Viewer) -> None:
+    loop = asyncio.get_running_loop()
+    left, at = float(BURST), loop.time()
+    while True:
+        text = await socket.receive_text()
+        now = loop.time()
+        left, at = min(BURST, left + (now - at) * RATE) - 1, now
+        if left < 0:
+            raise _Leave(FLOOD, "too many messages")
+        try:
+            said = _decoder.decode(text)
+        except (msgspec.DecodeError, UnicodeError) as error:
+            raise _Leave(MALFORMED, "not a message of this protocol") from error
+        match said:
+            case _Ack(seq=seq):
+                viewer.acknowledge(seq)
+            case _Watch(run=run):
+                try:
+                    await hub.watch(viewer, run)
+                except M2pemError as error:
+                    viewer.refuse(words.fault(str(error)))
+
+
+async def _look_after(viewer: Viewer, may_stay: Callable[[], bool]) -> None:
+    loop = asyncio.get_running_loop()
+    while True:
+        await asyncio.sleep(LOOK_EVERY_S)
+        if viewer.silent_since(loop.time()):
+            raise _Leave(SILENT, "it takes nothing in any more")
+        if not may_stay():
+            raise _Leave(SIGNED_OUT, "signed out")
+
+
+async def _close(socket: WebSocket, leave: _Leave) -> None:
+    """Say why, and hang up soon, whether or not it was heard: it may be read behind a flood."""
+    abort = socket.scope.get(ABORT)
+    if abort is not None:
+        asyncio.get_running_loop().call_later(LAST_WORDS_S, abort)
+    with suppress(TimeoutError, RuntimeError, WebSocketDisconnect):
+        async with asyncio.timeout(LAST_WORDS_S):
+            await socket.close(leave.code, leave.reason)

@@ -1,0 +1,201 @@
+"""Reads and saves missions: never over what somebody else has changed, and never for good."""
+
+import fcntl
+import os
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+
+from m2pem.errors import M2pemError
+from m2pem_plugin_web.missions.names import SUFFIX, why_not
+from m2pem_plugin_web.missions.versions import FOLDER, Version, Versions, version_of
+from m2pem_plugin_web.missions.writing import sync_folder, write
+
+LARGEST_BYTES = 20 * 1024 * 1024
+"""Of a mission, as m2pem reads them."""
+
+
+class NoMissionError(M2pemError):
+    """There is no such mission, or version of it."""
+
+
+class BadNameError(M2pemError):
+    """A mission cannot be called that."""
+
+
+class ChangedError(M2pemError):
+    """The mission on the disk is not the one that was read; `current` is, None: there is none."""
+
+    def __init__(self, name: str, current: "Saved | None") -> None:
+        what = "was changed" if current is not None else "was deleted"
+        super().__init__(f"{name} {what} since it was read")
+        self.current = current
+
+
+class FolderError(M2pemError):
+    """The folder cannot be read or written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Saved:
+    """A mission on the disk. `by`: who saved it here, "" if it came there in another way."""
+
+    name: str
+    path: Path
+    source: bytes
+    version: str
+    saved_at_us: int
+    by: str
+
+
+class MissionFolder:
+    """`path`: of the folder; it is made when something is saved. Calls block: use threads."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._lock = Lock()
+
+    def file(self, name: str) -> Path:
+        """Where the mission of a name is, or would be.
+
+        Raises:
+            BadNameError: no mission can be called that.
+        """
+        reason = why_not(name)
+        if reason:
+            raise BadNameError(f"{name!r}: {reason}")
+        return self.path / f"{name}{SUFFIX}"
+
+    def names(self) -> Sequence[str]:
+        """What is there, in the order of the alphabet."""
+        try:
+            files = [each.name for each in os.scandir(self.path) if each.is_file()]
+        except FileNotFoundError:
+            return ()
+        except OSError as error:
+            raise FolderError(f"{self.path}: {error.strerror}") from error
+        names = [each.removesuffix(SUFFIX) for each in files if each.endswith(SUFFIX)]
+        return sorted((each for each in names if not why_not(each)), key=str.casefold)
+
+    def read(self, name: str) -> Saved:
+        """A mission as it is on the disk.
+
+        Raises:
+            NoMissionError: there is none.
+        """
+        path = self.file(name)
+        try:
+            with path.open("rb") as file:
+                source = file.read(LARGEST_BYTES + 1)
+                changed_us = os.fstat(file.fileno()).st_mtime_ns // 1000
+        except (FileNotFoundError, IsADirectoryError):
+            raise NoMissionError(f"there is no mission {name!r}") from None
+        except OSError as error:
+            raise FolderError(f"{path}: {error.strerror}") from error
+        if len(source) > LARGEST_BYTES:
+            raise FolderError(f"{path} is larger than {LARGEST_BYTES:,} bytes")
+        version = version_of(source)
+        kept = next((v for v in reversed(self.versions(name)) if v.version == version), None)
+        if kept is None or kept.deleted:
+            return Saved(name, path, source, version, changed_us, "")
+        return Saved(name, path, source, version, kept.saved_at_us, kept.by)
+
+    def save(self, name: str, source: bytes, base: str | None, by: str) -> Saved:
+        """Save a mission that was made of version `base`; None: it is a new one.
+
+        Raises:
+            ChangedError: another version is there.
+            FolderError: it cannot be written.
+        """
+        path = self.file(name)
+        with self._alone():
+            current = self._current(name)
+            if (current.version if current is not None else None) != base:
+                raise ChangedError(name, current)
+            if current is not None and current.source == source:
+                return current
+            versions = Versions(self.path, name)
+            try:
+                if current is not None:
+                    versions.add(current.source, current.saved_at_us, "")
+                kept = versions.add(source, time.time_ns() // 1000, by)
+                write(path, source, new=current is None)
+            except FileExistsError:
+                raise ChangedError(name, self._current(name)) from None
+            except OSError as error:
+                raise FolderError(f"{path}: {error.strerror}") from error
+        return Saved(name, path, source, kept.version, kept.saved_at_us, kept.by)
+
+    def delete(self, name: str, by: str) -> None:
+        """Delete a mission; its last content is kept as a version.
+
+        Raises:
+            NoMissionError: there is none.
+        """
+        path = self.file(name)
+        with self._alone():
+            current = self.read(name)
+            try:
+                versions = Versions(self.path, name)
+                versions.add(current.source, time.time_ns() // 1000, by, deleted=True)
+                path.unlink()
+                sync_folder(self.path)
+            except OSError as error:
+                raise FolderError(f"{path}: {error.strerror}") from error
+
+    def versions(self, name: str) -> Sequence[Version]:
+        """All that is kept of a mission, the oldest first."""
+        self.file(name)
+        return Versions(self.path, name).all()
+
+    def version(self, name: str, number: int) -> tuple[Version, bytes]:
+        """One of them, with its content.
+
+        Raises:
+            NoMissionError: there is none.
+        """
+        found = next((each for each in self.versions(name) if each.number == number), None)
+        source = Versions(self.path, name).source(number) if found is not None else None
+        if found is None or source is None:
+            raise NoMissionError(f"there is no version {number} of {name!r}")
+        return found, source
+
+    def source(self, name: str, version: str | None) -> bytes:
+        """The content of a mission: the one on the disk, or that of a `version` of it.
+
+        Raises:
+            NoMissionError: there is none.
+        """
+        if version is not None:
+            for each in reversed(self.versions(name)):
+                if each.version == version:
+                    return self.version(name, each.number)[1]
+        current = self.read(name)
+        if version not in (None, current.version):
+            raise NoMissionError(f"there is no version {version!r} of {name!r}")
+        return current.source
+
+    def _current(self, name: str) -> Saved | None:
+        try:
+            return self.read(name)
+        except NoMissionError:
+            return None
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Nobody else saves here, in this process or in another one of m2pem."""
+        with self._lock:
+            try:
+                hidden = self.path / FOLDER
+                hidden.mkdir(parents=True, exist_ok=True)
+                handle = os.open(hidden / ".lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o666)
+            except OSError as error:
+                raise FolderError(f"{self.path}: {error.strerror}") from error
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX)
+                yield
+            finally:
+                os.close(handle)

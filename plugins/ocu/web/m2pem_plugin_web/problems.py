@@ -1,0 +1,113 @@
+"""Refusals and failures as `application/problem+json` (RFC 9457), all in one form."""
+
+import logging
+from collections.abc import Mapping
+from dataclasses import asdict
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, ConfigDict
+from starlette.exceptions import HTTPException
+
+from m2pem.errors import (
+    ExpressionSyntaxError,
+    FindingsError,
+    InternalError,
+    JournalError,
+    M2pemError,
+    NotDrivenError,
+    OperatorError,
+    PluginError,
+)
+
+MEDIA_TYPE = "application/problem+json"
+
+log = logging.getLogger("m2pem.ocu.web")
+
+STATUS_OF: tuple[tuple[type[M2pemError], int], ...] = (
+    (FindingsError, 422),
+    (ExpressionSyntaxError, 422),
+    (NotDrivenError, 409),
+    (OperatorError, 409),
+    (PluginError, 502),
+    (JournalError, 503),
+    (InternalError, 500),
+)
+
+
+class ProblemModel(BaseModel):
+    """What went wrong. `findings`: all that is wrong with a file."""
+
+    model_config = ConfigDict(extra="allow", title="Problem")
+
+    type: str
+    title: str
+    status: int
+    detail: str
+
+
+RESPONSES: dict[int | str, dict[str, Any]] = {
+    "default": {
+        "description": "It was refused, or failed.",
+        "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
+    }
+}
+"""For every route: how it says what went wrong."""
+
+
+class ProblemError(HTTPException):
+    """A refusal with more to say than its text: `more` goes beside it."""
+
+    def __init__(
+        self, status: int, detail: str, *, headers: dict[str, str] | None = None, **more: Any
+    ) -> None:
+        super().__init__(status, detail, headers)
+        self.more = more
+
+
+def problem(
+    status: int, detail: str, headers: Mapping[str, str] | None = None, **more: Any
+) -> JSONResponse:
+    """A response that says what went wrong."""
+    content = {
+        "type": "about:blank",
+        "title": HTTPStatus(status).phrase,
+        "status": status,
+        "detail": detail,
+        **more,
+    }
+    return JSONResponse(content, status, dict(headers or {}), media_type=MEDIA_TYPE)
+
+
+def handle_problems(app: FastAPI) -> None:
+    """Have whatever goes wrong in an app said in this form."""
+
+    @app.exception_handler(M2pemError)
+    def refused(_: Request, error: M2pemError) -> JSONResponse:
+        status = next((s for kind, s in STATUS_OF if isinstance(error, kind)), 500)
+        if isinstance(error, FindingsError):
+            return problem(status, error.what, findings=[asdict(each) for each in error.findings])
+        if status == 500:
+            log.error("a request failed: %s", error)
+        return problem(status, str(error))
+
+    @app.exception_handler(HTTPException)
+    def said(_: Request, error: HTTPException) -> JSONResponse:
+        more = error.more if isinstance(error, ProblemError) else {}
+        return problem(error.status_code, str(error.detail), error.headers, **more)
+
+    @app.exception_handler(RequestValidationError)
+    def malformed(_: Request, error: RequestValidationError) -> JSONResponse:
+        wrong = [
+            {"where": ".".join(map(str, each["loc"])), "what": each["msg"]}
+            for each in error.errors()
+        ]
+        told = "; ".join(f"{each['where']}: {each['what']}" for each in wrong)
+        return problem(422, told, wrong=wrong)
+
+    @app.exception_handler(Exception)
+    def broke(_: Request, error: Exception) -> JSONResponse:
+        return problem(500, "the server failed; its log says how")

@@ -1,0 +1,1 @@
+"""What browsers ask for over HTTP: one router a module."""

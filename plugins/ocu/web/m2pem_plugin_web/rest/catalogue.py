@@ -1,0 +1,220 @@
+"""/api/fleet, /api/behaviors, /api/services: who is there, and what they can do."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from fastapi import APIRouter
+from pydantic import BaseModel
+
+from m2pem.api import (
+    Area,
+    BehaviorSpec,
+    BehaviorType,
+    Fleet,
+    MissionControl,
+    ParameterKind,
+    ParameterSpec,
+    ResourceId,
+    as_geojson,
+)
+from m2pem_plugin_web.access.people import Viewer
+from m2pem_plugin_web.problems import RESPONSES
+
+_UNITS = {
+    ParameterKind.DURATION: "s",
+    ParameterKind.DISTANCE: "m",
+    ParameterKind.ALTITUDE: "m",
+    ParameterKind.SPEED: "m/s",
+    ParameterKind.ANGLE: "rad",
+    ParameterKind.ANGULAR_SPEED: "rad/s",
+}
+"""Of bounds and defaults; people write others too."""
+
+
+class OriginModel(BaseModel):
+    """Of the local frame: degrees, and metres above mean sea level."""
+
+    lat: float
+    lon: float
+    alt: float
+
+
+class VehicleModel(BaseModel):
+    """A vehicle."""
+
+    id: str
+    domain: str
+    manned: bool
+    arbiter: str
+    payloads: list[str]
+
+
+class PayloadModel(BaseModel):
+    """What is mounted on a vehicle."""
+
+    id: str
+    vehicle: str
+    detector: bool
+    arbiter: str
+
+
+class TeamModel(BaseModel):
+    """Vehicles that are commanded together."""
+
+    name: str
+    members: list[str]
+    lead: str
+
+
+class FleetModel(BaseModel):
+    """The fleet in use; `fence`: the area (GeoJSON) that no vehicle may leave, null for none."""
+
+    name: str
+    origin: OriginModel
+    vehicles: list[VehicleModel]
+    payloads: list[PayloadModel]
+    teams: list[TeamModel]
+    fence: dict[str, Any] | None
+
+
+class ParameterModel(BaseModel):
+    """A parameter; bounds and default are in `unit`."""
+
+    name: str
+    kind: ParameterKind
+    unit: str
+    required: bool
+    minimum: float | None
+    maximum: float | None
+    choices: list[str]
+    default: float | str | bool | None
+    doc: str
+
+
+class BehaviorModel(BaseModel):
+    """A behavior with its parameters, and who takes it so: vehicles and payloads, or teams."""
+
+    name: str
+    type: BehaviorType
+    doc: str
+    ends: bool
+    writes: list[str]
+    required_one_of: list[list[str]]
+    parameters: list[ParameterModel]
+    resources: list[str]
+    teams: list[str]
+
+
+class ServiceModel(BaseModel):
+    """A service-task class, and the names of data that it writes."""
+
+    name: str
+    writes: list[str]
+
+
+def router(control: MissionControl) -> APIRouter:
+    """The routes of the catalogue."""
+    routes = APIRouter(prefix="/api", tags=["catalogue"], responses=RESPONSES)
+
+    @routes.get("/fleet")
+    async def fleet(_: Viewer) -> FleetModel:
+        """The fleet in use."""
+        return _fleet(control.fleet())
+
+    @routes.get("/behaviors")
+    async def behaviors(_: Viewer) -> list[BehaviorModel]:
+        """What this fleet can do, by name; one that some take otherwise is there again."""
+        return behaviors_of(control.fleet(), control.catalogue())
+
+    @routes.get("/services")
+    async def services(_: Viewer) -> list[ServiceModel]:
+        """The service-task classes that there are."""
+        return [
+            ServiceModel(name=name, writes=list(writes))
+            for name, writes in sorted(control.services().items())
+        ]
+
+    return routes
+
+
+def _fleet(fleet: Fleet) -> FleetModel:
+    lat, lon, alt = fleet.origin
+    fence = fleet.geometries.get(fleet.fence)
+    return FleetModel(
+        name=fleet.name,
+        origin=OriginModel(lat=lat, lon=lon, alt=alt),
+        vehicles=[
+            VehicleModel(
+                id=each.id,
+                domain=each.domain.value,
+                manned=each.manned,
+                arbiter=each.arbiter,
+                payloads=list(each.payloads),
+            )
+            for each in fleet.vehicles.values()
+        ],
+        payloads=[
+            PayloadModel(
+                id=each.id, vehicle=each.vehicle, detector=each.detector, arbiter=each.arbiter
+            )
+            for each in fleet.payloads.values()
+        ],
+        teams=[
+            TeamModel(name=each.name, members=list(each.members), lead=each.lead)
+            for each in fleet.teams.values()
+        ],
+        fence=as_geojson(fence)["geometry"] if isinstance(fence, Area) else None,
+    )
+
+
+def behaviors_of(
+    fleet: Fleet, catalogue: Mapping[ResourceId, Sequence[BehaviorSpec]]
+) -> list[BehaviorModel]:
+    """Every behavior with who can do it: of a team, all members can, and its lead says how."""
+    found: dict[str, tuple[BehaviorSpec, list[str], list[str]]] = {}
+    for resource, specs in catalogue.items():
+        for spec in specs:
+            entry = found.setdefault(repr(spec), (spec, [], []))
+            if spec.type is not BehaviorType.TEAM:
+                entry[1].append(resource)
+    for team in fleet.teams.values():
+        members = dict.fromkeys((team.lead, *team.members))
+        offered = [_team_behaviors(catalogue.get(each, ())) for each in members]
+        for name, spec in offered[0].items():
+            if all(name in each for each in offered):
+                found[repr(spec)][2].append(team.name)
+    listed = [entry for entry in found.values() if entry[1] or entry[2]]
+    listed.sort(key=lambda entry: (entry[0].type, entry[0].name))
+    return [_behavior(*entry) for entry in listed]
+
+
+def _team_behaviors(specs: Iterable[BehaviorSpec]) -> dict[str, BehaviorSpec]:
+    return {each.name: each for each in specs if each.type is BehaviorType.TEAM}
+
+
+def _behavior(spec: BehaviorSpec, resources: list[str], teams: list[str]) -> BehaviorModel:
+    return BehaviorModel(
+        name=spec.name,
+        type=spec.type,
+        doc=spec.doc,
+        ends=spec.ends,
+        writes=list(spec.writes),
+        required_one_of=[list(each) for each in spec.required_one_of],
+        parameters=[_parameter(each) for each in spec.parameters],
+        resources=resources,
+        teams=teams,
+    )
+
+
+def _parameter(spec: ParameterSpec) -> ParameterModel:
+    return ParameterModel(
+        name=spec.name,
+        kind=spec.kind,
+        unit=_UNITS.get(spec.kind, ""),
+        required=spec.required,
+        minimum=spec.minimum,
+        maximum=spec.maximum,
+        choices=list(spec.choices),
+        default=spec.default,
+        doc=spec.doc,
+    )

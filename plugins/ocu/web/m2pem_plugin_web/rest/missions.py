@@ -1,0 +1,164 @@
+"""/api/missions: the folder of missions, with all that was ever saved there."""
+
+import asyncio
+from typing import Annotated
+
+from fastapi import APIRouter, Response
+from fastapi import Path as InPath
+from pydantic import BaseModel
+
+from m2pem.api import MissionControl
+from m2pem_plugin_web.access.people import Commander, Viewer
+from m2pem_plugin_web.missions.folder import MissionFolder, Saved
+from m2pem_plugin_web.missions.summaries import Summaries
+from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.rest.drafts import MissionName, of_folder, source_of
+from m2pem_plugin_web.rest.models import Body
+
+BPMN = "application/xml"
+
+VersionNumber = Annotated[int, InPath(ge=1, le=10**9)]
+
+
+class MissionLineModel(BaseModel):
+    """A mission of the folder. `by`: who saved it here, "" if it came in another way.
+
+    `runnable`: `m2pem check` finds no errors in it.
+    """
+
+    name: str
+    title: str
+    version: str
+    saved_at_us: int
+    by: str
+    runnable: bool
+
+
+class SavedModel(BaseModel):
+    """What was saved. `version`: what tells one content from another."""
+
+    name: str
+    version: str
+    saved_at_us: int
+    by: str
+
+
+class MissionModel(SavedModel):
+    """A mission for the editor; `notes`: what that does not keep of the file."""
+
+    xml: str
+    notes: list[str]
+
+
+class VersionModel(BaseModel):
+    """One that was saved or found. `deleted`: it was the last before the mission was deleted."""
+
+    number: int
+    version: str
+    saved_at_us: int
+    by: str
+    deleted: bool
+
+
+class OldMissionModel(VersionModel):
+    """An older one, for the editor."""
+
+    name: str
+    xml: str
+    notes: list[str]
+
+
+class SaveModel(Body):
+    """`base`: the version that it was made of; null: it is a new mission."""
+
+    xml: str
+    base: str | None
+
+
+def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
+    """The routes of missions."""
+    routes = APIRouter(prefix="/api/missions", tags=["missions"], responses=RESPONSES)
+    summaries = Summaries(control, folder)
+
+    @routes.get("")
+    async def missions(_: Viewer) -> list[MissionLineModel]:
+        """What is in the folder."""
+        return [
+            MissionLineModel(
+                name=each.saved.name,
+                title=each.title,
+                version=each.saved.version,
+                saved_at_us=each.saved.saved_at_us,
+                by=each.saved.by,
+                runnable=each.runnable,
+            )
+            for each in await of_folder(summaries.all)
+        ]
+
+    @routes.get("/{name}")
+    async def mission(_: Viewer, name: MissionName) -> MissionModel:
+        """A mission for the editor."""
+        saved = await of_folder(folder.read, name)
+        found = await asyncio.to_thread(control.editable, saved.source)
+        return MissionModel(
+            **_saved(saved).model_dump(), xml=found.source.decode(), notes=list(found.notes)
+        )
+
+    @routes.put("/{name}")
+    async def save(person: Commander, name: MissionName, wanted: SaveModel) -> SavedModel:
+        """Save a mission, also one with errors, but never over what is not its `base`: then 409,
+        with what is there as `current`."""
+        source = source_of(wanted.xml)
+        await asyncio.to_thread(control.outline, source)
+        return _saved(await of_folder(folder.save, name, source, wanted.base, person.name))
+
+    @routes.delete("/{name}", status_code=204)
+    async def delete(person: Commander, name: MissionName) -> None:
+        """Delete a mission; it is kept as a version."""
+        await of_folder(folder.delete, name, person.name)
+
+    @routes.get("/{name}/file", response_class=Response, responses={200: {"content": {BPMN: {}}}})
+    async def file(_: Viewer, name: MissionName) -> Response:
+        """The file as it is on the disk."""
+        saved = await of_folder(folder.read, name)
+        ascii_name = saved.path.name.encode("ascii", "replace").decode().replace("?", "_")
+        disposition = f'attachment; filename="{ascii_name}"'
+        return Response(saved.source, 200, {"content-disposition": disposition}, BPMN)
+
+    @routes.get("/{name}/versions")
+    async def versions(_: Viewer, name: MissionName) -> list[VersionModel]:
+        """All that is kept of a mission, also of one that was deleted, the oldest first."""
+        return [
+            VersionModel(
+                number=each.number,
+                version=each.version,
+                saved_at_us=each.saved_at_us,
+                by=each.by,
+                deleted=each.deleted,
+            )
+            for each in await of_folder(folder.versions, name)
+        ]
+
+    @routes.get("/{name}/versions/{number}")
+    async def version(_: Viewer, name: MissionName, number: VersionNumber) -> OldMissionModel:
+        """One of them, for the editor."""
+        kept, source = await of_folder(folder.version, name, number)
+        found = await asyncio.to_thread(control.editable, source)
+        return OldMissionModel(
+            name=name,
+            number=kept.number,
+            version=kept.version,
+            saved_at_us=kept.saved_at_us,
+            by=kept.by,
+            deleted=kept.deleted,
+            xml=found.source.decode(),
+            notes=list(found.notes),
+        )
+
+    return routes
+
+
+def _saved(saved: Saved) -> SavedModel:
+    return SavedModel(
+        name=saved.name, version=saved.version, saved_at_us=saved.saved_at_us, by=saved.by
+    )

@@ -1,0 +1,125 @@
+"""/api/runs: start them, list them, and read what happened in them."""
+
+from collections.abc import Iterable
+from typing import Annotated
+
+import msgspec
+from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel
+
+from m2pem.api import Draft, MissionControl, MissionFile
+from m2pem_plugin_web.access.people import Commander, Viewer
+from m2pem_plugin_web.live.words import record_of
+from m2pem_plugin_web.missions.folder import MissionFolder
+from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.rest.drafts import WrittenName, of_folder
+from m2pem_plugin_web.rest.lookup import find_run
+from m2pem_plugin_web.rest.models import Body, Data, Name, RecordPage, RunModel, run_model
+from m2pem_plugin_web.rest.shown import shown
+
+MOST_RUNS = 1000
+MOST_RECORDS = 5000
+LARGEST = 2**53 - 1
+
+_encode = msgspec.json.Encoder().encode
+
+
+class StartModel(Body):
+    """What to start. `version`: of the mission, None for its newest; `process`: None, its main."""
+
+    mission: WrittenName
+    version: str | None = None
+    process: Name | None = None
+    data: Data | None = None
+
+
+class StartedModel(BaseModel):
+    """The id of the run that began."""
+
+    run: str
+
+
+class FileModel(BaseModel):
+    """A file of BPMN, as the editor takes it.
+
+    `qualifier`: what ids of its elements begin with in records, before ":".
+    """
+
+    name: str
+    qualifier: str
+    xml: str
+
+
+class RunMissionModel(BaseModel):
+    """What a run executes: its file, and those that it calls into."""
+
+    name: str
+    process: str
+    files: list[FileModel]
+
+
+def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
+    """The routes of runs. `folder`: what missions are started from."""
+    routes = APIRouter(prefix="/api/runs", tags=["runs"], responses=RESPONSES)
+
+    @routes.post("", status_code=201)
+    async def start(person: Commander, wanted: StartModel) -> StartedModel:
+        """Start a mission."""
+        source = await of_folder(folder.source, wanted.mission, wanted.version)
+        draft = Draft(folder.file(wanted.mission), source)
+        run = await control.start(draft, process=wanted.process, data=wanted.data, by=person.name)
+        return StartedModel(run=run)
+
+    @routes.get("")
+    async def runs(
+        _: Viewer, limit: Annotated[int, Query(ge=1, le=MOST_RUNS)] = MOST_RUNS
+    ) -> list[RunModel]:
+        """The runs of the journal, the newest last; `limit` of them at most."""
+        return [run_model(each) for each in list(await control.runs())[-limit:]]
+
+    @routes.get("/{run}")
+    async def run(_: Viewer, run: str) -> RunModel:
+        """How a run stands."""
+        return run_model(await find_run(control, run))
+
+    @routes.get("/{run}/records", response_model=RecordPage)
+    async def records(
+        _: Viewer,
+        run: str,
+        after: Annotated[int, Query(ge=0, le=LARGEST)] = 0,
+        limit: Annotated[int, Query(ge=1, le=MOST_RECORDS)] = 1000,
+    ) -> Response:
+        """Records of a run after one of them: 0, or the `next` of the page before.
+
+        A page ends with all records of an input, so that it may have more than `limit`.
+        """
+        await find_run(control, run)
+        page = await control.records(run, after, limit)
+        after_next = page[-1].seq if len(page) >= limit else None
+        content = _encode(
+            {"records": [msgspec.Raw(record_of(each)) for each in page], "next": after_next}
+        )
+        return Response(content, media_type="application/json")
+
+    @routes.get("/{run}/mission")
+    async def mission(_: Viewer, run: str) -> RunMissionModel:
+        """What a run executes, as it was when it began."""
+        summary = await find_run(control, run)
+        found = await control.mission(run)
+        files = [
+            FileModel(
+                name=each.name, qualifier=each.qualifier, xml=await shown(control, each.source)
+            )
+            for each in found.files()
+        ]
+        return RunMissionModel(name=found.file, process=summary.process, files=files)
+
+    return routes
+
+
+async def file_models(control: MissionControl, files: Iterable[MissionFile]) -> list[FileModel]:
+    """Files as the page can draw them."""
+    return [
+        FileModel(name=each.name, qualifier=each.qualifier, xml=await shown(control, each.source))
+        for each in files
+    ]

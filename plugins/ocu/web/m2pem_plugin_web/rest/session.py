@@ -1,0 +1,83 @@
+"""/api/session: who one is here, and what this executive moves; signing in and out."""
+
+import math
+from importlib.metadata import version
+from typing import Annotated
+
+from fastapi import APIRouter, Request, Response
+from pydantic import BaseModel, Field
+
+from m2pem.api import MissionControl
+from m2pem_plugin_web.access.entry import Entry, ThrottledError
+from m2pem_plugin_web.access.passwords import LONGEST
+from m2pem_plugin_web.access.people import Person, Role, Viewer
+from m2pem_plugin_web.pages import set_cookie
+from m2pem_plugin_web.problems import RESPONSES, ProblemError
+from m2pem_plugin_web.rest.models import Body, Name
+from m2pem_plugin_web.settings import Settings
+
+
+class SessionModel(BaseModel):
+    """Who asks, and where they are."""
+
+    user: str
+    role: Role
+    fleet: str
+    simulated: bool
+    version: str
+    missions_folder: str
+
+
+class SignInModel(Body):
+    """A named user."""
+
+    name: Name
+    password: Annotated[str, Field(max_length=LONGEST)]
+
+
+def router(control: MissionControl, settings: Settings, entry: Entry) -> APIRouter:
+    """The routes of a session."""
+    routes = APIRouter(prefix="/api/session", tags=["session"], responses=RESPONSES)
+    installed = version("m2pem")
+
+    def session_of(person: Person) -> SessionModel:
+        return SessionModel(
+            user=person.name,
+            role=person.role,
+            fleet=control.fleet().name,
+            simulated=control.simulated(),
+            version=installed,
+            missions_folder=str(settings.missions),
+        )
+
+    @routes.get("")
+    async def session(person: Viewer) -> SessionModel:
+        """Who one is, and what this executive moves."""
+        return session_of(person)
+
+    @routes.post("")
+    async def sign_in(request: Request, response: Response, wanted: SignInModel) -> SessionModel:
+        """Sign in, with a name and its password."""
+        if not entry.by_name:
+            raise ProblemError(
+                401, "no users are named here: open the address that `m2pem web url` prints"
+            )
+        address = request.client.host if request.client else ""
+        try:
+            found = await entry.sign_in(wanted.name, wanted.password, address)
+        except ThrottledError as error:
+            wait = {"Retry-After": str(math.ceil(error.wait_s))}
+            raise ProblemError(429, str(error), headers=wait) from None
+        if found is None:
+            raise ProblemError(401, "the name or the password is wrong")
+        person, key = found
+        set_cookie(response, entry, key)
+        return session_of(person)
+
+    @routes.delete("", status_code=204)
+    async def sign_out(request: Request, response: Response, _: Viewer) -> None:
+        """Sign out: the cookie is worth nothing any more."""
+        entry.leave(request.cookies)
+        response.delete_cookie(entry.cookie, path="/")
+
+    return routes
