@@ -5,7 +5,7 @@ import type { EditorContext } from "../panel";
 import { frameAt, type Frame } from "./walk";
 import type { Verification } from "./verification";
 
-const LAYER = "m2v-walk";
+const LAYER = "verification";
 const UNREACHED = "m2v-unreached";
 const OVERLAYS = "m2v-step";
 const HATCH = "m2v-hatch";
@@ -42,15 +42,13 @@ function followChanges(editor: EditorContext, verification: Verification): () =>
 
 function draw(editor: EditorContext, verification: Verification): void {
   const old = verification.isStale.value ? " m2v-old" : "";
-  const marked = (classes: Record<string, string>) =>
-    Object.fromEntries(Object.entries(classes).map(([id, names]) => [id, names + old]));
-  const made = verification.made.value;
   const violation = verification.opened.value;
   const frame = violation && frameAt(violation, verification.step.value);
-  const unreached = made?.report.unreached ?? [];
+  const unreached = verification.made.value?.report.unreached ?? [];
   if (unreached.length > 0) provideHatch(editor);
-  editor.mark(UNREACHED, marked(Object.fromEntries(unreached.map((id) => [id, UNREACHED]))));
-  editor.mark(LAYER, marked(frame?.classes ?? {}));
+  const classes = new Map(Object.entries(frame?.classes ?? {}));
+  for (const id of unreached) classes.set(id, `${classes.get(id) ?? ""} ${UNREACHED}`.trim());
+  editor.mark(LAYER, Object.fromEntries([...classes].map(([id, names]) => [id, names + old])));
   editor.service("overlays").remove({ type: OVERLAYS });
   if (violation && frame) showBadges(editor, frame, violation.text, old);
 }
