@@ -10,7 +10,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/*/pyproject.toml))
 JS := tests/js
-DEBIAN_PACKAGES := nodejs npm spin tcc tmux
+UI := plugins/ocu/web/ui
+UI_SOURCES := $(shell find $(UI) -path $(UI)/node_modules -prune -o -type f -print)
+PAGE := plugins/ocu/web/m2pem_plugin_web/static/index.html
+DEBIAN_PACKAGES := chromium nodejs npm spin tcc tmux
 
 # An environment holds absolute paths: one made elsewhere, or by another Python, is made anew.
 INSTALLED := $(VENV)/installed
@@ -19,14 +22,14 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages demo demo-air demo-ros demo-ros-vehicle demo-ros-team demo-team
+.PHONY: help setup python-packages npm-packages page demo demo-air demo-ros demo-ros-vehicle demo-ros-team demo-team
 .PHONY: test test-long test-ros fuzz lint format docs pictures
 .PHONY: bench bench-quick conformance clean ros
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 12
 
-setup: python-packages npm-packages ## make .venv and install all that the demo and the tests need
+setup: python-packages npm-packages page ## make .venv and install all that the demo and the tests need
 
 python-packages: $(INSTALLED)
 
@@ -40,10 +43,10 @@ $(INSTALLED): pyproject.toml constraints.txt $(PLUGINS:%=%/pyproject.toml)
 	  --quiet --disable-pip-version-check --editable '.[dev,docs]' $(PLUGINS:%=--editable %)
 	@echo '$(IDENTITY)' > $@
 
-# The tests of what BPMN editors see need Node.js, those of the terminal unit tmux, and those of
-# verification Spin and a C compiler; nothing else does, so their absence stops nothing.
+# The tests of what BPMN editors see need Node.js, those of the terminal unit tmux, those of the web page
+# Chromium, and those of verification Spin and a C compiler; nothing else does, so their absence stops nothing.
 npm-packages:
-	@{ command -v npm && command -v tmux && command -v spin && command -v tcc; } >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && { \
+	@{ command -v npm && command -v chromium && command -v tmux && command -v spin && command -v tcc; } >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && { \
 	  echo "Installing Debian packages: $(DEBIAN_PACKAGES)"; \
 	  apt-get update -qq && apt-get install -y -qq $(DEBIAN_PACKAGES) >/dev/null; }; } || true
 	@if command -v npm >/dev/null; then $(MAKE) --silent $(JS)/node_modules/.package-lock.json; \
@@ -53,6 +56,14 @@ $(JS)/node_modules/.package-lock.json: $(JS)/package-lock.json $(JS)/.npmrc
 	@echo "Installing the npm packages of $(JS)"
 	@cd $(JS) && npm ci --loglevel=error >/dev/null
 	@touch $@
+
+# Built when the package was installed, and again when it has changed since.
+page: python-packages $(PAGE)
+
+$(PAGE): $(UI_SOURCES)
+	@command -v npm >/dev/null || { echo "The web page has changed; building it needs Node.js with npm" >&2; exit 1; }
+	@echo "Building the web page"
+	@cd $(UI) && npm ci --loglevel=error >/dev/null && npm run --silent build -- --logLevel warn
 
 # The wheels of ROS make every Python of their environment start twice (docs/ros.md): they get one of their own.
 ROS := .venv-ros
@@ -186,12 +197,14 @@ lint: setup ## check style, types and layers
 	@$(BIN)/mypy
 	@for plugin in $(PLUGINS); do $(BIN)/mypy $$plugin/m2pem_plugin_*; done
 	@$(BIN)/lint-imports
+	@cd $(UI) && npm run --silent check
 
 format: setup ## put the code into shape
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
 test: lint bench-quick ## check all but the long tests
+	@cd $(UI) && npm run --silent test
 	@$(BIN)/pytest -n 2 -m "not long"
 	@$(MAKE) --silent test-ros
 
@@ -230,6 +243,6 @@ $(PEERS)/installed: tests/conformance/spiffworkflow.txt
 	@touch $@
 
 clean: ## remove all that can be made again
-	@rm -rf $(VENV) $(ROS) $(PEERS) $(JS)/node_modules build dist site
+	@rm -rf $(VENV) $(ROS) $(PEERS) $(JS)/node_modules $(UI)/node_modules $(dir $(PAGE)) build dist site
 	@rm -rf .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache .coverage
 	@find . -name __pycache__ -prune -exec rm -rf {} +

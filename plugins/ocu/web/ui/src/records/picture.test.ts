@@ -45,6 +45,21 @@ describe("picture", () => {
     expect(after(14)).toMatchObject({ status: "failed", detail: "nobody caught BLOCKED", t: 9 });
   });
 
+  it("counts instances, not the token around them", () => {
+    const picture = emptyPicture();
+    const at = { run: "r1", t: 1, process: "P", element: "Each" };
+    fold(picture, { ...at, seq: 1, record: "TokenEntered", token: 1 });
+    fold(picture, { ...at, seq: 2, record: "ScopeOpened", scope: 2, token: 1, instances: 2 });
+    expect(picture.elements.P!.Each).toMatchObject({ active: 0, hits: 0 });
+    fold(picture, { ...at, seq: 3, record: "TokenEntered", token: 2, instance: 0 });
+    fold(picture, { ...at, seq: 4, record: "TokenEntered", token: 3, instance: 1 });
+    expect(picture.elements.P!.Each).toMatchObject({ active: 2, hits: 2 });
+    for (const [seq, token] of [[5, 2], [6, 3], [7, 1]] as const) {
+      fold(picture, { ...at, seq, record: "TokenLeft", token, outcome: "completed" });
+    }
+    expect(picture.elements.P!.Each).toMatchObject({ active: 0, hits: 2 });
+  });
+
   it("changes nothing for a record that it knows", () => {
     const picture = after(6);
     fold(picture, RECORDS[5]!);

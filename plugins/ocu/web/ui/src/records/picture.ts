@@ -17,6 +17,8 @@ export interface Picture {
   commands: Map<string, Command>;
   holders: Map<string, string>;
   tokens: Map<number, Token>;
+  /** Tokens that wait on an activity around its instances; they are none of them. */
+  around: Set<number>;
 }
 
 export function emptyPicture(): Picture {
@@ -30,6 +32,7 @@ export function emptyPicture(): Picture {
     commands: new Map(),
     holders: new Map(),
     tokens: new Map(),
+    around: new Set(),
   };
 }
 
@@ -47,6 +50,7 @@ export function copy(picture: Picture): Picture {
     commands: new Map(picture.commands),
     holders: new Map(picture.holders),
     tokens: new Map(picture.tokens),
+    around: new Set(picture.around),
   };
 }
 
@@ -73,10 +77,12 @@ const CHANGES: Record<string, (picture: Picture, record: RunRecord) => void> = {
     picture.status = text(record, "outcome") as RunStatus;
     picture.detail = text(record, "detail");
     for (const token of [...picture.tokens.keys()]) leave(picture, token, record.t, "terminated");
+    for (const prompt of [...picture.prompts.keys()]) closePrompt(picture, prompt, record.t);
   },
   TokenEntered: (picture, record) => enter(picture, record),
   TokenLeft: (picture, record) =>
     leave(picture, record.token ?? 0, record.t, text(record, "outcome")),
+  ScopeOpened: (picture, record) => surround(picture, record),
   BehaviorRequested: (picture, record) => {
     picture.commands.set(text(record, "behavior"), {
       name: text(record, "name"),
@@ -92,10 +98,12 @@ const CHANGES: Record<string, (picture: Picture, record: RunRecord) => void> = {
   PromptOpened: (picture, record) => {
     const prompt = promptOf(record);
     picture.prompts.set(prompt.prompt, prompt);
-    stateOf(picture, prompt.process, prompt.element).asking = true;
+    const state = stateOf(picture, prompt.process, prompt.element);
+    state.asking = true;
+    state.last = record.t;
   },
-  PromptAnswered: (picture, record) => closePrompt(picture, text(record, "prompt")),
-  PromptWithdrawn: (picture, record) => closePrompt(picture, text(record, "prompt")),
+  PromptAnswered: (picture, record) => closePrompt(picture, text(record, "prompt"), record.t),
+  PromptWithdrawn: (picture, record) => closePrompt(picture, text(record, "prompt"), record.t),
   OperatorTookControl: (picture, record) => {
     picture.holders.set(text(record, "resource"), text(record, "by"));
   },
@@ -131,19 +139,32 @@ function leave(picture: Picture, token: number, t: number, outcome: string): voi
   if (!at) return;
   picture.tokens.delete(token);
   const state = stateOf(picture, at.process, at.element);
-  state.active = Math.max(0, state.active - 1);
+  if (!picture.around.delete(token)) state.active -= 1;
   state.last = t;
   state.failed = outcome === "failed";
 }
 
-function closePrompt(picture: Picture, prompt: string): void {
+/** Instances of an activity are counted in the place of the token that waits around them. */
+function surround(picture: Picture, record: RunRecord): void {
+  const { token, process = "", element = "", instances } = record;
+  if (instances === undefined || instances === null || token === undefined) return;
+  if (!picture.tokens.has(token)) return;
+  picture.around.add(token);
+  const state = stateOf(picture, process, element);
+  state.active -= 1;
+  state.hits -= 1;
+}
+
+function closePrompt(picture: Picture, prompt: string, t: number): void {
   const closed = picture.prompts.get(prompt);
   if (!closed) return;
   picture.prompts.delete(prompt);
   const others = [...picture.prompts.values()];
-  stateOf(picture, closed.process, closed.element).asking = others.some(
+  const state = stateOf(picture, closed.process, closed.element);
+  state.asking = others.some(
     (other) => other.process === closed.process && other.element === closed.element,
   );
+  state.last = t;
 }
 
 function stateOf(picture: Picture, process: string, element: string): ElementState {

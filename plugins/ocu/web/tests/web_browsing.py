@@ -1,0 +1,80 @@
+"""A real browser, and what went wrong in it."""
+
+import shutil
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+
+from playwright.async_api import Browser, BrowserContext, ConsoleMessage, Page, async_playwright
+
+# Nothing leaves this machine: neither updates nor the experiments of the browser's maker.
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+TIMEOUT_MS = 30_000
+
+
+def chromium() -> str:
+    """The browser of this machine; the tests fail where there is none."""
+    program = shutil.which("chromium") or shutil.which("chromium-browser")
+    assert program, "these tests need Chromium: apt-get install chromium"
+    return program
+
+
+@asynccontextmanager
+async def browser() -> AsyncIterator[Browser]:
+    """Started and ended."""
+    async with async_playwright() as playwright:
+        started = await playwright.chromium.launch(
+            executable_path=chromium(), args=ARGUMENTS, headless=True
+        )
+        try:
+            yield started
+        finally:
+            await started.close()
+
+
+@dataclass(slots=True)
+class Watched:
+    """A page, and all that it complained about: errors that nobody caught, and on the console."""
+
+    page: Page
+    context: BrowserContext
+    complaints: list[str] = field(default_factory=list)
+
+    def assert_well(self) -> None:
+        """Nothing was complained about."""
+        assert self.complaints == []
+
+
+@asynccontextmanager
+async def page_at(
+    started: Browser, url: str, *, width: int = 1440, height: int = 900, dark: bool = False
+) -> AsyncIterator[Watched]:
+    """A page of its own profile, so of its own operator, at an address."""
+    context = await started.new_context(
+        viewport={"width": width, "height": height},
+        color_scheme="dark" if dark else "light",
+        accept_downloads=True,
+    )
+    context.set_default_timeout(TIMEOUT_MS)
+    page = await context.new_page()
+    watched = Watched(page, context)
+
+    def on_console(message: ConsoleMessage) -> None:
+        if message.type == "error":
+            watched.complaints.append(message.text)
+
+    page.on("console", on_console)
+    page.on("pageerror", lambda error: watched.complaints.append(str(error)))
+    try:
+        await page.goto(url)
+        yield watched
+    finally:
+        await context.close()

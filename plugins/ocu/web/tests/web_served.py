@@ -1,0 +1,90 @@
+"""`m2pem serve --ocu web` as a process of its own, as people start it."""
+
+import os
+import re
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import urlsplit
+
+REPOSITORY = Path(__file__).parents[4]
+FLEET = REPOSITORY / "fleet_configs" / "vignette1.yaml"
+STARTS_WITHIN_S = 60
+ENDS_WITHIN_S = 30
+
+_URL = re.compile(r"https?://\S+")
+
+
+@dataclass(slots=True)
+class Served:
+    """An executive with a page. `url`: what it printed, with the token that works once."""
+
+    process: subprocess.Popen[str]
+    url: str
+    missions: Path
+    printed: list[str]
+
+    @property
+    def origin(self) -> str:
+        """Of the page: scheme, host and port."""
+        parts = urlsplit(self.url)
+        return f"{parts.scheme}://{parts.netloc}"
+
+    def end(self) -> int:
+        """Ctrl-C, so to say; what the process ended with."""
+        self.process.terminate()
+        return self.process.wait(ENDS_WITHIN_S)
+
+
+@contextmanager
+def served(
+    folder: Path,
+    *,
+    fleet: Path = FLEET,
+    words: Sequence[str] = ("--simulate", "--speed", "1", "--journal", "memory:"),
+    environment: Mapping[str, str] | None = None,
+) -> Iterator[Served]:
+    """Start it, with its missions in `folder`/missions, and end it."""
+    missions = folder / "missions"
+    missions.mkdir(exist_ok=True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "m2pem", "serve", "--fleet", str(fleet), "--ocu", "web", *words],
+        cwd=folder,
+        env={
+            **os.environ,
+            "M2PEM_OPERATOR": "anna",
+            "M2PEM_WEB_PORT": "0",
+            "M2PEM_WEB_MISSIONS": str(missions),
+            **(environment or {}),
+        },
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    printed: list[str] = []
+    said = threading.Event()
+
+    def read() -> None:
+        assert process.stdout is not None
+        for line in process.stdout:
+            printed.append(line)
+            if _URL.search(line):
+                said.set()
+        said.set()
+
+    reading = threading.Thread(target=read, daemon=True)
+    reading.start()
+    try:
+        assert said.wait(STARTS_WITHIN_S), "".join(printed)
+        urls = _URL.findall("".join(printed))
+        assert urls, "".join(printed)
+        yield Served(process, urls[0], missions, printed)
+    finally:
+        process.kill()
+        process.wait()
+        reading.join()

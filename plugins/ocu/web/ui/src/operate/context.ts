@@ -1,0 +1,41 @@
+// What all parts of the page look at together.
+import { signal, type Signal } from "@preact/signals";
+import { createContext } from "preact";
+import { useContext } from "preact/hooks";
+import type { Fleet, Geometry } from "../shared/types";
+import type { MissionModel } from "./mission/missionModel";
+import type { Scene } from "./scene/scene";
+
+export interface Place {
+  process: string;
+  element: string;
+}
+
+export interface OperateContext {
+  scene: Scene;
+  mission: MissionModel;
+  fleet: Fleet;
+  geometries: Signal<Geometry[]>;
+  /** The element that everybody looks at; `show`: bring it into view. */
+  selected: Signal<(Place & { show: boolean }) | null>;
+  /** A vehicle that the map follows; "": none. */
+  followed: Signal<string>;
+  /** A vehicle that the map shows, once; a new object each time. */
+  centred: Signal<{ resource: string } | null>;
+}
+
+const Operating = createContext<OperateContext | null>(null);
+
+export const OperatingProvider = Operating.Provider;
+
+export function useOperating(): OperateContext {
+  const found = useContext(Operating);
+  if (!found) throw new Error("there is no run around this");
+  return found;
+}
+
+export function operateContext(
+  parts: Pick<OperateContext, "scene" | "mission" | "fleet" | "geometries">,
+): OperateContext {
+  return { ...parts, selected: signal(null), followed: signal(""), centred: signal(null) };
+}

@@ -1,0 +1,205 @@
+// One diagram of a file as bpmn-js draws it, with the states of its elements.
+import NavigatedViewer from "bpmn-js/lib/NavigatedViewer";
+import type Canvas from "diagram-js/lib/core/Canvas";
+import type ElementRegistry from "diagram-js/lib/core/ElementRegistry";
+import type EventBus from "diagram-js/lib/core/EventBus";
+import type { ElementLike, RootLike, ShapeLike } from "diagram-js/lib/core/Types";
+import type { Point } from "diagram-js/lib/util/Types";
+import type { ElementState } from "../../shared/types";
+import { processOf, type Element } from "../mission/moddle";
+import { keyIn, keyOf, qualified } from "../mission/names";
+import { Badges } from "./badges";
+import { lookOf, type Look, type Palette } from "./colours";
+import { Painter, type Outline, type Window } from "./painter";
+
+interface Figure {
+  key: string;
+  id: string;
+  root: RootLike | undefined;
+  outline: Outline;
+  gfx: SVGElement;
+  look: Look;
+  left_ms: number;
+}
+
+export interface DrawingListener {
+  chosen(process: string, element: string): void;
+  /** The user went into or out of a collapsed subprocess. */
+  wentTo(root: string): void;
+}
+
+/** The middle of what is seen; its type does not know that. */
+const MIDDLE = "auto" as unknown as Point;
+
+const LOOKS: Look[] = ["active", "asking", "failed", "done"];
+
+export class Drawing {
+  private readonly figures = new Map<string, Figure>();
+  private root: RootLike | undefined;
+  private selected: SVGElement | undefined;
+  private readonly badges = new Badges();
+  private readonly observer: ResizeObserver;
+
+  private constructor(
+    private readonly viewer: NavigatedViewer,
+    private readonly host: HTMLElement,
+    private readonly painter: Painter,
+    qualifier: string,
+    listener: DrawingListener,
+  ) {
+    this.index(qualifier);
+    this.root = this.canvas.getRootElement();
+    const bus = viewer.get<EventBus>("eventBus");
+    bus.on("canvas.viewbox.changing", () => this.follow());
+    bus.on("canvas.viewbox.changed", () => this.follow());
+    bus.on("root.set", () => {
+      this.root = this.canvas.getRootElement();
+      this.paintAll();
+      listener.wentTo(this.root.id);
+    });
+    bus.on<{ element: ElementLike }>("element.click", ({ element }) => {
+      const about = element.businessObject as Element | undefined;
+      if (!about?.$instanceOf("bpmn:FlowNode")) return;
+      listener.chosen(qualified(qualifier, processOf(about)), qualified(qualifier, about.id));
+    });
+    this.observer = new ResizeObserver(() => this.resized());
+    this.observer.observe(host);
+  }
+
+  static async open(
+    host: HTMLElement,
+    file: { xml: string; qualifier: string },
+    diagram: string,
+    palette: Palette,
+    fading_ms: number,
+    listener: DrawingListener,
+  ): Promise<Drawing> {
+    const viewer = new NavigatedViewer({ container: host });
+    await viewer.importXML(file.xml, diagram);
+    const canvas = document.createElement("canvas");
+    canvas.className = "glow";
+    host.querySelector(".djs-container")!.append(canvas);
+    const painter = new Painter(canvas, { x: 0, y: 0, scale: 1 }, palette, fading_ms);
+    const drawing = new Drawing(viewer, host, painter, file.qualifier, listener);
+    drawing.resized();
+    drawing.fit();
+    return drawing;
+  }
+
+  dispose(): void {
+    this.observer.disconnect();
+    this.badges.dispose();
+    this.painter.dispose();
+    this.viewer.destroy();
+  }
+
+  show(palette: Palette, fading_ms: number): void {
+    this.painter.show(palette, fading_ms);
+  }
+
+  /** Which of the roots in this drawing is seen: the diagram, or the inside of a subprocess. */
+  enter(root: string): void {
+    if (this.root?.id === root) return;
+    const found = this.canvas.getRootElements().find(({ id }) => id === root);
+    if (!found) return;
+    this.canvas.setRootElement(found);
+    this.fit();
+  }
+
+  fit(): void {
+    if (this.host.clientWidth === 0) return;
+    this.canvas.zoom("fit-viewport", MIDDLE);
+    const viewbox = this.canvas.viewbox();
+    if (viewbox.scale > 1.25) this.canvas.zoom(1.25, MIDDLE);
+  }
+
+  zoom(factor: number): void {
+    this.canvas.zoom(this.canvas.zoom() * factor, MIDDLE);
+  }
+
+  /** `age_ms`: how long ago an element was left, for one that is told of late. */
+  set(process: string, element: string, state: ElementState, passed: boolean, age_ms: number): void {
+    const figure = this.figures.get(keyOf(process, element));
+    if (!figure) return;
+    const look = lookOf(state);
+    // What came and went between two frames is seen fading, at least.
+    if (look === "done" && (passed || figure.look !== "done")) {
+      figure.left_ms = performance.now() - age_ms;
+    }
+    if (look !== figure.look) this.mark(figure, look);
+    this.badges.set(figure.key, figure.gfx, figure.outline, state);
+    this.paint(figure);
+  }
+
+  select(process: string, element: string, scroll: boolean): void {
+    this.selected?.classList.remove("m2-selected");
+    const figure = this.figures.get(keyOf(process, element));
+    this.selected = figure?.gfx;
+    if (!figure) return;
+    figure.gfx.classList.add("m2-selected");
+    if (scroll) this.canvas.scrollToElement(figure.id, 60);
+  }
+
+  unselect(): void {
+    this.selected?.classList.remove("m2-selected");
+    this.selected = undefined;
+  }
+
+  private get canvas(): Canvas {
+    return this.viewer.get<Canvas>("canvas");
+  }
+
+  private index(qualifier: string): void {
+    const registry = this.viewer.get<ElementRegistry>("elementRegistry");
+    registry.forEach((element, gfx) => {
+      const about = element.businessObject as Element | undefined;
+      if (!isShape(element) || !about?.$instanceOf("bpmn:FlowNode")) return;
+      const key = keyIn(qualifier, about);
+      const root = this.canvas.findRoot(element);
+      const outline = outlineOf(element, about);
+      this.figures.set(key, { key, id: element.id, root, outline, gfx, look: "idle", left_ms: 0 });
+    });
+  }
+
+  private mark(figure: Figure, look: Look): void {
+    for (const other of LOOKS) figure.gfx.classList.toggle(`m2-${other}`, other === look);
+    figure.look = look;
+  }
+
+  private paint({ key, root, outline, look, left_ms }: Figure): void {
+    if (root === this.root) this.painter.set(key, { outline, look, left_ms });
+  }
+
+  private paintAll(): void {
+    this.painter.clear();
+    for (const figure of this.figures.values()) this.paint(figure);
+  }
+
+  private follow(): void {
+    const { x, y, scale } = this.canvas.viewbox() as Window;
+    this.painter.look({ x, y, scale });
+  }
+
+  private resized(): void {
+    const { clientWidth, clientHeight } = this.host;
+    if (clientWidth === 0 || clientHeight === 0) return;
+    this.canvas.resized();
+    this.painter.resize(clientWidth, clientHeight);
+    this.follow();
+  }
+}
+
+const isShape = (element: ElementLike): element is ShapeLike =>
+  !("waypoints" in element) && element.type !== "label" && "width" in element;
+
+function outlineOf(shape: ShapeLike, about: Element): Outline {
+  const { x = 0, y = 0, width = 0, height = 0 } = shape;
+  const above = about.$instanceOf("bpmn:BoundaryEvent");
+  return { x, y, width, height, kind: kindOf(shape, about), above };
+}
+
+function kindOf(shape: ShapeLike, about: Element): Outline["kind"] {
+  if (about.$instanceOf("bpmn:Event")) return "circle";
+  if (about.$instanceOf("bpmn:Gateway")) return "diamond";
+  return about.$instanceOf("bpmn:SubProcess") && !shape.collapsed ? "frame" : "box";
+}

@@ -1,0 +1,77 @@
+// Where the parts of the page are: beside each other where there is room, behind tabs on a tablet.
+import { useEffect, useState } from "preact/hooks";
+import { Split } from "../../shared/Split";
+import { Tabs } from "../../shared/Tabs";
+import { strings } from "../../strings";
+import { DiagramPane } from "../diagram/DiagramPane";
+import { LogPane } from "../log/LogPane";
+import { MapPane } from "../map/MapPane";
+import { OutlinePane } from "../outline/OutlinePane";
+import { TimelinePane } from "../timeline/TimelinePane";
+import { VehiclesPane } from "../vehicles/VehiclesPane";
+
+const text = strings.operate.panes;
+
+const WIDE = "(width >= 1180px)";
+
+export function Layout({ onSeek }: { onSeek?: ((t: number) => void) | undefined }) {
+  const wide = useMedia(WIDE);
+  return <div class="panes">{wide ? <Wide onSeek={onSeek} /> : <Narrow onSeek={onSeek} />}</div>;
+}
+
+type Parts = { onSeek: ((t: number) => void) | undefined };
+
+function Wide({ onSeek }: Parts) {
+  return (
+    <Split name="bottom" direction="column" initial={68} label={`${text.resize}: ${text.bottom}`}>
+      <Split name="right" direction="row" initial={64} label={`${text.resize}: ${text.right}`}>
+        <Split name="left" direction="row" initial={24} label={`${text.resize}: ${text.outline}`}>
+          <OutlinePane />
+          <DiagramPane />
+        </Split>
+        <Split name="map" direction="column" initial={54} label={`${text.resize}: ${text.map}`}>
+          <MapPane />
+          <VehiclesPane />
+        </Split>
+      </Split>
+      <Split name="log" direction="row" initial={58} label={`${text.resize}: ${text.log}`}>
+        <TimelinePane onSeek={onSeek} />
+        <LogPane />
+      </Split>
+    </Split>
+  );
+}
+
+function Narrow({ onSeek }: Parts) {
+  return (
+    <Split name="narrow" direction="column" initial={52} label={text.resize}>
+      <Tabs
+        label={text.left}
+        tabs={[
+          { id: "diagram", title: text.diagram, render: () => <DiagramPane /> },
+          { id: "outline", title: text.outline, render: () => <OutlinePane /> },
+        ]}
+      />
+      <Tabs
+        label={text.right}
+        tabs={[
+          { id: "map", title: text.map, render: () => <MapPane /> },
+          { id: "vehicles", title: text.vehicles, render: () => <VehiclesPane /> },
+          { id: "timeline", title: text.timeline, render: () => <TimelinePane onSeek={onSeek} /> },
+          { id: "log", title: text.log, render: () => <LogPane /> },
+        ]}
+      />
+    </Split>
+  );
+}
+
+function useMedia(query: string): boolean {
+  const [matches, setMatches] = useState(() => matchMedia(query).matches);
+  useEffect(() => {
+    const media = matchMedia(query);
+    const renew = () => setMatches(media.matches);
+    media.addEventListener("change", renew);
+    return () => media.removeEventListener("change", renew);
+  }, [query]);
+  return matches;
+}

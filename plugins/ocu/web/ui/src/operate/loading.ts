@@ -1,0 +1,74 @@
+// What has to be read before a run or rehearsal can be shown.
+import { signal, type Signal } from "@preact/signals";
+import { get } from "../shared/api";
+import type { Fleet, Geometry, RunRecord, RunSummary } from "../shared/types";
+import { readDefinitions } from "./mission/moddle";
+import { missionModel, type MissionModel } from "./mission/missionModel";
+import type { Page } from "./scene/recordFeed";
+import { ReplayScene } from "./scene/replayScene";
+import type { TelemetrySample } from "./scene/telemetryTrack";
+
+export type Source = { kind: "run"; run: string } | { kind: "rehearsal"; id: string };
+
+export interface Stage {
+  mission: MissionModel;
+  fleet: Fleet;
+  geometries: Signal<Geometry[]>;
+}
+
+interface MissionAnswer {
+  name: string;
+  process: string;
+  files: { name: string; qualifier?: string; xml: string }[];
+}
+
+const PAGE = 5000;
+
+export const pathOf = (source: Source): string =>
+  source.kind === "run"
+    ? `/runs/${encodeURIComponent(source.run)}`
+    : `/rehearsals/${encodeURIComponent(source.id)}`;
+
+export async function loadStage(source: Source): Promise<Stage> {
+  const [answer, fleet, geometries] = await Promise.all([
+    get<MissionAnswer>(`${pathOf(source)}/mission`),
+    get<Fleet>("/fleet"),
+    get<Geometry[]>("/geometries"),
+  ]);
+  const sources = await Promise.all(
+    answer.files.map(async ({ name, qualifier = "", xml }) => {
+      return { name, qualifier, xml, definitions: await readDefinitions(xml) };
+    }),
+  );
+  return { mission: missionModel(sources, answer.process), fleet, geometries: signal(geometries) };
+}
+
+/** All records, page by page; `progress` is told how many there are so far. */
+export async function loadRecords(
+  source: Source,
+  progress: (count: number) => void,
+): Promise<RunRecord[]> {
+  const records: RunRecord[] = [];
+  let after: number | null = 0;
+  while (after !== null) {
+    const page: Page = await get(`${pathOf(source)}/records?after=${after}&limit=${PAGE}`);
+    for (const record of page.records) records.push(record);
+    progress(records.length);
+    after = page.next;
+  }
+  return records;
+}
+
+export async function loadReplay(
+  source: Source,
+  summary: RunSummary,
+  progress: (count: number) => void,
+): Promise<ReplayScene> {
+  const [records, telemetry] = await Promise.all([
+    loadRecords(source, progress),
+    source.kind === "rehearsal"
+      ? get<TelemetrySample[]>(`${pathOf(source)}/telemetry`)
+      : Promise.resolve([]),
+  ]);
+  return new ReplayScene(source.kind === "run" ? source.run : "", summary, records, telemetry);
+}

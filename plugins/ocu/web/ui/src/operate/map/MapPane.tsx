@@ -1,0 +1,134 @@
+// Where everybody is; and routes, areas and points, which operators draw for the mission.
+import { useSignal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { get, put } from "../../shared/api";
+import { remember, remembered } from "../../shared/memory";
+import { may, session } from "../../shared/session";
+import { attempt, toast } from "../../shared/Toasts";
+import { fill, strings } from "../../strings";
+import type { Geometry } from "../../shared/types";
+import { useOperating } from "../context";
+import { Pane } from "../layout/Pane";
+import { STALE_S } from "../vehicles/VehiclesPane";
+import { workOf } from "../vehicles/work";
+import { DrawForm } from "./DrawForm";
+import { added, draftOf, emptyDraft, geometryOf, moved, type Draft, type Kind } from "./draft";
+import { MapTools, type MapShows } from "./MapTools";
+import { MapView } from "./mapView";
+import "leaflet/dist/leaflet.css";
+import "./map.css";
+
+const text = strings.operate.map;
+
+const SHOWS: MapShows = { trails: true, names: true, footprints: true, geometries: true };
+const AGES_MS = 500;
+
+export function MapPane() {
+  const { scene, fleet, geometries, followed, centred, selected } = useOperating();
+  const host = useRef<HTMLDivElement>(null);
+  const view = useRef<MapView>();
+  const draft = useSignal<Draft | null>(null);
+  const shows = useSignal<MapShows>({ ...SHOWS, ...remembered<Partial<MapShows>>("map", {}) });
+  const positions = scene.mode === "live" || Object.keys(scene.vehicles.value).length > 0;
+
+  useEffect(() => {
+    const made = new MapView(host.current!, fleet, session.peek()?.tiles, {
+      chosen: (resource) => {
+        const [work] = workOf(resource, scene.commands.peek());
+        if (work) selected.value = { ...work.command, show: true };
+      },
+      clicked: (vertex) => {
+        if (draft.value) draft.value = added(draft.value, vertex);
+      },
+      dragged: (index, { latitude, longitude }) => {
+        if (draft.value) draft.value = moved(draft.value, index, { latitude, longitude });
+      },
+      moved: () => (followed.value = ""),
+    });
+    view.current = made;
+    let fitted = false;
+    const stops = [
+      geometries.subscribe((now) => {
+        made.showGeometries(now);
+        if (!fitted) made.fitAll();
+      }),
+      scene.vehicles.subscribe((states) => {
+        made.vehicles.vehicles(states);
+        if (!fitted && made.vehicles.positions().length > 0) {
+          made.fitAll();
+          fitted = true;
+        }
+        if (followed.value) made.follow(followed.value);
+      }),
+      scene.payloads.subscribe((states) => made.vehicles.payloads(states)),
+      followed.subscribe((resource) => made.centre(resource)),
+      centred.subscribe((wanted) => wanted && made.centre(wanted.resource)),
+      draft.subscribe((now) => made.draw(now)),
+      shows.subscribe((now) => {
+        made.vehicles.show(now);
+        made.turnGeometries(now.geometries);
+        remember("map", now);
+      }),
+    ];
+    const aging = setInterval(() => {
+      made.vehicles.ages((resource) => (scene.silentFor_s(resource) ?? Infinity) > STALE_S);
+    }, AGES_MS);
+    return () => {
+      clearInterval(aging);
+      for (const stop of stops) stop();
+      made.dispose();
+    };
+  }, [scene, fleet]);
+
+  const save = async (runOnly: boolean) => {
+    const drawn = draft.value;
+    if (!drawn) return;
+    const body = { geometry: geometryOf(drawn), ...(runOnly ? { run: scene.run } : {}) };
+    const path = `/geometries/${encodeURIComponent(drawn.name)}`;
+    if (!(await attempt(() => put(path, body)))) return;
+    toast(fill(text.saved, { name: drawn.name }), "good");
+    draft.value = null;
+    await attempt(async () => (geometries.value = await get<Geometry[]>("/geometries")));
+  };
+
+  return (
+    <Pane
+      title={strings.operate.panes.map}
+      class="map-pane"
+      tools={
+        <MapTools
+          fleet={fleet}
+          followed={followed}
+          shows={shows}
+          geometries={geometries.value}
+          mayDraw={may("operator") && draft.value === null}
+          onFit={() => view.current?.fitAll()}
+          onDraw={(kind: Kind) => (draft.value = emptyDraft(kind))}
+          onEdit={(geometry) => (draft.value = draftOf(geometry))}
+        />
+      }
+    >
+      <div
+        ref={host}
+        class="map"
+        role="application"
+        aria-label={text.label}
+        onKeyDown={(event) => {
+          if (!draft.value) return;
+          if (event.key === "Escape" && !event.shiftKey) draft.value = null;
+        }}
+      />
+      {draft.value && (
+        <DrawForm
+          draft={draft.value}
+          run={scene.mode === "live" ? scene.run : ""}
+          onChange={(now) => (draft.value = now)}
+          onSave={(runOnly) => void save(runOnly)}
+          onCancel={() => (draft.value = null)}
+          middle={() => view.current!.middle()}
+        />
+      )}
+      {!positions && <p class="map-nobody">{text.notKnown}</p>}
+    </Pane>
+  );
+}

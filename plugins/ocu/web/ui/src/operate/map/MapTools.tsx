@@ -1,0 +1,117 @@
+// What the map shows, whom it follows, and what is drawn on it.
+import type { Signal } from "@preact/signals";
+import { strings } from "../../strings";
+import type { Fleet, Geometry } from "../../shared/types";
+import type { Kind } from "./draft";
+
+const text = strings.operate.map;
+
+export interface MapShows {
+  trails: boolean;
+  names: boolean;
+  footprints: boolean;
+  geometries: boolean;
+}
+
+export interface MapToolsProps {
+  fleet: Fleet;
+  followed: Signal<string>;
+  shows: Signal<MapShows>;
+  geometries: readonly Geometry[];
+  mayDraw: boolean;
+  onFit: () => void;
+  onDraw: (kind: Kind) => void;
+  onEdit: (geometry: Geometry) => void;
+}
+
+const SHOWN = ["trails", "names", "footprints", "geometries"] as const;
+
+export function MapTools(props: MapToolsProps) {
+  const { fleet, followed, shows, geometries, mayDraw, onFit, onDraw, onEdit } = props;
+  return (
+    <div class="tools">
+      <select
+        aria-label={text.follow}
+        value={followed.value}
+        onChange={(event) => (followed.value = event.currentTarget.value)}
+      >
+        <option value="">{text.followNobody}</option>
+        {fleet.vehicles.map(({ id }) => (
+          <option key={id} value={id}>
+            {text.follow} {id}
+          </option>
+        ))}
+      </select>
+      <details class="menu" onKeyDown={closeOnEscape}>
+        <summary>{text.show}</summary>
+        <div>
+          {SHOWN.map((name) => (
+            <label key={name} class="switch">
+              <input
+                type="checkbox"
+                checked={shows.value[name]}
+                onChange={(event) => {
+                  shows.value = { ...shows.value, [name]: event.currentTarget.checked };
+                }}
+              />
+              {text[name]}
+            </label>
+          ))}
+        </div>
+      </details>
+      <details class="menu" onKeyDown={closeOnEscape}>
+        <summary>{text.draw}</summary>
+        <div>
+          {(
+            [
+              ["route", text.drawRoute],
+              ["area", text.drawArea],
+              ["point", text.drawPoint],
+            ] as const
+          ).map(([kind, title]) => (
+            <button
+              key={kind}
+              type="button"
+              class="plain"
+              disabled={!mayDraw}
+              onClick={(event) => {
+                close(event.currentTarget);
+                onDraw(kind);
+              }}
+            >
+              {title}
+            </button>
+          ))}
+          <hr />
+          {geometries.length === 0 && <p class="hint">{text.noGeometries}</p>}
+          {geometries.map((geometry) => (
+            <button
+              key={geometry.name}
+              type="button"
+              class="plain"
+              disabled={!mayDraw}
+              onClick={(event) => {
+                close(event.currentTarget);
+                onEdit(geometry);
+              }}
+            >
+              {text.edit} {geometry.name}
+            </button>
+          ))}
+        </div>
+      </details>
+      <button type="button" class="plain" onClick={onFit}>
+        {text.fitAll}
+      </button>
+    </div>
+  );
+}
+
+const close = (inside: HTMLElement): void => inside.closest("details")?.removeAttribute("open");
+
+function closeOnEscape(event: KeyboardEvent & { currentTarget: HTMLDetailsElement }): void {
+  if (event.key !== "Escape" || event.shiftKey || !event.currentTarget.open) return;
+  event.stopPropagation();
+  event.currentTarget.open = false;
+  event.currentTarget.querySelector("summary")?.focus();
+}

@@ -1,0 +1,60 @@
+import { describe, expect, it } from "vitest";
+import { added, draftOf, emptyDraft, geometryOf, moved, problemOf, removed, undone } from "./draft";
+
+const at = (latitude: number, longitude: number, altitude: number | null = null) => ({
+  latitude,
+  longitude,
+  altitude,
+});
+
+const route = () => added(added({ ...emptyDraft("route"), name: "r" }, at(1, 2)), at(3, 4, 50));
+
+describe("draft", () => {
+  it("becomes GeoJSON: longitude first, areas closed", () => {
+    expect(geometryOf(route())).toEqual({
+      type: "LineString",
+      coordinates: [
+        [2, 1],
+        [4, 3, 50],
+      ],
+    });
+    const area = added({ ...route(), kind: "area" }, at(5, 6));
+    expect(geometryOf(area)).toEqual({
+      type: "Polygon",
+      coordinates: [
+        [
+          [2, 1],
+          [4, 3, 50],
+          [6, 5],
+          [2, 1],
+        ],
+      ],
+    });
+  });
+
+  it("is made of a geometry again", () => {
+    const geometry = geometryOf(added({ ...route(), kind: "area" }, at(5, 6)));
+    const known = { name: "a", kind: "area", geometry, from: "fleet", by: "", at_us: null } as const;
+    expect(geometryOf(draftOf(known))).toEqual(geometry);
+  });
+
+  it("takes changes back, one by one", () => {
+    const draft = removed(moved(route(), 0, { latitude: 9 }), 1);
+    expect(draft.vertices).toEqual([at(9, 2)]);
+    expect(undone(draft).vertices).toEqual([at(9, 2), at(3, 4, 50)]);
+    expect(undone(undone(undone(undone(undone(draft))))).vertices).toEqual([]);
+  });
+
+  it("has one vertex as a point", () => {
+    const point = added(added(emptyDraft("point"), at(1, 2)), at(3, 4));
+    expect(point.vertices).toEqual([at(3, 4)]);
+  });
+
+  it("says what it lacks", () => {
+    expect(problemOf(emptyDraft("route"))).toBe("vertices");
+    expect(problemOf({ ...route(), kind: "area" })).toBe("vertices");
+    expect(problemOf({ ...route(), name: "" })).toBe("name");
+    expect(problemOf({ ...route(), name: "../x" })).toBe("name");
+    expect(problemOf(route())).toBeNull();
+  });
+});

@@ -1,0 +1,99 @@
+// A route, area or point while it is drawn.
+import type { Geometry } from "../../shared/types";
+
+export type Kind = Geometry["kind"];
+
+/** WGS-84 degrees, and metres above mean sea level where somebody gave it. */
+export interface Vertex {
+  latitude: number;
+  longitude: number;
+  altitude: number | null;
+}
+
+export interface Draft {
+  kind: Kind;
+  name: string;
+  vertices: readonly Vertex[];
+  /** Earlier vertices, newest last. */
+  before: readonly (readonly Vertex[])[];
+}
+
+export const emptyDraft = (kind: Kind): Draft => ({ kind, name: "", vertices: [], before: [] });
+
+export function draftOf({ kind, name, geometry }: Geometry): Draft {
+  return { kind, name, vertices: verticesOf(geometry), before: [] };
+}
+
+const changed = (draft: Draft, vertices: readonly Vertex[]): Draft => ({
+  ...draft,
+  vertices,
+  before: [...draft.before, draft.vertices],
+});
+
+/** A point has but one vertex: the new one takes its place. */
+export function added(draft: Draft, vertex: Vertex): Draft {
+  return changed(draft, draft.kind === "point" ? [vertex] : [...draft.vertices, vertex]);
+}
+
+export function moved(draft: Draft, index: number, to: Partial<Vertex>): Draft {
+  return changed(
+    draft,
+    draft.vertices.map((vertex, at) => (at === index ? { ...vertex, ...to } : vertex)),
+  );
+}
+
+export function removed(draft: Draft, index: number): Draft {
+  return changed(draft, draft.vertices.filter((_, at) => at !== index));
+}
+
+export function undone(draft: Draft): Draft {
+  const vertices = draft.before.at(-1);
+  return vertices ? { ...draft, vertices, before: draft.before.slice(0, -1) } : draft;
+}
+
+const LEAST: Record<Kind, number> = { route: 2, area: 3, point: 1 };
+
+export type Problem = "vertices" | "name";
+
+/** What keeps it from being saved. */
+export function problemOf({ kind, name, vertices }: Draft): Problem | null {
+  if (vertices.length < LEAST[kind]) return "vertices";
+  return /^[\w.-]{1,100}$/.test(name) ? null : "name";
+}
+
+export function geometryOf({ kind, vertices }: Draft): GeoJSON.Geometry {
+  const positions = vertices.map(({ latitude, longitude, altitude }) => {
+    const flat = [round(longitude), round(latitude)];
+    return altitude === null ? flat : [...flat, altitude];
+  });
+  switch (kind) {
+    case "point":
+      return { type: "Point", coordinates: positions[0]! };
+    case "route":
+      return { type: "LineString", coordinates: positions };
+    case "area":
+      return { type: "Polygon", coordinates: [[...positions, positions[0]!]] };
+  }
+}
+
+function verticesOf(geometry: GeoJSON.Geometry): Vertex[] {
+  switch (geometry.type) {
+    case "Point":
+      return [vertexOf(geometry.coordinates)];
+    case "LineString":
+      return geometry.coordinates.map(vertexOf);
+    case "Polygon":
+      return (geometry.coordinates[0] ?? []).slice(0, -1).map(vertexOf);
+    default:
+      return [];
+  }
+}
+
+const vertexOf = ([longitude = 0, latitude = 0, altitude]: GeoJSON.Position): Vertex => ({
+  latitude,
+  longitude,
+  altitude: altitude ?? null,
+});
+
+/** A centimetre or so. */
+const round = (degrees: number): number => Math.round(degrees * 1e7) / 1e7;

@@ -1,0 +1,159 @@
+// The map, without Preact: Leaflet with no tiles but local ones.
+import L from "leaflet";
+import type { Fleet, Geometry } from "../../shared/types";
+import type { Draft, Vertex } from "./draft";
+import { Graticule } from "./graticule";
+import { VehicleLayer } from "./vehicleLayer";
+
+export interface Tiles {
+  max_zoom: number;
+  attribution: string;
+}
+
+export interface MapListener {
+  chosen(resource: string): void;
+  clicked(vertex: Vertex): void;
+  dragged(index: number, to: Vertex): void;
+  /** A hand moved the map: it follows nobody any more. */
+  moved(): void;
+}
+
+const OF_FLEET = "#56687a";
+const OF_OPERATOR = "#8347c7";
+const FENCE = "#c2262e";
+const DRAFT = "#0b63ce";
+
+export class MapView {
+  readonly vehicles: VehicleLayer;
+  private readonly map: L.Map;
+  private readonly geometries = L.layerGroup();
+  private readonly drafted = L.layerGroup();
+  private readonly observer: ResizeObserver;
+  private isDrawing = false;
+
+  constructor(
+    host: HTMLElement,
+    private readonly fleet: Fleet,
+    tiles: Tiles | undefined,
+    private readonly listener: MapListener,
+  ) {
+    const { lat, lon } = fleet.origin;
+    this.map = L.map(host, {
+      center: [lat, lon],
+      zoom: 17,
+      maxZoom: 22,
+      preferCanvas: true,
+      attributionControl: tiles !== undefined,
+      zoomSnap: 0.5,
+    });
+    this.map.attributionControl?.setPrefix(false);
+    if (tiles) {
+      const options = { maxNativeZoom: tiles.max_zoom, maxZoom: 22, attribution: tiles.attribution };
+      L.tileLayer("/tiles/{z}/{x}/{y}.png", options).addTo(this.map);
+    }
+    L.control.scale({ imperial: false }).addTo(this.map);
+    new Graticule(this.map);
+    if (fleet.fence) {
+      const style = { color: FENCE, weight: 2, dashArray: "6 6", fill: false, interactive: false };
+      L.geoJSON(fleet.fence, { style }).addTo(this.map);
+    }
+    this.geometries.addTo(this.map);
+    this.drafted.addTo(this.map);
+    this.vehicles = new VehicleLayer(this.map, fleet, (resource) => listener.chosen(resource));
+    this.map.on("click", ({ latlng }) => {
+      if (this.isDrawing) listener.clicked(vertexOf(latlng));
+    });
+    this.map.on("dragstart", () => listener.moved());
+    this.observer = new ResizeObserver(() => this.map.invalidateSize({ animate: false }));
+    this.observer.observe(host);
+  }
+
+  dispose(): void {
+    this.observer.disconnect();
+    this.map.remove();
+  }
+
+  showGeometries(geometries: readonly Geometry[]): void {
+    this.geometries.clearLayers();
+    for (const geometry of geometries) {
+      layerOf(geometry)
+        .bindTooltip(geometry.name, { permanent: true, direction: "center", className: "map-name" })
+        .addTo(this.geometries);
+    }
+  }
+
+  turnGeometries(on: boolean): void {
+    if (on) this.geometries.addTo(this.map);
+    else this.geometries.remove();
+  }
+
+  fitAll(): void {
+    const bounds = L.latLngBounds(this.vehicles.positions());
+    this.geometries.eachLayer((layer) => {
+      if (layer instanceof L.GeoJSON) bounds.extend(layer.getBounds());
+    });
+    if (!bounds.isValid()) bounds.extend([this.fleet.origin.lat, this.fleet.origin.lon]);
+    this.map.fitBounds(bounds, { padding: [36, 36], maxZoom: 18, animate: false });
+  }
+
+  centre(resource: string): void {
+    const at = this.vehicles.position(resource);
+    if (at) this.map.setView(at, Math.max(this.map.getZoom(), 17), { animate: true });
+  }
+
+  /** Keep a vehicle in the middle, without a jump at each step. */
+  follow(resource: string): void {
+    const at = this.vehicles.position(resource);
+    if (!at) return;
+    const off = this.map.latLngToContainerPoint(at).distanceTo(this.map.getSize().divideBy(2));
+    if (off > 4) this.map.panTo(at, { animate: false, noMoveStart: true });
+  }
+
+  middle(): Vertex {
+    return vertexOf(this.map.getCenter());
+  }
+
+  draw(draft: Draft | null): void {
+    this.isDrawing = draft !== null;
+    this.map.getContainer().classList.toggle("map-drawing", this.isDrawing);
+    this.drafted.clearLayers();
+    if (!draft) return;
+    const points = draft.vertices.map<L.LatLngTuple>((each) => [each.latitude, each.longitude]);
+    const style = { color: DRAFT, weight: 3, dashArray: "4 6", interactive: false };
+    const line = draft.kind === "area" ? L.polygon(points, style) : L.polyline(points, style);
+    if (draft.kind !== "point") line.addTo(this.drafted);
+    points.forEach((point, index) => this.handle(point, index, line));
+  }
+
+  private handle(point: L.LatLngTuple, index: number, line: L.Polyline | L.Polygon): void {
+    const icon = L.divIcon({ className: "map-vertex", html: String(index + 1), iconSize: [22, 22] });
+    const marker = L.marker(point, { icon, draggable: true, keyboard: false, zIndexOffset: 2000 });
+    marker.on("drag", () => {
+      const points = (line instanceof L.Polygon ? line.getLatLngs()[0] : line.getLatLngs()) as L.LatLng[];
+      line.setLatLngs(points.map((other, at) => (at === index ? marker.getLatLng() : other)));
+    });
+    marker.on("dragend", () => this.listener.dragged(index, vertexOf(marker.getLatLng())));
+    marker.addTo(this.drafted);
+  }
+}
+
+const vertexOf = ({ lat, lng }: L.LatLng): Vertex => ({
+  latitude: lat,
+  longitude: lng,
+  altitude: null,
+});
+
+function layerOf({ kind, from, geometry }: Geometry): L.GeoJSON {
+  const color = from === "fleet" ? OF_FLEET : OF_OPERATOR;
+  const style: L.PathOptions = {
+    color,
+    weight: kind === "route" ? 3 : 2,
+    fillOpacity: kind === "area" ? 0.1 : 0.9,
+    interactive: false,
+    ...(kind === "route" ? { dashArray: "10 5" } : {}),
+  };
+  return L.geoJSON(geometry, {
+    style,
+    pointToLayer: (_, at) => L.circleMarker(at, { ...style, radius: 7 }),
+  });
+}

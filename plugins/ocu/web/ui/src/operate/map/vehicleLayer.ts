@@ -1,0 +1,151 @@
+// Vehicles on the map: where they are, where they head, where they have been, what they see.
+import L from "leaflet";
+import type { Fleet, GeoPosition, PayloadState, VehicleState } from "../../shared/types";
+import { heading_deg } from "../../shared/format";
+import { DOMAIN_PATHS } from "../vehicles/DomainSymbol";
+
+type Vehicle = Fleet["vehicles"][number];
+
+const TRAIL_POINTS = 2000;
+const TRAIL_STEP_M = 1;
+
+const TRAIL: L.PolylineOptions = { color: "#3a7bd0", weight: 2, opacity: 0.65, interactive: false };
+const FOOTPRINT: L.PolylineOptions = {
+  color: "#d08a1d",
+  weight: 1,
+  fillOpacity: 0.16,
+  interactive: false,
+};
+
+interface Shown {
+  marker: L.Marker;
+  trail: L.Polyline;
+  state: VehicleState | undefined;
+  symbol: SVGElement | null;
+}
+
+export interface Shows {
+  trails: boolean;
+  names: boolean;
+  footprints: boolean;
+}
+
+const place = ({ latitude_deg, longitude_deg }: GeoPosition): L.LatLngTuple => [
+  latitude_deg,
+  longitude_deg,
+];
+
+export class VehicleLayer {
+  private readonly shown = new Map<string, Shown>();
+  private readonly trails = L.layerGroup();
+  private readonly footprints = L.layerGroup();
+  private readonly seen = new Map<string, { polygon: L.Polygon; state: PayloadState }>();
+
+  constructor(
+    private readonly map: L.Map,
+    private readonly fleet: Fleet,
+    private readonly chosen: (resource: string) => void,
+  ) {}
+
+  position(resource: string): L.LatLngTuple | null {
+    const position = this.shown.get(resource)?.state?.position;
+    return position ? place(position) : null;
+  }
+
+  positions(): L.LatLngTuple[] {
+    return [...this.shown.keys()].flatMap((resource) => {
+      const found = this.position(resource);
+      return found ? [found] : [];
+    });
+  }
+
+  show({ trails, names, footprints }: Shows): void {
+    this.turn(this.trails, trails);
+    this.turn(this.footprints, footprints);
+    this.map.getContainer().classList.toggle("map-nameless", !names);
+  }
+
+  vehicles(states: Record<string, VehicleState>): void {
+    for (const vehicle of this.fleet.vehicles) {
+      const state = states[vehicle.id];
+      const shown = this.shown.get(vehicle.id);
+      if (!state?.position) {
+        if (shown) this.remove(vehicle.id, shown);
+      } else if (shown?.state !== state) {
+        this.move(shown ?? this.add(vehicle, state.position), state, state.position);
+      }
+    }
+  }
+
+  /** Gray where nothing was heard for a while. */
+  ages(isStale: (resource: string) => boolean): void {
+    for (const [resource, { marker, state }] of this.shown) {
+      const element = marker.getElement();
+      element?.classList.toggle("vehicle-stale", isStale(resource));
+      element?.classList.toggle("vehicle-lost", state?.link === "lost");
+    }
+  }
+
+  payloads(states: Record<string, PayloadState>): void {
+    for (const [resource, state] of Object.entries(states)) {
+      const seen = this.seen.get(resource);
+      if (seen?.state === state) continue;
+      const corners = state.footprint.map(place);
+      const polygon = seen?.polygon ?? L.polygon([], FOOTPRINT).addTo(this.footprints);
+      polygon.setLatLngs(corners);
+      this.seen.set(resource, { polygon, state });
+    }
+  }
+
+  private turn(layer: L.LayerGroup, on: boolean): void {
+    if (on) layer.addTo(this.map);
+    else layer.remove();
+  }
+
+  private add(vehicle: Vehicle, position: GeoPosition): Shown {
+    const icon = L.divIcon({
+      className: `vehicle vehicle-${vehicle.domain} ${vehicle.manned ? "vehicle-manned" : ""}`,
+      html: symbolOf(vehicle),
+      iconSize: [28, 28],
+    });
+    const marker = L.marker(place(position), { icon, keyboard: false, zIndexOffset: 1000 });
+    marker.on("click", () => this.chosen(vehicle.id)).addTo(this.map);
+    const symbol = marker.getElement()?.querySelector("svg") ?? null;
+    const trail = L.polyline([], TRAIL).addTo(this.trails);
+    const shown: Shown = { marker, trail, state: undefined, symbol };
+    this.shown.set(vehicle.id, shown);
+    return shown;
+  }
+
+  private move(shown: Shown, state: VehicleState, position: GeoPosition): void {
+    const at = L.latLng(place(position));
+    shown.marker.setLatLng(at);
+    if (state.yaw_rad !== null && shown.symbol) {
+      shown.symbol.style.transform = `rotate(${heading_deg(state.yaw_rad).toFixed(1)}deg)`;
+    }
+    this.draw(shown, state, at);
+    shown.state = state;
+  }
+
+  private draw({ trail, state: before }: Shown, state: VehicleState, at: L.LatLng): void {
+    // A replay that went back draws it anew.
+    if (before && state.time_us < before.time_us) trail.setLatLngs([]);
+    const points = trail.getLatLngs() as L.LatLng[];
+    const last = points.at(-1);
+    if (last && last.distanceTo(at) < TRAIL_STEP_M) return;
+    if (points.length >= TRAIL_POINTS) trail.setLatLngs(points.slice(TRAIL_POINTS / 4));
+    trail.addLatLng(at);
+  }
+
+  private remove(resource: string, { marker, trail }: Shown): void {
+    marker.remove();
+    trail.remove();
+    this.shown.delete(resource);
+  }
+}
+
+function symbolOf({ id, domain }: Vehicle): string {
+  const name = document.createElement("span");
+  name.textContent = id;
+  return `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${DOMAIN_PATHS[domain]}"/></svg>${name.outerHTML}`;
+}

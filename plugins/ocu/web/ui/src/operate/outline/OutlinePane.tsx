@@ -1,0 +1,157 @@
+// The elements of the mission as a tree, with how they stand: for the keyboard, for screen readers,
+// and for whoever looks for one.
+import { useSignal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { fill, strings } from "../../strings";
+import type { ElementState } from "../../shared/types";
+import { lookOf, type Look } from "../diagram/colours";
+import { useOperating } from "../context";
+import { Pane } from "../layout/Pane";
+import type { MissionNode } from "../mission/missionModel";
+import { keyOf } from "../mission/names";
+import { moved, rowsOf, type Row } from "./rows";
+import "./outline.css";
+
+const text = strings.operate.outline;
+const states = strings.operate.diagram.states;
+
+export function OutlinePane() {
+  const { scene, mission, selected } = useOperating();
+  const folded = useSignal<ReadonlySet<string>>(new Set());
+  const wanted = useSignal("");
+  const current = useSignal("");
+  const tree = useRef<HTMLUListElement>(null);
+  scene.elements.slow.value;
+
+  const rows = rowsOf(mission.trees, folded.value, wanted.value);
+  const chosen = selected.value ? keyOf(selected.value.process, selected.value.element) : "";
+  const reached = rows.some(({ key }) => key === current.value) ? current.value : rows[0]?.key;
+
+  useEffect(() => {
+    if (!chosen) return;
+    current.value = chosen;
+    tree.current?.querySelector("[aria-selected=true]")?.scrollIntoView({ block: "nearest" });
+  }, [chosen]);
+
+  const focus = (key: string) => {
+    current.value = key;
+    const index = rows.findIndex((row) => row.key === key);
+    tree.current?.querySelectorAll<HTMLElement>("[role=treeitem]")[index]?.focus();
+  };
+  const choose = (node: MissionNode) => {
+    selected.value = { process: node.process, element: node.id, show: true };
+  };
+  const turn = (key: string, fold: boolean) => {
+    const next = new Set(folded.value);
+    if (fold) next.add(key);
+    else next.delete(key);
+    folded.value = next;
+  };
+  const press = (event: KeyboardEvent, row: Row) => {
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.key === "Enter" || event.key === " ") {
+      event.preventDefault();
+      choose(row.node);
+      return;
+    }
+    const move = moved(rows, row.key, event.key);
+    if (!move) return;
+    event.preventDefault();
+    if (move.fold !== undefined) turn(row.key, move.fold);
+    else focus(move.to);
+  };
+
+  return (
+    <Pane title={strings.operate.panes.outline} class="outline-pane">
+      <input
+        type="search"
+        aria-label={text.search}
+        placeholder={text.search}
+        value={wanted.value}
+        onInput={(event) => (wanted.value = event.currentTarget.value)}
+        onKeyDown={(event) => {
+          if (event.key === "ArrowDown" && reached) focus(reached);
+        }}
+      />
+      {rows.length === 0 && <p class="nothing">{text.none}</p>}
+      <ul ref={tree} role="tree" aria-label={strings.operate.panes.outline}>
+        {rows.map((row) => (
+          <Item
+            key={row.key}
+            row={row}
+            state={scene.elements.get(row.node.process, row.node.id)}
+            selected={row.key === chosen}
+            reached={row.key === reached}
+            onKeyDown={(event) => press(event, row)}
+            onClick={() => {
+              current.value = row.key;
+              choose(row.node);
+            }}
+            onTurn={() => turn(row.key, row.open === true)}
+          />
+        ))}
+      </ul>
+    </Pane>
+  );
+}
+
+interface ItemProps {
+  row: Row;
+  state: ElementState | undefined;
+  selected: boolean;
+  reached: boolean;
+  onKeyDown: (event: KeyboardEvent) => void;
+  onClick: () => void;
+  onTurn: () => void;
+}
+
+function Item({ row, state, selected, reached, onKeyDown, onClick, onTurn }: ItemProps) {
+  const { node, level, open } = row;
+  const look: Look = state ? lookOf(state) : "idle";
+  const isProcess = node.type === "Process";
+  const said = [
+    node.label,
+    words(node.type),
+    node.calls && fill(text.calls, { process: node.calls }),
+    isProcess ? "" : states[look],
+    state && state.hits > 0 ? times(state.hits) : "",
+    state && state.active > 1 ? fill(text.tokens, { count: state.active }) : "",
+  ];
+  return (
+    <li
+      role="treeitem"
+      class={`item item-${look} ${isProcess ? "item-process" : ""}`}
+      style={`padding-left: ${(level - 1) * 14 + 6}px`}
+      aria-level={level}
+      aria-selected={selected}
+      aria-expanded={open ?? undefined}
+      aria-label={said.filter(Boolean).join(", ")}
+      tabIndex={reached ? 0 : -1}
+      onKeyDown={onKeyDown}
+      onClick={onClick}
+    >
+      <span
+        class="fold"
+        aria-hidden="true"
+        onClick={(event) => {
+          if (open === null) return;
+          event.stopPropagation();
+          onTurn();
+        }}
+      >
+        {open === null ? "" : open ? "▾" : "▸"}
+      </span>
+      {!isProcess && (
+        <i class="dot" aria-hidden="true">
+          {{ asking: "?", failed: "✕", active: "", done: "", idle: "" }[look]}
+        </i>
+      )}
+      <span class="name">{node.label}</span>
+      {state && state.hits > 0 && <span class="hits">{state.hits}</span>}
+    </li>
+  );
+}
+
+const words = (type: string): string => type.replace(/(?<=[a-z])(?=[A-Z])/g, " ").toLowerCase();
+
+const times = (hits: number): string => (hits === 1 ? text.once : fill(text.times, { count: hits }));

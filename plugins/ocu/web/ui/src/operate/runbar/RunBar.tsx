@@ -1,0 +1,147 @@
+// Which run is shown, how it stands, and what may be done with all of it.
+import { useSignal } from "@preact/signals";
+import { post } from "../../shared/api";
+import { activeRuns } from "../../shared/executive";
+import { clock, dateTime } from "../../shared/format";
+import { go } from "../../shared/router";
+import { may } from "../../shared/session";
+import { StopButton } from "../../shared/StopButton";
+import { attempt } from "../../shared/Toasts";
+import { fill, strings } from "../../strings";
+import type { RunSummary } from "../../shared/types";
+import { useOperating } from "../context";
+import { usePaced } from "../layout/pace";
+import { SendDialog } from "./SendDialog";
+import "./runbar.css";
+
+const text = strings.operate.run;
+
+export function RunBar() {
+  const { scene } = useOperating();
+  const summary = scene.summary.value;
+  const status = scene.status.value ?? summary?.status ?? "running";
+  return (
+    <div class="run-bar">
+      <Runs shown={scene.run} />
+      <span class={`status status-${status}`} role="status">
+        {text.status[status]}
+      </span>
+      <strong class="mission-name" title={summary?.process}>
+        {summary ? titleOf(summary) : ""}
+      </strong>
+      {scene.mode === "replay" && (
+        <span class="mode">
+          {scene.run ? text.replay : text.rehearsal}
+          {scene.run && summary && ` · ${dateTime(summary.started_us)}`}
+        </span>
+      )}
+      <Clock />
+      <span class="space" />
+      {scene.mode === "live" && <Controls status={status} />}
+    </div>
+  );
+}
+
+export const titleOf = ({ mission, process }: RunSummary): string =>
+  mission.replace(/^.*[\\/]/, "").replace(/\.bpmn$/, "") || process;
+
+function Runs({ shown }: { shown: string }) {
+  const others = activeRuns.value;
+  if (others.length === 0 || (others.length === 1 && others[0]!.run === shown)) {
+    return <span class="run-name">{shown}</span>;
+  }
+  return (
+    <nav class="runs" aria-label={text.runs}>
+      {others.map((run) => {
+        const path = `/runs/${encodeURIComponent(run.run)}`;
+        return (
+          <a
+            key={run.run}
+            href={path}
+            aria-current={run.run === shown ? "page" : undefined}
+            title={titleOf(run)}
+            onClick={(event) => {
+              if (event.ctrlKey || event.metaKey || event.shiftKey) return;
+              event.preventDefault();
+              go(path);
+            }}
+          >
+            {run.run} <small>{titleOf(run)}</small>
+          </a>
+        );
+      })}
+    </nav>
+  );
+}
+
+function Clock() {
+  const { scene } = useOperating();
+  const time = usePaced(scene.time, 200);
+  const events = usePaced(scene.events, 500);
+  const pace = scene.pace.value;
+  return (
+    <>
+      <span class="clock" title={text.time}>
+        {clock(time)}
+      </span>
+      {scene.mode === "live" && pace !== 1 && (
+        <span title={text.speed}>{Number(pace.toPrecision(3))}×</span>
+      )}
+      <span class="events">
+        {events.toLocaleString()} {text.events}
+      </span>
+    </>
+  );
+}
+
+function Controls({ status }: { status: string }) {
+  const { scene } = useOperating();
+  const sending = useSignal<"signal" | "message" | null>(null);
+  const ask = (what: string, body?: unknown) =>
+    void attempt(() => post(`/runs/${encodeURIComponent(scene.run)}/${what}`, body));
+  const steerable = may("operator") && (status === "running" || status === "paused");
+  return (
+    <>
+      {status === "paused" ? (
+        <button type="button" class="primary" disabled={!steerable} onClick={() => ask("resume")}>
+          ▶ {text.resume}
+        </button>
+      ) : (
+        <button
+          type="button"
+          class="secondary"
+          title={text.pauseHint}
+          disabled={!steerable}
+          onClick={() => ask("pause")}
+        >
+          ❚❚ {text.pause}
+        </button>
+      )}
+      <button
+        type="button"
+        class="secondary"
+        disabled={!steerable}
+        onClick={() => (sending.value = "signal")}
+      >
+        {text.signal}
+      </button>
+      <button
+        type="button"
+        class="secondary"
+        disabled={!steerable}
+        onClick={() => (sending.value = "message")}
+      >
+        {text.message}
+      </button>
+      <StopButton
+        class="stop-run"
+        label={text.stopRun}
+        again={fill(text.stopRunAgain, { run: scene.run })}
+        hint={text.stopRun}
+        disabled={!steerable}
+        onStop={() => ask("stop", { reason: strings.shell.stopReason })}
+      />
+      {sending.value && <SendDialog what={sending.value} onClose={() => (sending.value = null)} />}
+    </>
+  );
+}

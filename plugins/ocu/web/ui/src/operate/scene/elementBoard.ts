@@ -1,0 +1,100 @@
+// The states of a run's elements. Who draws is told what changed at once; lists that people read are
+// renewed a few times a second (`slow`).
+import { signal, type ReadonlySignal } from "@preact/signals";
+import type { Elements, ElementState } from "../../shared/types";
+
+export interface ElementChange {
+  process: string;
+  element: string;
+  state: ElementState;
+  before: ElementState | undefined;
+}
+
+type Listener = (changes: ElementChange[]) => void;
+
+const SLOW_MS = 200;
+
+const IDLE: ElementState = { active: 0, hits: 0, last: 0, failed: false, asking: false };
+
+export class ElementBoard {
+  private states = new Map<string, Map<string, ElementState>>();
+  private readonly listeners = new Set<Listener>();
+  private readonly version = signal(0);
+  private timer: ReturnType<typeof setTimeout> | undefined;
+
+  /** Rises after changes, but not more often than people can read. */
+  get slow(): ReadonlySignal<number> {
+    return this.version;
+  }
+
+  get(process: string, element: string): ElementState | undefined {
+    return this.states.get(process)?.get(element);
+  }
+
+  *all(): Generator<[process: string, element: string, state: ElementState]> {
+    for (const [process, states] of this.states) {
+      for (const [element, state] of states) yield [process, element, state];
+    }
+  }
+
+  listen(listener: Listener): () => void {
+    this.listeners.add(listener);
+    return () => void this.listeners.delete(listener);
+  }
+
+  /** Take what is new; all else stays. */
+  merge(elements: Elements): void {
+    const changes: ElementChange[] = [];
+    for (const [process, states] of Object.entries(elements)) {
+      for (const [element, state] of Object.entries(states)) {
+        this.set(process, element, state, changes);
+      }
+    }
+    this.tell(changes);
+  }
+
+  /** Take all; what is not told of is as at the start of the run. */
+  replace(elements: Elements): void {
+    const changes: ElementChange[] = [];
+    for (const [process, element] of [...this.all()]) {
+      if (!elements[process]?.[element]) this.set(process, element, IDLE, changes);
+    }
+    for (const [process, states] of Object.entries(elements)) {
+      for (const [element, state] of Object.entries(states)) {
+        this.set(process, element, state, changes);
+      }
+    }
+    this.tell(changes);
+  }
+
+  private set(
+    process: string,
+    element: string,
+    state: ElementState,
+    changes: ElementChange[],
+  ): void {
+    let states = this.states.get(process);
+    if (!states) this.states.set(process, (states = new Map()));
+    const before = states.get(element);
+    if (before && same(before, state)) return;
+    const kept = { ...state };
+    states.set(element, kept);
+    changes.push({ process, element, state: kept, before });
+  }
+
+  private tell(changes: ElementChange[]): void {
+    if (changes.length === 0) return;
+    for (const listener of this.listeners) listener(changes);
+    this.timer ??= setTimeout(() => {
+      this.timer = undefined;
+      this.version.value += 1;
+    }, SLOW_MS);
+  }
+}
+
+const same = (one: ElementState, other: ElementState): boolean =>
+  one.active === other.active &&
+  one.hits === other.hits &&
+  one.failed === other.failed &&
+  one.asking === other.asking &&
+  one.last === other.last;

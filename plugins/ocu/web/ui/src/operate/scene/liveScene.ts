@@ -1,0 +1,125 @@
+// A run that goes on, as the executive tells of it.
+import { batch, computed, signal } from "@preact/signals";
+import { get } from "../../shared/api";
+import * as executive from "../../shared/executive";
+import type {
+  Command,
+  RunStatus,
+  RunSummary,
+  ServerMessage,
+} from "../../shared/types";
+import { ElementBoard } from "./elementBoard";
+import { RecordFeed, type Page } from "./recordFeed";
+import type { Scene } from "./scene";
+
+const TICK_MS = 200;
+
+type Frame = Extract<ServerMessage, { type: "frame" }>;
+type Snapshot = Extract<ServerMessage, { type: "snapshot" }>;
+
+export class LiveScene implements Scene {
+  readonly mode = "live";
+  readonly elements = new ElementBoard();
+  readonly summary = computed<RunSummary | null>(
+    () => executive.runs.value.find(({ run }) => run === this.run) ?? null,
+  );
+  readonly status = computed<RunStatus | null>(() => this.summary.value?.status ?? null);
+  readonly time = signal(0);
+  readonly pace = signal(1);
+  readonly events = signal(0);
+  readonly commands = signal<Record<string, Command>>({});
+  readonly prompts = executive.prompts;
+  readonly holders = executive.holders;
+  readonly vehicles = executive.vehicles;
+  readonly payloads = executive.payloads;
+  readonly teams = executive.teams;
+  readonly silentFor_s = executive.silentFor_s;
+  readonly end = this.time;
+  private readonly feed: RecordFeed;
+  private begun = false;
+  private toldAt = performance.now();
+  private told_s = 0;
+  private readonly stopListening: () => void;
+  private readonly ticking: ReturnType<typeof setInterval>;
+
+  constructor(readonly run: string) {
+    const path = `/runs/${encodeURIComponent(run)}/records`;
+    this.feed = new RecordFeed((after, limit) =>
+      get<Page>(`${path}?after=${after}&limit=${limit}`),
+    );
+    this.stopListening = executive.listen((message) => this.take(message));
+    this.ticking = setInterval(() => (this.time.value = this.now()), TICK_MS);
+    executive.watch(run);
+  }
+
+  get timeline() {
+    return this.feed.timeline;
+  }
+
+  get log() {
+    return this.feed.log;
+  }
+
+  older(): Promise<void> {
+    return this.feed.older();
+  }
+
+  /** Frames come only when something changes; in between the clock goes on. */
+  now(): number {
+    if (this.status.value !== "running" || executive.connection.value !== "open") return this.told_s;
+    return this.told_s + ((performance.now() - this.toldAt) / 1000) * this.pace.value;
+  }
+
+  dispose(): void {
+    clearInterval(this.ticking);
+    this.stopListening();
+    this.feed.dispose();
+    executive.watch(null);
+  }
+
+  private take(message: ServerMessage): void {
+    switch (message.type) {
+      case "snapshot":
+        if (message.run === this.run) this.takeSnapshot(message);
+        break;
+      case "frame":
+        if (message.run === this.run) this.takeFrame(message);
+        break;
+      case "log":
+        this.feed.push(message.records.filter(({ run }) => run === this.run));
+        break;
+    }
+  }
+
+  private takeSnapshot(snapshot: Snapshot): void {
+    batch(() => {
+      this.clock(snapshot.t, snapshot.events);
+      this.pace.value = snapshot.speed || 1;
+      this.commands.value = present(snapshot.commands);
+      this.elements.replace(snapshot.elements);
+    });
+    // After a break, what was missed comes with the next records that are pushed.
+    if (!this.begun) void this.feed.begin(snapshot.events);
+    this.begun = true;
+  }
+
+  private takeFrame(frame: Frame): void {
+    this.clock(frame.t, frame.events);
+    if (frame.elements) this.elements.merge(frame.elements);
+    if (!frame.commands) return;
+    this.commands.value = present({ ...this.commands.value, ...frame.commands });
+    this.feed.settle(this.commands.value, frame.t);
+  }
+
+  private clock(t: number, events: number): void {
+    this.told_s = t;
+    this.toldAt = performance.now();
+    this.events.value = events;
+  }
+}
+
+function present(commands: Record<string, Command | null>): Record<string, Command> {
+  return Object.fromEntries(
+    Object.entries(commands).filter((entry): entry is [string, Command] => entry[1] !== null),
+  );
+}

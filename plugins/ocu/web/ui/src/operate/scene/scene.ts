@@ -1,0 +1,54 @@
+// What the page shows of one run, wherever it comes from: the executive now, or records of the past.
+import type { ReadonlySignal } from "@preact/signals";
+import type { Spans } from "../../records/spans";
+import type {
+  Command,
+  PayloadState,
+  Prompt,
+  RunRecord,
+  RunStatus,
+  RunSummary,
+  TeamState,
+  VehicleState,
+} from "../../shared/types";
+import type { ElementBoard } from "./elementBoard";
+
+export interface LogPage {
+  records: readonly RunRecord[];
+  /** Whether there are older ones that were not read. */
+  more: boolean;
+  /** Records between those here that were not read: more came than anybody can follow. */
+  skipped: number;
+}
+
+export interface Scene {
+  readonly mode: "live" | "replay";
+  /** "": a rehearsal, which the executive does not know. */
+  readonly run: string;
+  readonly summary: ReadonlySignal<RunSummary | null>;
+  readonly status: ReadonlySignal<RunStatus | null>;
+  /** Mission time in seconds, a few times a second. */
+  readonly time: ReadonlySignal<number>;
+  /** Mission time at this very moment. */
+  now(): number;
+  /** Mission seconds in a second of the clock on the wall. */
+  readonly pace: ReadonlySignal<number>;
+  readonly events: ReadonlySignal<number>;
+  readonly elements: ElementBoard;
+  readonly commands: ReadonlySignal<Record<string, Command>>;
+  readonly prompts: ReadonlySignal<Prompt[]>;
+  readonly holders: ReadonlySignal<Record<string, string>>;
+  readonly vehicles: ReadonlySignal<Record<string, VehicleState>>;
+  readonly payloads: ReadonlySignal<Record<string, PayloadState>>;
+  readonly teams: ReadonlySignal<Record<string, TeamState>>;
+  /** Seconds since a resource was heard; null: never. */
+  silentFor_s(resource: string): number | null;
+  /** Its `spans` change in place; the signal tells that they did. */
+  readonly timeline: ReadonlySignal<{ spans: Spans }>;
+  readonly log: ReadonlySignal<LogPage>;
+  /** Read older records for the log. */
+  older(): Promise<void>;
+  /** The whole length in seconds, of what is over. */
+  readonly end: ReadonlySignal<number>;
+  dispose(): void;
+}

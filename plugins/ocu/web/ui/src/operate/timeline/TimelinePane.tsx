@@ -1,0 +1,176 @@
+// Who did what when: a row for each vehicle and payload, questions and services above.
+import { useSignal } from "@preact/signals";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { PROMPTS, SERVICES, type Span } from "../../records/spans";
+import { clock } from "../../shared/format";
+import { strings } from "../../strings";
+import type { Fleet } from "../../shared/types";
+import { useOperating } from "../context";
+import { Pane } from "../layout/Pane";
+import { usePaced } from "../layout/pace";
+import { Bars } from "./Bars";
+import { lanes, marks, whole, zoomed, type Bar, type Window } from "./scale";
+import "./timeline.css";
+
+const text = strings.operate.timeline;
+
+const LANE_PX = 22;
+const AXIS_PX = 22;
+
+export interface Row {
+  id: string;
+  title: string;
+  top: number;
+  height: number;
+  bars: Bar<Span>[];
+}
+
+export function TimelinePane({ onSeek }: { onSeek?: ((t: number) => void) | undefined }) {
+  const { scene, fleet } = useOperating();
+  const { spans } = usePaced(scene.timeline, 300);
+  const time = usePaced(scene.time, 200);
+  const end = Math.max(usePaced(scene.end, 1000), time);
+  const [width, setWidth] = useState(600);
+  const chosen = useSignal<Window | null>(null);
+  const plot = useRef<HTMLDivElement>(null);
+  const rows = useMemo(() => rowsOf(spans.all, fleet), [spans, spans.all.length, fleet]);
+  const height = (rows.at(-1)?.top ?? 0) + (rows.at(-1)?.height ?? 0);
+  const window = chosen.value ?? whole(end, width);
+  const window_ = useRef(window);
+  window_.current = window;
+
+  useEffect(() => {
+    const box = plot.current!;
+    const observer = new ResizeObserver(() => setWidth(box.clientWidth));
+    observer.observe(box);
+    const wheel = (event: WheelEvent) => {
+      if (event.ctrlKey) {
+        event.preventDefault();
+        const around = event.clientX - box.getBoundingClientRect().left;
+        chosen.value = zoomed(window_.current, event.deltaY < 0 ? 1.25 : 0.8, around);
+      } else if (event.deltaX !== 0 || event.shiftKey) {
+        event.preventDefault();
+        pan(event.deltaX || event.deltaY);
+      }
+    };
+    box.addEventListener("wheel", wheel, { passive: false });
+    return () => {
+      observer.disconnect();
+      box.removeEventListener("wheel", wheel);
+    };
+  }, []);
+
+  const pan = (px: number) => {
+    const { from_s, px_per_s } = window_.current;
+    chosen.value = { px_per_s, from_s: Math.max(0, from_s + px / px_per_s) };
+  };
+  const x = (t: number) => (t - window.from_s) * window.px_per_s;
+  const seek = (event: MouseEvent) => {
+    const left = plot.current!.getBoundingClientRect().left;
+    onSeek?.(window.from_s + (event.clientX - left) / window.px_per_s);
+  };
+
+  return (
+    <Pane
+      title={strings.operate.panes.timeline}
+      class="timeline-pane"
+      tools={
+        <div class="tools">
+          <button
+            type="button"
+            class="plain"
+            aria-label={text.zoomOut}
+            onClick={() => (chosen.value = zoomed(window, 1 / 1.5, width / 2))}
+          >
+            −
+          </button>
+          <button
+            type="button"
+            class="plain"
+            aria-label={text.zoomIn}
+            onClick={() => (chosen.value = zoomed(window, 1.5, width / 2))}
+          >
+            +
+          </button>
+          <button type="button" class="plain" onClick={() => (chosen.value = null)}>
+            {text.all}
+          </button>
+          <button
+            type="button"
+            class="plain"
+            onClick={() => {
+              const from_s = Math.max(0, time - (width * 0.7) / window.px_per_s);
+              chosen.value = { px_per_s: window.px_per_s, from_s };
+            }}
+          >
+            {text.now}
+          </button>
+        </div>
+      }
+    >
+      <div class="timeline" title={text.hint}>
+        <ul class="timeline-rows" style={`padding-top: ${AXIS_PX}px`} aria-hidden="true">
+          {rows.map((row) => (
+            <li key={row.id} style={`height: ${row.height}px`}>
+              {row.title}
+            </li>
+          ))}
+        </ul>
+        <div ref={plot} class={onSeek ? "timeline-plot timeline-seek" : "timeline-plot"}>
+          <svg
+            width={width}
+            height={Math.max(height + AXIS_PX, 60)}
+            role="group"
+            aria-label={text.label}
+            onClick={seek}
+          >
+            {marks(window, width, 70).map((t) => (
+              <g key={t} class="mark" transform={`translate(${x(t)} 0)`}>
+                <line y1={AXIS_PX} y2="100%" />
+                <text y="14">{clock(t)}</text>
+              </g>
+            ))}
+            <g transform={`translate(0 ${AXIS_PX})`}>
+              {rows.map((row) => (
+                <line key={row.id} class="row-line" x2="100%" y1={row.top} y2={row.top} />
+              ))}
+              <Bars rows={rows} window={window} width={width} now={time} lane_px={LANE_PX} onSeek={onSeek} />
+            </g>
+            <line class="now" x1={x(time)} x2={x(time)} y1={AXIS_PX - 6} y2="100%" />
+          </svg>
+          {spans.all.length === 0 && <p class="nothing">{text.none}</p>}
+        </div>
+      </div>
+    </Pane>
+  );
+}
+
+function rowsOf(spans: readonly Span[], fleet: Fleet): Row[] {
+  const inRow = new Map<string, Span[]>();
+  for (const span of spans) {
+    const row = inRow.get(span.row);
+    if (row) row.push(span);
+    else inRow.set(span.row, [span]);
+  }
+  const resources = fleet.vehicles.flatMap(({ id }) => [
+    id,
+    ...fleet.payloads.filter(({ vehicle }) => vehicle === id).map((payload) => payload.id),
+  ]);
+  const vehicles = new Set(fleet.vehicles.map(({ id }) => id));
+  const order = [...new Set([PROMPTS, SERVICES, ...resources, ...inRow.keys()])];
+  let top = 0;
+  return order
+    .filter((id) => inRow.has(id) || vehicles.has(id))
+    .map((id) => {
+      const bars = lanes(inRow.get(id) ?? []);
+      const height = Math.max(1, ...bars.map(({ lane }) => lane + 1)) * LANE_PX + 4;
+      const row = { id, title: titleOf(id), top, height, bars };
+      top += height;
+      return row;
+    });
+}
+
+function titleOf(id: string): string {
+  if (id === PROMPTS) return text.prompts;
+  return id === SERVICES ? text.services : id;
+}

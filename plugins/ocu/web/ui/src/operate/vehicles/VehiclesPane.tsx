@@ -1,0 +1,226 @@
+// Each vehicle: how it is, what it does and for which element, and who has it.
+import { usePaced } from "../layout/pace";
+import { age, heading_deg, speed_m_s } from "../../shared/format";
+import { may, session } from "../../shared/session";
+import { post } from "../../shared/api";
+import { attempt, toast } from "../../shared/Toasts";
+import { fill, strings } from "../../strings";
+import type { Fleet, PayloadState, VehicleState } from "../../shared/types";
+import { useOperating } from "../context";
+import { Pane } from "../layout/Pane";
+import { DomainSymbol } from "./DomainSymbol";
+import { Teams } from "./Teams";
+import { isOperator, payloadsOf, workOf } from "./work";
+import "./vehicles.css";
+
+const text = strings.operate.vehicles;
+
+/** Nobody reads numbers that change faster. */
+const PACE_MS = 400;
+/** As a fleet's `lost_after`, where it says nothing. */
+export const STALE_S = 3;
+
+export function VehiclesPane() {
+  const { scene, fleet } = useOperating();
+  const states = usePaced(scene.vehicles, PACE_MS);
+  const payloads = usePaced(scene.payloads, PACE_MS);
+  // Ages grow without anything being told.
+  usePaced(scene.time, 1000);
+  return (
+    <Pane title={strings.operate.panes.vehicles} class="vehicles-pane">
+      {fleet.vehicles.length === 0 && <p class="nothing">{text.none}</p>}
+      <ul class="cards">
+        {fleet.vehicles.map((vehicle) => (
+          <Card
+            key={vehicle.id}
+            vehicle={vehicle}
+            state={states[vehicle.id]}
+            payloads={payloads}
+            silent_s={scene.silentFor_s(vehicle.id)}
+          />
+        ))}
+      </ul>
+      <Teams />
+    </Pane>
+  );
+}
+
+interface CardProps {
+  vehicle: Fleet["vehicles"][number];
+  state: VehicleState | undefined;
+  payloads: Record<string, PayloadState>;
+  silent_s: number | null;
+}
+
+function Card({ vehicle, state, payloads, silent_s }: CardProps) {
+  const { fleet, followed, centred } = useOperating();
+  const stale = !state || silent_s === null || silent_s > STALE_S || state.link === "lost";
+  return (
+    <li class={stale ? "card card-stale" : "card"}>
+      <div class="card-head">
+        <DomainSymbol domain={vehicle.domain} />
+        <strong>{vehicle.id}</strong>
+        <small>{vehicle.manned ? text.manned : text.domain[vehicle.domain]}</small>
+        <span class="card-badges">
+          {state && <Badges state={state} />}
+          {silent_s === null ? (
+            <em>{text.unheard}</em>
+          ) : (
+            silent_s > STALE_S && <em>{fill(text.silent, { age: age(silent_s) })}</em>
+          )}
+        </span>
+      </div>
+      {state && <Numbers state={state} />}
+      {state && state.not_ready_reasons.length > 0 && (
+        <p class="card-reasons">
+          {text.notReady}: {state.not_ready_reasons.join("; ")}
+        </p>
+      )}
+      <Doing resource={vehicle.id} name={vehicle.id} />
+      {payloadsOf(fleet, vehicle.id).map((payload) => (
+        <Doing
+          key={payload}
+          resource={payload}
+          name={payload.slice(vehicle.id.length + 1)}
+          look={payloads[payload]}
+        />
+      ))}
+      <div class="card-tools">
+        <HandOver resource={vehicle.id} />
+        <button
+          type="button"
+          class="plain"
+          disabled={!state?.position}
+          onClick={() => (centred.value = { resource: vehicle.id })}
+        >
+          {text.centre}
+        </button>
+        <button
+          type="button"
+          class="plain"
+          aria-pressed={followed.value === vehicle.id}
+          disabled={!state?.position}
+          onClick={() => {
+            followed.value = followed.value === vehicle.id ? "" : vehicle.id;
+          }}
+        >
+          {text.follow}
+        </button>
+      </div>
+    </li>
+  );
+}
+
+function Badges({ state }: { state: VehicleState }) {
+  const { link, armed, ready, battery_fraction } = state;
+  const low = battery_fraction !== null && battery_fraction < 0.25;
+  return (
+    <>
+      {link !== "connected" && <b class="bad">{text.links[link]}</b>}
+      {armed !== null && <b class={armed ? "good" : ""}>{armed ? text.armed : text.disarmed}</b>}
+      {ready === false && <b class="warn">{text.notReady}</b>}
+      {battery_fraction !== null && (
+        <b class={low ? "bad" : ""} title={text.battery}>
+          {Math.round(battery_fraction * 100)} %
+        </b>
+      )}
+    </>
+  );
+}
+
+function Numbers({ state }: { state: VehicleState }) {
+  const { mode, velocity_enu_m_s, altitude_above_home_m, yaw_rad } = state;
+  const facts: [string, string][] = [];
+  if (mode) facts.push([text.mode, mode]);
+  if (velocity_enu_m_s) facts.push([text.speed, `${speed_m_s(velocity_enu_m_s).toFixed(1)} m/s`]);
+  if (yaw_rad !== null) facts.push([text.heading, `${Math.round(heading_deg(yaw_rad)) % 360}°`]);
+  if (altitude_above_home_m !== null) {
+    facts.push([text.altitude, `${altitude_above_home_m.toFixed(1)} m`]);
+  }
+  return (
+    <dl class="card-numbers">
+      {facts.map(([name, value]) => (
+        <div key={name}>
+          <dt>{name}</dt>
+          <dd>{value}</dd>
+        </div>
+      ))}
+    </dl>
+  );
+}
+
+interface DoingProps {
+  resource: string;
+  name: string;
+  look?: PayloadState | undefined;
+}
+
+/** What a vehicle or payload does, and for which element: click to see it in the diagram. */
+function Doing({ resource, name, look }: DoingProps) {
+  const { scene, mission, selected } = useOperating();
+  const work = workOf(resource, scene.commands.value);
+  const holder = scene.holders.value[resource] ?? "";
+  const degrees = (rad: number) => Math.round((rad * 180) / Math.PI);
+  return (
+    <p class="card-work">
+      <span>{name}</span>{" "}
+      {isOperator(holder) ? (
+        <b class="warn">{fill(text.heldBy, { by: holder })}</b>
+      ) : work.length === 0 ? (
+        <i>{text.idle}</i>
+      ) : (
+        work.map(({ behavior, command: { name: does, process, element } }) => (
+          <button
+            key={behavior}
+            type="button"
+            onClick={() => (selected.value = { process, element, show: true })}
+          >
+            {does} {text.for} {mission.label(process, element)}
+          </button>
+        ))
+      )}
+      {look && look.pan_rad !== null && look.tilt_rad !== null && (
+        <small>
+          {" "}
+          {degrees(look.pan_rad)}° / {degrees(look.tilt_rad)}°
+          {look.zoom !== null && ` ×${look.zoom.toFixed(1)}`}
+        </small>
+      )}
+    </p>
+  );
+}
+
+function HandOver({ resource }: { resource: string }) {
+  const { scene } = useOperating();
+  if (scene.mode !== "live" || !may("operator")) return null;
+  const holder = scene.holders.value[resource] ?? "";
+  const ask = async (what: "take" | "give-back", done: string) => {
+    const path = resource.split("/").map(encodeURIComponent).join("/");
+    if (await attempt(() => post(`/resources/${path}/${what}`))) {
+      toast(fill(done, { resource }), "good");
+    }
+  };
+  if (isOperator(holder)) {
+    const own = holder === session.value?.user;
+    return (
+      <button
+        type="button"
+        class="secondary"
+        disabled={!own}
+        onClick={() => void ask("give-back", text.given)}
+      >
+        {text.giveBack}
+      </button>
+    );
+  }
+  return (
+    <button
+      type="button"
+      class="secondary"
+      title={text.takeHint}
+      onClick={() => void ask("take", text.taken)}
+    >
+      {text.take}
+    </button>
+  );
+}

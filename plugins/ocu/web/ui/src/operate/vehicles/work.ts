@@ -1,0 +1,22 @@
+// What a vehicle and its payloads do, and for whom.
+import type { Command, Fleet } from "../../shared/types";
+
+export interface Work {
+  behavior: string;
+  command: Command;
+}
+
+/** Behaviors that hold a resource, oldest first. */
+export function workOf(resource: string, commands: Record<string, Command>): Work[] {
+  return Object.entries(commands)
+    .filter(([, { resources }]) => resources.includes(resource))
+    .map(([behavior, command]) => ({ behavior, command }))
+    .sort((one, other) => one.command.since - other.command.since);
+}
+
+/** Holders are operators, behaviors ("r1.b3"), or "" for nobody. */
+export const isOperator = (holder: string): boolean =>
+  holder !== "" && !/^r\d+\.b\d+$/.test(holder);
+
+export const payloadsOf = (fleet: Fleet, vehicle: string): string[] =>
+  fleet.payloads.filter((payload) => payload.vehicle === vehicle).map(({ id }) => id);
