@@ -1,30 +1,29 @@
 // Why the server would not do something: in its words, with all that it found.
 import { useId } from "preact/hooks";
-import type { Problem } from "../../shared/api";
 import type { Finding } from "../../shared/types";
 import { strings } from "../../strings";
-import { pointedAt, scalarIn } from "./pointed";
+import type { Refusal } from "./job";
 import type { EditorContext } from "./panel";
+import { pointedAt, scalarIn } from "./pointed";
 
 const words = strings.verify;
 
 export interface ProblemViewProps {
   editor: EditorContext;
   title: string;
-  problem: Problem;
+  refusal: Refusal;
   /** The text that findings with a line may be of. */
   spec?: string;
 }
 
-export function ProblemView({ editor, title, problem, spec = "" }: ProblemViewProps) {
+export function ProblemView({ editor, title, refusal, spec = "" }: ProblemViewProps) {
   const heading = useId();
-  const findings = problem.findings ?? [];
   return (
     <section class="m2v-problem" role="alert" aria-labelledby={heading}>
       <h3 id={heading}>{title}</h3>
-      <p>{problem.detail || problem.title || strings.shell.offline}</p>
+      <p>{refusal.text}</p>
       <ul>
-        {findings.map((finding, index) => (
+        {refusal.findings.map((finding, index) => (
           <FindingLine key={index} editor={editor} finding={finding} spec={spec} />
         ))}
       </ul>

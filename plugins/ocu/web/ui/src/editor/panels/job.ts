@@ -1,11 +1,19 @@
 // Work that the server does for minutes: it is begun once, asked after until it is over, and can be
 // cancelled.
 import { computed, signal } from "@preact/signals";
-import { ApiError, get, post, remove, type Problem } from "../../shared/api";
+import { ApiError, get, post, remove } from "../../shared/api";
+import type { Finding } from "../../shared/types";
 
 export interface JobTold {
   state: "running" | "done" | "failed" | "cancelled";
-  problem?: Problem | null;
+  problem: string | null;
+  findings: Finding[];
+}
+
+/** Why something was not done: in the server's words, with all that it found. */
+export interface Refusal {
+  text: string;
+  findings: readonly Finding[];
 }
 
 export interface Requests {
@@ -25,8 +33,9 @@ export class Job<Told extends JobTold> {
   readonly phase = signal<Phase>("idle");
   readonly told = signal<Told | null>(null);
   readonly id = signal("");
-  /** Why it could not begin or go on; the server says no more than `told` otherwise. */
-  readonly refused = signal<Problem | null>(null);
+  private readonly refused = signal<Refusal | null>(null);
+  /** Why there is no result; null while there is no reason to say so. */
+  readonly refusal = computed(() => this.refused.value ?? failureOf(this.told.value));
   readonly isBusy = computed(() => this.phase.value === "starting" || this.phase.value === "running");
 
   constructor(
@@ -48,7 +57,7 @@ export class Job<Told extends JobTold> {
       this.phase.value = "running";
       await this.follow();
     } catch (error) {
-      this.refused.value = problemOf(error);
+      this.refused.value = refusalOf(error);
     }
     this.phase.value = "over";
     return this.told.value;
@@ -81,8 +90,14 @@ export class Job<Told extends JobTold> {
   }
 }
 
-export function problemOf(error: unknown): Problem {
-  if (error instanceof ApiError) return error.problem;
-  const detail = error instanceof Error ? error.message : String(error);
-  return { type: "about:blank", title: "", status: 0, detail };
+export function refusalOf(error: unknown): Refusal {
+  if (error instanceof ApiError) {
+    return { text: error.message, findings: error.problem.findings ?? [] };
+  }
+  return { text: error instanceof Error ? error.message : String(error), findings: [] };
+}
+
+function failureOf(told: JobTold | null): Refusal | null {
+  if (told?.state !== "failed") return null;
+  return { text: told.problem ?? "", findings: told.findings };
 }

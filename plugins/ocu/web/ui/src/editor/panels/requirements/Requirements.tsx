@@ -77,9 +77,8 @@ export function Requirements({ editor, verification }: RequirementsProps) {
 }
 
 function findingsOf(verification: Verification, id: string): Finding[] {
-  const told = verification.job.told.value;
-  const problem = verification.job.refused.value ?? told?.problem;
-  return (problem?.findings ?? []).filter(({ element }) => element === id);
+  const findings = verification.job.refusal.value?.findings ?? [];
+  return findings.filter(({ element }) => element === id);
 }
 
 /** One, or one for each vehicle. */

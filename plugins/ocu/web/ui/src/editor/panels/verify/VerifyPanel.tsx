@@ -125,7 +125,7 @@ const NUMBER = new Intl.NumberFormat("en");
 function Progress({ editor, verification }: PartProps) {
   const { job, spec } = verification;
   const told = job.told.value;
-  const problem = job.refused.value ?? (told?.state === "failed" ? told.problem : null);
+  const refusal = job.refusal.value;
   const { states = 0, waiting = 0, seconds = 0 } = told?.progress ?? {};
   return (
     <>
@@ -144,8 +144,8 @@ function Progress({ editor, verification }: PartProps) {
         )}
         {told?.state === "cancelled" && <p class="m2-note">{words.cancelled}</p>}
       </div>
-      {problem && (
-        <ProblemView editor={editor} title={words.failed} problem={problem} spec={spec.value} />
+      {refusal && (
+        <ProblemView editor={editor} title={words.failed} refusal={refusal} spec={spec.value} />
       )}
     </>
   );

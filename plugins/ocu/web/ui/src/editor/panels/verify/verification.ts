@@ -9,8 +9,8 @@ import { meaningOf, type Report, type Violation } from "./report";
 import { walkOf } from "./walk";
 
 export interface VerificationTold extends JobTold {
-  progress?: { seconds: number; states: number; waiting: number } | null;
-  report?: Report | null;
+  progress: { seconds: number; states: number; waiting: number };
+  report: Report | null;
 }
 
 export interface Made {
@@ -38,6 +38,7 @@ export class Verification {
       meaning = meaningOf(xml);
       return {
         xml,
+        mission: editor.mission,
         ...beginningOf(editor).request(),
         ...(this.spec.value.trim() ? { spec: this.spec.value } : {}),
         strict: this.strict.value,
