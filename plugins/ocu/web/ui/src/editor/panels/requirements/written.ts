@@ -1,10 +1,10 @@
 // The requirements of the mission that is drawn, and changes to them, which can be undone.
-import { child, isA, list, text, type ModdleElement } from "../../moddle/moddle";
-import { DEFAULT_STORE, promptOf } from "../../moddle/prompts";
+import { text, type ModdleElement } from "../../moddle/moddle";
+import { DEFAULT_STORE } from "../../moddle/prompts";
 import { freeId, requirementsOf, setRequirements, type Requirement } from "../../moddle/requirements";
-import type { Decided } from "../../condition/completion";
 import type { Element } from "../../session/services";
 import { beginningOf } from "../begin/beginning";
+import { askingTasks, processesOf, showsProcess } from "../drawn";
 import type { EditorContext } from "../panel";
 import type { Vocabulary } from "./completion";
 import { isList, patternNamed } from "./patterns";
@@ -17,7 +17,7 @@ export interface Placed {
 }
 
 export function placed(editor: EditorContext): Placed[] {
-  return processes(editor).flatMap((process) =>
+  return processesOf(editor).flatMap((process) =>
     requirementsOf(process).map((requirement, index) => ({ process, index, requirement })),
   );
 }
@@ -64,42 +64,23 @@ export function vocabularyOf(editor: EditorContext): Vocabulary {
     resources: [...vehicles, ...payloads].map(({ id }) => id).concat(teams.map(({ name }) => name)),
     behaviors: [...new Set(catalogue.behaviors.map(({ name }) => name))].sort(),
     names: outline?.names ?? [],
-    decided: processes(editor).flatMap((process) => decidedIn(process)),
+    decided: askingTasks(editor).map(({ store, decisions }) => ({
+      store: store || DEFAULT_STORE,
+      values: decisions,
+    })),
   };
 }
 
 /** What operators can decide at a user task. */
 export function decisionsAt(editor: EditorContext, task: string): string[] {
-  const found = processes(editor).flatMap(flowElements).find((each) => text(each, "id") === task);
-  return found ? promptOf(found).prompt.decisions.map(({ value }) => value) : [];
+  const asking = askingTasks(editor).find(({ id }) => id === task);
+  return asking?.decisions.map(({ value }) => value) ?? [];
 }
 
 const NOT_ASKED_FOR = /flow$|^data|annotation$|association$/i;
 
-function decidedIn(process: ModdleElement): Decided[] {
-  return flowElements(process)
-    .filter((each) => isA(each, "bpmn:UserTask"))
-    .map((task) => {
-      const { prompt } = promptOf(task);
-      return { store: prompt.store || DEFAULT_STORE, values: prompt.decisions };
-    });
-}
-
-function flowElements(container: ModdleElement): ModdleElement[] {
-  return list(container, "flowElements").flatMap((each) =>
-    isA(each, "bpmn:SubProcess") ? [each, ...flowElements(each)] : [each],
-  );
-}
-
-function processes(editor: EditorContext): ModdleElement[] {
-  const root = editor.service("canvas").getRootElement().businessObject as ModdleElement | undefined;
-  let at = root;
-  while (at?.$parent) at = at.$parent;
-  return list(at, "rootElements").filter((each) => isA(each, "bpmn:Process"));
-}
-
 function main(editor: EditorContext): ModdleElement | undefined {
-  const all = processes(editor);
+  const all = processesOf(editor);
   const said = beginningOf(editor).process.value;
   const starts = editor.checks.outline.value?.processes.find((each) => each.starts)?.id;
   return all.find((each) => text(each, "id") === (said || starts)) ?? all[0];
@@ -112,11 +93,6 @@ function write(
 ): void {
   const edits = editor.service("edits");
   const root = editor.service("canvas").getRootElement() as Element;
-  const shown = editor.service("elementRegistry").find((each) => standsFor(each as Element, process));
+  const shown = editor.service("elementRegistry").find((each) => showsProcess(each, process));
   edits.apply((shown as Element) ?? root, setRequirements(edits.factory, process, requirements));
-}
-
-function standsFor(element: Element, process: ModdleElement): boolean {
-  const object = element.businessObject as ModdleElement;
-  return object === process || (isA(object, "bpmn:Participant") && child(object, "processRef") === process);
 }

@@ -79,7 +79,9 @@ function useFollowing(editor: EditorContext, violation: Violation, at: number): 
     const step = steps[at];
     const isLast = at >= steps.length - 1;
     const shown = isLast ? (violation.elements[0] ?? step?.element) : step?.element;
-    if (shown) void editor.select(shown);
+    if (!shown) return;
+    // What can be done with an element would hide the marks on it.
+    void editor.select(shown).then(() => editor.service("selection").select(null));
   }, [editor, violation, at]);
 }
 
@@ -114,10 +116,10 @@ interface StepperProps {
 function Stepper({ verification, steps, last, at }: StepperProps) {
   const said = fill(words.at, { step: at + 1, count: last + 1 });
   const buttons = [
-    { label: words.first, text: "⏮", to: 0, disabled: at === 0 },
-    { label: words.previous, text: "◀", to: at - 1, disabled: at === 0 },
-    { label: words.next, text: "▶", to: at + 1, disabled: at === last },
-    { label: words.last, text: "⏭", to: last, disabled: at === last },
+    { label: words.first, text: "«", to: 0, disabled: at === 0 },
+    { label: words.previous, text: "‹", to: at - 1, disabled: at === 0 },
+    { label: words.next, text: "›", to: at + 1, disabled: at === last },
+    { label: words.last, text: "»", to: last, disabled: at === last },
   ];
   return (
     <div class="m2v-stepper" role="group" aria-label={words.stepper}>
