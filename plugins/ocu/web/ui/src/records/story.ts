@@ -85,7 +85,7 @@ export function lineOf(record: RunRecord, names: Names): LogLine {
 
 const templates: Readonly<Record<string, string>> = strings.operate.records;
 
-const DEFINED = new Set(["signal", "message", "escalation"]);
+const DEFINED = new Set(["signal", "message", "escalation", "ref"]);
 
 /** In a template `{field}` is a field of the record, and `[...]` is left out if one in it is empty. */
 function textOf(record: RunRecord, where: string, names: Names): string {

@@ -2,5 +2,6 @@
 import type { Panel } from "./panel";
 import { problemsPanel } from "./ProblemsPanel";
 import { propertiesPanel } from "./PropertiesPanel";
+import { verifyPanel } from "./verify/VerifyPanel";
 
-export const panels: readonly Panel[] = [propertiesPanel, problemsPanel];
+export const panels: readonly Panel[] = [propertiesPanel, problemsPanel, verifyPanel];

@@ -31,14 +31,13 @@ export function PromptPanel() {
   const at = Math.max(0, prompts.findIndex((prompt) => idOf(prompt) === chosen.value));
   const prompt = prompts[at];
   const id = prompt ? idOf(prompt) : "";
-  const mayAnswer = scene.mode === "live" && may("operator");
+  const mayAnswer = may("operator");
   const usable = mayAnswer && ready.value && sending.value !== id;
 
-  useTellWhoWasFirst(scene.mode === "live");
+  useTellWhoWasFirst();
 
   useEffect(() => {
     if (!id) return;
-    if (scene.mode === "replay") return;
     ready.value = false;
     const deaf = setTimeout(() => (ready.value = true), DEAF_MS);
     const before = document.activeElement;
@@ -80,7 +79,7 @@ export function PromptPanel() {
     <section
       ref={panel}
       class="prompt"
-      role={scene.mode === "live" ? "alertdialog" : "region"}
+      role="alertdialog"
       aria-label={title}
       aria-describedby="prompt-text"
       tabIndex={-1}
@@ -133,13 +132,12 @@ export function PromptPanel() {
 const idOf = ({ run, prompt }: Prompt): string => `${run}/${prompt}`;
 
 /** Whoever was about to answer is told that somebody else was first. */
-function useTellWhoWasFirst(live: boolean): void {
+function useTellWhoWasFirst(): void {
   const { scene } = useOperating();
   const standing = useRef<Prompt[]>([]);
   // While a message is told, this is still the list of before it.
   useEffect(() => scene.prompts.subscribe((now) => void (standing.current = now)), [scene]);
   useEffect(() => {
-    if (!live) return;
     return listen((message) => {
       if (message.type !== "prompt_closed") return;
       const was = standing.current.find(
@@ -152,5 +150,5 @@ function useTellWhoWasFirst(live: boolean): void {
         toast(fill(text.answered, { by: message.by, decision: label || message.decision }));
       }
     });
-  }, [live]);
+  }, []);
 }

@@ -12,8 +12,8 @@ const MOST = 6;
 
 type Ended = keyof typeof text;
 
-export function RunEnd({ onReplay, onClose }: { onReplay: () => void; onClose: () => void }) {
-  const { scene, mission } = useOperating();
+export function RunEnd({ onClose }: { onClose: () => void }) {
+  const { scene, mission, replay } = useOperating();
   const summary = scene.summary.value;
   if (!summary) return null;
   const { records } = scene.log.value;
@@ -31,7 +31,7 @@ export function RunEnd({ onReplay, onClose }: { onReplay: () => void; onClose: (
           <button type="button" class="secondary" onClick={onClose}>
             {text.dismiss}
           </button>
-          <button type="button" class="primary" onClick={onReplay}>
+          <button type="button" class="primary" onClick={replay}>
             {text.replay}
           </button>
         </>

@@ -13,6 +13,8 @@ export interface ElementChange {
 type Listener = (changes: ElementChange[]) => void;
 
 const SLOW_MS = 200;
+/** Long lists are renewed less often, as each renewal takes longer. */
+const EACH_MS = 2;
 
 const IDLE: ElementState = { active: 0, hits: 0, last: 0, failed: false, asking: false };
 
@@ -88,7 +90,7 @@ export class ElementBoard {
     this.timer ??= setTimeout(() => {
       this.timer = undefined;
       this.version.value += 1;
-    }, SLOW_MS);
+    }, Math.max(SLOW_MS, changes.length * EACH_MS));
   }
 }
 

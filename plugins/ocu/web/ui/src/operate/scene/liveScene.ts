@@ -19,6 +19,7 @@ type Snapshot = Extract<ServerMessage, { type: "snapshot" }>;
 
 export class LiveScene implements Scene {
   readonly mode = "live";
+  readonly hasTelemetry = true;
   readonly elements = new ElementBoard();
   readonly summary = computed<RunSummary | null>(
     () => executive.runs.value.find(({ run }) => run === this.run) ?? null,

@@ -41,6 +41,8 @@ export interface Scene {
   readonly vehicles: ReadonlySignal<Record<string, VehicleState>>;
   readonly payloads: ReadonlySignal<Record<string, PayloadState>>;
   readonly teams: ReadonlySignal<Record<string, TeamState>>;
+  /** Whether anything is known of where vehicles are and how: not of runs of the past. */
+  readonly hasTelemetry: boolean;
   /** Seconds since a resource was heard; null: never. */
   silentFor_s(resource: string): number | null;
   /** Its `spans` change in place; the signal tells that they did. */

@@ -125,7 +125,7 @@ export function TimelinePane({ onSeek }: { onSeek?: ((t: number) => void) | unde
             onClick={seek}
           >
             {marks(window, width, 70).map((t) => (
-              <g key={t} class="mark" transform={`translate(${x(t)} 0)`}>
+              <g key={t} class={x(t) < 20 ? "mark mark-first" : "mark"} transform={`translate(${x(t)} 0)`}>
                 <line y1={AXIS_PX} y2="100%" />
                 <text y="14">{clock(t)}</text>
               </g>
