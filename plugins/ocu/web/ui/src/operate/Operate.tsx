@@ -43,7 +43,8 @@ export default function Operate({ source }: { source: Source }) {
   useEffect(() => {
     open();
     const stop = listen((message) => {
-      const here = source.kind === "run" && message.type === "run" && message.run.run === source.run;
+      const here =
+        source.kind === "run" && message.type === "run" && message.run.run === source.run;
       if (here && isOver(message.run) && context.peek()?.scene.mode === "live") ended.value = true;
     });
     return () => {

@@ -1,5 +1,5 @@
-// Numbers at the corners of elements: how often a token came, how many are there now; and a sign for
-// what failed or asks. Renewed a few times a second: nobody reads faster.
+// Numbers at the corners of elements: how often a token came, how many are there now; and a sign
+// for what failed or asks. Renewed a few times a second: nobody reads faster.
 import type { ElementState } from "../../shared/types";
 import type { Outline } from "./painter";
 
@@ -64,7 +64,13 @@ export class Badges {
     this.waiting.clear();
   }
 
-  private write(key: string, gfx: SVGElement, outline: Outline, corner: Corner, text: string): void {
+  private write(
+    key: string,
+    gfx: SVGElement,
+    outline: Outline,
+    corner: Corner,
+    text: string,
+  ): void {
     let badge = this.badges.get(key);
     if (!badge && text === "") return;
     if (!badge) this.badges.set(key, (badge = make(gfx, corner)));

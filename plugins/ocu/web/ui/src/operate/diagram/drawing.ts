@@ -128,7 +128,13 @@ export class Drawing {
   }
 
   /** `age_ms`: how long ago an element was left, for one that is told of late. */
-  set(process: string, element: string, state: ElementState, passed: boolean, age_ms: number): void {
+  set(
+    process: string,
+    element: string,
+    state: ElementState,
+    passed: boolean,
+    age_ms: number,
+  ): void {
     const figure = this.figures.get(keyOf(process, element));
     if (!figure) return;
     const look = lookOf(state);

@@ -1,6 +1,6 @@
-// Colours of the elements of one drawn diagram, on a canvas of their own that is multiplied with the
-// drawing. The drawing itself is never touched for them: to repaint hundreds of SVG shapes while they
-// fade is too slow, to fill as many rectangles is not.
+// Colours of the elements of one drawn diagram, on a canvas of their own that is multiplied with
+// the drawing. The drawing itself is never touched for them: to repaint hundreds of SVG shapes
+// while they fade is too slow, to fill as many rectangles is not.
 import type { Colour, Look, Palette } from "./colours";
 
 export interface Outline {

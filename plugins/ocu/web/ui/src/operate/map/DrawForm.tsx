@@ -6,7 +6,16 @@ import { attempt, toast } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
 import type { Geometry } from "../../shared/types";
 import { useOperating } from "../context";
-import { added, geometryOf, moved, problemOf, removed, undone, type Draft, type Vertex } from "./draft";
+import {
+  added,
+  geometryOf,
+  moved,
+  problemOf,
+  removed,
+  undone,
+  type Draft,
+  type Vertex,
+} from "./draft";
 import "./draw.css";
 
 const text = strings.operate.map;
@@ -91,7 +100,11 @@ export function DrawForm({ draft }: { draft: Draft }) {
         ))}
       </ol>
       <div class="draw-row draw-actions">
-        <button type="button" class="secondary" onClick={() => change(added(draft, middle.current()))}>
+        <button
+          type="button"
+          class="secondary"
+          onClick={() => change(added(draft, middle.current()))}
+        >
           {text.addCentre}
         </button>
         <button
@@ -125,7 +138,12 @@ interface VertexFieldsProps {
 }
 
 function VertexFields({ vertex, label, onChange }: VertexFieldsProps) {
-  const number = (name: string, value: number | null, limit: number, set: (value: number | null) => void) => (
+  const number = (
+    name: string,
+    value: number | null,
+    limit: number,
+    set: (value: number | null) => void,
+  ) => (
     <input
       type="number"
       step="any"

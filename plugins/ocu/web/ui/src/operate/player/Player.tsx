@@ -28,7 +28,8 @@ export function Player({ scene }: { scene: ReplayScene }) {
 
   useEffect(() => {
     const press = (event: KeyboardEvent) => {
-      if (event.ctrlKey || event.altKey || event.metaKey || isTyping(document.activeElement)) return;
+      if (event.ctrlKey || event.altKey || event.metaKey || isTyping(document.activeElement))
+        return;
       if (event.key === "," || event.key === ".") scene.step(event.key === "." ? 1 : -1);
       else if (event.key === "k") turn(scene);
       else return;

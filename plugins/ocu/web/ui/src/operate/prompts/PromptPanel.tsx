@@ -3,6 +3,7 @@ import { useComputed, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { post } from "../../shared/api";
 import { listen } from "../../shared/executive";
+import { go } from "../../shared/router";
 import { may, session } from "../../shared/session";
 import { attempt, toast } from "../../shared/Toasts";
 import type { Prompt } from "../../shared/types";
@@ -28,7 +29,10 @@ export function PromptPanel() {
     return [...scene.prompts.value].sort((one, other) => own(one) - own(other));
   });
   const prompts = queue.value;
-  const at = Math.max(0, prompts.findIndex((prompt) => idOf(prompt) === chosen.value));
+  const at = Math.max(
+    0,
+    prompts.findIndex((prompt) => idOf(prompt) === chosen.value),
+  );
   const prompt = prompts[at];
   const id = prompt ? idOf(prompt) : "";
   const mayAnswer = may("operator");
@@ -91,12 +95,15 @@ export function PromptPanel() {
           class="prompt-where"
           title={text.show}
           onClick={() => {
-            selected.value = { process: prompt.process, element: prompt.element, show: true };
+            const { run, process, element } = prompt;
+            if (run === scene.run) selected.value = { process, element, show: true };
+            else go(`/runs/${encodeURIComponent(run)}`);
           }}
         >
-          {fill(text.of, { element: mission.label(prompt.process, prompt.element) })}
+          {prompt.run === scene.run
+            ? fill(text.of, { element: mission.label(prompt.process, prompt.element) })
+            : fill(text.run, { run: prompt.run })}
         </button>
-        {prompt.run !== scene.run && <span>{fill(text.run, { run: prompt.run })}</span>}
         {prompt.role && <span>{fill(text.role, { role: prompt.role })}</span>}
       </div>
       <p id="prompt-text">{prompt.text || mission.label(prompt.process, prompt.element)}</p>

@@ -37,6 +37,7 @@ export function RunBar() {
         </span>
       )}
       <Clock />
+      {status === "interrupted" && <em>{fill(text.interrupted, { run: scene.run })}</em>}
       <span class="space" />
       {scene.mode === "replay" && <Asked />}
       {scene.mode === "live" && <Controls status={status} />}

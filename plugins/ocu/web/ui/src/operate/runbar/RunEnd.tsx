@@ -19,7 +19,10 @@ export function RunEnd({ onClose }: { onClose: () => void }) {
   const { records } = scene.log.value;
   const names = { element: mission.label, definition: mission.definition };
   const lines = (wanted: (record: RunRecord) => boolean) =>
-    records.filter(wanted).slice(-MOST).map((record) => lineOf(record, names));
+    records
+      .filter(wanted)
+      .slice(-MOST)
+      .map((record) => lineOf(record, names));
   const decisions = lines(({ record }) => record === "PromptAnswered");
   const faults = lines((record) => isFault(record));
   return (

@@ -1,5 +1,5 @@
-// The states of a run's elements. Who draws is told what changed at once; lists that people read are
-// renewed a few times a second (`slow`).
+// The states of a run's elements. Who draws is told what changed at once; lists that people read
+// are renewed a few times a second (`slow`).
 import { signal, type ReadonlySignal } from "@preact/signals";
 import type { Elements, ElementState } from "../../shared/types";
 
@@ -87,10 +87,13 @@ export class ElementBoard {
   private tell(changes: ElementChange[]): void {
     if (changes.length === 0) return;
     for (const listener of this.listeners) listener(changes);
-    this.timer ??= setTimeout(() => {
-      this.timer = undefined;
-      this.version.value += 1;
-    }, Math.max(SLOW_MS, changes.length * EACH_MS));
+    this.timer ??= setTimeout(
+      () => {
+        this.timer = undefined;
+        this.version.value += 1;
+      },
+      Math.max(SLOW_MS, changes.length * EACH_MS),
+    );
   }
 }
 

@@ -1,4 +1,5 @@
-// What the page shows of one run, wherever it comes from: the executive now, or records of the past.
+// What the page shows of one run, wherever it comes from: the executive now, or records of the
+// past.
 import type { ReadonlySignal } from "@preact/signals";
 import type { Spans } from "../../records/spans";
 import type {

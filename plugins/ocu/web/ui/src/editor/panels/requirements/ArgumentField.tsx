@@ -79,7 +79,7 @@ function SingleField(props: SingleFieldProps) {
         <ComboField
           {...common}
           mono
-          suggestions={vocabulary.elements.map(({ id: element, name, type }) => ({
+          suggestions={elementsFor(argument, vocabulary).map(({ id: element, name, type }) => ({
             value: element,
             note: name || type,
           }))}
@@ -112,6 +112,11 @@ function SingleField(props: SingleFieldProps) {
         />
       );
   }
+}
+
+/** Only user tasks ask. */
+function elementsFor({ name }: Argument, { elements }: Vocabulary): Vocabulary["elements"] {
+  return name === "ask" ? elements.filter(({ type }) => type === "userTask") : elements;
 }
 
 function resourceOptions({ resources }: Vocabulary) {

@@ -109,7 +109,7 @@ function Line({ one, isOpen, isWrong, answers, strict, toggle, remove }: LinePro
   return (
     <div class="m2v-requirement-line">
       <button type="button" class="m2v-requirement-head" aria-expanded={isOpen} onClick={toggle}>
-        {worst ? <Sign outcome={worst} /> : <span class="m2v-sign" aria-hidden="true" />}
+        {worst && <Sign outcome={worst} />}
         <span>
           <b>{id || words.unnamed}</b>
           {worst && (

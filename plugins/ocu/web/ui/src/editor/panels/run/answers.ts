@@ -51,9 +51,10 @@ export function isComplete(script: Script): boolean {
   );
 }
 
-/** A service writes a name, fails, or just ends. */
-function isGiven({ name, value, error }: ScriptedService): boolean {
-  return error !== "" || name.trim() !== "" || value.trim() === "";
+/** A service writes a value under a name, fails, or just ends. */
+export function isGiven({ name, value, error }: ScriptedService): boolean {
+  if (error.trim()) return true;
+  return (name.trim() === "") === (value.trim() === "") && readValue(value).kind !== "unreadable";
 }
 
 /** The text of the answers file; "" where nothing is scripted. */
