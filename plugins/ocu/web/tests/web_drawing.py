@@ -57,7 +57,7 @@ class Drawing:
         """Click the sequence flow between two elements, somewhere on its way."""
         flow = await self.flow(source, target)
         hit = self.element(flow).locator(".djs-hit").first
-        await self.click_until_selected(flow, lambda: hit.evaluate(MIDDLE))
+        await self.click_until_selected(flow, lambda: hit.evaluate(ON_LINE))
         return flow
 
     async def click_until_selected(
@@ -109,6 +109,12 @@ class Drawing:
         await self.put_down(x, y)
         return await self.named(name)
 
+    async def palette(self, title: str, x: float, y: float, name: str = "") -> str:
+        """Take one of the palette's symbols, and put it down somewhere."""
+        await self.page.locator(".djs-palette").get_by_role("button", name=title).click()
+        await self.put_down(x, y)
+        return await self.named(name)
+
     async def block(self, title: str, x: float, y: float, name: str = "") -> str:
         """Drag a block of the library to a place."""
         block = self.page.get_by_role("button", name=title, exact=True).first
@@ -153,6 +159,10 @@ class Drawing:
         if await self.page.locator(".djs-direct-editing-content").count():
             await self.page.keyboard.press("Escape")
 
+    async def who(self, resource: str) -> None:
+        """Choose who does the behavior."""
+        await self.page.get_by_label(re.compile(r"^Who\b")).first.select_option(resource)
+
     async def connect(self, source: str, target: str) -> str:
         """Draw a sequence flow from one element to another; the flow."""
         await self.select(source)
@@ -174,10 +184,10 @@ class Drawing:
         await expect(self.page.locator(SAVED)).to_have_text("Saved")
 
 
-# The middle of the longest part of a line, where nothing else lies on it.
-MIDDLE = """(line) => {
+# On a line where no label lies on it, as in its middle.
+ON_LINE = """(line) => {
   const length = line.getTotalLength();
-  const at = line.getPointAtLength(length / 2).matrixTransform(line.getScreenCTM());
+  const at = line.getPointAtLength(length / 4).matrixTransform(line.getScreenCTM());
   return [at.x, at.y];
 }"""
 
