@@ -5,6 +5,7 @@ import { Dialog } from "../shared/Dialog";
 import { go } from "../shared/router";
 import { may, session } from "../shared/session";
 import { attempt } from "../shared/Toasts";
+import { moment } from "../shared/moments";
 import type { MissionLine } from "../shared/types";
 import { fill, strings } from "../strings";
 import { Link } from "./Link";
@@ -135,7 +136,7 @@ function MissionRow({ mission, leave }: { mission: MissionLine; leave(): void })
         {title && title !== name && <span class="home-title">{title}</span>}
         {!runnable && <span class="home-chip home-chip-bad">{words.notRunnable}</span>}
       </td>
-      <td>{new Date(saved_at_us / 1000).toLocaleString()}</td>
+      <td class="home-when">{moment(saved_at_us / 1000)}</td>
       <td>{by}</td>
       <td class="home-actions">
         {may("commander") && (

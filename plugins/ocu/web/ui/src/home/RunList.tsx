@@ -1,6 +1,7 @@
 // What is and was run, the newest first.
 import { useState } from "preact/hooks";
 import { go } from "../shared/router";
+import { moment } from "../shared/moments";
 import type { RunSummary } from "../shared/types";
 import { fill, strings } from "../strings";
 import { Link } from "./Link";
@@ -70,7 +71,7 @@ function RunRow({ run }: { run: RunSummary }) {
           {strings.operate.run.status[run.status]}
         </span>
       </td>
-      <td>{new Date(run.started_us / 1000).toLocaleString()}</td>
+      <td class="home-when">{moment(run.started_us / 1000)}</td>
       <td>{duration((ended - run.started_us) / 1_000_000)}</td>
     </tr>
   );
