@@ -42,6 +42,8 @@ export class MissionWork {
       () => this.saved.value?.version ?? null,
     );
     this.session.changes.subscribe(() => {
+      // It would take back what was drawn since, too.
+      this.putBack.value = null;
       if (this.session.isDirty.peek()) this.autosave.soon();
     });
   }
