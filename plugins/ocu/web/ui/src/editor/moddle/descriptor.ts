@@ -72,7 +72,7 @@ export const m2pemDescriptor = {
       name: "Requirement",
       superClass: ["Element"],
       properties: [
-        ...["id", "ltl", "pattern", "text"].map(attribute),
+        ...["id", "ltl", "pattern", "text", "fair"].map(attribute),
         children("args", "Arg"),
       ],
     },

@@ -8,7 +8,7 @@ import { panels } from "./panels";
 const words = strings.editor.panel;
 const LEAST = 240;
 const MOST = 720;
-const USUAL = 340;
+const USUAL = 380;
 const STEP = 24;
 
 export function SidePanel({ editor }: { editor: EditorContext }) {

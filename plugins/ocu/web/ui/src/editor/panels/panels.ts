@@ -2,5 +2,7 @@
 import type { Panel } from "./panel";
 import { problemsPanel } from "./ProblemsPanel";
 import { propertiesPanel } from "./PropertiesPanel";
+import { runPanel } from "./run/RunPanel";
+import { verifyPanel } from "./verify/VerifyPanel";
 
-export const panels: readonly Panel[] = [propertiesPanel, problemsPanel];
+export const panels: readonly Panel[] = [propertiesPanel, problemsPanel, verifyPanel, runPanel];

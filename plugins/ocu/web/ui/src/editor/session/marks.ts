@@ -23,7 +23,9 @@ export class Marks {
     for (const [id, name] of this.shown.get(layer) ?? []) {
       if (registry.get(id)) canvas.removeMarker(id, name);
     }
-    const drawn = Object.entries(this.layers.get(layer) ?? {}).filter(([id]) => registry.get(id));
+    const drawn = Object.entries(this.layers.get(layer) ?? {})
+      .filter(([id]) => registry.get(id))
+      .flatMap(([id, names]) => names.split(" ").map((name): [string, string] => [id, name]));
     for (const [id, name] of drawn) canvas.addMarker(id, name);
     this.shown.set(layer, drawn);
   }

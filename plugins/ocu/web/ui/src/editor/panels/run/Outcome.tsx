@@ -1,0 +1,95 @@
+// What a rehearsal came to: how it ended, who did what when, and where to watch it.
+import { fill, strings } from "../../../strings";
+import type { RunSummary } from "../../../shared/types";
+import { PROMPTS, SERVICES, type Span } from "../../../records/spans";
+import type { EditorContext } from "../panel";
+
+const words = strings.run;
+const STATUS = strings.operate.run.status;
+
+export interface OutcomeProps {
+  editor: EditorContext;
+  id: string;
+  summary: RunSummary;
+  spans: readonly Span[];
+}
+
+export function Outcome({ editor, id, summary, spans }: OutcomeProps) {
+  const { status, detail, records, started_us, ended_us } = summary;
+  const seconds = ended_us === null ? 0 : (ended_us - started_us) / 1e6;
+  const good = status === "completed" || status === "terminated";
+  return (
+    <section class="m2r-outcome" aria-label={words.outcome}>
+      <div class={`m2v-summary ${good ? "m2v-holds" : "m2v-violated"}`}>
+        <h3>
+          <span class={`m2v-sign m2v-sign-${good ? "holds" : "violated"}`} aria-hidden="true">
+            {good ? "✓" : "✗"}
+          </span>
+          {STATUS[status]}
+        </h3>
+        {detail && <p>{detail}</p>}
+        <p class="m2v-faint">{fill(words.took, { duration: duration(seconds), records })}</p>
+        <a class="m2r-watch" href={`/rehearsals/${encodeURIComponent(id)}`} target="_blank">
+          {words.watch}
+        </a>
+      </div>
+      {spans.length > 0 && <Bars editor={editor} spans={spans} end={seconds} />}
+    </section>
+  );
+}
+
+/** A row for each vehicle and payload, and for questions and services. */
+function Bars({ editor, spans, end }: { editor: EditorContext; spans: readonly Span[]; end: number }) {
+  const rows = [...new Set(spans.map(({ row }) => row))];
+  const last = Math.max(end, ...spans.map(({ from, to }) => to ?? from), 0.001);
+  const title = (row: string) =>
+    row === PROMPTS ? words.questions : row === SERVICES ? words.services : row;
+  return (
+    <>
+      <h4>{words.timeline}</h4>
+      <ul class="m2r-bars">
+        {rows.map((row) => (
+          <li key={row}>
+            <span class="m2r-row">{title(row)}</span>
+            <div class="m2r-track">
+              {spans
+                .filter((span) => span.row === row)
+                .map((span) => (
+                  <Bar key={span.id} editor={editor} span={span} last={last} />
+                ))}
+            </div>
+          </li>
+        ))}
+      </ul>
+      <p class="m2r-scale" aria-hidden="true">
+        <span>0 s</span>
+        <span>{duration(last)}</span>
+      </p>
+    </>
+  );
+}
+
+function Bar({ editor, span, last }: { editor: EditorContext; span: Span; last: number }) {
+  const { from, to, label, end, reason, element } = span;
+  const until = to ?? last;
+  const said = fill(words.bar, { label, from: duration(from), to: duration(until) });
+  const title = [said, end && strings.operate.timeline.ends[end], reason].filter(Boolean).join(", ");
+  return (
+    <button
+      type="button"
+      class={`m2r-bar m2r-bar-${end || "unknown"}`}
+      style={{ left: `${(100 * from) / last}%`, width: `${(100 * (until - from)) / last}%` }}
+      title={title}
+      aria-label={title}
+      onClick={() => void editor.select(element)}
+    />
+  );
+}
+
+export function duration(seconds: number): string {
+  if (seconds < 60) return `${Number(seconds.toFixed(1))} s`;
+  const whole = Math.round(seconds);
+  const [hours, minutes] = [Math.floor(whole / 3600), Math.floor((whole % 3600) / 60)];
+  const rest = String(whole % 60).padStart(2, "0");
+  return hours ? `${hours}:${String(minutes).padStart(2, "0")}:${rest} h` : `${minutes}:${rest} min`;
+}

@@ -1,0 +1,147 @@
+// Run: the mission is rehearsed as it is drawn, or saved and started.
+import { useState } from "preact/hooks";
+import { Dialog } from "../../../shared/Dialog";
+import { go } from "../../../shared/router";
+import { may, session } from "../../../shared/session";
+import { fill, strings } from "../../../strings";
+import { beginningOf } from "../begin/beginning";
+import { BeginForm } from "../begin/BeginForm";
+import type { EditorContext, Panel } from "../panel";
+import { ProblemView } from "../ProblemView";
+import { AnswersForm } from "./AnswersForm";
+import { Outcome } from "./Outcome";
+import { rehearsalOf } from "./rehearsal";
+import { startingOf } from "./starting";
+import "../begin/begin.css";
+import "../verify/verify.css";
+import "./run.css";
+
+const words = strings.run;
+
+export const runPanel: Panel = {
+  id: "run",
+  title: words.title,
+  render: (editor) => <RunPanel editor={editor} />,
+};
+
+function RunPanel({ editor }: { editor: EditorContext }) {
+  return (
+    <div class="m2v">
+      <section aria-label={words.begins}>
+        <h3>{words.begins}</h3>
+        <BeginForm editor={editor} prefix="m2r" />
+      </section>
+      <Rehearse editor={editor} />
+      <Start editor={editor} />
+    </div>
+  );
+}
+
+function Rehearse({ editor }: { editor: EditorContext }) {
+  const rehearsal = rehearsalOf(editor);
+  const { job } = rehearsal;
+  const busy = job.isBusy.value;
+  const allowed = may("operator");
+  const ready = beginningOf(editor).isReadable() && rehearsal.isReady.value;
+  const told = job.told.value;
+  const refusal = job.refusal.value;
+  return (
+    <section class="m2r-part" aria-label={words.rehearse}>
+      <h3>{words.rehearse}</h3>
+      <p class="m2-field-hint">{words.rehearseHint}</p>
+      <details class="m2v-options">
+        <summary>{words.answers.title}</summary>
+        <AnswersForm editor={editor} rehearsal={rehearsal} />
+      </details>
+      <div class="m2v-actions">
+        <button
+          type="button"
+          class="primary"
+          disabled={busy || !allowed || !ready}
+          onClick={() => void rehearsal.begin(editor)}
+        >
+          {words.rehearse}
+        </button>
+        {busy && (
+          <button type="button" class="secondary" onClick={() => void job.cancel()}>
+            {strings.verify.cancel}
+          </button>
+        )}
+      </div>
+      {!allowed && <p class="m2-note">{words.rehearseNotAllowed}</p>}
+      {!ready && <p class="m2-note">{words.notReady}</p>}
+      <div role="status">
+        {busy && (
+          <div class="m2v-progress">
+            <span class="m2v-spinner" aria-hidden="true" />
+            {words.rehearsing}
+          </div>
+        )}
+        {told?.state === "cancelled" && <p class="m2-note">{words.cancelled}</p>}
+        {told?.summary && (
+          <Outcome
+            editor={editor}
+            id={job.id.value}
+            summary={told.summary}
+            spans={rehearsal.spans.value}
+          />
+        )}
+      </div>
+      {refusal && <ProblemView editor={editor} title={words.failed} refusal={refusal} />}
+    </section>
+  );
+}
+
+function Start({ editor }: { editor: EditorContext }) {
+  const [asks, setAsks] = useState(false);
+  const starting = startingOf(editor);
+  const simulated = session.value?.simulated ?? false;
+  const allowed = may("commander");
+  const ready = beginningOf(editor).isReadable();
+  const busy = starting.isBusy.value;
+  const refusal = starting.refusal.value;
+  const start = async () => {
+    setAsks(false);
+    const run = await starting.start(editor);
+    if (run !== undefined) go(`/runs/${encodeURIComponent(run)}`);
+  };
+  return (
+    <section class="m2r-part" aria-label={words.start}>
+      <h3>{words.start}</h3>
+      <p class="m2-field-hint">{simulated ? words.startSimulated : words.startReal}</p>
+      <div class="m2v-actions">
+        <button
+          type="button"
+          class={simulated ? "primary" : "primary m2r-real"}
+          disabled={busy || !allowed || !ready}
+          onClick={() => (simulated ? void start() : setAsks(true))}
+        >
+          {busy ? words.starting : simulated ? words.start : words.startRealButton}
+        </button>
+      </div>
+      {!allowed && <p class="m2-note">{words.startNotAllowed}</p>}
+      {refusal && <ProblemView editor={editor} title={words.startFailed} refusal={refusal} />}
+      {asks && (
+        <Dialog
+          title={words.real.title}
+          onClose={() => setAsks(false)}
+          actions={
+            <>
+              <button type="button" class="secondary" onClick={() => setAsks(false)}>
+                {words.real.no}
+              </button>
+              <button type="button" class="primary m2r-real" onClick={() => void start()}>
+                {words.real.yes}
+              </button>
+            </>
+          }
+        >
+          <p>
+            <strong>{words.real.moves}</strong>
+          </p>
+          <p>{fill(words.real.text, { fleet: session.value?.fleet ?? "", mission: editor.mission })}</p>
+        </Dialog>
+      )}
+    </section>
+  );
+}

@@ -1,0 +1,56 @@
+import { describe, expect, it } from "vitest";
+import { dataOf, EMPTY, isComplete, yamlOf, type Script } from "./answers";
+
+const script: Script = {
+  answers: { UserSendRoute: ["continue", "no way"], Unused: [] },
+  services: [
+    { element: "Detector", after: "5", name: "detection.type", value: "gpr", error: "" },
+    { element: "Detector", after: "", name: "", value: "", error: "SENSOR_BROKEN" },
+  ],
+  behaviors: [
+    { element: "DriveRoute", after: "30", end: "failed", error: "ROUTE_BLOCKED" },
+    { element: "DriveStop", after: "", end: "stalled", error: "ignored" },
+  ],
+  sends: [
+    { kind: "signal", id: "dc45ff2b-ef6b", at: "12.5", data: "reason = dust, depth = 2" },
+    { kind: "message", id: "7c1e4a90-2f53", at: "0", data: "" },
+  ],
+};
+
+describe("an answers file", () => {
+  it("says what the rows say", () => {
+    expect(yamlOf(script)).toBe(`answers:
+  UserSendRoute: [continue, "no way"]
+services:
+  Detector:
+    - {after: 5 s, write: {detection.type: gpr}}
+    - {error: SENSOR_BROKEN}
+behaviors:
+  DriveRoute:
+    - {after: 30 s, end: failed, error: ROUTE_BLOCKED}
+  DriveStop:
+    - {end: stalled}
+signals:
+  - {at: 12.5 s, id: dc45ff2b-ef6b, data: {reason: dust, depth: 2}}
+messages:
+  - {at: 0 s, id: "7c1e4a90-2f53", data: {}}
+`);
+  });
+
+  it("is empty where nothing is scripted", () => {
+    expect(yamlOf(EMPTY)).toBe("");
+  });
+
+  it("waits for rows that are not filled in", () => {
+    expect(isComplete(script)).toBe(true);
+    const [send] = script.sends;
+    expect(isComplete({ ...script, sends: [{ ...send!, at: "" }] })).toBe(false);
+    expect(isComplete({ ...script, sends: [{ ...send!, data: "dust" }] })).toBe(false);
+    expect(isComplete({ ...script, behaviors: [{ ...script.behaviors[0]!, after: "soon" }] })).toBe(false);
+  });
+});
+
+it("reads what is sent along", () => {
+  expect(dataOf("a = 1, b.c = x")).toEqual({ a: 1, "b.c": "x" });
+  expect(dataOf("a")).toBeUndefined();
+});

@@ -1,0 +1,152 @@
+// Verify: what is asked, how far it is, and what came of it.
+import { useEffect, useRef } from "preact/hooks";
+import { may } from "../../../shared/session";
+import { fill, strings } from "../../../strings";
+import { CheckField } from "../../properties/fields/SelectField";
+import { TextField } from "../../properties/fields/TextField";
+import { beginningOf } from "../begin/beginning";
+import { BeginForm } from "../begin/BeginForm";
+import type { EditorContext, Panel } from "../panel";
+import { ProblemView } from "../ProblemView";
+import { Requirements } from "../requirements/Requirements";
+import { Answers } from "./Answers";
+import { followOnCanvas } from "./canvas";
+import { counted } from "./report";
+import { verificationOf, type Verification } from "./verification";
+import { ViolationView } from "./ViolationView";
+import "../begin/begin.css";
+import "./verify.css";
+import "./canvas.css";
+
+const words = strings.verify;
+
+export const verifyPanel: Panel = {
+  id: "verify",
+  title: words.title,
+  badge: (editor) => {
+    const made = verificationOf(editor).made.value;
+    return made ? counted(made.report).violated : 0;
+  },
+  render: (editor) => <VerifyPanel editor={editor} />,
+};
+
+function VerifyPanel({ editor }: { editor: EditorContext }) {
+  const verification = verificationOf(editor);
+  const top = useRef<HTMLDivElement>(null);
+  useEffect(() => followOnCanvas(editor, verification), [editor, verification]);
+  const opened = verification.opened.value;
+  useEffect(() => top.current?.scrollIntoView({ block: "start" }), [opened]);
+  return (
+    <div class="m2v" ref={top}>
+      {opened ? (
+        <ViolationView editor={editor} verification={verification} violation={opened} />
+      ) : (
+        <>
+          <Ask editor={editor} verification={verification} />
+          <Progress editor={editor} verification={verification} />
+          <Answers editor={editor} verification={verification} />
+          <Requirements editor={editor} verification={verification} />
+        </>
+      )}
+    </div>
+  );
+}
+
+interface PartProps {
+  editor: EditorContext;
+  verification: Verification;
+}
+
+function Ask({ editor, verification }: PartProps) {
+  const { job, strict, inOrder, spec } = verification;
+  const busy = job.isBusy.value;
+  const allowed = may("operator");
+  const ready = beginningOf(editor).isReadable();
+  return (
+    <section class="m2v-ask" aria-label={words.ask}>
+      <div class="m2v-actions">
+        <button
+          type="button"
+          class="primary"
+          disabled={busy || !allowed || !ready}
+          title={allowed ? words.beginHint : words.notAllowed}
+          onClick={() => void verification.begin(editor)}
+        >
+          {words.begin}
+        </button>
+        {busy && (
+          <button type="button" class="secondary" onClick={() => void job.cancel()}>
+            {words.cancel}
+          </button>
+        )}
+      </div>
+      {!allowed && <p class="m2-note">{words.notAllowed}</p>}
+      <details class="m2v-options">
+        <summary>{words.options}</summary>
+        <BeginForm editor={editor} prefix="m2v" />
+        <CheckField
+          id="m2v-in-order"
+          label={words.inOrder}
+          hint={words.inOrderHint}
+          value={inOrder.value}
+          write={(value) => {
+            inOrder.value = value;
+          }}
+        />
+        <CheckField
+          id="m2v-strict"
+          label={words.strict}
+          hint={words.strictHint}
+          value={strict.value}
+          write={(value) => {
+            strict.value = value;
+          }}
+        />
+        <TextField
+          id="m2v-spec"
+          label={words.spec}
+          hint={words.specHint}
+          rows={4}
+          mono
+          placeholder={words.specExample}
+          value={spec.value}
+          write={(value) => {
+            spec.value = value;
+          }}
+        />
+      </details>
+    </section>
+  );
+}
+
+const NUMBER = new Intl.NumberFormat("en");
+
+/** How far the search is, or why there is no report. */
+function Progress({ editor, verification }: PartProps) {
+  const { job, spec } = verification;
+  const told = job.told.value;
+  const refusal = job.refusal.value;
+  const { states = 0, waiting = 0, seconds = 0 } = told?.progress ?? {};
+  return (
+    <>
+      <div role="status">
+        {job.isBusy.value && (
+          <div class="m2v-progress">
+            <span class="m2v-spinner" aria-hidden="true" />
+            {states
+              ? fill(words.progress, {
+                  states: NUMBER.format(states),
+                  waiting: NUMBER.format(waiting),
+                  seconds: NUMBER.format(Math.round(seconds)),
+                })
+              : words.starting}
+          </div>
+        )}
+        {told?.state === "cancelled" && <p class="m2-note">{words.cancelled}</p>}
+      </div>
+      {refusal && (
+        <ProblemView editor={editor} title={words.failed} refusal={refusal} spec={spec.value} />
+      )}
+    </>
+  );
+}
