@@ -93,8 +93,11 @@ class Hub:
 
     async def _pace(self) -> None:
         loop = asyncio.get_running_loop()
+        at = loop.time()
         while True:
-            await asyncio.sleep(FRAME_S)
+            # What was late once must not be late for ever, nor be made up for in a rush.
+            at = max(at + FRAME_S, loop.time())
+            await asyncio.sleep(at - loop.time())
             if self.viewers:
                 await self._tick(loop.time())
 
@@ -162,6 +165,8 @@ class Hub:
         messages = [viewer.numbered(each) for each in viewer.urgent]
         viewer.urgent.clear()
         if viewer.may_send and (viewer.wants_snapshot or viewer.frame_due):
+            # Records may have come since the names were handed out: all that is counted is shown.
+            self._hand_out()
             told = self._snapshot(viewer) if viewer.wants_snapshot else self._frame(viewer)
             viewer.wants_snapshot = viewer.frame_due = False
             viewer.changes = Changes()
