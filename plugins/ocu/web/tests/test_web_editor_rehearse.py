@@ -6,7 +6,6 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 from playwright.async_api import Page, expect
-
 from web_browsing import TIMEOUT_MS, browser, page_at
 from web_served import FLEET, REPOSITORY, Served, served
 

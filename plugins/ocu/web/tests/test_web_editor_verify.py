@@ -7,7 +7,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from playwright.async_api import Locator, Page, expect
-
 from web_browsing import TIMEOUT_MS, browser, page_at
 from web_served import REPOSITORY, Served, served
 
@@ -137,7 +136,9 @@ async def test_a_pattern_gets_its_arguments_from_pickers(tmp_path: Path) -> None
         await parts.get_by_role("button", name="Add", exact=True).click()
         ask = parts.get_by_role("combobox", name="ask", exact=True)
         await ask.click()
-        await expect(offered(page).get_by_role("option")).to_have_text(["UserSendRouteUSER SEND ROUTE"])
+        await expect(offered(page).get_by_role("option")).to_have_text(
+            ["UserSendRouteUSER SEND ROUTE"]
+        )
         await offered(page).get_by_role("option").click()
         await parts.get_by_role("combobox", name="decision").click()
         await offered(page).get_by_role("option", name="continue").click()
