@@ -6,6 +6,7 @@ and processes without a diagram, and subprocesses whose inside is drawn nowhere.
 
 from collections.abc import Iterator
 from copy import deepcopy
+from dataclasses import replace
 
 from lxml import etree
 
@@ -37,6 +38,8 @@ NAMESPACES = {
 
 _DI, _DC, _DD = (f"{{{uri}}}" for uri in NAMESPACES.values())
 _MARGIN_X, _MARGIN_Y = 160, 80
+_ABOVE_THE_TRACKS = 11
+"""Lines run below an activity as near as that, and a name would be crossed."""
 _ORDER = {"participant": 0, "lane": 1, "boundaryEvent": 3}
 """What lies below all else, and what above: 2 is all else, the outer before the inner."""
 
@@ -198,7 +201,10 @@ class _Writer:
         _bounds(shape, bounds)
         symbol = Shape(name, tag(element), name_of_symbol(element), bounds)
         if has_label(symbol):
-            _label(shape, label_of(symbol).bounds)
+            label = label_of(symbol).bounds
+            if symbol.kind == "boundaryEvent":
+                label = replace(label, y=label.y - _ABOVE_THE_TRACKS)
+            _label(shape, label)
 
     def _edge(self, plane: Element, name: str, block: Block) -> None:
         element, points = self._elements[name], tuple(block.lines[name])

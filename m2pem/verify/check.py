@@ -85,7 +85,8 @@ def check(
     fleet = fleet or fleet_for(mission)
     try:
         bound = bound_of(limits)
-        system = simplify(derive(mission, fleet, process=process, options=options, bound=bound))
+        system = derive(mission, fleet, process=process, options=options, bound=bound)
+        system = simplify(system, bound=bound)
     except TooLargeError as error:
         return too_large(mission, error, process)
     found = search(system, _rest(limits, began), progress)

@@ -6,6 +6,7 @@ to have one token at most, and rules never to fire.
 
 from collections.abc import Iterable
 
+from m2pem.verify.derive.bound import Bound
 from m2pem.verify.system import Rule, System
 
 MOST_PLACES = 1_500
@@ -50,7 +51,9 @@ def bits_of(places: Iterable[int]) -> int:
 class Concurrency:
     """`rows[p]`: a bit for each place that may have a token when p has one; p's own bit: two."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, bound: Bound | None = None) -> None:
+        """Raises TooLargeError if it takes longer than `bound` allows."""
+        bound = bound or Bound()
         self.rows = [0] * len(system.places)
         self.live: set[int] = set()
         self._marked = 0
@@ -71,6 +74,7 @@ class Concurrency:
         while waiting:
             number = next(iter(waiting))
             del waiting[number]
+            bound.look(system.rules[number].element)
             for place in self._fire(system.rules[number]):
                 for rule in by_place.get(place, ()):
                     waiting[rule.index] = None

@@ -27,6 +27,7 @@ class Compiled:
     """One rule as masks. `plain`: they say it all; else the lists do what they cannot.
 
     `erase`: of what is cleared, what goes after tokens have moved; the rest is consumed before.
+    `kill`: of that, what is emptied whatever it holds.
     """
 
     test: int = 0
@@ -40,6 +41,7 @@ class Compiled:
     takes: list[tuple[int, int]] = field(default_factory=list)
     moves: list[tuple[int, int, int, bool]] = field(default_factory=list)
     gives: list[tuple[int, int, int, int, int]] = field(default_factory=list)
+    kill: int = 0
     reads: int = 0
     changes: int = 0
 
@@ -71,6 +73,7 @@ class Encoding:
             self.initial |= count << self.offset[place_index]
         for variable in system.variables:
             self.initial |= 1 << (self.value_bit[variable.index] + variable.initial)
+        self._kills: dict[tuple[int, ...], int] = {}
         self.rules = [self._compile(rule) for rule in system.rules]
 
     def places_mask(self, places: Iterable[int]) -> int:
@@ -79,6 +82,13 @@ class Encoding:
         for place in places:
             mask |= self.mask[place]
         return mask
+
+    def _killed(self, places: tuple[int, ...]) -> int:
+        """The same, of what an interruption ends: often what many others end as well."""
+        known = self._kills.get(places)
+        if known is None:
+            known = self._kills[places] = self.places_mask(places)
+        return known
 
     def _values_mask(self, variable: int, values: Iterable[int]) -> int:
         mask = 0
@@ -114,8 +124,9 @@ class Encoding:
                 c.need |= mask
             elif len(values) < len(self.system.variables[variable].values):
                 c.any_of.append(mask)
-        for place in rule.kill:
-            c.erase |= self.mask[place]
+        if rule.kill:
+            c.kill = self._killed(rule.kill)
+            c.erase = c.kill
         for pairs, gone in ((rule.moves, True), (rule.copies, False)):
             for source, target in pairs:
                 c.moves.append((self.mask[source], self.mask[target], self.offset[target], gone))

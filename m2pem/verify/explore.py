@@ -28,8 +28,11 @@ _LOOK_EVERY_STEPS = 10_000
 _LOOK_EVERY_CHOICE = 4
 """The same, where what is tried in a state has to be chosen first."""
 _BYTES_A_STATE = 250
-"""About what a state costs in memory, beside its own bits."""
-_BYTES_AN_EDGE = 8
+"""About what a state costs in memory, beside its own bits; until it is searched, more."""
+_BYTES_A_WAITING_STATE = 56
+_BYTES_A_RULE = 8
+"""Of each that may fire there."""
+_BYTES_AN_EDGE = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,7 +300,7 @@ class _Search:
         while at < count:
             if at % look_every == 0 or transitions - looked > _LOOK_EVERY_STEPS:
                 found.transitions = looked = transitions
-                if self._stop(found, count, at, progress):
+                if self._stop(found, count, at, waiting, progress):
                     return
             state = states[at]
             enabled = waiting[at]
@@ -373,6 +376,7 @@ class _Search:
         found: Exploration,
         states: int,
         done: int,
+        waiting: "list[tuple[int, ...] | None]",
         progress: Callable[[Progress], None] | None,
     ) -> bool:
         seconds = time.monotonic() - self.began
@@ -380,7 +384,10 @@ class _Search:
             progress(Progress(states, states - done, seconds))
         size = states * (_BYTES_A_STATE + self.encoding.bits // 7)
         if self.keep_edges:
-            size += found.transitions * _BYTES_AN_EDGE * 2
+            size += found.transitions * _BYTES_AN_EDGE
+        # What may fire in those that wait: about as much as in the first and the last of them.
+        ends = [len(each) for each in (waiting[done], waiting[-1]) if each is not None]
+        size += (states - done) * (_BYTES_A_WAITING_STATE + _BYTES_A_RULE * sum(ends) // len(ends))
         if states > self.limits.states:
             found.stopped = Stopped.STATES
         elif seconds > self.limits.seconds:

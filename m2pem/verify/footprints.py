@@ -18,7 +18,7 @@ class Footprints:
         self.encoding = encoding
         self.needs, self.forbids = [0] * count, [0] * count
         self.clears, self.sets = [0] * count, [0] * count
-        self.kill = [encoding.places_mask(rule.kill) for rule in encoding.system.rules]
+        self.kill = [rule.kill for rule in encoding.rules]
         for number in range(count):
             self._look_at(number)
         self.needing = _registered(self.needs)
@@ -57,6 +57,8 @@ class Footprints:
 
 _PART = 64
 _FULL = (1 << _PART) - 1
+_FEW = 8
+"""Bits of a mask that are looked up one by one."""
 
 
 class Union:
@@ -74,23 +76,29 @@ class Union:
         """Those rules, as a mask of their numbers."""
         known = self._known.get(mask)
         if known is None:
-            known, rest, at = 0, mask, 0
-            while rest:
-                if part := rest & _FULL:
-                    known |= self._of_part(part, at)
-                rest >>= _PART
-                at += _PART
-            self._known[mask] = known
+            few = mask.bit_count() <= _FEW
+            known = self._known[mask] = self._each(mask) if few else self._in_parts(mask)
         return known
 
-    def _of_part(self, part: int, at: int) -> int:
-        known = self._parts.get((part, at))
-        if known is None:
-            known = 0
-            for low in bits_of(part << at):
-                known |= self._register.get(low, 0)
-            self._parts[part, at] = known
-        return known
+    def _each(self, mask: int) -> int:
+        found, look_up = 0, self._register.get
+        while mask:
+            low = mask & -mask
+            mask ^= low
+            found |= look_up(low, 0)
+        return found
+
+    def _in_parts(self, mask: int) -> int:
+        found = at = 0
+        while mask:
+            if part := mask & _FULL:
+                known = self._parts.get((part, at))
+                if known is None:
+                    known = self._parts[part, at] = self._each(part << at)
+                found |= known
+            mask >>= _PART
+            at += _PART
+        return found
 
 
 def _registered(masks: Sequence[int], kill: Sequence[int] = ()) -> dict[int, int]:

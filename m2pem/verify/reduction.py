@@ -23,7 +23,6 @@ at last as for those of rounds that go on for ever, as nothing is put off all th
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from heapq import nsmallest
 from typing import Protocol
 
 from m2pem.verify.concurrency import Concurrency, is_small
@@ -93,7 +92,10 @@ class _Bound:
         self._visible = bytearray(rule.index in visible for rule in self.rules)
         self.joins = _mask(r.index for r in self.rules if r.kind is Kind.JOIN)
         # The same in all states: what goes on at once is gone through branch by branch.
-        self._rank = [(each.bit_count(), n) for n, each in enumerate(prints.kill)]
+        self._rank = [0] * len(self.rules)
+        kills = [each.bit_count() for each in prints.kill]
+        for rank, number in enumerate(sorted(range(len(kills)), key=kills.__getitem__)):
+            self._rank[number] = rank
         self._rivals_of: dict[int, int] = {}
         self._all_bits = (1 << encoding.bits) - 1
 
@@ -104,19 +106,18 @@ class _Bound:
         first = self.rules[usable[0]].kind
         if first is Kind.JOIN:
             return usable
-        together = 0
-        for number in usable:
-            together |= self._bit[number]
+        visible = self._visible
+        together = sum(map(self._bit.__getitem__, usable))
         candidates = self.internal if first is Kind.INTERNAL else self.every
         best: Sequence[int] = usable
-        order = [n for n in usable if not self._visible[n]]
-        for seed in nsmallest(_MOST_SEEDS, order, key=self._rank.__getitem__):
+        order = sorted([n for n in usable if not visible[n]], key=self._rank.__getitem__)
+        for seed in order[:_MOST_SEEDS]:
             if len(best) <= (self._rivals(seed) & together).bit_count():
                 continue
             closed = self._close(state, seed, together, candidates, len(best))
             if closed is None:
                 continue
-            chosen = [n for n in usable if closed >> n & 1]
+            chosen = [low.bit_length() - 1 for low in bits_of(closed & together)]
             if len(chosen) < len(best):
                 best = chosen
                 if len(best) == 1:

@@ -74,6 +74,11 @@ class Relays:
         return known and bool(self.prints.forbidding.get(bit, 0) >> end & 1)
 
     def _is_brought(self, bit: int) -> bool:
+        """See `_comes_last`.
+
+        What needs the source cannot come while its token is at `bit`, or, with a rule that waits,
+        there would be two at the source. So it makes no difference what that does to `bit`.
+        """
         prints = self.prints
         needing = prints.needing.get(bit, 0)
         if not bit & self._safe or not needing or needing & (needing - 1):
@@ -85,7 +90,7 @@ class Relays:
             (source := self._source(low.bit_length() - 1)) != 0
             and prints.sets[low.bit_length() - 1] == bit
             and prints.forbidding.get(source, 0) == prints.forbidding.get(bit, 0)
-            and self._emptying(source) == self._emptying(bit)
+            and self._emptying(source) == self._emptying(bit) & ~prints.needing[source]
             for low in bits_of(makers)
         )
 

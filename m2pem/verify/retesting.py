@@ -10,7 +10,7 @@ from m2pem.verify.footprints import bits_of
 
 def as_sets(affected: list[list[int]]) -> list[frozenset[int]]:
     """The same as sets; lists that are shared give sets that are."""
-    made = {id(each): frozenset(each) for each in affected}
+    made = {key: frozenset(each) for key, each in _apart(affected).items()}
     return [made[id(each)] for each in affected]
 
 
@@ -20,8 +20,13 @@ def tests_of(
     """By rule, what to test after it: the number of each rule, its masks and whether they say it
     all."""
     of = [(n, test, need, plain) for n, (test, need, _, _, plain) in enumerate(masks)]
-    made = {id(each): [of[n] for n in each] for each in affected}
+    made = {key: [of[n] for n in each] for key, each in _apart(affected).items()}
     return [made[id(each)] for each in affected]
+
+
+def _apart(affected: list[list[int]]) -> dict[int, list[int]]:
+    """Each list once, however many rules share it."""
+    return {id(each): each for each in affected}
 
 
 def affected_rules(encoding: Encoding) -> list[list[int]]:

@@ -7,27 +7,41 @@ what comes to the place goes straight to what follows it. The places that remain
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import replace
+from functools import cache
 
 from m2pem.verify.concurrency import Concurrency, is_small
+from m2pem.verify.derive.bound import Bound
 from m2pem.verify.system import Kind, Role, Rule, System
 
 _MOST_PAIRS = 64
 """Rules that one passed place may be replaced by."""
 
+_WORTH_TRIMMING = 0.5
+"""Of what a rule kills, what may be left. It is more use if all rules of a scope kill alike."""
 
-def simplify(system: System, seen: Collection[int] = (), visible: Collection[int] = ()) -> System:
+
+def simplify(
+    system: System,
+    seen: Collection[int] = (),
+    visible: Collection[int] = (),
+    bound: Bound | None = None,
+) -> System:
     """The same, smaller.
 
     `seen`: places that a property looks at; `visible`: rules that change those, or are looked at
     themselves. Those places stay, and such a rule stays a step of its own after what it follows.
+
+    Raises:
+        TooLargeError: it takes longer than `bound` allows.
     """
-    concurrency = Concurrency(system) if is_small(system) else None
+    bound = bound or Bound()
+    concurrency = Concurrency(system, bound) if is_small(system) else None
     rules = list(system.rules)
     if concurrency is not None:
         rules = [_trim(rule, concurrency) for rule in rules if concurrency.may_fire(rule)]
         # What the smaller system does, this one can do as well: so that is true of it, too.
         system = replace(system, single=concurrency.single)
-    return renumbered(system, _fused(system, rules, frozenset(seen), frozenset(visible)))
+    return renumbered(system, _fused(system, rules, frozenset(seen), frozenset(visible), bound))
 
 
 def _trim(rule: Rule, concurrency: Concurrency) -> Rule:
@@ -43,6 +57,8 @@ def _trim(rule: Rule, concurrency: Concurrency) -> Rule:
     inhibit = tuple(p for p in rule.inhibit if possible >> p & 1)
     absent = set(rule.inhibit) - told
     kill = tuple(p for p in rule.kill if p not in absent and (possible >> p & 1 or p in told))
+    if len(kill) > len(rule.kill) * _WORTH_TRIMMING:
+        kill = rule.kill
     return replace(rule, inhibit=inhibit, kill=kill)
 
 
@@ -55,6 +71,11 @@ def renumbered(system: System, rules: list[Rule]) -> System:
             used |= {one, other}
     order = [place for place in system.places if place.index in used]
     number = {place.index: n for n, place in enumerate(order)}
+
+    @cache  # what ends one scope says the same, and as much as the scope is large
+    def killed(places: tuple[int, ...]) -> tuple[int, ...]:
+        return tuple(number[p] for p in places if p in number)
+
     made = tuple(
         replace(
             rule,
@@ -63,7 +84,7 @@ def renumbered(system: System, rules: list[Rule]) -> System:
             produce=tuple((number[p], c) for p, c in rule.produce),
             read=tuple(number[p] for p in rule.read),
             inhibit=tuple(number[p] for p in rule.inhibit if p in number),
-            kill=tuple(number[p] for p in rule.kill if p in number),
+            kill=killed(rule.kill),
             moves=tuple((number[a], number[b]) for a, b in rule.moves),
             copies=tuple((number[a], number[b]) for a, b in rule.copies),
         )
@@ -89,7 +110,11 @@ def renumbered(system: System, rules: list[Rule]) -> System:
 
 
 def _fused(
-    system: System, rules: list[Rule], seen: frozenset[int], visible: frozenset[int]
+    system: System,
+    rules: list[Rule],
+    seen: frozenset[int],
+    visible: frozenset[int],
+    bound: Bound,
 ) -> list[Rule]:
     looked_at: set[int] = set(seen)
     watched: set[int] = set()
@@ -122,6 +147,7 @@ def _fused(
             continue
         if len(eaters) * len(makers) > max(_MOST_PAIRS, len(eaters) + len(makers)):
             continue
+        bound.look(place.element)
         if any(dict(alive[n].produce)[p] != 1 or n in consumers[p] for n in makers):
             continue
         for n in makers:

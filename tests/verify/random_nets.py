@@ -1,8 +1,8 @@
 """Random systems that look like missions: blocks within blocks, most with something wrong in them.
 
-Branches that are joined, or end each for itself; loops; scopes that are interrupted by a timer, or
-by an error that one of their branches throws; inclusive joins; conditions on data. Then a few
-things are changed at random, so that tokens are doubled, lost or waited for in vain.
+Branches that are joined, or end each for itself; loops; scopes that are interrupted by a timer, by
+an error that one of their branches throws, or by any failure; inclusive joins; conditions on data.
+Then a few things are changed at random, so that tokens are doubled, lost or waited for in vain.
 """
 
 from dataclasses import dataclass, field, replace
@@ -12,13 +12,19 @@ from m2pem.verify.system import Action, Kind, Place, Role, Rule, Scope, Step, Sy
 
 _ENDS = 3
 _FIRST = ("row", "fork", "fork", "scope", "scope", "loop")
-_BLOCKS = ("task", "task", "task", "step", "row", "row", "fork", "fork", "choice", "loop", "scope")
+_ANY = ("task", "task", "task", "step", "row", "row", "fork", "fork", "choice", "loop", "scope")
+_IN_BRANCHES = ("task", "task", "task", "task", "row", "row", "fork", "loop", "choice", "scope")
+_BLOCKS = (_FIRST, _ANY)
+"""By depth, what there is; the last goes for what is deeper, too."""
+_BLOCKS_OF_BRANCHES = (("scope", "scope", "loop", "row"), ("fork", "fork", "row"), _IN_BRANCHES)
 
 
 @dataclass
 class _Draft:
     dice: Random
     budget: int
+    failing: float
+    blocks: tuple[tuple[str, ...], ...]
     places: list[Place] = field(default_factory=list)
     rules: list[Rule] = field(default_factory=list)
     scopes: list[set[int]] = field(default_factory=list)
@@ -54,7 +60,7 @@ class _Draft:
     def block(self, source: int, target: int, depth: int) -> None:
         """Something that takes a token from one place to another."""
         self.budget -= 1
-        kind = self.dice.choice(_BLOCKS if depth else _FIRST)
+        kind = self.dice.choice(self.blocks[min(depth, len(self.blocks) - 1)])
         if depth > 4 or self.budget <= 0:
             kind = "task"
         getattr(self, f"_{kind}")(source, target, depth)
@@ -78,7 +84,7 @@ class _Draft:
         self.scopes.append(inside)
         self.rule(self.dice.choice([Kind.INTERNAL, Kind.OUTSIDE]), [source], starts)
         for start, end in zip(starts, ends, strict=True):
-            self.block(start, end, depth + 1)
+            self._branch(start, end, depth)
         self.scopes.remove(inside)
         if self.dice.random() < 0.8:
             self.rule(Kind.INTERNAL, ends, [target], assign=self._assignment(20))
@@ -87,6 +93,13 @@ class _Draft:
             others = tuple(end for end in ends if end != one)
             waits = tuple(sorted(inside - set(ends)))
             self.rule(Kind.JOIN, [one], [target], inhibit=waits, kill=others)
+
+    def _branch(self, source: int, target: int, depth: int) -> None:
+        if self.dice.random() < self.failing:
+            last = self.place()
+            self.rule(Kind.OUTSIDE, [last], [target])
+            target = last
+        self.block(source, target, depth + 1)
 
     def _choice(self, source: int, target: int, depth: int) -> None:
         variable = self.dice.choice(self.variables)
@@ -126,6 +139,11 @@ class _Draft:
                 thrown = [running] if kind is Kind.OUTSIDE else [running, self._thrown(waits)]
                 kill = tuple(p for p in everything if p not in thrown)
                 self.rule(kind, thrown, [handler], kill=kill)
+        if self.dice.random() < self.failing:  # whatever is done may fail
+            done = {p for r in self.rules if r.kind is Kind.OUTSIDE for p, _ in r.consume}
+            for place in waits:
+                if place in done and self.dice.random() < 0.9:
+                    self.rule(Kind.OUTSIDE, [running, place], [handler], kill=everything)
         self.block(handler, target, depth + 2)
         if self.dice.random() < 0.25:  # what does not interrupt
             beside = self.place()
@@ -152,7 +170,7 @@ class _Draft:
         place = self.dice.randrange(_ENDS, len(self.places))
         made = dict(rule.produce)
         taken = {p for p, _ in rule.consume}
-        match self.dice.randrange(8):
+        match self.dice.randrange(9):
             case 0:
                 made[place] = 1
             case 1:
@@ -169,14 +187,21 @@ class _Draft:
             case 6:
                 made = {**dict.fromkeys(made, 0), place: 1}
                 made = {p: n for p, n in made.items() if n}
+            case 7 if rule.kill:
+                kept = {p for p in rule.kill if self.dice.random() < 0.2}
+                rule = replace(rule, kill=tuple(p for p in rule.kill if p not in kept))
             case _:
                 rule = replace(rule, assign=self._assignment(100))
         self.rules[number] = replace(rule, produce=tuple(sorted(made.items())))
 
 
-def random_net(dice: Random, size: int = 12, *, spoilt: int = 2) -> System:
-    """`size`: of how many blocks, at most; `spoilt`: how many changes at most are made to it."""
-    draft = _Draft(dice, dice.randint(size // 2, size))
+def random_net(dice: Random, size: int = 12, *, spoilt: int = 2, failing: bool = False) -> System:
+    """`size`: of how many blocks, at most; `spoilt`: how many changes at most are made to it.
+
+    `failing`: most scopes have parallel branches in which everything may fail.
+    """
+    share, blocks = (0.9, _BLOCKS_OF_BRANCHES) if failing else (0.3, _BLOCKS)
+    draft = _Draft(dice, dice.randint(size // 2, size), share, blocks)
     for _ in range(_ENDS):
         draft.place(Role.END)
     start, last = draft.place(), draft.place()

@@ -2,14 +2,16 @@
 
 import itertools
 import time
+import tracemalloc
 
 import pytest
 
 from m2pem.model.bpmn import parse_mission
 from m2pem.model.mission import Mission
+from m2pem.verify import concurrency
 from m2pem.verify.check import check, search
 from m2pem.verify.derive import Bound, Options, TooLargeError, derive
-from m2pem.verify.explore import Limits, Stopped
+from m2pem.verify.explore import Limits, Stopped, explore
 from m2pem.verify.results import Verdict
 from m2pem.verify.simplify import simplify
 from tests.verify.models import branches
@@ -91,6 +93,29 @@ def test_a_long_row_of_works_that_may_fail_is_decided() -> None:
     assert {each.property for each in report.results if each.verdict is not Verdict.HOLDS} == {
         "failures-handled"
     }
+
+
+@pytest.mark.parametrize("proven", [True, False])
+def test_the_limit_of_time_holds_for_making_rules_fewer(
+    proven: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not proven:
+        monkeypatch.setattr(concurrency, "MOST_PLACES", 0)
+    system = derive(branches(40))
+    with pytest.raises(TooLargeError, match="limit of time"):
+        simplify(system, bound=Bound(until_s=time.monotonic() - 1))
+
+
+def test_what_may_fire_in_states_that_wait_counts_as_memory() -> None:
+    system = simplify(derive(branches(100)))
+    tracemalloc.start()
+    try:
+        found = explore(system, Limits(states=100_000, memory_mb=20))
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert found.stopped is Stopped.MEMORY
+    assert 10e6 < most < 25e6
 
 
 def test_of_short_time_enough_is_left_for_a_search_that_leaves_orders_out() -> None:

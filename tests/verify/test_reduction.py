@@ -5,6 +5,7 @@ from random import Random
 
 import pytest
 
+from m2pem.verify import concurrency
 from m2pem.verify.derive import derive
 from m2pem.verify.explore import Exploration, Limits, explore
 from m2pem.verify.reduction import StubbornSets
@@ -66,14 +67,22 @@ def test_branches_are_searched_in_time_that_grows_with_their_number_alone() -> N
         assert set(found.fired) == set(range(len(system.rules)))
 
 
-def failing(count: int) -> System:
-    """Branches of tasks in a subprocess, each of which may fail, which interrupts all of it."""
+def failing(count: int, *, service: bool = False) -> System:
+    """Branches of tasks in a subprocess, each of which may fail, which interrupts all of it.
+
+    They are a vehicle's, or a service's.
+    """
     row = range(3)
     inside = '<startEvent id="s"/><parallelGateway id="f"/><parallelGateway id="j"/>'
     inside += f'<endEvent id="e"/>{flow("s", "f")}{flow("j", "e")}'
     for branch in range(count):
         names = ["f", *(f"t{branch}x{place}" for place in row), "j"]
-        inside += "".join(task(each, f"v{branch}", "goto", target="x") for each in names[1:-1])
+        inside += "".join(
+            f'<serviceTask id="{each}" m2pem:class="Work"/>'
+            if service
+            else task(each, f"v{branch}", "goto", target="x")
+            for each in names[1:-1]
+        )
         inside += "".join(flow(one, other) for one, other in pairwise(names))
     around = mission(
         f'<startEvent id="S"/><subProcess id="SUB">{inside}</subProcess><endEvent id="E"/>',
@@ -86,7 +95,20 @@ def failing(count: int) -> System:
 def test_a_failure_that_interrupts_its_siblings_does_not_bring_their_orders_back() -> None:
     few = failing(3)
     assert seen(reduced(few)) == seen(explore(few))
-    many = failing(20)
+    all_orders_are_left_out_but_one(failing(20))
+
+
+def test_nor_does_it_where_there_are_too_many_places_to_prove_which_meet(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(concurrency, "MOST_PLACES", 0)
+    few = failing(3, service=True)
+    assert few.single is None
+    assert seen(reduced(few)) == seen(explore(few))
+    all_orders_are_left_out_but_one(failing(20, service=True))
+
+
+def all_orders_are_left_out_but_one(many: System) -> None:
     found = reduced(many)
     assert found.complete
     assert len(found.states) < 70

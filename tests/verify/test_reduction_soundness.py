@@ -7,6 +7,7 @@ from random import Random
 
 import pytest
 
+from m2pem.verify import concurrency
 from m2pem.verify.derive import derive
 from m2pem.verify.explore import Exploration, explore
 from m2pem.verify.ltl.formula import needs_steps
@@ -15,7 +16,7 @@ from m2pem.verify.reduction import StubbornSets
 from m2pem.verify.system import System
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
-from tests.verify.answers import FEW, atoms_of, both, formula_of
+from tests.verify.answers import FEW, NO_FEWER, atoms_of, both, formula_of
 from tests.verify.random_nets import random_net
 from tests.verify.random_systems import random_system
 
@@ -31,6 +32,10 @@ def nets(dice: Random) -> System:
 
 def sound_nets(dice: Random) -> System:
     return random_net(dice, 20, spoilt=0)
+
+
+def failing_nets(dice: Random) -> System:
+    return random_net(dice, 14, failing=True)
 
 
 def rules(dice: Random) -> System:
@@ -59,7 +64,7 @@ def compare(make: Make, seed: int, count: Counter[str]) -> list[str]:
         return []
     count["systems"] += 1
     wrong = []
-    less = explore(system, FEW, reduction=StubbornSets(system))
+    less = explore(system, NO_FEWER, reduction=StubbornSets(system))
     if bool(whole.overflows) != bool(less.overflows):
         wrong.append(f"{seed}: a second token")
     elif not whole.overflows and seen(whole) != seen(less):
@@ -90,8 +95,17 @@ def _steps(found: Exploration, number: int) -> list[tuple[int, int]]:
     return list(found.successors(number))
 
 
+@pytest.fixture(params=["proven", "too large to prove"])
+def places(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether it is known of each place how many tokens it may have, and beside which others."""
+    if request.param != "proven":
+        monkeypatch.setattr(concurrency, "MOST_PLACES", 0)
+
+
+@pytest.mark.usefixtures("places")
 @pytest.mark.parametrize(
-    ("make", "models"), [(nets, 30), (sound_nets, 25), (rules, 25), (missions, 10)]
+    ("make", "models"),
+    [(nets, 30), (sound_nets, 25), (failing_nets, 25), (rules, 25), (missions, 10)],
 )
 def test_nothing_that_can_be_asked_is_answered_otherwise(make: Make, models: int) -> None:
     count: Counter[str] = Counter()
@@ -105,8 +119,10 @@ def test_nothing_that_can_be_asked_is_answered_otherwise(make: Make, models: int
 
 @pytest.mark.long
 @pytest.mark.timeout(14_400)
+@pytest.mark.usefixtures("places")
 @pytest.mark.parametrize(
-    ("make", "models"), [(nets, 9_000), (sound_nets, 6_000), (rules, 5_000), (missions, 1_500)]
+    ("make", "models"),
+    [(nets, 9_000), (sound_nets, 6_000), (failing_nets, 4_000), (rules, 5_000), (missions, 1_500)],
 )
 def test_nor_of_twenty_thousand_models(make: Make, models: int) -> None:
     count: Counter[str] = Counter()

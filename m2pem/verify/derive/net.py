@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
+from functools import cache
 
 from m2pem.model.elements import (
     Activity,
@@ -180,10 +181,16 @@ class Net:
     ) -> System:
         """All of it, with every scope spelled out as its places."""
         inside = {area.index: self._inside(area) for area in reversed(self.areas)}
+
+        @cache  # whatever ends one scope shares one list of its places: there may be many of both
+        def killed(kill: frozenset[int], scopes: frozenset[int]) -> tuple[int, ...]:
+            return tuple(sorted(kill.union(*(inside[scope][0] for scope in scopes))))
+
         rules: list[Rule] = []
         names: Counter[str] = Counter()
         for draft in self.drafts:
-            rule = self._rule(draft, len(rules), names, inside)
+            kill = killed(draft.effect.kill, draft.effect.kill_scopes)
+            rule = self._rule(draft, len(rules), names, inside, kill)
             if rule is not None:
                 rules.append(rule)
         return System(
@@ -218,12 +225,11 @@ class Net:
         number: int,
         names: Counter[str],
         inside: dict[int, tuple[frozenset[int], frozenset[int]]],
+        kill: tuple[int, ...],
     ) -> Rule | None:
         effect = draft.effect
         self.bound.look(_spelled_out(effect))
-        kill, inhibit = set(effect.kill), set(effect.inhibit)
-        for scope in effect.kill_scopes:
-            kill |= inside[scope][0]
+        inhibit = set(effect.inhibit)
         for scope in effect.quiet_scopes:
             inhibit |= inside[scope][1]
         consume = Counter(effect.consume)
@@ -243,7 +249,7 @@ class Net:
             tuple(sorted(effect.guard.items())),
             effect.moves,
             effect.copies,
-            tuple(sorted(kill)),
+            kill,
             tuple(sorted(Counter(effect.produce).items())),
             tuple(sorted(effect.assign.items())),
             draft.trigger,

@@ -81,7 +81,7 @@ def system_for(
             continue  # it is going to be undecided, whatever the rules are
         places |= labels.visible_places()
         rules |= labels.visible_rules()
-    return simplify(system, places, rules)
+    return simplify(system, places, rules, bound)
 
 
 def check_mission(

@@ -51,7 +51,8 @@ def check_with_spin(
     fleet = fleet or fleet_for(mission)
     try:
         bound = bound_of(limits)
-        system = simplify(derive(mission, fleet, process=process, options=options, bound=bound))
+        system = derive(mission, fleet, process=process, options=options, bound=bound)
+        system = simplify(system, bound=bound)
     except TooLargeError as error:
         return replace(too_large(mission, error, process), engine="spin")
     found = search(system, limits, storage=storage, progress=progress)

@@ -116,10 +116,15 @@ def router(entry: Entry, pages: Pages) -> APIRouter:
     for address in ADDRESSES:
         routes.add_api_route(address, page, methods=["GET"])
 
-    @routes.get("/{name:path}")
+    @routes.get("/{name}")
     async def file(request: Request, name: str) -> Response:
         """A file of the page."""
         return await pages.answer(name, request.headers)
+
+    @routes.get("/assets/{name:path}")
+    async def asset(request: Request, name: str) -> Response:
+        """A file of the page that never changes."""
+        return await pages.answer(f"assets/{name}", request.headers)
 
     return routes
 

@@ -11,6 +11,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 from m2pem.errors import (
     ExpressionSyntaxError,
@@ -23,6 +24,7 @@ from m2pem.errors import (
     PluginError,
 )
 
+METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS")
 MEDIA_TYPE = "application/problem+json"
 
 log = logging.getLogger("m2pem.ocu.web")
@@ -95,9 +97,12 @@ def handle_problems(app: FastAPI) -> None:
         return problem(status, str(error))
 
     @app.exception_handler(HTTPException)
-    def said(_: Request, error: HTTPException) -> JSONResponse:
+    def said(request: Request, error: HTTPException) -> JSONResponse:
         more = error.more if isinstance(error, ProblemError) else {}
-        return problem(error.status_code, str(error.detail), error.headers, **more)
+        headers = error.headers
+        if error.status_code == 405:
+            headers = {"Allow": ", ".join(_methods_at(app, request))}
+        return problem(error.status_code, str(error.detail), headers, **more)
 
     @app.exception_handler(RequestValidationError)
     def malformed(_: Request, error: RequestValidationError) -> JSONResponse:
@@ -111,3 +116,16 @@ def handle_problems(app: FastAPI) -> None:
     @app.exception_handler(Exception)
     def broke(_: Request, error: Exception) -> JSONResponse:
         return problem(500, "the server failed; its log says how")
+
+
+def _methods_at(app: FastAPI, request: Request) -> list[str]:
+    """What may be asked at an address; of several routes there, a router names those of one."""
+    scope = {key: value for key, value in request.scope.items() if key in ("type", "path")}
+    return [
+        method
+        for method in METHODS
+        if any(
+            route.matches({**scope, "method": method, "headers": []})[0] is Match.FULL
+            for route in app.router.routes
+        )
+    ]

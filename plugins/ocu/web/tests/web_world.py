@@ -17,8 +17,12 @@ from m2pem_plugin_web.access.users import User, write_users
 from m2pem_plugin_web.ocu import WebOcu
 
 from m2pem.api import MissionControl, OpenPrompt, RunId
+from m2pem.executive.clock import SystemClock
+from m2pem.executive.executive import Executive
+from m2pem.journal import Journal, MemoryJournal
+from m2pem.plugins import PluginManager
+from m2pem.sim.rehearser import rehearse_apart
 from m2pem.testing import scenarios
-from m2pem.testing.stage import stage
 
 WITHIN_S = 10.0
 VEHICLE = "ugv1"
@@ -226,12 +230,22 @@ class MakeWorld:
             path = self.folder / "users.json"
             write_users(path, {name: User(role, HASHED()) for name, role in users.items()})
             environment = {"M2PEM_WEB_USERS": str(path), **environment}
-        fleet = scenarios.fleet("sim", {VEHICLE: {}})
-        async with (
-            stage(fleet, speed=SPEED) as control,
-            serving(control, self.folder, environment) as world,
-        ):
+        running = executive(MemoryJournal())
+        async with running, serving(running.control, self.folder, environment) as world:
             yield world
+
+
+def executive(journal: Journal) -> Executive:
+    """One with a simulated vehicle, that can also rehearse."""
+    return Executive(
+        scenarios.fleet("sim", {VEHICLE: {}}),
+        journal,
+        PluginManager(),
+        SystemClock(SPEED),
+        speed=SPEED,
+        simulated=True,
+        rehearse=rehearse_apart,
+    )
 
 
 class _Hashed:

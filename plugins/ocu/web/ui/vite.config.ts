@@ -30,6 +30,8 @@ export default defineConfig({
     emptyOutDir: true,
     license: { fileName: "licenses.md" },
     target: "es2022",
+    // The largest is the modeler; what all pages load is bounded by a test.
+    chunkSizeWarningLimit: 2000,
   },
   // For work on the page alone: `npm run dev`, beside `m2pem serve --ocu web`.
   server: {

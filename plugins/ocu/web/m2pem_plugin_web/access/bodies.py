@@ -44,10 +44,8 @@ class BoundedBodies:
         if said and int(said) > self._largest:
             return 413, self._too_large()
         comes = said not in ("", "0") or "transfer-encoding" in headers
-        if not comes:
+        if not comes or method in SAFE_METHODS:
             return None
-        if method in SAFE_METHODS:
-            return 400, f"{method} has no body"
         kind = headers.get("content-type", "").partition(";")[0].strip().lower()
         if kind != "application/json":
             return 415, "send application/json"

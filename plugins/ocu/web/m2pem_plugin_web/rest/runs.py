@@ -106,12 +106,7 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         """What a run executes, as it was when it began."""
         summary = await find_run(control, run)
         found = await control.mission(run)
-        files = [
-            FileModel(
-                name=each.name, qualifier=each.qualifier, xml=await shown(control, each.source)
-            )
-            for each in found.files()
-        ]
+        files = await file_models(control, found.files())
         return RunMissionModel(name=found.file, process=summary.process, files=files)
 
     return routes

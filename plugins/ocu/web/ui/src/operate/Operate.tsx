@@ -1,6 +1,6 @@
 // The operator page: a run that goes on, a run of the past, or a rehearsal.
 import { useSignal } from "@preact/signals";
-import { useEffect } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import { ApiError, get } from "../shared/api";
 import { isOver, listen } from "../shared/executive";
 import { fill, strings } from "../strings";
@@ -15,6 +15,7 @@ import { RunBar } from "./runbar/RunBar";
 import { RunEnd } from "./runbar/RunEnd";
 import { LiveScene } from "./scene/liveScene";
 import { ReplayScene } from "./scene/replayScene";
+import type { Scene } from "./scene/scene";
 import { waitForRehearsal } from "./rehearsal";
 import "./operate.css";
 
@@ -25,17 +26,30 @@ export default function Operate({ source }: { source: Source }) {
   const problem = useSignal("");
   const progress = useSignal(0);
   const ended = useSignal(false);
+  const opening = useRef<Opening>();
+
+  const open = (known?: Stage) => {
+    opening.current?.close();
+    context.value = null;
+    ended.value = false;
+    opening.current = new Opening(source, (count) => (progress.value = count), known);
+    opening.current
+      .open((parts) => {
+        context.value = operateContext({ ...parts, replay: () => open(parts) });
+      })
+      .catch((error: unknown) => (problem.value = problemOf(error, source)));
+  };
 
   useEffect(() => {
-    const page = new Opening(source, context, progress);
-    page.open().catch((error: unknown) => (problem.value = problemOf(error, source)));
+    open();
     const stop = listen((message) => {
-      const here = source.kind === "run" && message.type === "run" && message.run.run === source.run;
+      const here =
+        source.kind === "run" && message.type === "run" && message.run.run === source.run;
       if (here && isOver(message.run) && context.peek()?.scene.mode === "live") ended.value = true;
     });
     return () => {
       stop();
-      page.close();
+      opening.current?.close();
     };
   }, []);
 
@@ -57,25 +71,16 @@ export default function Operate({ source }: { source: Source }) {
     );
   }
   const { scene } = shown;
-  const replay = async () => {
-    ended.value = false;
-    context.value = null;
-    await new Opening(source, context, progress, shown).open();
-  };
+  const isReplay = scene instanceof ReplayScene;
   return (
     <OperatingProvider value={shown}>
       <div class="operate">
         <h1 class="for-readers">{scene.run || text.run.rehearsal}</h1>
         <RunBar />
-        <PromptPanel />
-        <Layout
-          key={scene.mode}
-          onSeek={scene instanceof ReplayScene ? (t) => scene.seek(t) : undefined}
-        />
-        {scene instanceof ReplayScene && <Player scene={scene} />}
-        {ended.value && (
-          <RunEnd onReplay={() => void replay()} onClose={() => (ended.value = false)} />
-        )}
+        {!isReplay && <PromptPanel />}
+        <Layout key={scene.mode} onSeek={isReplay ? (t) => scene.seek(t) : undefined} />
+        {isReplay && <Player scene={scene} />}
+        {ended.value && <RunEnd onClose={() => (ended.value = false)} />}
       </div>
     </OperatingProvider>
   );
@@ -84,33 +89,28 @@ export default function Operate({ source }: { source: Source }) {
 /** Reads what there is to show, unless the page is left meanwhile. */
 class Opening {
   private left = false;
+  private scene: Scene | undefined;
 
   constructor(
     private readonly source: Source,
-    private readonly context: { value: OperateContext | null },
-    private readonly progress: { value: number },
+    private readonly progress: (count: number) => void,
     private readonly known?: Stage,
   ) {}
 
-  async open(): Promise<void> {
+  async open(show: (parts: Stage & { scene: Scene }) => void): Promise<void> {
     const summary = await summaryOf(this.source);
     const stage = this.known ?? (await loadStage(this.source));
     const live = this.source.kind === "run" && !isOver(summary);
-    const scene = live
-      ? new LiveScene(summary.run)
-      : await loadReplay(this.source, summary, (count) => (this.progress.value = count));
-    if (this.left) {
-      scene.dispose();
-      return;
-    }
-    if (scene instanceof ReplayScene) scene.seek(positionInAddress() ?? 0);
-    const { mission, fleet, geometries } = stage;
-    this.context.value = operateContext({ scene, mission, fleet, geometries });
+    const replayed = live ? null : await loadReplay(this.source, summary, this.progress);
+    if (this.left) return;
+    replayed?.seek(positionInAddress() ?? 0);
+    this.scene = replayed ?? new LiveScene(summary.run);
+    show({ ...stage, scene: this.scene });
   }
 
   close(): void {
     this.left = true;
-    this.context.value?.scene.dispose();
+    this.scene?.dispose();
   }
 }
 

@@ -3,6 +3,7 @@ import { signal, type Signal } from "@preact/signals";
 import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 import type { Fleet, Geometry } from "../shared/types";
+import type { Draft, Vertex } from "./map/draft";
 import type { MissionModel } from "./mission/missionModel";
 import type { Scene } from "./scene/scene";
 
@@ -22,6 +23,12 @@ export interface OperateContext {
   followed: Signal<string>;
   /** A vehicle that the map shows, once; a new object each time. */
   centred: Signal<{ resource: string } | null>;
+  /** What is drawn on the map. */
+  draft: Signal<Draft | null>;
+  /** The middle of the map, while there is one. */
+  middle: { current: () => Vertex };
+  /** Show the run from its records, once it is over. */
+  replay: () => void;
 }
 
 const Operating = createContext<OperateContext | null>(null);
@@ -35,7 +42,15 @@ export function useOperating(): OperateContext {
 }
 
 export function operateContext(
-  parts: Pick<OperateContext, "scene" | "mission" | "fleet" | "geometries">,
+  parts: Pick<OperateContext, "scene" | "mission" | "fleet" | "geometries" | "replay">,
 ): OperateContext {
-  return { ...parts, selected: signal(null), followed: signal(""), centred: signal(null) };
+  const { lat: latitude, lon: longitude } = parts.fleet.origin;
+  return {
+    ...parts,
+    middle: { current: () => ({ latitude, longitude, altitude: null }) },
+    selected: signal(null),
+    followed: signal(""),
+    centred: signal(null),
+    draft: signal(null),
+  };
 }

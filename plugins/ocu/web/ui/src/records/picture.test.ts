@@ -54,7 +54,11 @@ describe("picture", () => {
     fold(picture, { ...at, seq: 3, record: "TokenEntered", token: 2, instance: 0 });
     fold(picture, { ...at, seq: 4, record: "TokenEntered", token: 3, instance: 1 });
     expect(picture.elements.P!.Each).toMatchObject({ active: 2, hits: 2 });
-    for (const [seq, token] of [[5, 2], [6, 3], [7, 1]] as const) {
+    for (const [seq, token] of [
+      [5, 2],
+      [6, 3],
+      [7, 1],
+    ] as const) {
       fold(picture, { ...at, seq, record: "TokenLeft", token, outcome: "completed" });
     }
     expect(picture.elements.P!.Each).toMatchObject({ active: 0, hits: 2 });

@@ -1,12 +1,22 @@
-// How a run stands after a number of its records: the same states as the server tells of a live run.
-import type { Command, Elements, ElementState, Prompt, RunRecord, RunStatus } from "../shared/types";
+// How a run stands after a number of its records: the same states as the server tells of a live
+// run.
+import type {
+  Command,
+  Elements,
+  ElementState,
+  Prompt,
+  RunRecord,
+  RunStatus,
+} from "../shared/types";
 
 interface Token {
   process: string;
   element: string;
 }
 
-/** Made of records only, in their order; `fold` changes it in place, `copy` keeps a moment of it. */
+/**
+ * Made of records only, in their order; `fold` changes it in place, `copy` keeps a moment of it.
+ */
 export interface Picture {
   seq: number;
   t: number;

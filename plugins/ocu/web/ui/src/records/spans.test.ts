@@ -38,7 +38,10 @@ describe("spans", () => {
 
   it("keeps a bar that both told of once", () => {
     const spans = after(7);
-    spans.settle({ "r1.b1": { name: "go", resources: ["v1"], process: "P", element: "Drive", since: 4 } }, 5);
+    spans.settle(
+      { "r1.b1": { name: "go", resources: ["v1"], process: "P", element: "Drive", since: 4 } },
+      5,
+    );
     expect(spans.all.filter((span) => span.kind === "behavior")).toHaveLength(1);
   });
 });

@@ -25,7 +25,9 @@ export interface LogLine {
   element: string;
 }
 
-/** What the mission calls an element, and what it defines for the whole file: a signal, a message. */
+/**
+ * What the mission calls an element, and what it defines for the whole file: a signal, a message.
+ */
 export interface Names {
   element(process: string, element: string): string;
   definition(id: string): string;
@@ -85,18 +87,21 @@ export function lineOf(record: RunRecord, names: Names): LogLine {
 
 const templates: Readonly<Record<string, string>> = strings.operate.records;
 
-const DEFINED = new Set(["signal", "message", "escalation"]);
+const DEFINED = new Set(["signal", "message", "escalation", "ref"]);
 
-/** In a template `{field}` is a field of the record, and `[...]` is left out if one in it is empty. */
+/**
+ * In a template `{field}` is a field of the record, and `[...]` is left out if one in it is empty.
+ */
 function textOf(record: RunRecord, where: string, names: Names): string {
   const template = templates[record.record];
   if (template === undefined) return [record.record, where].filter(Boolean).join(" · ");
   const value = (field: string) => (field === "where" ? where : valueOf(record, field, names));
-  const filled = (part: string) =>
-    part.replace(/\{(\w+)\}/g, (_, field: string) => value(field));
+  const filled = (part: string) => part.replace(/\{(\w+)\}/g, (_, field: string) => value(field));
   const isWhole = (part: string) =>
     [...part.matchAll(/\{(\w+)\}/g)].every(([, field]) => value(field!) !== "");
-  const chosen = template.replace(/\[([^\]]*)\]/g, (_, part: string) => (isWhole(part) ? part : ""));
+  const chosen = template.replace(/\[([^\]]*)\]/g, (_, part: string) =>
+    isWhole(part) ? part : "",
+  );
   return filled(chosen).trim();
 }
 

@@ -57,14 +57,14 @@ export function Dialog({ title, onClose, children, actions, wide = false }: Dial
           if (event.key === "Escape" && !event.shiftKey) onClose();
         }}
       >
-        <header>
+        <div class="dialog-head">
           <h2 id={heading}>{title}</h2>
           <button type="button" class="plain" aria-label={strings.shell.close} onClick={onClose}>
             ×
           </button>
-        </header>
+        </div>
         <div class="dialog-body">{children}</div>
-        {actions && <footer>{actions}</footer>}
+        {actions && <div class="dialog-actions">{actions}</div>}
       </div>
     </div>,
     document.getElementById("dialogs")!,

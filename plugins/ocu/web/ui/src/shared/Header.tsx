@@ -3,7 +3,7 @@ import { effect } from "@preact/signals";
 import { strings } from "../strings";
 import { post } from "./api";
 import { connect, connection, prompts } from "./executive";
-import { go } from "./router";
+import { go, route } from "./router";
 import { may, session, signOut } from "./session";
 import { StopButton } from "./StopButton";
 import { switchTheme, theme } from "./theme";
@@ -127,7 +127,8 @@ function Link() {
 function Questions() {
   const standing = prompts.value;
   const first = standing[0];
-  if (!first) return null;
+  const at = route.value;
+  if (!first || (at.page === "run" && at.run === first.run)) return null;
   const path = `/runs/${encodeURIComponent(first.run)}`;
   return (
     <a class="questions" href={path} onClick={leave(path)}>

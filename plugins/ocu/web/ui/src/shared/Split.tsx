@@ -32,7 +32,8 @@ export function Split({ name, direction, initial, label, children }: SplitProps)
   const move = (event: PointerEvent) => {
     if (!(event.buttons & 1) || !box.current) return;
     const { left, top, width, height } = box.current.getBoundingClientRect();
-    const [at, room] = direction === "row" ? [event.clientX - left, width] : [event.clientY - top, height];
+    const [at, room] =
+      direction === "row" ? [event.clientX - left, width] : [event.clientY - top, height];
     place((at / room) * 100);
   };
   const key = (event: KeyboardEvent) => {

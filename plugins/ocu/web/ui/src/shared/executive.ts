@@ -67,7 +67,9 @@ export const connect = (): void => client.start();
 export const disconnect = (): void => client.stop();
 export const watch = (run: string | null): void => client.watch(run);
 
-/** A page that is not signed in is refused before it is connected, which a browser does not tell. */
+/**
+ * A page that is not signed in is refused before it is connected, which a browser does not tell.
+ */
 async function afterLoss(): Promise<void> {
   if ((await loadSession()) && session.value === null) signedOut();
 }

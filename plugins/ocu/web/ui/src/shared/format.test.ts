@@ -3,7 +3,12 @@ import { age, clock, clockTenths, heading_deg } from "./format";
 
 describe("format", () => {
   it("writes mission time", () => {
-    expect([clock(4), clock(64.9), clock(7209), clock(-1)]).toEqual(["0:04", "1:04", "2:00:09", "0:00"]);
+    expect([clock(4), clock(64.9), clock(7209), clock(-1)]).toEqual([
+      "0:04",
+      "1:04",
+      "2:00:09",
+      "0:00",
+    ]);
     expect(clockTenths(4.27)).toBe("0:04.2");
   });
 

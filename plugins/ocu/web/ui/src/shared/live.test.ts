@@ -46,7 +46,13 @@ const around: Surroundings = {
   chance: () => 1,
 };
 
-const frame = (seq: number, run: string | null = "r1") => ({ type: "frame", seq, run, t: seq, events: seq });
+const frame = (seq: number, run: string | null = "r1") => ({
+  type: "frame",
+  seq,
+  run,
+  t: seq,
+  events: seq,
+});
 const newest = () => sockets.at(-1)!;
 const draw = () => paints.splice(0).forEach((paint) => paint());
 

@@ -57,6 +57,10 @@ describe("what is offered in a condition", () => {
     expect(values("detection.type == 'g p' and user.decision == ")).toContain("'abort'");
   });
 
+  it("is nothing right behind a value", () => {
+    for (const text of ["user.decision == 'abort'", "(a)", "a == 5"]) expect(values(text)).toEqual([]);
+  });
+
   it("looks at what stands before the cursor only", () => {
     expect(complete("det == 1", 3, names, decided).options[0]?.value).toBe("detection.type");
   });

@@ -26,6 +26,7 @@ const COMPARED = /([\p{L}_][\p{L}\p{N}_.-]*)\s*(==|!=|=)\s*(['"]?)([^'"]*)$/u;
 const AFTER_OPERAND = /(?:[\p{L}\p{N}_)\]]|['"])\s+$/u;
 const AFTER_OPERATOR_WORD = /\b(?:and|or|not|in)\s+$/;
 const OPERATORS = ["==", "!=", "<", "<=", ">", ">=", "and", "or", "in", "+", "-", "*", "/"];
+const ENDED = /['")\]\p{N}]$/u;
 const CONSTANTS = ["true", "false", "null"];
 /** docs/conditions.md */
 const FUNCTIONS = [
@@ -85,6 +86,7 @@ function afterOperand(before: string): Completions | undefined {
 
 function word(before: string, names: Outline["names"]): Completions {
   const typed = WORD.exec(before)?.[0] ?? "";
+  if (typed === "" && ENDED.test(before)) return { from: before.length, options: [] };
   const fits = (value: string) => value.toLowerCase().includes(typed.toLowerCase());
   const starts = (value: string) => typed !== "" && value.startsWith(typed);
   const known = names.map(({ name, from }) => ({ value: name, note: from, group: "names" as const }));

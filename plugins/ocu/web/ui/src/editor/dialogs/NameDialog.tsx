@@ -4,9 +4,8 @@ import { get } from "../../shared/api";
 import { Dialog } from "../../shared/Dialog";
 import type { MissionLine } from "../../shared/types";
 import { strings } from "../../strings";
-import { freeName, isName } from "../session/files";
-
-const words = strings.home.newDialog;
+import { freeName } from "../../missions/files";
+import { NameInput, nameProblem } from "../../missions/NameInput";
 
 export interface NameDialogProps {
   title: string;
@@ -53,36 +52,5 @@ export function NameDialog({ title, label, act, suggested, close, chosen }: Name
         <NameInput label={label} name={name} wrong={wrong} write={setName} />
       </form>
     </Dialog>
-  );
-}
-
-export function nameProblem(name: string, taken: readonly string[]): string {
-  const said = name.trim();
-  if (!isName(said)) return words.badName;
-  return taken.includes(said) ? words.taken : "";
-}
-
-interface NameInputProps {
-  label: string;
-  name: string;
-  wrong: string;
-  write(name: string): void;
-}
-
-export function NameInput({ label, name, wrong, write }: NameInputProps) {
-  return (
-    <label class="m2-stacked">
-      {label}
-      <input
-        value={name}
-        maxLength={100}
-        aria-invalid={wrong !== "" && name !== "" ? "true" : undefined}
-        aria-describedby="m2-name-note"
-        onInput={(event) => write(event.currentTarget.value)}
-      />
-      <span id="m2-name-note" class={wrong && name ? "m2-field-error" : "m2-field-hint"}>
-        {name && wrong ? wrong : words.nameHint}
-      </span>
-    </label>
   );
 }

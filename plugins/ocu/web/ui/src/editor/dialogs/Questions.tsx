@@ -1,6 +1,7 @@
 // What the editor asks, one question at a time.
 import { Dialog } from "../../shared/Dialog";
 import { toast } from "../../shared/Toasts";
+import { moment } from "../../shared/moments";
 import { fill, strings } from "../../strings";
 import type { MissionWork, Question } from "../session/MissionWork";
 import { NameDialog } from "./NameDialog";
@@ -40,7 +41,7 @@ export function Questions({ work }: { work: MissionWork }) {
 
 function Conflict({ work, question, close }: QuestionProps<"conflict">) {
   const { by, saved_at_us } = question.current;
-  const at = new Date(saved_at_us / 1000).toLocaleString();
+  const at = moment(saved_at_us / 1000);
   return (
     <Dialog
       title={words.conflict.title}
@@ -85,7 +86,7 @@ function Conflict({ work, question, close }: QuestionProps<"conflict">) {
 
 function Recovery({ work, question, close }: QuestionProps<"recovery">) {
   const { draft, isOlder } = question;
-  const at = new Date(draft.at).toLocaleString();
+  const at = moment(draft.at);
   return (
     <Dialog
       title={words.recovery.title}

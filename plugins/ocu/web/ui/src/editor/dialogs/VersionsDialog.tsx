@@ -2,8 +2,9 @@
 import { useEffect, useState } from "preact/hooks";
 import { Dialog } from "../../shared/Dialog";
 import { toast } from "../../shared/Toasts";
+import { moment } from "../../shared/moments";
 import { fill, strings } from "../../strings";
-import { versionsOf, type Version } from "../session/files";
+import { versionsOf, type Version } from "../../missions/files";
 import type { MissionWork } from "../session/MissionWork";
 
 const words = strings.editor.versions;
@@ -45,7 +46,7 @@ export function VersionsDialog({ work, close }: { work: MissionWork; close(): vo
                 <td>
                   {number} {index === 0 && <span class="m2-chip">{words.newest}</span>}
                 </td>
-                <td>{new Date(saved_at_us / 1000).toLocaleString()}</td>
+                <td>{moment(saved_at_us / 1000)}</td>
                 <td>{by}</td>
                 <td>
                   <button

@@ -75,8 +75,9 @@ function Problem({ editor, finding }: { editor: EditorContext; finding: Finding 
 }
 
 function nameOf(editor: EditorContext, element: string): string {
+  const drawn = editor.service("elementRegistry").get(element)?.businessObject?.name as unknown;
   const known = editor.checks.outline.value?.elements.find(({ id }) => id === element);
-  return known?.name || element;
+  return String(drawn || known?.name || element);
 }
 
 function statusText(state: string, errors: number, warnings: number): string {

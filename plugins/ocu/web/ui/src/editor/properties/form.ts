@@ -7,6 +7,8 @@ import type { Element } from "../session/services";
 export interface FormProps {
   element: Element;
   editor: EditorContext;
+  /** Grows with every change: the element stays the same object when it is changed. */
+  revision: number;
 }
 
 export function objectOf({ element }: FormProps): ModdleElement {

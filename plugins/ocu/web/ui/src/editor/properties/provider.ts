@@ -36,7 +36,7 @@ interface GroupDefinition {
   id: string;
   label: string;
   component: unknown;
-  entries: { id: string; component: ComponentType<FormProps>; editor?: EditorContext }[];
+  entries: ({ id: string; component: ComponentType<FormProps> } & Partial<FormProps>)[];
   shouldOpen?: boolean;
 }
 
@@ -44,6 +44,7 @@ type GroupName = keyof typeof strings.editor.groups;
 
 export class MissionProperties {
   static readonly $inject = ["propertiesPanel", "editorContext"];
+  private revision = 0;
 
   constructor(
     propertiesPanel: PropertiesPanel,
@@ -60,11 +61,12 @@ export class MissionProperties {
   }
 
   private group(id: GroupName, component: ComponentType<FormProps>): GroupDefinition {
+    const revision = ++this.revision;
     return {
       id: `m2-${id}`,
       label: strings.editor.groups[id],
       component: Group,
-      entries: [{ id: `m2-${id}-form`, component, editor: this.editor }],
+      entries: [{ id: `m2-${id}-form`, component, editor: this.editor, revision }],
       shouldOpen: true,
     };
   }

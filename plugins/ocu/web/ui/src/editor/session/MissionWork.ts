@@ -9,7 +9,7 @@ import { Autosave } from "./Autosave";
 import type { Catalogue } from "./catalogue";
 import { dropDraft, readDraft, type Draft } from "./drafts";
 import { EditorSession } from "./EditorSession";
-import { makeEditable, openMission, openVersion, saveMission, type SavedVersion } from "./files";
+import { makeEditable, openMission, openVersion, saveMission, type SavedVersion } from "../../missions/files";
 
 const words = strings.editor;
 
@@ -42,6 +42,8 @@ export class MissionWork {
       () => this.saved.value?.version ?? null,
     );
     this.session.changes.subscribe(() => {
+      // It would take back what was drawn since, too.
+      this.putBack.value = null;
       if (this.session.isDirty.peek()) this.autosave.soon();
     });
   }

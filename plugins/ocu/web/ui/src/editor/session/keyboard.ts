@@ -9,6 +9,8 @@ const TYPING = "input, textarea, select, [contenteditable='true'], .djs-direct-e
 /** Follows the keys of the page until what it gives is called. */
 export function followKeys(work: MissionWork): () => void {
   const pressed = (event: KeyboardEvent) => {
+    // The canvas and the properties panel have had it already.
+    if (event.defaultPrevented || work.question.peek()) return;
     const isCommand = event.ctrlKey || event.metaKey;
     const isTyping = (event.target as HTMLElement).matches?.(TYPING);
     if (isCommand && event.key.toLowerCase() === "s") {
@@ -19,12 +21,33 @@ export function followKeys(work: MissionWork): () => void {
     } else if (isCommand && event.key === "9") {
       event.preventDefault();
       work.session.fit();
+    } else if (isCommand && !isTyping && step(work.session, event)) {
+      event.preventDefault();
     } else if (event.key === "?" && !isTyping && !isCommand) {
       work.question.value = { kind: "shortcuts" };
     }
   };
   addEventListener("keydown", pressed);
   return () => removeEventListener("keydown", pressed);
+}
+
+/** Undoes, redoes or searches, wherever the focus is; false: the keys mean something else. */
+function step(session: EditorSession, event: KeyboardEvent): boolean {
+  const stack = session.service("commandStack");
+  switch (event.shiftKey ? `Shift ${event.key.toLowerCase()}` : event.key.toLowerCase()) {
+    case "z":
+      stack.undo();
+      return true;
+    case "y":
+    case "Shift z":
+      stack.redo();
+      return true;
+    case "f":
+      session.service("editorActions").trigger("find", {} as never);
+      return true;
+    default:
+      return false;
+  }
 }
 
 /** Tab goes from element to element in the order of the flow; at either end it leaves the canvas. */

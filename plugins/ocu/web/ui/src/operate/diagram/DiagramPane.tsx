@@ -91,7 +91,9 @@ export function DiagramPane() {
           chosen={shown.value}
           tabs={mission.views.map(({ key, title, inside }) => ({
             id: key,
-            title: <ViewTitle title={title} inside={inside !== ""} activity={activity.value.get(key)} />,
+            title: (
+              <ViewTitle title={title} inside={inside !== ""} activity={activity.value.get(key)} />
+            ),
           }))}
           onChoose={(key) => {
             stopFollowing();

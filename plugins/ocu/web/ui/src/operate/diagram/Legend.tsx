@@ -10,7 +10,9 @@ export function Legend() {
     <ul class="legend" aria-label={text.legend}>
       {(["active", "done", "asking", "failed"] as const).map((look) => {
         const { fill, ring, dash } = colours[look];
-        const line = ring ? `2px ${dash.length > 0 ? "dashed" : "solid"} ${ring}` : "1px solid #777";
+        const line = ring
+          ? `2px ${dash.length > 0 ? "dashed" : "solid"} ${ring}`
+          : "1px solid #777";
         return (
           <li key={look}>
             <i style={`background: ${css(fill)}; border: ${line}`} aria-hidden="true" />

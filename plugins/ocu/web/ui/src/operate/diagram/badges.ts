@@ -1,12 +1,16 @@
-// Numbers at the corners of elements: how often a token came, how many are there now; and a sign for
-// what failed or asks. Renewed a few times a second: nobody reads faster.
+// Numbers at the corners of elements: how often a token came, how many are there now; and a sign
+// for what failed or asks. Renewed a few times a second: nobody reads faster.
 import type { ElementState } from "../../shared/types";
 import type { Outline } from "./painter";
 
 const SVG = "http://www.w3.org/2000/svg";
 const RENEWED_MS = 250;
+/** To write hundreds at once takes the browser a while: then it is done less often. */
+const EACH_MS = 4;
 const HEIGHT = 16;
 const DIGIT = 6.6;
+/** Larger ones would hide what they belong to. */
+const LARGEST = 1.8;
 
 interface Badge {
   group: SVGElement;
@@ -26,11 +30,21 @@ interface Waiting {
 export class Badges {
   private readonly badges = new Map<string, Badge>();
   private readonly waiting = new Map<string, Waiting>();
+  private wrote = 0;
+  private size = "";
   private timer: ReturnType<typeof setTimeout> | undefined;
 
   set(key: string, gfx: SVGElement, outline: Outline, state: ElementState): void {
     this.waiting.set(key, { gfx, outline, state });
-    this.timer ??= setTimeout(() => this.renew(), RENEWED_MS);
+    this.timer ??= setTimeout(() => this.renew(), Math.max(RENEWED_MS, this.wrote * EACH_MS));
+  }
+
+  /** Numbers stay readable when all else gets small. */
+  zoom(host: HTMLElement, scale: number): void {
+    const size = Math.max(1, Math.min(LARGEST, 1 / scale)).toFixed(2);
+    if (size === this.size) return;
+    this.size = size;
+    host.style.setProperty("--badge", size);
   }
 
   dispose(): void {
@@ -39,6 +53,7 @@ export class Badges {
 
   private renew(): void {
     this.timer = undefined;
+    this.wrote = this.waiting.size;
     for (const [key, { gfx, outline, state }] of this.waiting) {
       this.write(`${key}\nhits`, gfx, outline, "hits", state.hits > 1 ? short(state.hits) : "");
       const tokens = state.active > 1 ? `● ${short(state.active)}` : "";
@@ -49,7 +64,13 @@ export class Badges {
     this.waiting.clear();
   }
 
-  private write(key: string, gfx: SVGElement, outline: Outline, corner: Corner, text: string): void {
+  private write(
+    key: string,
+    gfx: SVGElement,
+    outline: Outline,
+    corner: Corner,
+    text: string,
+  ): void {
     let badge = this.badges.get(key);
     if (!badge && text === "") return;
     if (!badge) this.badges.set(key, (badge = make(gfx, corner)));
@@ -58,11 +79,11 @@ export class Badges {
     badge.group.setAttribute("display", text === "" ? "none" : "inline");
     if (text === "") return;
     const width = Math.max(HEIGHT, text.length * DIGIT + 9);
-    const x = corner === "sign" ? -7 : outline.width - width + 7;
-    const y = corner === "tokens" ? outline.height - HEIGHT / 2 : -HEIGHT / 2;
+    const x = corner === "sign" ? 0 : outline.width;
+    const y = corner === "tokens" ? outline.height : 0;
     badge.group.setAttribute("transform", `translate(${x} ${y})`);
+    badge.box.setAttribute("x", String(-width / 2));
     badge.box.setAttribute("width", String(width));
-    badge.text.setAttribute("x", String(width / 2));
     badge.text.textContent = text;
   }
 }
@@ -70,13 +91,16 @@ export class Badges {
 function make(gfx: SVGElement, corner: Corner): Badge {
   const group = document.createElementNS(SVG, "g");
   group.setAttribute("class", `m2-badge m2-badge-${corner}`);
+  const sized = document.createElementNS(SVG, "g");
   const box = document.createElementNS(SVG, "rect");
+  box.setAttribute("y", String(-HEIGHT / 2));
   box.setAttribute("height", String(HEIGHT));
   box.setAttribute("rx", String(HEIGHT / 2));
   const text = document.createElementNS(SVG, "text");
-  text.setAttribute("y", "12");
+  text.setAttribute("y", "4");
   text.setAttribute("text-anchor", "middle");
-  group.append(box, text);
+  sized.append(box, text);
+  group.append(sized);
   gfx.append(group);
   return { group, box, text, shown: "" };
 }

@@ -31,12 +31,18 @@ export interface DrawingListener {
 /** The middle of what is seen; its type does not know that. */
 const MIDDLE = "auto" as unknown as Point;
 
+/** Small diagrams are not blown up more. */
+const LARGEST = 1.2;
+
 const LOOKS: Look[] = ["active", "asking", "failed", "done"];
 
 export class Drawing {
   private readonly figures = new Map<string, Figure>();
   private root: RootLike | undefined;
-  private selected: SVGElement | undefined;
+  /** Nobody has moved it since it was fitted: then it is fitted again when its pane changes. */
+  private fits = false;
+  private fitting = false;
+  private selected: Figure | undefined;
   private readonly badges = new Badges();
   private readonly observer: ResizeObserver;
 
@@ -49,6 +55,7 @@ export class Drawing {
   ) {
     this.index(qualifier);
     this.root = this.canvas.getRootElement();
+    this.paintAll();
     const bus = viewer.get<EventBus>("eventBus");
     bus.on("canvas.viewbox.changing", () => this.follow());
     bus.on("canvas.viewbox.changed", () => this.follow());
@@ -108,9 +115,12 @@ export class Drawing {
 
   fit(): void {
     if (this.host.clientWidth === 0) return;
+    this.fitting = true;
     this.canvas.zoom("fit-viewport", MIDDLE);
-    const viewbox = this.canvas.viewbox();
-    if (viewbox.scale > 1.25) this.canvas.zoom(1.25, MIDDLE);
+    const { scale } = this.canvas.viewbox();
+    this.canvas.zoom(Math.min(LARGEST, scale * 0.97), MIDDLE);
+    this.fitting = false;
+    this.fits = true;
   }
 
   zoom(factor: number): void {
@@ -118,7 +128,13 @@ export class Drawing {
   }
 
   /** `age_ms`: how long ago an element was left, for one that is told of late. */
-  set(process: string, element: string, state: ElementState, passed: boolean, age_ms: number): void {
+  set(
+    process: string,
+    element: string,
+    state: ElementState,
+    passed: boolean,
+    age_ms: number,
+  ): void {
     const figure = this.figures.get(keyOf(process, element));
     if (!figure) return;
     const look = lookOf(state);
@@ -132,17 +148,14 @@ export class Drawing {
   }
 
   select(process: string, element: string, scroll: boolean): void {
-    this.selected?.classList.remove("m2-selected");
-    const figure = this.figures.get(keyOf(process, element));
-    this.selected = figure?.gfx;
-    if (!figure) return;
-    figure.gfx.classList.add("m2-selected");
-    if (scroll) this.canvas.scrollToElement(figure.id, 60);
+    this.selected = this.figures.get(keyOf(process, element));
+    if (this.selected && scroll) this.canvas.scrollToElement(this.selected.id, 60);
+    this.showSelected();
   }
 
   unselect(): void {
-    this.selected?.classList.remove("m2-selected");
     this.selected = undefined;
+    this.showSelected();
   }
 
   private get canvas(): Canvas {
@@ -171,21 +184,32 @@ export class Drawing {
   }
 
   private paintAll(): void {
-    this.painter.clear();
-    for (const figure of this.figures.values()) this.paint(figure);
+    const figures = [...this.figures.values()].filter(({ root }) => root === this.root);
+    this.painter.clear(figures.map(({ outline }) => outline).filter(({ above }) => above));
+    for (const figure of figures) this.paint(figure);
+    this.showSelected();
+  }
+
+  private showSelected(): void {
+    const isSeen = this.selected?.root === this.root;
+    this.painter.select(isSeen ? this.selected?.outline : undefined);
   }
 
   private follow(): void {
     const { x, y, scale } = this.canvas.viewbox() as Window;
     this.painter.look({ x, y, scale });
+    this.badges.zoom(this.host, scale);
+    this.fits &&= this.fitting;
   }
 
   private resized(): void {
     const { clientWidth, clientHeight } = this.host;
     if (clientWidth === 0 || clientHeight === 0) return;
+    const fitted = this.fits;
     this.canvas.resized();
     this.painter.resize(clientWidth, clientHeight);
-    this.follow();
+    if (fitted) this.fit();
+    else this.follow();
   }
 }
 

@@ -105,7 +105,8 @@ export class Drawings {
     for (const { process, element, state, before } of changes) {
       const passed = before !== undefined && state.hits > before.hits;
       const age_ms = this.age_ms(state.last);
-      for (const drawing of this.made.values()) drawing.set(process, element, state, passed, age_ms);
+      for (const drawing of this.made.values())
+        drawing.set(process, element, state, passed, age_ms);
     }
   }
 

@@ -1,6 +1,6 @@
-// Colours of the elements of one drawn diagram, on a canvas of their own that is multiplied with the
-// drawing. The drawing itself is never touched for them: to repaint hundreds of SVG shapes while they
-// fade is too slow, to fill as many rectangles is not.
+// Colours of the elements of one drawn diagram, on a canvas of their own that is multiplied with
+// the drawing. The drawing itself is never touched for them: to repaint hundreds of SVG shapes
+// while they fade is too slow, to fill as many rectangles is not.
 import type { Colour, Look, Palette } from "./colours";
 
 export interface Outline {
@@ -9,7 +9,7 @@ export interface Outline {
   width: number;
   height: number;
   kind: "circle" | "diamond" | "box" | "frame";
-  /** Lies on the border of another one, and hides its colour. */
+  /** Lies on the border of another one, and hides its colour, whatever its own. */
   above: boolean;
 }
 
@@ -27,11 +27,14 @@ export interface Window {
 }
 
 const CORNER = 10;
+const SELECTED = "#0b63ce";
 /** Fading is slow: it needs no more frames than this. */
 const FADE_FRAME_MS = 50;
 
 export class Painter {
   private readonly painted = new Map<string, Painted>();
+  private above: readonly Outline[] = [];
+  private selected: Outline | undefined;
   private readonly pen: CanvasRenderingContext2D;
   private frame = 0;
   private drawn_ms = 0;
@@ -51,8 +54,16 @@ export class Painter {
     this.soon();
   }
 
-  clear(): void {
+  /** Begin another drawing. `above`: all that lies on borders in it. */
+  clear(above: readonly Outline[]): void {
     this.painted.clear();
+    this.above = above;
+    this.selected = undefined;
+    this.soon();
+  }
+
+  select(outline: Outline | undefined): void {
+    this.selected = outline;
     this.soon();
   }
 
@@ -104,7 +115,9 @@ export class Painter {
     const scale = window.scale * devicePixelRatio;
     pen.setTransform(scale, 0, 0, scale, -window.x * scale, -window.y * scale);
     for (const painted of this.painted.values()) if (!painted.outline.above) this.fill(painted);
+    for (const outline of this.above) this.punch(outline);
     for (const painted of this.painted.values()) if (painted.outline.above) this.fill(painted);
+    if (this.selected) this.surround(this.selected);
   }
 
   private fill({ outline, look, left_ms }: Painted): void {
@@ -112,16 +125,30 @@ export class Painter {
     const { pen } = this;
     const colour = this.palette[look];
     trace(pen, outline);
-    if (outline.above) {
-      pen.globalCompositeOperation = "destination-out";
-      pen.fill();
-      pen.globalCompositeOperation = "source-over";
-    }
     if (outline.kind !== "frame") {
       pen.fillStyle = look === "done" ? this.faded(left_ms) : rgb(colour.fill);
       pen.fill();
     }
     if (colour.width > 0) this.ring(colour);
+  }
+
+  /** Around what is selected. */
+  private surround({ x, y, width, height }: Outline): void {
+    const { pen } = this;
+    pen.strokeStyle = SELECTED;
+    pen.lineWidth = 3;
+    pen.setLineDash([]);
+    pen.beginPath();
+    pen.roundRect(x - 7, y - 7, width + 14, height + 14, CORNER);
+    pen.stroke();
+  }
+
+  private punch(outline: Outline): void {
+    const { pen } = this;
+    trace(pen, outline);
+    pen.globalCompositeOperation = "destination-out";
+    pen.fill();
+    pen.globalCompositeOperation = "source-over";
   }
 
   private ring({ ring, dash, width }: Colour): void {

@@ -3,14 +3,18 @@ import { useEffect, useState } from "preact/hooks";
 import { Split } from "../../shared/Split";
 import { Tabs } from "../../shared/Tabs";
 import { strings } from "../../strings";
+import { useOperating } from "../context";
 import { DiagramPane } from "../diagram/DiagramPane";
 import { LogPane } from "../log/LogPane";
+import { DrawForm } from "../map/DrawForm";
 import { MapPane } from "../map/MapPane";
 import { OutlinePane } from "../outline/OutlinePane";
+import { Pane } from "./Pane";
 import { TimelinePane } from "../timeline/TimelinePane";
 import { VehiclesPane } from "../vehicles/VehiclesPane";
 
 const text = strings.operate.panes;
+const kinds = strings.operate.map.kinds;
 
 const WIDE = "(width >= 1180px)";
 
@@ -22,6 +26,7 @@ export function Layout({ onSeek }: { onSeek?: ((t: number) => void) | undefined 
 type Parts = { onSeek: ((t: number) => void) | undefined };
 
 function Wide({ onSeek }: Parts) {
+  const { draft } = useOperating();
   return (
     <Split name="bottom" direction="column" initial={68} label={`${text.resize}: ${text.bottom}`}>
       <Split name="right" direction="row" initial={64} label={`${text.resize}: ${text.right}`}>
@@ -30,8 +35,14 @@ function Wide({ onSeek }: Parts) {
           <DiagramPane />
         </Split>
         <Split name="map" direction="column" initial={54} label={`${text.resize}: ${text.map}`}>
-          <MapPane />
-          <VehiclesPane />
+          <MapPane formInside={false} />
+          {draft.value ? (
+            <Pane title={`${strings.operate.map.draw}: ${kinds[draft.value.kind]}`}>
+              <DrawForm draft={draft.value} />
+            </Pane>
+          ) : (
+            <VehiclesPane />
+          )}
         </Split>
       </Split>
       <Split name="log" direction="row" initial={58} label={`${text.resize}: ${text.log}`}>
@@ -55,7 +66,7 @@ function Narrow({ onSeek }: Parts) {
       <Tabs
         label={text.right}
         tabs={[
-          { id: "map", title: text.map, render: () => <MapPane /> },
+          { id: "map", title: text.map, render: () => <MapPane formInside /> },
           { id: "vehicles", title: text.vehicles, render: () => <VehiclesPane /> },
           { id: "timeline", title: text.timeline, render: () => <TimelinePane onSeek={onSeek} /> },
           { id: "log", title: text.log, render: () => <LogPane /> },

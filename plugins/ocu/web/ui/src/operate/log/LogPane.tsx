@@ -88,7 +88,12 @@ export function LogPane() {
           </button>
         ))}
         {hasOlder && (
-          <button type="button" class="log-older" disabled={loading.value} onClick={() => void older()}>
+          <button
+            type="button"
+            class="log-older"
+            disabled={loading.value}
+            onClick={() => void older()}
+          >
             {loading.value ? text.loading : text.older}
           </button>
         )}
@@ -154,7 +159,10 @@ function Line({ line }: { line: LogLine }) {
   const { t, process, element } = line;
   const where = element ? { process, element, show: true } : null;
   return (
-    <div class={line.urgent ? "log-line log-urgent" : "log-line"} title={`${line.record} ${line.seq}`}>
+    <div
+      class={line.urgent ? "log-line log-urgent" : "log-line"}
+      title={`${line.record} ${line.seq}`}
+    >
       <time>{clockTenths(t)}</time>
       <span class="log-mark" aria-hidden="true">
         {line.urgent ? "!" : ""}

@@ -28,7 +28,11 @@ export class Lines {
       const line = this.of(records[index]!);
       if (wanted.hidden.has(line.kind) && !line.urgent) continue;
       if (wanted.urgentOnly && !line.urgent) continue;
-      if (words && !line.text.toLowerCase().includes(words) && !line.record.toLowerCase().includes(words)) {
+      if (
+        words &&
+        !line.text.toLowerCase().includes(words) &&
+        !line.record.toLowerCase().includes(words)
+      ) {
         continue;
       }
       found.push(line);

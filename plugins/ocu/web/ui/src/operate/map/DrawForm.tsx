@@ -1,33 +1,58 @@
 // To draw with the keyboard: the vertices as numbers, and what the geometry is called.
 import { useSignal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { get, put } from "../../shared/api";
+import { attempt, toast } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
-import { added, moved, problemOf, removed, undone, type Draft, type Vertex } from "./draft";
+import type { Geometry } from "../../shared/types";
+import { useOperating } from "../context";
+import {
+  added,
+  geometryOf,
+  moved,
+  problemOf,
+  removed,
+  undone,
+  type Draft,
+  type Vertex,
+} from "./draft";
+import "./draw.css";
 
 const text = strings.operate.map;
 
-export interface DrawFormProps {
-  draft: Draft;
-  /** A run that it can be for alone. */
-  run: string;
-  onChange: (draft: Draft) => void;
-  onSave: (runOnly: boolean) => void;
-  onCancel: () => void;
-  middle: () => Vertex;
-}
-
-export function DrawForm({ draft, run, onChange, onSave, onCancel, middle }: DrawFormProps) {
+export function DrawForm({ draft }: { draft: Draft }) {
+  const { scene, geometries, draft: drawn, middle } = useOperating();
   const runOnly = useSignal(false);
+  const saving = useSignal(false);
+  const name = useRef<HTMLInputElement>(null);
+  useEffect(() => name.current?.focus(), []);
   const problem = problemOf(draft);
+  const run = scene.mode === "live" ? scene.run : "";
+  const change = (to: Draft) => (drawn.value = to);
+  const cancel = () => (drawn.value = null);
+
+  const save = async () => {
+    const { name } = draft;
+    const body = { geometry: geometryOf(draft), ...(runOnly.value && run ? { run } : {}) };
+    saving.value = true;
+    const done = await attempt(() => put(`/geometries/${encodeURIComponent(name)}`, body));
+    saving.value = false;
+    if (!done) return;
+    toast(fill(text.saved, { name }), "good");
+    drawn.value = null;
+    await attempt(async () => (geometries.value = await get<Geometry[]>("/geometries")));
+  };
+
   return (
     <form
       class="draw-form"
       aria-label={`${text.draw}: ${text.kinds[draft.kind]}`}
       onSubmit={(event) => {
         event.preventDefault();
-        if (!problem) onSave(runOnly.value);
+        if (!problem) void save();
       }}
       onKeyDown={(event) => {
-        if (event.key === "Escape" && !event.shiftKey) onCancel();
+        if (event.key === "Escape" && !event.shiftKey) cancel();
       }}
     >
       <p class="hint">{text.clickHint}</p>
@@ -35,10 +60,11 @@ export function DrawForm({ draft, run, onChange, onSave, onCancel, middle }: Dra
         <label>
           {text.name}
           <input
+            ref={name}
             value={draft.name}
             placeholder={text.nameHint}
             spellcheck={false}
-            onInput={(event) => onChange({ ...draft, name: event.currentTarget.value })}
+            onInput={(event) => change({ ...draft, name: event.currentTarget.value })}
           />
         </label>
         {run && (
@@ -60,36 +86,40 @@ export function DrawForm({ draft, run, onChange, onSave, onCancel, middle }: Dra
             <VertexFields
               vertex={vertex}
               label={fill(text.vertex, { number: index + 1 })}
-              onChange={(to) => onChange(moved(draft, index, to))}
+              onChange={(to) => change(moved(draft, index, to))}
             />
             <button
               type="button"
               class="plain"
               aria-label={fill(text.removeVertex, { number: index + 1 })}
-              onClick={() => onChange(removed(draft, index))}
+              onClick={() => change(removed(draft, index))}
             >
               ×
             </button>
           </li>
         ))}
       </ol>
-      <div class="draw-row">
-        <button type="button" class="secondary" onClick={() => onChange(added(draft, middle()))}>
+      <div class="draw-row draw-actions">
+        <button
+          type="button"
+          class="secondary"
+          onClick={() => change(added(draft, middle.current()))}
+        >
           {text.addCentre}
         </button>
         <button
           type="button"
           class="secondary"
           disabled={draft.before.length === 0}
-          onClick={() => onChange(undone(draft))}
+          onClick={() => change(undone(draft))}
         >
           {text.undo}
         </button>
         <span class="space" />
-        <button type="button" class="secondary" onClick={onCancel}>
+        <button type="button" class="secondary" onClick={cancel}>
           {text.cancel}
         </button>
-        <button class="primary" disabled={problem !== null}>
+        <button class="primary" disabled={problem !== null || saving.value}>
           {text.finish}
         </button>
       </div>
@@ -108,7 +138,12 @@ interface VertexFieldsProps {
 }
 
 function VertexFields({ vertex, label, onChange }: VertexFieldsProps) {
-  const number = (name: string, value: number | null, limit: number, set: (value: number | null) => void) => (
+  const number = (
+    name: string,
+    value: number | null,
+    limit: number,
+    set: (value: number | null) => void,
+  ) => (
     <input
       type="number"
       step="any"

@@ -1,18 +1,15 @@
 // Where everybody is; and routes, areas and points, which operators draw for the mission.
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { get, put } from "../../shared/api";
 import { remember, remembered } from "../../shared/memory";
 import { may, session } from "../../shared/session";
-import { attempt, toast } from "../../shared/Toasts";
-import { fill, strings } from "../../strings";
-import type { Geometry } from "../../shared/types";
+import { strings } from "../../strings";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import { STALE_S } from "../vehicles/VehiclesPane";
 import { workOf } from "../vehicles/work";
 import { DrawForm } from "./DrawForm";
-import { added, draftOf, emptyDraft, geometryOf, moved, type Draft, type Kind } from "./draft";
+import { added, draftOf, emptyDraft, moved, type Kind } from "./draft";
 import { MapTools, type MapShows } from "./MapTools";
 import { MapView } from "./mapView";
 import "leaflet/dist/leaflet.css";
@@ -23,13 +20,12 @@ const text = strings.operate.map;
 const SHOWS: MapShows = { trails: true, names: true, footprints: true, geometries: true };
 const AGES_MS = 500;
 
-export function MapPane() {
-  const { scene, fleet, geometries, followed, centred, selected } = useOperating();
+/** `formInside`: what is drawn is shown as numbers below the map. */
+export function MapPane({ formInside }: { formInside: boolean }) {
+  const { scene, fleet, geometries, followed, centred, selected, draft, middle } = useOperating();
   const host = useRef<HTMLDivElement>(null);
   const view = useRef<MapView>();
-  const draft = useSignal<Draft | null>(null);
   const shows = useSignal<MapShows>({ ...SHOWS, ...remembered<Partial<MapShows>>("map", {}) });
-  const positions = scene.mode === "live" || Object.keys(scene.vehicles.value).length > 0;
 
   useEffect(() => {
     const made = new MapView(host.current!, fleet, session.peek()?.tiles, {
@@ -46,6 +42,7 @@ export function MapPane() {
       moved: () => (followed.value = ""),
     });
     view.current = made;
+    middle.current = () => made.middle();
     let fitted = false;
     const stops = [
       geometries.subscribe((now) => {
@@ -80,17 +77,6 @@ export function MapPane() {
     };
   }, [scene, fleet]);
 
-  const save = async (runOnly: boolean) => {
-    const drawn = draft.value;
-    if (!drawn) return;
-    const body = { geometry: geometryOf(drawn), ...(runOnly ? { run: scene.run } : {}) };
-    const path = `/geometries/${encodeURIComponent(drawn.name)}`;
-    if (!(await attempt(() => put(path, body)))) return;
-    toast(fill(text.saved, { name: drawn.name }), "good");
-    draft.value = null;
-    await attempt(async () => (geometries.value = await get<Geometry[]>("/geometries")));
-  };
-
   return (
     <Pane
       title={strings.operate.panes.map}
@@ -118,17 +104,8 @@ export function MapPane() {
           if (event.key === "Escape" && !event.shiftKey) draft.value = null;
         }}
       />
-      {draft.value && (
-        <DrawForm
-          draft={draft.value}
-          run={scene.mode === "live" ? scene.run : ""}
-          onChange={(now) => (draft.value = now)}
-          onSave={(runOnly) => void save(runOnly)}
-          onCancel={() => (draft.value = null)}
-          middle={() => view.current!.middle()}
-        />
-      )}
-      {!positions && <p class="map-nobody">{text.notKnown}</p>}
+      {formInside && draft.value && <DrawForm draft={draft.value} />}
+      {!scene.hasTelemetry && <p class="map-nobody">{text.notKnown}</p>}
     </Pane>
   );
 }

@@ -1,5 +1,6 @@
 // What the map shows, whom it follows, and what is drawn on it.
 import type { Signal } from "@preact/signals";
+import { Menu } from "../../shared/Menu";
 import { strings } from "../../strings";
 import type { Fleet, Geometry } from "../../shared/types";
 import type { Kind } from "./draft";
@@ -24,6 +25,12 @@ export interface MapToolsProps {
   onEdit: (geometry: Geometry) => void;
 }
 
+const DRAWN: [Kind, string][] = [
+  ["route", text.drawRoute],
+  ["area", text.drawArea],
+  ["point", text.drawPoint],
+];
+
 const SHOWN = ["trails", "names", "footprints", "geometries"] as const;
 
 export function MapTools(props: MapToolsProps) {
@@ -42,7 +49,7 @@ export function MapTools(props: MapToolsProps) {
           </option>
         ))}
       </select>
-      <details class="menu" onKeyDown={closeOnEscape}>
+      <details class="folder" onKeyDown={closeOnEscape}>
         <summary>{text.show}</summary>
         <div>
           {SHOWN.map((name) => (
@@ -59,55 +66,30 @@ export function MapTools(props: MapToolsProps) {
           ))}
         </div>
       </details>
-      <details class="menu" onKeyDown={closeOnEscape}>
-        <summary>{text.draw}</summary>
-        <div>
-          {(
-            [
-              ["route", text.drawRoute],
-              ["area", text.drawArea],
-              ["point", text.drawPoint],
-            ] as const
-          ).map(([kind, title]) => (
-            <button
-              key={kind}
-              type="button"
-              class="plain"
-              disabled={!mayDraw}
-              onClick={(event) => {
-                close(event.currentTarget);
-                onDraw(kind);
-              }}
-            >
-              {title}
-            </button>
-          ))}
-          <hr />
-          {geometries.length === 0 && <p class="hint">{text.noGeometries}</p>}
-          {geometries.map((geometry) => (
-            <button
-              key={geometry.name}
-              type="button"
-              class="plain"
-              disabled={!mayDraw}
-              onClick={(event) => {
-                close(event.currentTarget);
-                onEdit(geometry);
-              }}
-            >
-              {text.edit} {geometry.name}
-            </button>
-          ))}
-        </div>
-      </details>
+      <Menu
+        label={text.draw}
+        class="plain"
+        items={[
+          ...DRAWN.map(([kind, label]) => ({
+            label,
+            disabled: !mayDraw,
+            act: () => onDraw(kind),
+          })),
+          ...geometries.map((geometry) => ({
+            label: `${text.edit} ${geometry.name}`,
+            disabled: !mayDraw,
+            act: () => onEdit(geometry),
+          })),
+        ]}
+      >
+        {text.draw} ▾
+      </Menu>
       <button type="button" class="plain" onClick={onFit}>
         {text.fitAll}
       </button>
     </div>
   );
 }
-
-const close = (inside: HTMLElement): void => inside.closest("details")?.removeAttribute("open");
 
 function closeOnEscape(event: KeyboardEvent & { currentTarget: HTMLDetailsElement }): void {
   if (event.key !== "Escape" || event.shiftKey || !event.currentTarget.open) return;

@@ -34,7 +34,14 @@ describe("draft", () => {
 
   it("is made of a geometry again", () => {
     const geometry = geometryOf(added({ ...route(), kind: "area" }, at(5, 6)));
-    const known = { name: "a", kind: "area", geometry, from: "fleet", by: "", at_us: null } as const;
+    const known = {
+      name: "a",
+      kind: "area",
+      geometry,
+      from: "fleet",
+      by: "",
+      at_us: null,
+    } as const;
     expect(geometryOf(draftOf(known))).toEqual(geometry);
   });
 

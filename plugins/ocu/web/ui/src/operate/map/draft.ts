@@ -43,7 +43,10 @@ export function moved(draft: Draft, index: number, to: Partial<Vertex>): Draft {
 }
 
 export function removed(draft: Draft, index: number): Draft {
-  return changed(draft, draft.vertices.filter((_, at) => at !== index));
+  return changed(
+    draft,
+    draft.vertices.filter((_, at) => at !== index),
+  );
 }
 
 export function undone(draft: Draft): Draft {

@@ -52,7 +52,11 @@ export class Graticule {
   }
 
   private label(at: L.LatLngTuple, text: string, className: string): void {
-    const icon = L.divIcon({ className: `graticule ${className}`, html: text, iconSize: undefined });
+    const icon = L.divIcon({
+      className: `graticule ${className}`,
+      html: text,
+      iconSize: undefined,
+    });
     L.marker(at, { icon, interactive: false, keyboard: false }).addTo(this.layer);
   }
 }

@@ -48,7 +48,11 @@ export class MapView {
     });
     this.map.attributionControl?.setPrefix(false);
     if (tiles) {
-      const options = { maxNativeZoom: tiles.max_zoom, maxZoom: 22, attribution: tiles.attribution };
+      const options = {
+        maxNativeZoom: tiles.max_zoom,
+        maxZoom: 22,
+        attribution: tiles.attribution,
+      };
       L.tileLayer("/tiles/{z}/{x}/{y}.png", options).addTo(this.map);
     }
     L.control.scale({ imperial: false }).addTo(this.map);
@@ -126,10 +130,16 @@ export class MapView {
   }
 
   private handle(point: L.LatLngTuple, index: number, line: L.Polyline | L.Polygon): void {
-    const icon = L.divIcon({ className: "map-vertex", html: String(index + 1), iconSize: [22, 22] });
+    const icon = L.divIcon({
+      className: "map-vertex",
+      html: String(index + 1),
+      iconSize: [22, 22],
+    });
     const marker = L.marker(point, { icon, draggable: true, keyboard: false, zIndexOffset: 2000 });
     marker.on("drag", () => {
-      const points = (line instanceof L.Polygon ? line.getLatLngs()[0] : line.getLatLngs()) as L.LatLng[];
+      const points = (
+        line instanceof L.Polygon ? line.getLatLngs()[0] : line.getLatLngs()
+      ) as L.LatLng[];
       line.setLatLngs(points.map((other, at) => (at === index ? marker.getLatLng() : other)));
     });
     marker.on("dragend", () => this.listener.dragged(index, vertexOf(marker.getLatLng())));

@@ -13,7 +13,7 @@ const TRAIL: L.PolylineOptions = { color: "#3a7bd0", weight: 2, opacity: 0.65, i
 const FOOTPRINT: L.PolylineOptions = {
   color: "#d08a1d",
   weight: 1,
-  fillOpacity: 0.16,
+  fillOpacity: 0.1,
   interactive: false,
 };
 

@@ -7,7 +7,10 @@ import type { Definitions } from "./moddle";
 
 async function modelOf(xml: string, first = "", qualifier = "") {
   const { rootElement } = await new BpmnModdle().fromXML(xml);
-  return missionModel([{ name: "m.bpmn", qualifier, xml, definitions: rootElement as unknown as Definitions }], first);
+  return missionModel(
+    [{ name: "m.bpmn", qualifier, xml, definitions: rootElement as unknown as Definitions }],
+    first,
+  );
 }
 
 const HEAD = `<bpmn:definitions xmlns:bpmn="http://www.omg.org/spec/BPMN/20100524/MODEL"
@@ -69,7 +72,9 @@ describe("mission model", () => {
       `${NESTED}${diagram("P", drawn)}${diagram("S", shape("C") + shape("T", 'isExpanded="true"') + shape("E"))}
        ${diagram("Q", "")}</bpmn:definitions>`,
     );
-    expect(model.views.map(({ root, title, inside, diagram }) => [root, title, inside, diagram])).toEqual([
+    expect(
+      model.views.map(({ root, title, inside, diagram }) => [root, title, inside, diagram]),
+    ).toEqual([
       ["P", "Main", "", "P_diagram"],
       ["S_plane", "Inside", "0/P", "P_diagram"],
     ]);
@@ -88,7 +93,11 @@ describe("mission model", () => {
   });
 
   it("names what is in a called file as records do", async () => {
-    const model = await modelOf(`${NESTED}${diagram("P", shape("A"))}</bpmn:definitions>`, "", "sub");
+    const model = await modelOf(
+      `${NESTED}${diagram("P", shape("A"))}</bpmn:definitions>`,
+      "",
+      "sub",
+    );
     expect(model.trees.map(({ id }) => id)).toEqual(["sub:P", "sub:Q"]);
     expect(model.node("sub:P", "sub:E")!.label).toBe("E");
     expect(model.viewOf("sub:P", "sub:A")!.root).toBe("P");

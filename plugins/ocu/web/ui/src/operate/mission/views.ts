@@ -1,6 +1,13 @@
 // The pictures of a file that can be shown one at a time: its diagrams, and what is inside its
 // collapsed subprocesses.
-import { processOf, type Collaboration, type Definitions, type Diagram, type Element, type Process } from "./moddle";
+import {
+  processOf,
+  type Collaboration,
+  type Definitions,
+  type Diagram,
+  type Element,
+  type Process,
+} from "./moddle";
 import { keyIn } from "./names";
 
 export interface View {
@@ -23,14 +30,24 @@ interface Drawn {
   definitions: Definitions;
 }
 
-export function viewsOf({ name, qualifier, definitions }: Drawn, file: number, several: boolean): View[] {
+export function viewsOf(
+  { name, qualifier, definitions }: Drawn,
+  file: number,
+  several: boolean,
+): View[] {
   const collapsed = collapsedIn(definitions);
   const views = new Map<string, View>();
   for (const diagram of definitions.diagrams ?? []) {
     const about = diagram.plane?.bpmnElement;
     if (!about || about.$instanceOf("bpmn:SubProcess")) continue;
     const suffix = several ? ` · ${name.replace(/\.bpmn$/, "")}` : "";
-    const view = emptyView(`${file}/${about.id}`, file, diagram.id, about.id, titleOf(about, diagram) + suffix);
+    const view = emptyView(
+      `${file}/${about.id}`,
+      file,
+      diagram.id,
+      about.id,
+      titleOf(about, diagram) + suffix,
+    );
     views.set(view.root, view);
   }
   for (const diagram of definitions.diagrams ?? []) {

@@ -147,11 +147,16 @@ function Item({ row, state, selected, reached, onKeyDown, onClick, onTurn }: Ite
         </i>
       )}
       <span class="name">{node.label}</span>
-      {state && state.hits > 0 && <span class="hits">{state.hits}</span>}
+      {state && state.hits > 0 && (
+        <span class="hits" aria-hidden="true">
+          {state.hits}
+        </span>
+      )}
     </li>
   );
 }
 
 const words = (type: string): string => type.replace(/(?<=[a-z])(?=[A-Z])/g, " ").toLowerCase();
 
-const times = (hits: number): string => (hits === 1 ? text.once : fill(text.times, { count: hits }));
+const times = (hits: number): string =>
+  hits === 1 ? text.once : fill(text.times, { count: hits });

@@ -42,7 +42,10 @@ export function moved(
   from: string,
   key: string,
 ): { to: string; fold?: boolean } | null {
-  const at = Math.max(0, rows.findIndex((row) => row.key === from));
+  const at = Math.max(
+    0,
+    rows.findIndex((row) => row.key === from),
+  );
   const row = rows[at];
   if (!row) return null;
   const to = (index: number) => ({ to: rows[Math.max(0, Math.min(index, rows.length - 1))]!.key });

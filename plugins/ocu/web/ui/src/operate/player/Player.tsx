@@ -2,6 +2,7 @@
 import { useEffect } from "preact/hooks";
 import { clockTenths } from "../../shared/format";
 import { strings } from "../../strings";
+import { Icon } from "../layout/icons";
 import { isTyping } from "../layout/keys";
 import { FASTEST, SLOWEST, type ReplayScene } from "../scene/replayScene";
 import { keepPosition } from "./address";
@@ -27,7 +28,8 @@ export function Player({ scene }: { scene: ReplayScene }) {
 
   useEffect(() => {
     const press = (event: KeyboardEvent) => {
-      if (event.ctrlKey || event.altKey || event.metaKey || isTyping(document.activeElement)) return;
+      if (event.ctrlKey || event.altKey || event.metaKey || isTyping(document.activeElement))
+        return;
       if (event.key === "," || event.key === ".") scene.step(event.key === "." ? 1 : -1);
       else if (event.key === "k") turn(scene);
       else return;
@@ -47,7 +49,7 @@ export function Player({ scene }: { scene: ReplayScene }) {
   return (
     <section class="player" aria-label={text.label}>
       <button type="button" class="plain" aria-label={text.start} onClick={() => scene.seek(0)}>
-        ⏮
+        <Icon name="start" />
       </button>
       <button
         type="button"
@@ -57,7 +59,7 @@ export function Player({ scene }: { scene: ReplayScene }) {
         aria-keyshortcuts=","
         onClick={() => scene.step(-1)}
       >
-        ◂
+        <Icon name="back" />
       </button>
       <button
         type="button"
@@ -66,6 +68,7 @@ export function Player({ scene }: { scene: ReplayScene }) {
         aria-keyshortcuts="k"
         onClick={() => turn(scene)}
       >
+        <Icon name={playing ? "pause" : "play"} />
         {playing ? text.pause : text.play}
       </button>
       <button
@@ -76,10 +79,10 @@ export function Player({ scene }: { scene: ReplayScene }) {
         aria-keyshortcuts="."
         onClick={() => scene.step(1)}
       >
-        ▸
+        <Icon name="forward" />
       </button>
       <button type="button" class="plain" aria-label={text.end} onClick={() => scene.seek(end)}>
-        ⏭
+        <Icon name="end" />
       </button>
       <output class="player-time">
         {clockTenths(time)} {text.of} {clockTenths(end)}

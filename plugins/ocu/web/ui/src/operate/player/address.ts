@@ -1,4 +1,5 @@
-// The moment that is shown, in the address of the page: to come back to it, or to show it to others.
+// The moment that is shown, in the address of the page: to come back to it, or to show it to
+// others.
 
 /** Seconds, of `?t=`; null: none is named. */
 export function positionInAddress(): number | null {

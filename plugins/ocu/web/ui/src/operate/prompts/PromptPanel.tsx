@@ -3,6 +3,7 @@ import { useComputed, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { post } from "../../shared/api";
 import { listen } from "../../shared/executive";
+import { go } from "../../shared/router";
 import { may, session } from "../../shared/session";
 import { attempt, toast } from "../../shared/Toasts";
 import type { Prompt } from "../../shared/types";
@@ -28,17 +29,19 @@ export function PromptPanel() {
     return [...scene.prompts.value].sort((one, other) => own(one) - own(other));
   });
   const prompts = queue.value;
-  const at = Math.max(0, prompts.findIndex((prompt) => idOf(prompt) === chosen.value));
+  const at = Math.max(
+    0,
+    prompts.findIndex((prompt) => idOf(prompt) === chosen.value),
+  );
   const prompt = prompts[at];
   const id = prompt ? idOf(prompt) : "";
-  const mayAnswer = scene.mode === "live" && may("operator");
+  const mayAnswer = may("operator");
   const usable = mayAnswer && ready.value && sending.value !== id;
 
-  useTellWhoWasFirst(scene.mode === "live");
+  useTellWhoWasFirst();
 
   useEffect(() => {
     if (!id) return;
-    if (scene.mode === "replay") return;
     ready.value = false;
     const deaf = setTimeout(() => (ready.value = true), DEAF_MS);
     const before = document.activeElement;
@@ -80,7 +83,7 @@ export function PromptPanel() {
     <section
       ref={panel}
       class="prompt"
-      role={scene.mode === "live" ? "alertdialog" : "region"}
+      role="alertdialog"
       aria-label={title}
       aria-describedby="prompt-text"
       tabIndex={-1}
@@ -92,12 +95,15 @@ export function PromptPanel() {
           class="prompt-where"
           title={text.show}
           onClick={() => {
-            selected.value = { process: prompt.process, element: prompt.element, show: true };
+            const { run, process, element } = prompt;
+            if (run === scene.run) selected.value = { process, element, show: true };
+            else go(`/runs/${encodeURIComponent(run)}`);
           }}
         >
-          {fill(text.of, { element: mission.label(prompt.process, prompt.element) })}
+          {prompt.run === scene.run
+            ? fill(text.of, { element: mission.label(prompt.process, prompt.element) })
+            : fill(text.run, { run: prompt.run })}
         </button>
-        {prompt.run !== scene.run && <span>{fill(text.run, { run: prompt.run })}</span>}
         {prompt.role && <span>{fill(text.role, { role: prompt.role })}</span>}
       </div>
       <p id="prompt-text">{prompt.text || mission.label(prompt.process, prompt.element)}</p>
@@ -133,13 +139,12 @@ export function PromptPanel() {
 const idOf = ({ run, prompt }: Prompt): string => `${run}/${prompt}`;
 
 /** Whoever was about to answer is told that somebody else was first. */
-function useTellWhoWasFirst(live: boolean): void {
+function useTellWhoWasFirst(): void {
   const { scene } = useOperating();
   const standing = useRef<Prompt[]>([]);
   // While a message is told, this is still the list of before it.
   useEffect(() => scene.prompts.subscribe((now) => void (standing.current = now)), [scene]);
   useEffect(() => {
-    if (!live) return;
     return listen((message) => {
       if (message.type !== "prompt_closed") return;
       const was = standing.current.find(
@@ -152,5 +157,5 @@ function useTellWhoWasFirst(live: boolean): void {
         toast(fill(text.answered, { by: message.by, decision: label || message.decision }));
       }
     });
-  }, [live]);
+  }, []);
 }

@@ -10,6 +10,7 @@ import { attempt } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
 import type { RunSummary } from "../../shared/types";
 import { useOperating } from "../context";
+import { Icon } from "../layout/icons";
 import { usePaced } from "../layout/pace";
 import { SendDialog } from "./SendDialog";
 import "./runbar.css";
@@ -36,7 +37,9 @@ export function RunBar() {
         </span>
       )}
       <Clock />
+      {status === "interrupted" && <em>{fill(text.interrupted, { run: scene.run })}</em>}
       <span class="space" />
+      {scene.mode === "replay" && <Asked />}
       {scene.mode === "live" && <Controls status={status} />}
     </div>
   );
@@ -74,6 +77,24 @@ function Runs({ shown }: { shown: string }) {
   );
 }
 
+/** In a replay: which question stood then. */
+function Asked() {
+  const { scene, selected } = useOperating();
+  const [prompt] = scene.prompts.value;
+  if (!prompt) return null;
+  const { process, element, text: question } = prompt;
+  return (
+    <button
+      type="button"
+      class="asked"
+      title={question}
+      onClick={() => (selected.value = { process, element, show: true })}
+    >
+      ? {question}
+    </button>
+  );
+}
+
 function Clock() {
   const { scene } = useOperating();
   const time = usePaced(scene.time, 200);
@@ -95,16 +116,25 @@ function Clock() {
 }
 
 function Controls({ status }: { status: string }) {
-  const { scene } = useOperating();
+  const { scene, replay } = useOperating();
   const sending = useSignal<"signal" | "message" | null>(null);
   const ask = (what: string, body?: unknown) =>
     void attempt(() => post(`/runs/${encodeURIComponent(scene.run)}/${what}`, body));
-  const steerable = may("operator") && (status === "running" || status === "paused");
+  const goesOn = status === "running" || status === "paused";
+  const steerable = may("operator") && goesOn;
+  if (!goesOn && status !== "interrupted") {
+    return (
+      <button type="button" class="primary" onClick={replay}>
+        {text.replay}
+      </button>
+    );
+  }
   return (
     <>
       {status === "paused" ? (
         <button type="button" class="primary" disabled={!steerable} onClick={() => ask("resume")}>
-          ▶ {text.resume}
+          <Icon name="play" />
+          {text.resume}
         </button>
       ) : (
         <button
@@ -114,7 +144,8 @@ function Controls({ status }: { status: string }) {
           disabled={!steerable}
           onClick={() => ask("pause")}
         >
-          ❚❚ {text.pause}
+          <Icon name="pause" />
+          {text.pause}
         </button>
       )}
       <button

@@ -12,14 +12,17 @@ const MOST = 6;
 
 type Ended = keyof typeof text;
 
-export function RunEnd({ onReplay, onClose }: { onReplay: () => void; onClose: () => void }) {
-  const { scene, mission } = useOperating();
+export function RunEnd({ onClose }: { onClose: () => void }) {
+  const { scene, mission, replay } = useOperating();
   const summary = scene.summary.value;
   if (!summary) return null;
   const { records } = scene.log.value;
   const names = { element: mission.label, definition: mission.definition };
   const lines = (wanted: (record: RunRecord) => boolean) =>
-    records.filter(wanted).slice(-MOST).map((record) => lineOf(record, names));
+    records
+      .filter(wanted)
+      .slice(-MOST)
+      .map((record) => lineOf(record, names));
   const decisions = lines(({ record }) => record === "PromptAnswered");
   const faults = lines((record) => isFault(record));
   return (
@@ -31,7 +34,7 @@ export function RunEnd({ onReplay, onClose }: { onReplay: () => void; onClose: (
           <button type="button" class="secondary" onClick={onClose}>
             {text.dismiss}
           </button>
-          <button type="button" class="primary" onClick={onReplay}>
+          <button type="button" class="primary" onClick={replay}>
             {text.replay}
           </button>
         </>

@@ -8,6 +8,12 @@ describe("data of a signal", () => {
   });
 
   it("is nothing else", () => {
-    expect(["[1]", "null", "3", "{a: 1}", '{"a"'].map(dataOf)).toEqual([null, null, null, null, null]);
+    expect(["[1]", "null", "3", "{a: 1}", '{"a"'].map(dataOf)).toEqual([
+      null,
+      null,
+      null,
+      null,
+      null,
+    ]);
   });
 });

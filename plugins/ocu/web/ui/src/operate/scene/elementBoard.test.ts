@@ -24,7 +24,10 @@ describe("element board", () => {
   it("tells what changed, and nothing else", () => {
     board.merge({ P: { A: state({ active: 1 }), B: state() } });
     board.merge({ P: { A: state({ active: 1 }), B: state({ hits: 1 }) } });
-    expect(told.map((changes) => changes.map(({ element }) => element))).toEqual([["A", "B"], ["B"]]);
+    expect(told.map((changes) => changes.map(({ element }) => element))).toEqual([
+      ["A", "B"],
+      ["B"],
+    ]);
     expect(told[1]![0]).toMatchObject({ before: { hits: 0 }, state: { hits: 1 } });
   });
 

@@ -1,5 +1,5 @@
-// The states of a run's elements. Who draws is told what changed at once; lists that people read are
-// renewed a few times a second (`slow`).
+// The states of a run's elements. Who draws is told what changed at once; lists that people read
+// are renewed a few times a second (`slow`).
 import { signal, type ReadonlySignal } from "@preact/signals";
 import type { Elements, ElementState } from "../../shared/types";
 
@@ -13,6 +13,8 @@ export interface ElementChange {
 type Listener = (changes: ElementChange[]) => void;
 
 const SLOW_MS = 200;
+/** Long lists are renewed less often, as each renewal takes longer. */
+const EACH_MS = 2;
 
 const IDLE: ElementState = { active: 0, hits: 0, last: 0, failed: false, asking: false };
 
@@ -85,10 +87,13 @@ export class ElementBoard {
   private tell(changes: ElementChange[]): void {
     if (changes.length === 0) return;
     for (const listener of this.listeners) listener(changes);
-    this.timer ??= setTimeout(() => {
-      this.timer = undefined;
-      this.version.value += 1;
-    }, SLOW_MS);
+    this.timer ??= setTimeout(
+      () => {
+        this.timer = undefined;
+        this.version.value += 1;
+      },
+      Math.max(SLOW_MS, changes.length * EACH_MS),
+    );
   }
 }
 

@@ -2,12 +2,7 @@
 import { batch, computed, signal } from "@preact/signals";
 import { get } from "../../shared/api";
 import * as executive from "../../shared/executive";
-import type {
-  Command,
-  RunStatus,
-  RunSummary,
-  ServerMessage,
-} from "../../shared/types";
+import type { Command, RunStatus, RunSummary, ServerMessage } from "../../shared/types";
 import { ElementBoard } from "./elementBoard";
 import { RecordFeed, type Page } from "./recordFeed";
 import type { Scene } from "./scene";
@@ -19,6 +14,7 @@ type Snapshot = Extract<ServerMessage, { type: "snapshot" }>;
 
 export class LiveScene implements Scene {
   readonly mode = "live";
+  readonly hasTelemetry = true;
   readonly elements = new ElementBoard();
   readonly summary = computed<RunSummary | null>(
     () => executive.runs.value.find(({ run }) => run === this.run) ?? null,
@@ -66,7 +62,8 @@ export class LiveScene implements Scene {
 
   /** Frames come only when something changes; in between the clock goes on. */
   now(): number {
-    if (this.status.value !== "running" || executive.connection.value !== "open") return this.told_s;
+    if (this.status.value !== "running" || executive.connection.value !== "open")
+      return this.told_s;
     return this.told_s + ((performance.now() - this.toldAt) / 1000) * this.pace.value;
   }
 

@@ -15,7 +15,8 @@ function journal(count: number) {
 
 const settled = () => new Promise((resolve) => setTimeout(resolve, 5));
 const seqs = (feed: RecordFeed) => feed.log.value.records.map(({ seq }) => seq);
-const upTo = (from: number, to: number) => Array.from({ length: to - from + 1 }, (_, i) => from + i);
+const upTo = (from: number, to: number) =>
+  Array.from({ length: to - from + 1 }, (_, i) => from + i);
 
 describe("record feed", () => {
   it("reads all there is, then takes what is pushed", async () => {

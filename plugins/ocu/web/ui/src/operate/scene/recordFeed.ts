@@ -1,5 +1,5 @@
-// The records of a run that goes on: read by page from the start, then as they are pushed. When more
-// come than can be followed, some are left out and counted.
+// The records of a run that goes on: read by page from the start, then as they are pushed. When
+// more come than can be followed, some are left out and counted.
 import { signal, type ReadonlySignal } from "@preact/signals";
 import { Spans } from "../../records/spans";
 import type { Command, RunRecord } from "../../shared/types";

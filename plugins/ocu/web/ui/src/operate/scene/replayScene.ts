@@ -41,7 +41,7 @@ export class ReplayScene implements Scene {
   readonly timeline;
   readonly log = signal<LogPage>({ records: [], more: false, skipped: 0 });
   readonly end;
-  readonly hasPositions: boolean;
+  readonly hasTelemetry: boolean;
   private readonly reel: Reel;
   private readonly track: TelemetryTrack;
   private position_s = 0;
@@ -59,7 +59,7 @@ export class ReplayScene implements Scene {
     this.summary = signal<RunSummary | null>(summary);
     this.reel = new Reel(records);
     this.track = new TelemetryTrack(telemetry);
-    this.hasPositions = telemetry.length > 0;
+    this.hasTelemetry = telemetry.length > 0;
     this.end = signal(this.reel.end);
     const spans = new Spans();
     for (const record of records) spans.add(record);

@@ -1,4 +1,5 @@
-// What the page shows of one run, wherever it comes from: the executive now, or records of the past.
+// What the page shows of one run, wherever it comes from: the executive now, or records of the
+// past.
 import type { ReadonlySignal } from "@preact/signals";
 import type { Spans } from "../../records/spans";
 import type {
@@ -41,6 +42,8 @@ export interface Scene {
   readonly vehicles: ReadonlySignal<Record<string, VehicleState>>;
   readonly payloads: ReadonlySignal<Record<string, PayloadState>>;
   readonly teams: ReadonlySignal<Record<string, TeamState>>;
+  /** Whether anything is known of where vehicles are and how: not of runs of the past. */
+  readonly hasTelemetry: boolean;
   /** Seconds since a resource was heard; null: never. */
   silentFor_s(resource: string): number | null;
   /** Its `spans` change in place; the signal tells that they did. */

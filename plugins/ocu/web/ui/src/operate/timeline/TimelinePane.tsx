@@ -125,7 +125,11 @@ export function TimelinePane({ onSeek }: { onSeek?: ((t: number) => void) | unde
             onClick={seek}
           >
             {marks(window, width, 70).map((t) => (
-              <g key={t} class="mark" transform={`translate(${x(t)} 0)`}>
+              <g
+                key={t}
+                class={x(t) < 20 ? "mark mark-first" : "mark"}
+                transform={`translate(${x(t)} 0)`}
+              >
                 <line y1={AXIS_PX} y2="100%" />
                 <text y="14">{clock(t)}</text>
               </g>
@@ -134,7 +138,14 @@ export function TimelinePane({ onSeek }: { onSeek?: ((t: number) => void) | unde
               {rows.map((row) => (
                 <line key={row.id} class="row-line" x2="100%" y1={row.top} y2={row.top} />
               ))}
-              <Bars rows={rows} window={window} width={width} now={time} lane_px={LANE_PX} onSeek={onSeek} />
+              <Bars
+                rows={rows}
+                window={window}
+                width={width}
+                now={time}
+                lane_px={LANE_PX}
+                onSeek={onSeek}
+              />
             </g>
             <line class="now" x1={x(time)} x2={x(time)} y1={AXIS_PX - 6} y2="100%" />
           </svg>

@@ -38,7 +38,9 @@ export interface Bar<T> {
 }
 
 /** Bars of a row that overlap get lanes of their own. */
-export function lanes<T extends { from: number; to: number | null }>(spans: readonly T[]): Bar<T>[] {
+export function lanes<T extends { from: number; to: number | null }>(
+  spans: readonly T[],
+): Bar<T>[] {
   const ends: number[] = [];
   return [...spans]
     .sort((one, other) => one.from - other.from)

@@ -53,20 +53,21 @@ interface CardProps {
 }
 
 function Card({ vehicle, state, payloads, silent_s }: CardProps) {
-  const { fleet, followed, centred } = useOperating();
-  const stale = !state || silent_s === null || silent_s > STALE_S || state.link === "lost";
+  const { scene, fleet, followed, centred } = useOperating();
+  const { hasTelemetry } = scene;
+  const stale = hasTelemetry && isStale(state, silent_s);
   return (
     <li class={stale ? "card card-stale" : "card"}>
       <div class="card-head">
         <DomainSymbol domain={vehicle.domain} />
         <strong>{vehicle.id}</strong>
-        <small>{vehicle.manned ? text.manned : text.domain[vehicle.domain]}</small>
+        <span class="for-readers">{text.domain[vehicle.domain]}</span>
+        {vehicle.manned && <small>{text.manned}</small>}
         <span class="card-badges">
           {state && <Badges state={state} />}
-          {silent_s === null ? (
-            <em>{text.unheard}</em>
-          ) : (
-            silent_s > STALE_S && <em>{fill(text.silent, { age: age(silent_s) })}</em>
+          {hasTelemetry && silent_s === null && <em>{text.unheard}</em>}
+          {silent_s !== null && silent_s > STALE_S && (
+            <em>{fill(text.silent, { age: age(silent_s) })}</em>
           )}
         </span>
       </div>
@@ -76,7 +77,7 @@ function Card({ vehicle, state, payloads, silent_s }: CardProps) {
           {text.notReady}: {state.not_ready_reasons.join("; ")}
         </p>
       )}
-      <Doing resource={vehicle.id} name={vehicle.id} />
+      <Doing resource={vehicle.id} name={text.does} />
       {payloadsOf(fleet, vehicle.id).map((payload) => (
         <Doing
           key={payload}
@@ -85,31 +86,36 @@ function Card({ vehicle, state, payloads, silent_s }: CardProps) {
           look={payloads[payload]}
         />
       ))}
-      <div class="card-tools">
-        <HandOver resource={vehicle.id} />
-        <button
-          type="button"
-          class="plain"
-          disabled={!state?.position}
-          onClick={() => (centred.value = { resource: vehicle.id })}
-        >
-          {text.centre}
-        </button>
-        <button
-          type="button"
-          class="plain"
-          aria-pressed={followed.value === vehicle.id}
-          disabled={!state?.position}
-          onClick={() => {
-            followed.value = followed.value === vehicle.id ? "" : vehicle.id;
-          }}
-        >
-          {text.follow}
-        </button>
-      </div>
+      {hasTelemetry && (
+        <div class="card-tools">
+          <HandOver resource={vehicle.id} />
+          <button
+            type="button"
+            class="plain"
+            disabled={!state?.position}
+            onClick={() => (centred.value = { resource: vehicle.id })}
+          >
+            {text.centre}
+          </button>
+          <button
+            type="button"
+            class="plain"
+            aria-pressed={followed.value === vehicle.id}
+            disabled={!state?.position}
+            onClick={() => {
+              followed.value = followed.value === vehicle.id ? "" : vehicle.id;
+            }}
+          >
+            {text.follow}
+          </button>
+        </div>
+      )}
     </li>
   );
 }
+
+const isStale = (state: VehicleState | undefined, silent_s: number | null): boolean =>
+  !state || silent_s === null || silent_s > STALE_S || state.link === "lost";
 
 function Badges({ state }: { state: VehicleState }) {
   const { link, armed, ready, battery_fraction } = state;
@@ -160,7 +166,6 @@ function Doing({ resource, name, look }: DoingProps) {
   const { scene, mission, selected } = useOperating();
   const work = workOf(resource, scene.commands.value);
   const holder = scene.holders.value[resource] ?? "";
-  const degrees = (rad: number) => Math.round((rad * 180) / Math.PI);
   return (
     <p class="card-work">
       <span>{name}</span>{" "}
@@ -175,19 +180,25 @@ function Doing({ resource, name, look }: DoingProps) {
             type="button"
             onClick={() => (selected.value = { process, element, show: true })}
           >
-            {does} {text.for} {mission.label(process, element)}
+            {mission.label(process, element)} <small>{does}</small>
           </button>
         ))
       )}
-      {look && look.pan_rad !== null && look.tilt_rad !== null && (
-        <small>
-          {" "}
-          {degrees(look.pan_rad)}° / {degrees(look.tilt_rad)}°
-          {look.zoom !== null && ` ×${look.zoom.toFixed(1)}`}
-        </small>
-      )}
+      {look && look.footprint.length > 0 && <small> {directionOf(look)}</small>}
     </p>
   );
+}
+
+/** Of a camera: from the bow, up or down, and how near. */
+function directionOf({ pan_rad, tilt_rad, zoom }: PayloadState): string {
+  const degrees = (rad: number) => `${Math.round((rad * 180) / Math.PI)}°`;
+  return [
+    pan_rad !== null && `↻ ${degrees(pan_rad)}`,
+    tilt_rad !== null && `↕ ${degrees(tilt_rad)}`,
+    zoom !== null && zoom !== 1 && `×${zoom.toFixed(1)}`,
+  ]
+    .filter(Boolean)
+    .join(" ");
 }
 
 function HandOver({ resource }: { resource: string }) {

@@ -12,11 +12,20 @@ const command = (name: string, since: number, ...resources: string[]): Command =
 
 describe("work", () => {
   it("is what holds a vehicle", () => {
-    const commands = { b1: command("late", 5, "v1"), b2: command("early", 1, "v1", "v2"), b3: command("other", 0, "v2") };
+    const commands = {
+      b1: command("late", 5, "v1"),
+      b2: command("early", 1, "v1", "v2"),
+      b3: command("other", 0, "v2"),
+    };
     expect(workOf("v1", commands).map(({ behavior }) => behavior)).toEqual(["b2", "b1"]);
   });
 
   it("tells operators from behaviors", () => {
-    expect(["anna@gcs1", "r1.b3", "", "r12.b144"].map(isOperator)).toEqual([true, false, false, false]);
+    expect(["anna@gcs1", "r1.b3", "", "r12.b144"].map(isOperator)).toEqual([
+      true,
+      false,
+      false,
+      false,
+    ]);
   });
 });

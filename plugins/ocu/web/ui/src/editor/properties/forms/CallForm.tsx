@@ -61,7 +61,7 @@ function Mappings({ form, direction }: { form: FormProps; direction: Direction }
     apply(form, setMappings(factoryOf(form), call, direction, next));
   return (
     <>
-      <h4 class="m2-heading">{words[direction]}</h4>
+      <h2 class="m2-heading">{words[direction]}</h2>
       <Rows
         rows={mappings}
         write={write}

@@ -49,7 +49,7 @@ function NameField({ form }: { form: FormProps }) {
       id="m2-name"
       label={isNote ? words.text : words.name}
       rows={isNote ? 3 : 2}
-      value={getLabel(element as never) ?? ""}
+      value={isLabel ? (getLabel(element as never) ?? "") : text(objectOf(form), "name")}
       write={(name) => {
         if (isLabel) modeling.updateLabel(element as never, name);
         else modeling.updateProperties(element as never, { name: name || undefined });

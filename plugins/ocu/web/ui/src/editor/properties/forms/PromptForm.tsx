@@ -31,7 +31,7 @@ export function PromptForm(form: FormProps) {
         hint={words.textHint}
         write={(value) => write({ text: value })}
       />
-      <h4 class="m2-heading">{words.decisions}</h4>
+      <h2 class="m2-heading">{words.decisions}</h2>
       <Rows
         rows={prompt.decisions}
         write={(decisions) => write({ decisions })}

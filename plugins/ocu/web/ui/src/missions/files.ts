@@ -1,6 +1,6 @@
 // Missions on the server: opened, saved with the version that they were drawn from, and kept.
-import { ApiError, get, post, put } from "../../shared/api";
-import type { MissionFile } from "../../shared/types";
+import { ApiError, get, post, put } from "../shared/api";
+import type { MissionFile } from "../shared/types";
 
 export interface SavedVersion {
   version: string;
