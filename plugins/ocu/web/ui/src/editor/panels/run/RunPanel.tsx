@@ -139,7 +139,9 @@ function Start({ editor }: { editor: EditorContext }) {
           <p>
             <strong>{words.real.moves}</strong>
           </p>
-          <p>{fill(words.real.text, { fleet: session.value?.fleet ?? "", mission: editor.mission })}</p>
+          <p>
+            {fill(words.real.text, { fleet: session.value?.fleet ?? "", mission: editor.mission })}
+          </p>
         </Dialog>
       )}
     </section>

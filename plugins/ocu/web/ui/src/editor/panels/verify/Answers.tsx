@@ -40,7 +40,9 @@ export function Answers({ editor, verification }: PartProps) {
 function Summary({ report }: { report: Report }) {
   const counts = counted(report);
   const { states, transitions, seconds, stopped, notes } = report.coverage;
-  const said = (["violated", "warning", "undecided", "holds"] as const).filter((each) => counts[each]);
+  const said = (["violated", "warning", "undecided", "holds"] as const).filter(
+    (each) => counts[each],
+  );
   return (
     <div class={`m2v-summary m2v-${report.verdict}`}>
       <h3>
