@@ -6,6 +6,8 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from xml.etree import ElementTree
 
+import pytest
+from axe_playwright_python.async_playwright import Axe
 from playwright.async_api import Locator, Page, expect
 from web_browsing import TIMEOUT_MS, browser, page_at
 from web_served import REPOSITORY, Served, served
@@ -85,7 +87,7 @@ async def test_requirements_are_written_verified_undone_and_kept(tmp_path: Path)
         parts = page.get_by_role("region", name="Requirements of this mission")
         await parts.get_by_label("Pattern").select_option("")
         await parts.get_by_role("button", name="Add", exact=True).click()
-        formula = parts.get_by_role("combobox", name="Formula", exact=True)
+        formula = parts.get_by_role("textbox", name="Formula", exact=True)
         await formula.fill("[](activ(Reverse) -> <> ended)")
         await formula.blur()
         await verify(page)
@@ -142,7 +144,7 @@ async def test_a_pattern_gets_its_arguments_from_pickers(tmp_path: Path) -> None
         await offered(page).get_by_role("option").click()
         await parts.get_by_role("combobox", name="decision").click()
         await offered(page).get_by_role("option", name="continue").click()
-        before = parts.get_by_role("combobox", name="before")
+        before = parts.get_by_role("textbox", name="before")
         await before.fill("active(DriveR")
         await offered(page).get_by_role("option", name="DriveRoute").click()
         await before.blur()
@@ -170,3 +172,35 @@ async def test_requirements_typed_as_yaml_are_pointed_at_where_they_are_wrong(
         report = page.get_by_role("region", name="Report")
         await expect(report).to_contain_text("Your requirements")
         await expect(report).to_contain_text("ends")
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+async def test_axe_has_nothing_against_what_verification_shows(tmp_path: Path, theme: str) -> None:
+    async with editor_of(tmp_path, STUCK) as (page, _):
+        if theme == "dark":
+            await page.get_by_role("button", name="Dark theme").click()
+        parts = page.get_by_role("region", name="Requirements of this mission")
+        for pattern in ("", "visits_at_least"):
+            await parts.get_by_label("Pattern").last.select_option(pattern)
+            await parts.get_by_role("button", name="Add", exact=True).click()
+            assert await against(page) == []
+        await verify(page)
+        await expect(page.get_by_role("alert").filter(has_text="not be verified")).to_be_visible()
+        assert await against(page) == []
+        await page.get_by_role("button", name="Undo (Ctrl+Z)").click()
+        await page.get_by_role("button", name="Undo (Ctrl+Z)").click()
+        await verify(page)
+        report = page.get_by_role("region", name="Report")
+        await expect(report.get_by_role("heading", name="Violated")).to_be_visible()
+        assert await against(page) == []
+        await report.get_by_role("button", name="Show the run: 12 steps").first.click()
+        assert await against(page) == []
+
+
+async def against(page: Page) -> list[str]:
+    """What axe has against a page."""
+    found = await Axe().run(page)
+    return [
+        f"{each['id']}: {[node['html'][:200] for node in each['nodes']]}"
+        for each in found.response["violations"]
+    ]

@@ -21,12 +21,12 @@ export function Outcome({ editor, id, summary, spans }: OutcomeProps) {
   return (
     <section class="m2r-outcome" aria-label={words.outcome}>
       <div class={`m2v-summary ${good ? "m2v-holds" : "m2v-violated"}`}>
-        <h3>
+        <h2>
           <span class={`m2v-sign m2v-sign-${good ? "holds" : "violated"}`} aria-hidden="true">
             {good ? "✓" : "✗"}
           </span>
           {STATUS[status]}
-        </h3>
+        </h2>
         {detail && <p>{detail}</p>}
         <p class="m2v-faint">{fill(words.took, { duration: duration(seconds), records })}</p>
         <a class="m2r-watch" href={`/rehearsals/${encodeURIComponent(id)}`} target="_blank">
@@ -54,7 +54,7 @@ function Bars({
     row === PROMPTS ? words.questions : row === SERVICES ? words.services : row;
   return (
     <>
-      <h4>{words.timeline}</h4>
+      <h3>{words.timeline}</h3>
       <ul class="m2r-bars">
         {rows.map((row) => (
           <li key={row}>
