@@ -220,10 +220,11 @@ fuzz: python-packages ## read and run strange files for FUZZ_S seconds (600)
 docs: python-packages ## build the documentation into site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
-pictures: npm-packages python-packages ## draw the missions and examples for the docs (needs Chromium)
+pictures: npm-packages page ## draw the missions and examples, and the web page, for the docs (needs Chromium)
 	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn && \
 	for example in ../../examples/*/; do node draw_bpmn.mjs "$$example" "$$example"*.bpmn; done
 	@$(BIN)/python -m tests.broken
+	@M2PEM_PICTURES=1 $(BIN)/pytest --quiet plugins/ocu/web/tests/test_web_mission_drawn.py
 
 PEERS := .conformance
 

@@ -138,7 +138,9 @@ async def watch_rehearsal(page: Page) -> None:
     """It plays: the vehicle drives, and what it does is green."""
     await page.get_by_role("button", name="Play", exact=True).click()
     await wait_for_colour(page, "DRIVE ROUTE", GREEN)
-    await expect(page.locator(".vehicles-pane .card", has_text="evsg1").first).to_contain_text("5.0 m/s")
+    await expect(page.locator(".vehicles-pane .card", has_text="evsg1").first).to_contain_text(
+        "5.0 m/s"
+    )
     await picture(page, "rehearsal")
     await page.get_by_label("Position").focus()
     await page.keyboard.press("End")
@@ -179,11 +181,15 @@ async def watch_detection(page: Page) -> None:
 async def pause_and_resume(page: Page) -> None:
     await page.get_by_role("button", name="Pause", exact=True).click()
     await wait_for_status(page, "Paused")
-    await expect(page.locator(".vehicles-pane .card", has_text="evsg1").first).to_contain_text("0.0 m/s")
+    await expect(page.locator(".vehicles-pane .card", has_text="evsg1").first).to_contain_text(
+        "0.0 m/s"
+    )
     await picture(page, "paused")
     await page.get_by_role("button", name="Resume", exact=True).click()
     await wait_for_status(page, "Running")
-    await expect(page.locator(".vehicles-pane .card", has_text="evsg1").first).to_contain_text("5.0 m/s")
+    await expect(page.locator(".vehicles-pane .card", has_text="evsg1").first).to_contain_text(
+        "5.0 m/s"
+    )
 
 
 async def stop(page: Page) -> None:

@@ -128,7 +128,7 @@ class Drawing:
 
     async def choose(self, word: str) -> None:
         """Type a word into the open menu, and take what is called so."""
-        await self.page.locator(f"{MENU}-search input").fill(word)
+        await self.page.locator(f"{MENU}-search input").press_sequentially(word)
         entry = self.page.locator(f"{MENU} .entry", has_text=word).first
         await expect(entry).to_be_visible()
         await entry.click()
@@ -170,6 +170,16 @@ class Drawing:
         x, y = await self.centre(target)
         await self.put_down(x, y)
         return await self.flow(source, target)
+
+    async def bend(self, source: str, target: str, down: float) -> None:
+        """Drag a straight flow away from others that lie on it."""
+        flow = await self.select_flow(source, target)
+        x, y = await self.element(flow).locator(".djs-hit").first.evaluate(ON_LINE)
+        await self.page.mouse.move(x, y)
+        await self.page.mouse.down()
+        await self.page.mouse.move(x, y + down / 2, steps=4)
+        await self.page.mouse.move(x, y + down, steps=4)
+        await self.page.mouse.up()
 
     async def condition(self, source: str, target: str, text: str, name: str = "") -> None:
         """Say when a flow is taken."""

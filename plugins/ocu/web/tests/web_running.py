@@ -61,9 +61,7 @@ async def wait_for_colour(page: Page, element: str, wanted: tuple[int, int, int]
 
 
 def is_near(found: list[int] | None, wanted: tuple[int, int, int]) -> bool:
-    return found is not None and all(
-        abs(a - b) <= NEAR for a, b in zip(found, wanted, strict=True)
-    )
+    return found is not None and all(abs(a - b) <= NEAR for a, b in zip(found, wanted, strict=True))
 
 
 def answer(page: Page, label: str) -> Locator:

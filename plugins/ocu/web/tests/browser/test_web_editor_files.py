@@ -17,6 +17,7 @@ FILES = sorted(
     [
         *(ROOT / "missions").glob("*.bpmn"),
         *(ROOT / "examples").glob("*/*.bpmn"),
+        *(ROOT / "docs" / "broken").glob("*.bpmn"),
         *(Path(CORPORA).rglob("*.bpmn") if CORPORA else ()),
     ]
 )

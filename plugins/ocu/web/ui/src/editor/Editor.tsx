@@ -112,6 +112,7 @@ function Workplace({ work, fail }: WorkplaceProps) {
       <div class="m2-workplace">
         {showsBlocks && <BlockLibrary session={session} />}
         <div class="m2-drawing">
+          <h2 class="m2-hidden">{words.canvas}</h2>
           <DiagramTabs session={session} />
           <div
             id="m2-canvas"

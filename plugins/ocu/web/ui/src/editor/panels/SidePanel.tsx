@@ -19,6 +19,12 @@ export function SidePanel({ editor }: { editor: EditorContext }) {
     setWidth(bounded);
     remember("editor-panel-width", bounded);
   };
+  const focus = (at: number) => {
+    const next = panels[at];
+    if (!next) return;
+    setShown(next.id);
+    document.getElementById(`m2-panel-tab-${next.id}`)?.focus();
+  };
   return (
     <aside class="m2-side" style={{ width: `${width}px` }} aria-label={strings.editor.panels.label}>
       <Grip width={width} resize={resize} />
@@ -30,12 +36,8 @@ export function SidePanel({ editor }: { editor: EditorContext }) {
             panel={panel}
             isShown={panel.id === shown}
             show={() => setShown(panel.id)}
-            step={(offset) => {
-              const next = panels[(index + offset + panels.length) % panels.length];
-              if (!next) return;
-              setShown(next.id);
-              document.getElementById(`m2-panel-tab-${next.id}`)?.focus();
-            }}
+            step={(offset) => focus((index + offset + panels.length) % panels.length)}
+            focus={(at) => focus(at < 0 ? panels.length + at : at)}
           />
         ))}
       </div>
@@ -62,9 +64,11 @@ interface PanelTabProps {
   isShown: boolean;
   show(): void;
   step(offset: number): void;
+  /** The tab at a place; -1: the last one. */
+  focus(at: number): void;
 }
 
-function PanelTab({ editor, panel, isShown, show, step }: PanelTabProps) {
+function PanelTab({ editor, panel, isShown, show, step, focus }: PanelTabProps) {
   const count = panel.badge?.(editor) ?? 0;
   return (
     <button
@@ -78,6 +82,8 @@ function PanelTab({ editor, panel, isShown, show, step }: PanelTabProps) {
       onKeyDown={(event) => {
         if (event.key === "ArrowRight") step(1);
         if (event.key === "ArrowLeft") step(-1);
+        if (event.key === "Home") focus(0);
+        if (event.key === "End") focus(-1);
       }}
     >
       {panel.title}

@@ -79,9 +79,8 @@ export function ExpressionField(props: ExpressionFieldProps) {
           ref={area}
           class="m2-input m2-mono"
           rows={props.rows ?? 2}
-          role="combobox"
-          aria-expanded={options.length > 0}
-          aria-controls={`${id}-list`}
+          aria-haspopup="listbox"
+          aria-controls={options.length > 0 ? `${id}-list` : undefined}
           aria-autocomplete="list"
           aria-activedescendant={active >= 0 ? optionId(id, active) : undefined}
           {...described(id, error, hint)}
