@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 from playwright.async_api import Page, expect
-
 from web_axe import Accessibility
 from web_browsing import browser, page_at
 from web_drawing import Drawing

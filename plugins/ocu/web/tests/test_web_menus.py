@@ -4,7 +4,6 @@ import shutil
 from pathlib import Path
 
 from playwright.async_api import Page, expect
-
 from web_browsing import browser, page_at
 from web_drawing import MENU, Drawing
 from web_served import REPOSITORY, served

@@ -8,8 +8,6 @@ from collections import Counter
 from pathlib import Path
 
 from playwright.async_api import Page, expect
-
-from m2pem import load_mission
 from web_browsing import browser, page_at
 from web_drawing import Drawing, new_mission
 from web_pictures import picture
@@ -25,6 +23,8 @@ from web_running import (
 )
 from web_served import REPOSITORY, served
 from web_vignette import Mission, draw_detection, draw_main
+
+from m2pem import load_mission
 
 NAME = "vignette1"
 FASTER = ("--simulate", "--speed", "5", "--journal", "memory:")

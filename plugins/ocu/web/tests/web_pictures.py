@@ -3,7 +3,6 @@
 import os
 
 from playwright.async_api import Page
-
 from web_served import REPOSITORY
 
 IMAGES = REPOSITORY / "docs" / "images"

@@ -6,7 +6,6 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from playwright.async_api import Locator, Page, expect
-
 from web_served import FLEET
 
 GREEN = (61, 224, 88)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from playwright.async_api import expect
-
 from web_drawing import Drawing
 
 PROMPT = "Send the route, then continue"
