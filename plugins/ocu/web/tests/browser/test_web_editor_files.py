@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 from browser_world import ROOT, Browsing
-from playwright.async_api import Page, expect
+from playwright.async_api import Dialog, FilePayload, Page, expect
 
 from m2pem.editing.editable import editable
 from m2pem.errors import MissionError
@@ -30,9 +30,9 @@ async def from_menu(page: Page, item: str) -> None:
 async def upload(page: Page, name: str, content: bytes) -> None:
     async with page.expect_file_chooser() as chooser:
         await from_menu(page, "Replace by a file")
-    file = {"name": name, "mimeType": "application/xml", "buffer": content}
+    file = FilePayload(name=name, mimeType="application/xml", buffer=content)
     async with page.expect_response("**/api/editable") as answered:
-        await (await chooser.value).set_files([file])  # type: ignore[list-item]
+        await (await chooser.value).set_files([file])
     assert (await answered.value).ok
     await expect(page.locator(".toasts")).to_contain_text(f"{name} was put in place")
 
@@ -40,7 +40,7 @@ async def upload(page: Page, name: str, content: bytes) -> None:
 async def downloaded(page: Page, item: str) -> bytes:
     async with page.expect_download() as download:
         await from_menu(page, item)
-    return Path(await (await download.value).path()).read_bytes()
+    return Path(await (await download.value).path()).read_bytes()  # noqa: ASYNC240  # small
 
 
 async def test_every_mission_goes_through_the_editor_without_loss(browsing: Browsing) -> None:
@@ -112,7 +112,9 @@ async def test_a_diagram_is_laid_out_and_put_back(browsing: Browsing) -> None:
     assert await moved.get_attribute("transform") != before
     await page.locator(".m2-notice").get_by_role("button", name="Undo").click()
     await expect(page.locator("[data-element-id=Reverse]")).to_have_count(1)
-    assert await page.locator("[data-element-id=Reverse]").first.get_attribute("transform") == before
+    assert (
+        await page.locator("[data-element-id=Reverse]").first.get_attribute("transform") == before
+    )
 
 
 async def test_a_called_process_of_another_diagram_is_shown(browsing: Browsing) -> None:
@@ -136,9 +138,47 @@ async def test_what_cannot_be_drawn_is_refused_with_the_reason(browsing: Browsin
     page = await browsing.edit("vignette1")
     async with page.expect_file_chooser() as chooser:
         await from_menu(page, "Replace by a file")
-    file = {"name": "x.bpmn", "mimeType": "application/xml", "buffer": b"<!DOCTYPE x><x/>"}
-    await (await chooser.value).set_files([file])  # type: ignore[list-item]
+    file = FilePayload(name="x.bpmn", mimeType="application/xml", buffer=b"<!DOCTYPE x><x/>")
+    await (await chooser.value).set_files([file])
     await expect(page.get_by_role("alert")).to_contain_text("cannot be drawn")
     await expect(page.locator("[data-element-id=Reverse]")).to_have_count(1)
     # Chromium logs the refusal itself.
     browsing.faults[:] = [fault for fault in browsing.faults if "status of 4" not in fault]
+
+
+async def test_problems_lead_into_collapsed_subprocesses_and_other_diagrams(
+    browsing: Browsing,
+) -> None:
+    page = await browsing.begin()
+    source = (Path(__file__).parent / "nested.bpmn").read_bytes()
+    (browsing.served.missions / "nested.bpmn").write_bytes(source)
+    await browsing.edit("nested", page)
+    problems = page.get_by_role("tab", name="Problems")
+    for element, diagram in (("Unreached", "OUTER"), ("Bad", "OTHER")):
+        await problems.click()
+        await page.locator(".m2-problem", has_text=element).first.click()
+        selected = page.locator(".djs-element.selected")
+        await expect(selected).to_be_visible()
+        await expect(selected).to_have_attribute("data-element-id", element)
+        tab = page.get_by_role("tab", name=diagram)
+        await expect(tab).to_have_attribute("aria-selected", "true")
+
+
+async def test_changes_are_not_left_unasked(browsing: Browsing) -> None:
+    page = await browsing.begin()
+    asked: list[str] = []
+
+    async def stay(dialog: Dialog) -> None:
+        asked.append(dialog.message)
+        await dialog.dismiss()
+
+    await page.get_by_role("link", name="vignette1", exact=True).click()
+    await page.click("[data-element-id=Reverse]")
+    await page.get_by_label("Name", exact=True).fill("BACK OFF")
+    await expect(page.locator(".m2-saved-state")).to_have_text("Not saved yet")
+    page.on("dialog", stay)
+    await page.get_by_role("button", name="All missions").click()
+    await page.evaluate("history.back()")
+    await page.wait_for_url("**/missions/vignette1")
+    await expect(page.locator("[data-element-id=Reverse]").first).to_contain_text("BACK OFF")
+    assert len(asked) == 2

@@ -1,4 +1,4 @@
-"""The editor and the first page for everybody: axe finds nothing, small screens, what viewers get."""
+"""The editor and the first page for everybody: axe finds nothing, and they load soon."""
 
 import pytest
 from axe_playwright_python.async_playwright import Axe

@@ -76,6 +76,12 @@ function Workplace({ work, fail }: WorkplaceProps) {
   }, [work]);
   useEffect(() => followKeys(work), [work]);
   useEffect(() => {
+    // Somebody may have drawn a route or area on the map in the meantime.
+    const refresh = () => void session.catalogue.refreshGeometries().catch(() => undefined);
+    addEventListener("focus", refresh);
+    return () => removeEventListener("focus", refresh);
+  }, [session]);
+  useEffect(() => {
     const leave = guardLeaving(() => !session.isDirty.peek() || confirm(words.leave));
     const unload = (event: BeforeUnloadEvent) => {
       if (session.isDirty.peek()) event.preventDefault();
