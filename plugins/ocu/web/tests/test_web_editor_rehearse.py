@@ -6,9 +6,10 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 from playwright.async_api import Page, expect
-
-from web_browsing import browser, page_at
+from web_browsing import TIMEOUT_MS, browser, page_at
 from web_served import FLEET, REPOSITORY, Served, served
+
+expect.set_options(timeout=TIMEOUT_MS)
 
 VIGNETTE = REPOSITORY / "missions" / "vignette1.bpmn"
 SIMULATED = ("--simulate", "--speed", "1", "--journal", "memory:")
@@ -56,11 +57,12 @@ async def editor_of(
 
 
 async def runs_of(page: Page) -> list[str]:
+    """The missions of all runs."""
     found: list[str] = await page.evaluate(
         "fetch('/api/runs').then((answer) => answer.json())"
         ".then((runs) => runs.map(({mission}) => mission))"
     )
-    return found
+    return [Path(each).stem for each in found]
 
 
 async def test_what_is_drawn_is_rehearsed_with_what_the_form_scripts(tmp_path: Path) -> None:
@@ -109,10 +111,11 @@ async def test_answers_that_do_not_fit_are_refused_with_the_reason(tmp_path: Pat
 
 async def test_a_simulated_run_starts_once_and_is_shown(tmp_path: Path) -> None:
     async with editor_of(tmp_path, VIGNETTE) as (page, _):
-        await page.get_by_role("button", name="Add data").click()
-        await page.get_by_label("name", exact=True).fill("mission.speed")
-        await page.get_by_label("Value of mission.speed").fill("1.5")
-        await expect(page.get_by_text("number", exact=True)).to_be_visible()
+        panel = page.get_by_role("tabpanel", name="Run")
+        await panel.get_by_role("button", name="Add data").click()
+        await panel.get_by_label("name", exact=True).fill("mission.speed")
+        await panel.get_by_label("Value of mission.speed").fill("1.5")
+        await expect(panel.get_by_text("number", exact=True)).to_be_visible()
         await page.get_by_role("button", name="Start", exact=True).dblclick()
         await page.wait_for_url("**/runs/*")
         assert await runs_of(page) == ["vignette1"]
@@ -124,9 +127,15 @@ async def test_real_vehicles_start_only_when_that_was_confirmed(tmp_path: Path) 
     mission.write_text(TAKEOFF)
     words = ("--journal", "memory:")
     async with editor_of(tmp_path, mission, fleet=fleet, words=words) as (page, _):
-        await page.get_by_role("button", name="Start with real vehicles").click()
+        start = page.get_by_role("button", name="Start with real vehicles")
+        await start.click()
         dialog = page.get_by_role("dialog", name="Start with real vehicles?")
         await expect(dialog).to_contain_text("REAL VEHICLES will move.")
         await page.keyboard.press("Enter")  # the focus is not on what starts them
+        await dialog.get_by_role("button", name="Do not start").click()
         await expect(dialog).to_have_count(0)
         assert await runs_of(page) == []
+        await start.click()
+        await dialog.get_by_role("button", name="Start: real vehicles move").click()
+        await page.wait_for_url("**/runs/*")
+        assert await runs_of(page) == ["up"]

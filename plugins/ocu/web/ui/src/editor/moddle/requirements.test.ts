@@ -2,7 +2,13 @@ import { BpmnModdle } from "bpmn-moddle";
 import { describe, expect, it } from "vitest";
 import { m2pemDescriptor } from "./descriptor";
 import { list, type Factory, type ModdleElement } from "./moddle";
-import { freeId, requirementsOf, setRequirements, splitList, type Requirement } from "./requirements";
+import {
+  freeId,
+  requirementsOf,
+  setRequirements,
+  splitList,
+  type Requirement,
+} from "./requirements";
 
 const moddle = new BpmnModdle({ m2pem: m2pemDescriptor });
 const factory: Factory = {

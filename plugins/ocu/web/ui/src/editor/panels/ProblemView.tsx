@@ -20,7 +20,7 @@ export function ProblemView({ editor, title, refusal, spec = "" }: ProblemViewPr
   const heading = useId();
   return (
     <section class="m2v-problem" role="alert" aria-labelledby={heading}>
-      <h3 id={heading}>{title}</h3>
+      <h2 id={heading}>{title}</h2>
       <p>{refusal.text}</p>
       <ul>
         {refusal.findings.map((finding, index) => (

@@ -31,7 +31,10 @@ export function flowElements(container: ModdleElement): ModdleElement[] {
   );
 }
 
-const task = (element: ModdleElement): Task => ({ id: text(element, "id"), name: text(element, "name") });
+const task = (element: ModdleElement): Task => ({
+  id: text(element, "id"),
+  name: text(element, "name"),
+});
 
 export function askingTasks(editor: EditorContext): AskingTask[] {
   return processesOf(editor)
@@ -55,7 +58,10 @@ export function servingTasks(editor: EditorContext): Task[] {
 }
 
 /** Whether an element on the canvas is a process, or the pool that shows it. */
-export function showsProcess(element: { businessObject?: unknown }, process: ModdleElement): boolean {
+export function showsProcess(
+  element: { businessObject?: unknown },
+  process: ModdleElement,
+): boolean {
   const object = element.businessObject as ModdleElement | undefined;
   if (!object || object === process) return object === process;
   return isA(object, "bpmn:Participant") && child(object, "processRef") === process;

@@ -29,7 +29,12 @@ function world(replies: Reply[]) {
   return { asked, job: new Job<JobTold>("/verifications", requests, async () => {}) };
 }
 
-const refusal = new ApiError({ type: "about:blank", title: "Gone", status: 404, detail: "no such" });
+const refusal = new ApiError({
+  type: "about:blank",
+  title: "Gone",
+  status: 404,
+  detail: "no such",
+});
 
 describe("a job", () => {
   it("is asked after until it is over", async () => {

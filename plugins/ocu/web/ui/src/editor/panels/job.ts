@@ -36,7 +36,9 @@ export class Job<Told extends JobTold> {
   private readonly refused = signal<Refusal | null>(null);
   /** Why there is no result; null while there is no reason to say so. */
   readonly refusal = computed(() => this.refused.value ?? failureOf(this.told.value));
-  readonly isBusy = computed(() => this.phase.value === "starting" || this.phase.value === "running");
+  readonly isBusy = computed(
+    () => this.phase.value === "starting" || this.phase.value === "running",
+  );
 
   constructor(
     private readonly path: string,

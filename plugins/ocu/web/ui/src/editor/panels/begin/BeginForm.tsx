@@ -18,7 +18,8 @@ export function BeginForm({ editor, prefix }: BeginFormProps) {
   const outline = editor.checks.outline.value;
   const processes = outline?.processes ?? [];
   const main = processes.find((each) => each.starts);
-  const title = ({ id, name }: { id: string; name: string }) => (name && name !== id ? `${name} (${id})` : id);
+  const title = ({ id, name }: { id: string; name: string }) =>
+    name && name !== id ? `${name} (${id})` : id;
   const mainLabel = main ? fill(words.main, { process: title(main) }) : words.mainUnknown;
   const rows = beginning.given.value;
   const write = (next: readonly Given[]) => {

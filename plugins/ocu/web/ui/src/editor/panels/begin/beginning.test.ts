@@ -21,7 +21,10 @@ describe("what a run begins with", () => {
       { name: "", written: "" },
       { name: "route", written: "alpha" },
     ];
-    expect(beginning.request()).toEqual({ process: "PATROL", data: { speed: 1.5, route: "alpha" } });
+    expect(beginning.request()).toEqual({
+      process: "PATROL",
+      data: { speed: 1.5, route: "alpha" },
+    });
     expect(beginning.isReadable()).toBe(true);
   });
 

@@ -18,7 +18,9 @@ export class Beginning {
   /** As the server takes it. */
   request(): { process?: string; data?: Record<string, Value> } {
     const rows = this.given.value.filter(({ name }) => name.trim() !== "");
-    const data = Object.fromEntries(rows.map((row) => [row.name.trim(), readValue(row.written).value]));
+    const data = Object.fromEntries(
+      rows.map((row) => [row.name.trim(), readValue(row.written).value]),
+    );
     return {
       ...(this.process.value ? { process: this.process.value } : {}),
       ...(rows.length ? { data } : {}),
@@ -51,7 +53,9 @@ export function wanted(outline: Outline | null, rows: readonly Given[]): string[
   const given = new Set(rows.map(({ name }) => name.trim()));
   const names = outline?.names ?? [];
   const written = new Set(names.filter(({ from }) => from !== "").map(({ name }) => name));
-  const missing = names.map(({ name }) => name).filter((name) => !written.has(name) && !given.has(name));
+  const missing = names
+    .map(({ name }) => name)
+    .filter((name) => !written.has(name) && !given.has(name));
   return [...new Set(missing)];
 }
 

@@ -89,7 +89,11 @@ function SingleField(props: SingleFieldProps) {
       return <SelectField {...common} options={resourceOptions(vocabulary)} />;
     case "behavior":
       return (
-        <ComboField {...common} mono suggestions={vocabulary.behaviors.map((name) => ({ value: name }))} />
+        <ComboField
+          {...common}
+          mono
+          suggestions={vocabulary.behaviors.map((name) => ({ value: name }))}
+        />
       );
     case "decision":
       return (

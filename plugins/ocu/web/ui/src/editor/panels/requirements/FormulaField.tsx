@@ -77,9 +77,8 @@ export function FormulaField(props: FormulaFieldProps) {
           ref={area}
           class="m2-input m2-mono"
           rows={isCondition ? 1 : 3}
-          role="combobox"
-          aria-expanded={isOpen}
-          aria-controls={`${id}-list`}
+          // A text of several lines may be no combobox (ARIA in HTML), but may have suggestions.
+          aria-controls={isOpen ? `${id}-list` : undefined}
           aria-autocomplete="list"
           aria-activedescendant={active >= 0 ? optionId(id, active) : undefined}
           aria-required={required}

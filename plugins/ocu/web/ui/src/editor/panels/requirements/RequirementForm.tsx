@@ -54,7 +54,9 @@ export function RequirementForm(props: RequirementFormProps) {
           ...PATTERNS.map(({ name, group }) => ({ value: name, label: spaced(name), group })),
         ]}
         hint={known?.meaning ?? words.formulaHint}
-        write={(next) => write(ofPattern({ ...requirement, pattern: next, ltl: next ? null : (ltl ?? "") }))}
+        write={(next) =>
+          write(ofPattern({ ...requirement, pattern: next, ltl: next ? null : (ltl ?? "") }))
+        }
       />
       {ltl === null ? (
         <>
@@ -80,7 +82,10 @@ export function RequirementForm(props: RequirementFormProps) {
         hint={words.fairHint}
         value={requirement.fair}
         options={[
-          { value: "", label: fill(words.fairUsual, { fair: words.fairs[known?.fair ? "true" : "false"] }) },
+          {
+            value: "",
+            label: fill(words.fairUsual, { fair: words.fairs[known?.fair ? "true" : "false"] }),
+          },
           { value: "true", label: words.fairs.true },
           { value: "false", label: words.fairs.false },
         ]}
@@ -107,7 +112,9 @@ function Arguments(props: RequirementFormProps) {
   const { requirement } = props;
   const known = patternNamed(requirement.pattern);
   if (!known) {
-    return <p class="m2-field-error">{fill(words.unknownPattern, { pattern: requirement.pattern })}</p>;
+    return (
+      <p class="m2-field-error">{fill(words.unknownPattern, { pattern: requirement.pattern })}</p>
+    );
   }
   const scopes = scopesOf(known);
   const isScoped = scopes.some(({ name }) => name in requirement.args);

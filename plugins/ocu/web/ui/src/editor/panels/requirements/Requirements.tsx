@@ -33,7 +33,7 @@ export function Requirements({ editor, verification }: RequirementsProps) {
   };
   return (
     <section class="m2v-requirements" aria-labelledby={heading}>
-      <h3 id={heading}>{words.title}</h3>
+      <h2 id={heading}>{words.title}</h2>
       {all.length === 0 && <p class="m2-note">{words.none}</p>}
       <ul>
         {all.map((one, index) => {

@@ -42,7 +42,15 @@ describe("what may come next in a formula", () => {
   });
 
   it("is an operator after what can be joined, and an operand after an operator", () => {
-    expect(offered("active(Drive) |").values).toEqual(["-> ", "&& ", "|| ", "<-> ", "U ", "W ", "since "]);
+    expect(offered("active(Drive) |").values).toEqual([
+      "-> ",
+      "&& ",
+      "|| ",
+      "<-> ",
+      "U ",
+      "W ",
+      "since ",
+    ]);
     expect(offered("user.decision |").values).toContain("== ");
     expect(offered("active(Drive) U |").values).toContain("completed(");
   });

@@ -14,7 +14,8 @@ export interface FormulaCompletion extends Omit<Completion, "group"> {
   group: FormulaGroup;
 }
 
-export type FormulaGroup = "elements" | "resources" | "behaviors" | "names" | "values" | "atoms" | "operators";
+export type FormulaGroup =
+  "elements" | "resources" | "behaviors" | "names" | "values" | "atoms" | "operators";
 
 export interface FormulaCompletions extends Omit<Completions, "options"> {
   options: FormulaCompletion[];
@@ -71,28 +72,46 @@ function element(before: string, { elements }: Vocabulary): Part {
   const fits = has(typed);
   const found = elements.filter(({ id, name }) => fits(id) || fits(name));
   const options = quote
-    ? found.filter(({ name }) => name).map((each) => ({ value: `${each.name}${quote})`, note: each.id }))
+    ? found
+        .filter(({ name }) => name)
+        .map((each) => ({ value: `${each.name}${quote})`, note: each.id }))
     : found.map((each) => ({ value: `${each.id})`, note: each.name || each.type }));
-  return part(before, typed, options.map((each) => ({ ...each, group: "elements" })));
+  return part(
+    before,
+    typed,
+    options.map((each) => ({ ...each, group: "elements" })),
+  );
 }
 
 function resource(before: string, { resources }: Vocabulary): Part {
   const typed = OF_RESOURCE.exec(before)?.[1];
   if (typed === undefined) return undefined;
-  return part(before, typed, resources.filter(has(typed)).map((each) => ({ value: each, group: "resources" })));
+  return part(
+    before,
+    typed,
+    resources.filter(has(typed)).map((each) => ({ value: each, group: "resources" })),
+  );
 }
 
 function behavior(before: string, { behaviors }: Vocabulary): Part {
   const typed = OF_BEHAVIOR.exec(before)?.[1];
   if (typed === undefined) return undefined;
   const options = behaviors.filter(has(typed));
-  return part(before, typed, options.map((each) => ({ value: `${each})`, group: "behaviors" })));
+  return part(
+    before,
+    typed,
+    options.map((each) => ({ value: `${each})`, group: "behaviors" })),
+  );
 }
 
 function end(before: string): Part {
   const typed = OF_END.exec(before)?.[1];
   if (typed === undefined) return undefined;
-  return part(before, typed, ENDS.filter(has(typed)).map((each) => ({ value: `${each})`, group: "values" })));
+  return part(
+    before,
+    typed,
+    ENDS.filter(has(typed)).map((each) => ({ value: `${each})`, group: "values" })),
+  );
 }
 
 function value(before: string, { decided }: Vocabulary): Part {
@@ -102,7 +121,8 @@ function value(before: string, { decided }: Vocabulary): Part {
   if (!quote && /\S\s/.test(said)) return undefined;
   const values = new Map<string, string>();
   for (const each of decided) {
-    if (each.store === name) for (const { value: key, label } of each.values) values.set(key, label);
+    if (each.store === name)
+      for (const { value: key, label } of each.values) values.set(key, label);
   }
   if (values.size === 0) return undefined;
   const mark = quote || "'";
@@ -123,7 +143,11 @@ function operator(before: string): Part {
   if (!AFTER_OPERAND.test(before) || AFTER_WORD.test(before)) return undefined;
   const compared = AFTER_NAME.test(before) ? COMPARISONS : [];
   const options = [...OPERATORS, ...compared];
-  return part(before, "", options.map((each) => ({ value: each, group: "operators" })));
+  return part(
+    before,
+    "",
+    options.map((each) => ({ value: each, group: "operators" })),
+  );
 }
 
 function word(before: string, vocabulary: Vocabulary, isCondition: boolean): FormulaCompletions {
@@ -135,8 +159,15 @@ function word(before: string, vocabulary: Vocabulary, isCondition: boolean): For
   const names = new Map(vocabulary.names.map(({ name, from }) => [name, from]));
   const prefixes = typed === "" ? PREFIXES : PREFIXES.filter((each) => each.startsWith(typed));
   return part(before, typed, [
-    ...found.map(({ id, name, type }) => ({ value: id, note: name || type, group: "elements" as const })),
-    ...ATOMS.filter((each) => each.startsWith(typed)).map((each) => ({ value: each, group: "atoms" as const })),
+    ...found.map(({ id, name, type }) => ({
+      value: id,
+      note: name || type,
+      group: "elements" as const,
+    })),
+    ...ATOMS.filter((each) => each.startsWith(typed)).map((each) => ({
+      value: each,
+      group: "atoms" as const,
+    })),
     ...prefixes.map((each) => ({ value: each, group: "operators" as const })),
     ...[...names]
       .filter(([name]) => fits(name))

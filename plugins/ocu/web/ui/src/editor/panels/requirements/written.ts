@@ -1,7 +1,12 @@
 // The requirements of the mission that is drawn, and changes to them, which can be undone.
 import { text, type ModdleElement } from "../../moddle/moddle";
 import { DEFAULT_STORE } from "../../moddle/prompts";
-import { freeId, requirementsOf, setRequirements, type Requirement } from "../../moddle/requirements";
+import {
+  freeId,
+  requirementsOf,
+  setRequirements,
+  type Requirement,
+} from "../../moddle/requirements";
 import type { Element } from "../../session/services";
 import { beginningOf } from "../begin/beginning";
 import { askingTasks, processesOf, showsProcess } from "../drawn";
@@ -47,7 +52,9 @@ export function ofPattern(requirement: Requirement): Requirement {
   if (requirement.ltl !== null || !known) return requirement;
   const needed = known.arguments
     .filter((each) => each.required)
-    .map(({ name, kind }) => [name, isList(kind) ? ["", ""] : [kind === "count" ? "1" : ""]] as const);
+    .map(
+      ({ name, kind }) => [name, isList(kind) ? ["", ""] : [kind === "count" ? "1" : ""]] as const,
+    );
   const names = new Set(known.arguments.map(({ name }) => name));
   const kept = Object.entries(requirement.args).filter(([name]) => names.has(name));
   return { ...requirement, args: { ...Object.fromEntries(needed), ...Object.fromEntries(kept) } };

@@ -3,10 +3,12 @@ import { fill, strings } from "../../../strings";
 import { SelectField } from "../../properties/fields/SelectField";
 import { TextField } from "../../properties/fields/TextField";
 import { Rows } from "../../properties/forms/Rows";
-import { askingTasks, commandingTasks, servingTasks, type AskingTask, type Task } from "../drawn";
+import { askingTasks, type AskingTask } from "../drawn";
 import type { EditorContext } from "../panel";
-import { dataOf, ENDS, isGiven, isSeconds, yamlOf, type Script } from "./answers";
+import { dataOf, yamlOf, type Script } from "./answers";
 import type { Rehearsal } from "./rehearsal";
+import { Behaviors, Services } from "./ScriptedTasks";
+import { Seconds } from "./Seconds";
 
 const words = strings.run.answers;
 
@@ -61,7 +63,7 @@ export function AnswersForm({ editor, rehearsal }: AnswersFormProps) {
   );
 }
 
-interface PartProps {
+export interface PartProps {
   editor: EditorContext;
   script: Script;
   write(next: Partial<Script>): void;
@@ -99,7 +101,9 @@ function Visits({ task, visits, write }: VisitsProps) {
     <div class="m2r-visits" role="group" aria-label={name}>
       <b>{name}</b>
       {visits.length === 0 && (
-        <p class="m2-field-hint">{first ? fill(words.takesFirst, { decision: first }) : words.noDecisions}</p>
+        <p class="m2-field-hint">
+          {first ? fill(words.takesFirst, { decision: first }) : words.noDecisions}
+        </p>
       )}
       <div>
         {visits.map((visit, index) => (
@@ -110,7 +114,9 @@ function Visits({ task, visits, write }: VisitsProps) {
             value={visit}
             onChange={(event) => write(visits.with(index, event.currentTarget.value))}
           >
-            {!task.decisions.some(({ value }) => value === visit) && <option value={visit}>{visit}</option>}
+            {!task.decisions.some(({ value }) => value === visit) && (
+              <option value={visit}>{visit}</option>
+            )}
             {task.decisions.map(({ value, label }) => (
               <option key={value} value={value}>
                 {index + 1}. {label}
@@ -153,7 +159,12 @@ function Sends({ editor, script, write }: PartProps) {
       <Rows
         rows={script.sends}
         write={(sends) => write({ sends })}
-        add={() => ({ kind: options[0]?.kind ?? "signal", id: options[0]?.id ?? "", at: "", data: "" })}
+        add={() => ({
+          kind: options[0]?.kind ?? "signal",
+          id: options[0]?.id ?? "",
+          at: "",
+          data: "",
+        })}
         addLabel={words.addSend}
         empty={words.nothing}
         label={(row, index) => options.find(({ id }) => id === row.id)?.name || String(index + 1)}
@@ -166,10 +177,22 @@ function Sends({ editor, script, write }: PartProps) {
                 id={`m2r-send-${index}`}
                 label={words.what}
                 value={row.id}
-                options={options.map(({ id, name, group }) => ({ value: id, label: name || id, group }))}
-                write={(id) => change({ id, kind: options.find((each) => each.id === id)?.kind ?? row.kind })}
+                options={options.map(({ id, name, group }) => ({
+                  value: id,
+                  label: name || id,
+                  group,
+                }))}
+                write={(id) =>
+                  change({ id, kind: options.find((each) => each.id === id)?.kind ?? row.kind })
+                }
               />
-              <Seconds id={`m2r-send-at-${index}`} label={words.at} value={row.at} required write={(at) => change({ at })} />
+              <Seconds
+                id={`m2r-send-at-${index}`}
+                label={words.at}
+                value={row.at}
+                required
+                write={(at) => change({ at })}
+              />
               <TextField
                 id={`m2r-send-data-${index}`}
                 label={words.data}
@@ -184,109 +207,5 @@ function Sends({ editor, script, write }: PartProps) {
         }}
       />
     </fieldset>
-  );
-}
-
-const optionsOf = (tasks: readonly Task[]) =>
-  tasks.map(({ id, name }) => ({ value: id, label: name || id }));
-const nameOf = (tasks: readonly Task[], element: string) =>
-  tasks.find(({ id }) => id === element)?.name || element;
-
-function Services({ editor, script, write }: PartProps) {
-  const tasks = servingTasks(editor);
-  if (tasks.length === 0 && script.services.length === 0) return null;
-  return (
-    <fieldset class="m2v-list">
-      <legend>{words.services}</legend>
-      <Rows
-        rows={script.services}
-        write={(services) => write({ services })}
-        add={() => ({
-          element: tasks[0]?.id ?? "",
-          after: "5",
-          name: "detection.type",
-          value: "",
-          error: "",
-        })}
-        addLabel={words.addService}
-        empty={words.serviceUsual}
-        label={(row) => nameOf(tasks, row.element)}
-        render={(row, index) => {
-          const change = (next: Partial<typeof row>) =>
-            write({ services: script.services.with(index, { ...row, ...next }) });
-          const id = `m2r-service-${index}`;
-          return (
-            <>
-              <SelectField id={id} label={words.task} value={row.element} options={optionsOf(tasks)} write={(element) => change({ element })} />
-              <Seconds id={`${id}-after`} label={words.after} value={row.after} write={(after) => change({ after })} />
-              <TextField id={`${id}-name`} label={words.writes} mono value={row.name} write={(name) => change({ name })} />
-              <TextField id={`${id}-value`} label={words.value} mono value={row.value} error={isGiven(row) ? undefined : words.valueNeeded} write={(value) => change({ value })} />
-              <TextField id={`${id}-error`} label={words.orError} mono value={row.error} write={(error) => change({ error })} />
-            </>
-          );
-        }}
-      />
-    </fieldset>
-  );
-}
-
-function Behaviors({ editor, script, write }: PartProps) {
-  const tasks = commandingTasks(editor);
-  if (tasks.length === 0 && script.behaviors.length === 0) return null;
-  return (
-    <fieldset class="m2v-list">
-      <legend>{words.behaviors}</legend>
-      <Rows
-        rows={script.behaviors}
-        write={(behaviors) => write({ behaviors })}
-        add={() => ({ element: tasks[0]?.id ?? "", after: "", end: "failed" as const, error: "" })}
-        addLabel={words.addBehavior}
-        empty={words.behaviorUsual}
-        label={(row) => nameOf(tasks, row.element)}
-        render={(row, index) => {
-          const change = (next: Partial<typeof row>) =>
-            write({ behaviors: script.behaviors.with(index, { ...row, ...next }) });
-          const id = `m2r-behavior-${index}`;
-          return (
-            <>
-              <SelectField id={id} label={words.task} value={row.element} options={optionsOf(tasks)} write={(element) => change({ element })} />
-              <SelectField
-                id={`${id}-end`}
-                label={words.end}
-                value={row.end}
-                options={ENDS.map((end) => ({ value: end, label: words.ends[end] }))}
-                write={(end) => change({ end: ENDS.find((each) => each === end) ?? row.end })}
-              />
-              <Seconds id={`${id}-after`} label={words.after} value={row.after} write={(after) => change({ after })} />
-              {(row.end === "failed" || row.end === "lost") && (
-                <TextField id={`${id}-error`} label={words.error} mono value={row.error} placeholder="ROUTE_BLOCKED" write={(error) => change({ error })} />
-              )}
-            </>
-          );
-        }}
-      />
-    </fieldset>
-  );
-}
-
-interface SecondsProps {
-  id: string;
-  label: string;
-  value: string;
-  required?: boolean;
-  write(value: string): void;
-}
-
-function Seconds({ id, label, value, required = false, write }: SecondsProps) {
-  const isGood = isSeconds(value) || (!required && value.trim() === "");
-  return (
-    <TextField
-      id={id}
-      label={label}
-      required={required}
-      value={value}
-      error={isGood ? undefined : words.seconds}
-      write={write}
-    />
   );
 }

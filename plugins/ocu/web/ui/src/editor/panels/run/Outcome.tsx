@@ -21,12 +21,12 @@ export function Outcome({ editor, id, summary, spans }: OutcomeProps) {
   return (
     <section class="m2r-outcome" aria-label={words.outcome}>
       <div class={`m2v-summary ${good ? "m2v-holds" : "m2v-violated"}`}>
-        <h3>
+        <h2>
           <span class={`m2v-sign m2v-sign-${good ? "holds" : "violated"}`} aria-hidden="true">
             {good ? "✓" : "✗"}
           </span>
           {STATUS[status]}
-        </h3>
+        </h2>
         {detail && <p>{detail}</p>}
         <p class="m2v-faint">{fill(words.took, { duration: duration(seconds), records })}</p>
         <a class="m2r-watch" href={`/rehearsals/${encodeURIComponent(id)}`} target="_blank">
@@ -39,14 +39,22 @@ export function Outcome({ editor, id, summary, spans }: OutcomeProps) {
 }
 
 /** A row for each vehicle and payload, and for questions and services. */
-function Bars({ editor, spans, end }: { editor: EditorContext; spans: readonly Span[]; end: number }) {
+function Bars({
+  editor,
+  spans,
+  end,
+}: {
+  editor: EditorContext;
+  spans: readonly Span[];
+  end: number;
+}) {
   const rows = [...new Set(spans.map(({ row }) => row))];
   const last = Math.max(end, ...spans.map(({ from, to }) => to ?? from), 0.001);
   const title = (row: string) =>
     row === PROMPTS ? words.questions : row === SERVICES ? words.services : row;
   return (
     <>
-      <h4>{words.timeline}</h4>
+      <h3>{words.timeline}</h3>
       <ul class="m2r-bars">
         {rows.map((row) => (
           <li key={row}>
@@ -73,7 +81,9 @@ function Bar({ editor, span, last }: { editor: EditorContext; span: Span; last: 
   const { from, to, label, end, reason, element } = span;
   const until = to ?? last;
   const said = fill(words.bar, { label, from: duration(from), to: duration(until) });
-  const title = [said, end && strings.operate.timeline.ends[end], reason].filter(Boolean).join(", ");
+  const title = [said, end && strings.operate.timeline.ends[end], reason]
+    .filter(Boolean)
+    .join(", ");
   return (
     <button
       type="button"
@@ -91,5 +101,7 @@ export function duration(seconds: number): string {
   const whole = Math.round(seconds);
   const [hours, minutes] = [Math.floor(whole / 3600), Math.floor((whole % 3600) / 60)];
   const rest = String(whole % 60).padStart(2, "0");
-  return hours ? `${hours}:${String(minutes).padStart(2, "0")}:${rest} h` : `${minutes}:${rest} min`;
+  return hours
+    ? `${hours}:${String(minutes).padStart(2, "0")}:${rest} h`
+    : `${minutes}:${rest} min`;
 }

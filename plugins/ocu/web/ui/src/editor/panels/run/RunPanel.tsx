@@ -28,7 +28,7 @@ function RunPanel({ editor }: { editor: EditorContext }) {
   return (
     <div class="m2v">
       <section aria-label={words.begins}>
-        <h3>{words.begins}</h3>
+        <h2>{words.begins}</h2>
         <BeginForm editor={editor} prefix="m2r" />
       </section>
       <Rehearse editor={editor} />
@@ -47,7 +47,7 @@ function Rehearse({ editor }: { editor: EditorContext }) {
   const refusal = job.refusal.value;
   return (
     <section class="m2r-part" aria-label={words.rehearse}>
-      <h3>{words.rehearse}</h3>
+      <h2>{words.rehearse}</h2>
       <p class="m2-field-hint">{words.rehearseHint}</p>
       <details class="m2v-options">
         <summary>{words.answers.title}</summary>
@@ -107,7 +107,7 @@ function Start({ editor }: { editor: EditorContext }) {
   };
   return (
     <section class="m2r-part" aria-label={words.start}>
-      <h3>{words.start}</h3>
+      <h2>{words.start}</h2>
       <p class="m2-field-hint">{simulated ? words.startSimulated : words.startReal}</p>
       <div class="m2v-actions">
         <button
@@ -139,7 +139,9 @@ function Start({ editor }: { editor: EditorContext }) {
           <p>
             <strong>{words.real.moves}</strong>
           </p>
-          <p>{fill(words.real.text, { fleet: session.value?.fleet ?? "", mission: editor.mission })}</p>
+          <p>
+            {fill(words.real.text, { fleet: session.value?.fleet ?? "", mission: editor.mission })}
+          </p>
         </Dialog>
       )}
     </section>

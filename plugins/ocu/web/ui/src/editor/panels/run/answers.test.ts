@@ -46,7 +46,9 @@ messages:
     const [send] = script.sends;
     expect(isComplete({ ...script, sends: [{ ...send!, at: "" }] })).toBe(false);
     expect(isComplete({ ...script, sends: [{ ...send!, data: "dust" }] })).toBe(false);
-    expect(isComplete({ ...script, behaviors: [{ ...script.behaviors[0]!, after: "soon" }] })).toBe(false);
+    expect(isComplete({ ...script, behaviors: [{ ...script.behaviors[0]!, after: "soon" }] })).toBe(
+      false,
+    );
   });
 });
 

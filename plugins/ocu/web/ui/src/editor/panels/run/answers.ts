@@ -62,7 +62,10 @@ export function yamlOf(script: Script): string {
   const parts: string[] = [];
   const answers = Object.entries(script.answers).filter(([, visits]) => visits.length > 0);
   if (answers.length) {
-    parts.push("answers:", ...answers.map(([id, visits]) => `  ${key(id)}: [${visits.map(written).join(", ")}]`));
+    parts.push(
+      "answers:",
+      ...answers.map(([id, visits]) => `  ${key(id)}: [${visits.map(written).join(", ")}]`),
+    );
   }
   parts.push(...grouped("services", script.services, serviceEntry));
   parts.push(...grouped("behaviors", script.behaviors, behaviorEntry));

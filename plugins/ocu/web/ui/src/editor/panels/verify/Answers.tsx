@@ -40,13 +40,15 @@ export function Answers({ editor, verification }: PartProps) {
 function Summary({ report }: { report: Report }) {
   const counts = counted(report);
   const { states, transitions, seconds, stopped, notes } = report.coverage;
-  const said = (["violated", "warning", "undecided", "holds"] as const).filter((each) => counts[each]);
+  const said = (["violated", "warning", "undecided", "holds"] as const).filter(
+    (each) => counts[each],
+  );
   return (
     <div class={`m2v-summary m2v-${report.verdict}`}>
-      <h3>
+      <h2>
         <Sign outcome={report.verdict} />
         {words.verdicts[report.verdict]}
-      </h3>
+      </h2>
       <p>{said.map((each) => fill(words.counts[each], { count: counts[each] })).join(", ")}</p>
       <p class="m2v-faint">
         {fill(stopped ? words.searchedPart : words.searched, {
@@ -89,7 +91,7 @@ function AnswerList({ title, told, verification }: AnswerListProps) {
   );
   return (
     <>
-      <h3>{title}</h3>
+      <h2>{title}</h2>
       {bad.length > 0 && <ul class="m2v-answers">{bad.map(shown)}</ul>}
       {good.length > 0 && (
         <details open={bad.length === 0}>
@@ -138,7 +140,7 @@ function Unreached({ editor, report }: { editor: EditorContext; report: Report }
   if (report.unreached.length === 0) return null;
   return (
     <>
-      <h3>{words.unreached}</h3>
+      <h2>{words.unreached}</h2>
       <p class="m2v-faint">{words.unreachedHint}</p>
       <ul class="m2v-chips">
         {report.unreached.map((id) => (
@@ -155,7 +157,7 @@ function Approximations({ editor, report }: { editor: EditorContext; report: Rep
   if (report.approximations.length === 0) return null;
   return (
     <>
-      <h3>{words.approximations}</h3>
+      <h2>{words.approximations}</h2>
       <ul class="m2v-answers">
         {report.approximations.map(({ element, exactness, what }, index) => (
           <li key={index}>

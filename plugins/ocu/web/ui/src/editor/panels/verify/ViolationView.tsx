@@ -93,10 +93,10 @@ function Head({ verification, violation }: Omit<ViolationViewProps, "editor">) {
   const outcome = answer && report ? outcomeOf(answer, report.strict) : "violated";
   return (
     <>
-      <h3>
+      <h2>
         <Sign outcome={outcome} />
         {violation.property}
-      </h3>
+      </h2>
       {answer?.author && <p class="m2v-author">“{answer.author}”</p>}
       {answer && <p>{answer.says}</p>}
       <p class={outcome === "warning" ? "m2v-wrong m2v-wrong-warning" : "m2v-wrong"}>
@@ -167,7 +167,7 @@ function StepList({ verification, steps, offset, title }: StepListProps) {
   if (steps.length === 0) return null;
   return (
     <>
-      <h4>{title}</h4>
+      <h3>{title}</h3>
       <ol class="m2v-steps" ref={list}>
         {steps.map((step, index) => {
           const position = offset + index;
@@ -194,7 +194,7 @@ function Changed({ steps }: { steps: readonly [name: string, value: unknown][] }
   if (steps.length === 0) return null;
   return (
     <>
-      <h4>{words.data}</h4>
+      <h3>{words.data}</h3>
       <dl class="m2v-changed">
         {steps.map(([name, value]) => (
           <div key={name}>

@@ -55,7 +55,9 @@ function draw(editor: EditorContext, verification: Verification): void {
 
 function showBadges(editor: EditorContext, frame: Frame, reason: string, old: string): void {
   for (const [element, numbers] of frame.numbers) {
-    const label = numbers.map(({ step, repeats }) => (repeats ? `↻${step}` : String(step))).join(" · ");
+    const label = numbers
+      .map(({ step, repeats }) => (repeats ? `↻${step}` : String(step)))
+      .join(" · ");
     const now = numbers.some((each) => each.now) ? " m2v-number-now" : "";
     const steps = numbers.map(({ step }) => step).join(", ");
     badge(editor, element, `m2v-number${now}${old}`, label, fill(words.step, { steps }), "top");
@@ -76,7 +78,8 @@ function badge(
   title: string,
   side: "top" | "bottom",
 ): void {
-  const element = editor.service("elementRegistry").get(id) as Partial<Shape & Connection> | undefined;
+  const element = editor.service("elementRegistry").get(id) as
+    Partial<Shape & Connection> | undefined;
   if (!element || (element.width === undefined && !element.waypoints)) return;
   const html = document.createElement("div");
   html.className = className;

@@ -1,5 +1,13 @@
 import { describe, expect, it } from "vitest";
-import { counted, meaningOf, tell, type Answer, type Report, type Step, type Violation } from "./report";
+import {
+  counted,
+  meaningOf,
+  tell,
+  type Answer,
+  type Report,
+  type Step,
+  type Violation,
+} from "./report";
 import { changedData, frameAt, walkOf } from "./walk";
 
 const step = (number: number, passes: string[], more: Partial<Step> = {}): Step => ({
