@@ -389,14 +389,15 @@ export const strings = {
       sequential: "One after the other",
     },
     problems: {
-      badge: "{count} problems of {element}",
+      badge: { one: "1 problem of {element}", many: "{count} problems of {element}" },
       none: "No problems found.",
       checking: "Checking…",
       failed: "The check could not be asked: the executive does not answer.",
       errors: "Errors",
       warnings: "Warnings",
       ofFile: "The file",
-      summary: "{errors} errors, {warnings} warnings",
+      errorCount: { one: "1 error", many: "{count} errors" },
+      warningCount: { one: "1 warning", many: "{count} warnings" },
       filter: "Show",
       all: "all",
     },
@@ -959,4 +960,13 @@ export const strings = {
 /** `{name}` in a text becomes its value. */
 export function fill(text: string, values: Record<string, string | number>): string {
   return text.replace(/\{(\w+)\}/g, (whole, name: string) => String(values[name] ?? whole));
+}
+
+/** A text for one thing, and one for any other number of them. */
+export function counted(
+  texts: { readonly one: string; readonly many: string },
+  count: number,
+  values: Record<string, string | number> = {},
+): string {
+  return fill(count === 1 ? texts.one : texts.many, { count, ...values });
 }

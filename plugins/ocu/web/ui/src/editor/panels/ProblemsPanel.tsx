@@ -2,7 +2,7 @@
 import { useState } from "preact/hooks";
 import type { Finding } from "../../shared/types";
 import { toast } from "../../shared/Toasts";
-import { fill, strings } from "../../strings";
+import { counted, fill, strings } from "../../strings";
 import type { EditorContext, Panel } from "./panel";
 
 const words = strings.editor.problems;
@@ -84,5 +84,5 @@ function statusText(state: string, errors: number, warnings: number): string {
   if (state === "failed") return words.failed;
   if (state !== "checked") return words.checking;
   if (errors + warnings === 0) return words.none;
-  return fill(words.summary, { errors, warnings });
+  return [counted(words.errorCount, errors), counted(words.warningCount, warnings)].join(", ");
 }

@@ -1,6 +1,6 @@
 // Marks what is wrong on the canvas: an outline, and a badge with how many findings there are.
 import type { Finding } from "../../shared/types";
-import { fill, strings } from "../../strings";
+import { counted, strings } from "../../strings";
 import type { Canvas, ElementRegistry, Overlays } from "./services";
 
 const LAYER = "m2pem-findings";
@@ -51,10 +51,15 @@ function badge(
   made.className = `m2-badge m2-badge-${severity}`;
   made.textContent = String(findings.length);
   made.title = findings.map((each) => each.message).join("\n");
+<<<<<<< HEAD
   made.setAttribute(
     "aria-label",
     fill(strings.editor.problems.badge, { count: findings.length, element: id }),
   );
+=======
+  const { badge } = strings.editor.problems;
+  made.setAttribute("aria-label", counted(badge, findings.length, { element: id }));
+>>>>>>> h-w6
   made.tabIndex = -1;
   made.addEventListener("click", () => choose(id));
   return made;

@@ -16,7 +16,7 @@ export function Field({ id, label, required, unit, hint, error, children }: Fiel
   return (
     <div class={error ? "m2-field m2-field-wrong" : "m2-field"} data-field={id}>
       <label for={id}>
-        {label}
+        {label}{" "}
         {unit && <span class="m2-unit">{unit}</span>}
         {required && (
           <span class="m2-required" title={strings.editor.fields.required} aria-hidden="true">
