@@ -51,15 +51,8 @@ function badge(
   made.className = `m2-badge m2-badge-${severity}`;
   made.textContent = String(findings.length);
   made.title = findings.map((each) => each.message).join("\n");
-<<<<<<< HEAD
-  made.setAttribute(
-    "aria-label",
-    fill(strings.editor.problems.badge, { count: findings.length, element: id }),
-  );
-=======
   const { badge } = strings.editor.problems;
   made.setAttribute("aria-label", counted(badge, findings.length, { element: id }));
->>>>>>> h-w6
   made.tabIndex = -1;
   made.addEventListener("click", () => choose(id));
   return made;
