@@ -18,7 +18,7 @@ WITHIN_S = 60.0
 WITHIN_MS = 15_000
 ROOT = Path(__file__).parents[5]
 BUILT = Path(plugin_file).parent / "static" / "index.html"
-_ADDRESS = re.compile(r"http://\S+token=\S+")
+_ADDRESS = re.compile(r"http://\S+/(?:\?token=\S+)?")
 
 
 @dataclass
@@ -32,7 +32,7 @@ class Served:
 
     @property
     def base(self) -> str:
-        return self.address.partition("/?")[0]
+        return self.address.partition("/?")[0].rstrip("/")
 
 
 @asynccontextmanager

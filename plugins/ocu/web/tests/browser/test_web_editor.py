@@ -119,7 +119,9 @@ async def test_a_problem_is_marked_and_leads_to_its_element(browsing: Browsing) 
     await page.click("[data-element-id=Reverse]")
     await page.get_by_label("Distance").fill("10 s")
     await expect(page.locator("#m2-parameter-distance-error")).to_contain_text("does not fit")
-    await expect(page.locator("[data-element-id=Reverse]")).to_have_class(re.compile("m2-has-error"))
+    await expect(page.locator("[data-element-id=Reverse]")).to_have_class(
+        re.compile("m2-has-error")
+    )
     await page.click("[data-element-id=StartVignette1]")
     await page.get_by_role("tab", name="Problems").click()
     await page.get_by_role("button", name=re.compile("REVERSE")).click()
@@ -142,7 +144,9 @@ async def test_signals_are_made_by_name_and_shared(browsing: Browsing) -> None:
     await expect(page.get_by_text("Shared by 2 events")).to_be_visible()
     await save(page)
     text = (browsing.served.missions / "vignette1.bpmn").read_text()
-    made = re.search(r'<bpmn:signal id="([a-f][0-9a-f-]{35})" name="Halt" m2pem:from="operator"', text)
+    made = re.search(
+        r'<bpmn:signal id="([a-f][0-9a-f-]{35})" name="Halt" m2pem:from="operator"', text
+    )
     assert made
     assert text.count(f'signalRef="{made.group(1)}"') == 2
 
