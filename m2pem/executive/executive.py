@@ -394,8 +394,6 @@ class Executive:
     def _geometry(self, run: str, name: str) -> Geometry | None:
         runner = self.runners.get(run)
         given = runner.run.state.geometries.get(name) if runner is not None else None
-        if given is not None:
-            return parse_geojson(given)
-        if name in self.handed_over:
-            return parse_geojson(self.handed_over[name].geometry)
-        return self.fleet.geometries.get(name)
+        if given is None and name in self.handed_over:
+            given = dict(self.handed_over[name].geometry)
+        return self.fleet.geometries.get(name) if given is None else parse_geojson(given)

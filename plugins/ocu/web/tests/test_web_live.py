@@ -10,7 +10,8 @@ from m2pem_plugin_web.live.socket import FULL, SILENT
 from m2pem_plugin_web.live.viewer import URGENT, WINDOW, Viewer
 from web_world import VEHICLE, Live, MakeWorld, World, serving
 
-from m2pem.api import RunId, RunStatus
+from m2pem.api import RunId, RunStatus, StampedRecord
+from m2pem.api.records import TokenEntered
 from m2pem.testing import scenarios
 from m2pem.testing.contracts.ocu_bench import until
 
@@ -213,6 +214,27 @@ async def test_every_event_is_counted_and_frames_are_bounded(world: MakeWorld) -
         await ended(live, run)
         assert hits(live) == await counted(here, run)
         assert live.said[-1]["seq"] == len(live.said)
+
+
+async def test_a_frame_shows_all_that_it_counts(world: MakeWorld) -> None:
+    async with world() as here:
+        prompt = await here.asked(QUESTION)
+        hub = here.ocu.hub
+        picture = await hub.feed.load(prompt.run)
+        viewer = Viewer()
+        hub.viewers.add(viewer)
+        viewer.watch(picture)
+        hub.next_messages(viewer, 0.0)
+        viewer.acknowledge(1)
+        # A frame is due, and before it is made, a record comes.
+        viewer.frame_due = True
+        place = next(iter(picture.elements))
+        entered = TokenEntered(token=99, process=place[0], element=place[1], scope=1)
+        picture.apply(StampedRecord(prompt.run, picture.seq + 1, 1.0, entered))
+        told = next(each for each in hub.next_messages(viewer, 0.0) if each["type"] == "frame")
+        hub.viewers.discard(viewer)
+        assert told["events"] == picture.seq
+        assert f'"{place[1]}"' in bytes(told["elements"]).decode()
 
 
 async def test_a_browser_that_acknowledges_nothing_gets_no_more_than_the_window(

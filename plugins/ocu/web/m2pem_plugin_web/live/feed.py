@@ -74,11 +74,18 @@ class Feed:
             try:
                 await self._look_around()
                 taken = 0
+                pictures = self.pictures
                 async for notice in self._notices:
-                    if type(notice) is StampedRecord:
-                        await self._record(notice)
-                    else:
+                    if type(notice) is not StampedRecord:
                         await self._prompt(notice)
+                    elif (
+                        type(notice.record) not in OF_FAULTS
+                        and (picture := pictures.get(notice.run)) is not None
+                        and notice.seq == picture.seq + 1
+                    ):
+                        picture.apply(notice)  # nearly all of them: it must cost little
+                    else:
+                        await self._record(notice)
                     taken += 1
                     if taken % BREATH == 0:
                         await asyncio.sleep(0)
@@ -189,7 +196,7 @@ class Feed:
             self._listener.closed(closed)
 
 
-OF_FAULTS = (r.BehaviorEnded, r.ErrorThrown, r.RunEnded)
+OF_FAULTS = frozenset((r.BehaviorEnded, r.ErrorThrown, r.RunEnded))
 
 
 def _what_went_wrong(record: r.Record) -> str:

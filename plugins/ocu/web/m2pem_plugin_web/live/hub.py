@@ -33,6 +33,8 @@ HOLDERS_EVERY_S = 0.5
 
 MOST_VIEWERS = 64
 
+_encode = msgspec.json.Encoder().encode
+
 
 class Hub:
     """All browsers, and what they look at. Made before the executive runs, so nothing is missed."""
@@ -45,6 +47,8 @@ class Hub:
         self._holders: dict[str, str] = {}
         self._looked_at = 0.0
         self._times: dict[RunId, float] = {}
+        self._asked: tuple[RunId, int, set[Place]] = ("", 0, set())
+        self._told = msgspec.Raw(b"{}")
 
     async def run(self) -> None:
         """Go on until cancelled."""
@@ -93,8 +97,11 @@ class Hub:
 
     async def _pace(self) -> None:
         loop = asyncio.get_running_loop()
+        at = loop.time()
         while True:
-            await asyncio.sleep(FRAME_S)
+            # What was late once must not be late for ever, nor be made up for in a rush.
+            at = max(at + FRAME_S, loop.time())
+            await asyncio.sleep(at - loop.time())
             if self.viewers:
                 await self._tick(loop.time())
 
@@ -162,6 +169,8 @@ class Hub:
         messages = [viewer.numbered(each) for each in viewer.urgent]
         viewer.urgent.clear()
         if viewer.may_send and (viewer.wants_snapshot or viewer.frame_due):
+            # Records may have come since the names were handed out: all that is counted is shown.
+            self._hand_out()
             told = self._snapshot(viewer) if viewer.wants_snapshot else self._frame(viewer)
             viewer.wants_snapshot = viewer.frame_due = False
             viewer.changes = Changes()
@@ -204,13 +213,19 @@ class Hub:
             "commands": picture.commands if picture is not None else {},
         }
 
+    def _elements(self, picture: Picture, places: set[Place]) -> msgspec.Raw:
+        """Their states as JSON; browsers that keep up are told the same of a run."""
+        asked = (picture.summary.run, picture.seq, places)
+        if asked != self._asked:
+            states = words.nested((place, picture.encoded(place)) for place in places)
+            self._asked, self._told = asked, msgspec.Raw(_encode(states))
+        return self._told
+
     def _frame(self, viewer: Viewer) -> dict[str, Any]:
         picture, changes = viewer.picture, viewer.changes
         frame = self._head("frame", picture)
         if picture is not None and changes.elements:
-            frame["elements"] = words.nested(
-                (place, picture.encoded(place)) for place in changes.elements
-            )
+            frame["elements"] = self._elements(picture, changes.elements)
         if picture is not None and changes.commands:
             frame["commands"] = {key: picture.commands.get(key) for key in changes.commands}
         for name, heard, changed in (

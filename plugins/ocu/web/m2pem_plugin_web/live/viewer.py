@@ -106,6 +106,8 @@ class Viewer:
         """The browser has taken in all up to `seq`."""
         while self._unacked and self._unacked[0][0] <= seq:
             self._unacked.popleft()
+        if self.frame_due or self.wants_snapshot:
+            self.wake.set()
 
     @property
     def may_send(self) -> bool:
