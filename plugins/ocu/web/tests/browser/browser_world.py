@@ -1,18 +1,25 @@
 """A server of its own process with the missions of this repository, and Chromium to look at it."""
 
-import asyncio
 import os
 import re
 import shutil
+import subprocess
 import sys
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
+import time
+from collections.abc import AsyncIterator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from m2pem_plugin_web import __file__ as plugin_file
-from playwright.async_api import Browser, BrowserContext, Page, async_playwright
+from playwright.async_api import (
+    Browser,
+    BrowserContext,
+    Page,
+    StorageState,
+    async_playwright,
+)
 
 WITHIN_S = 60.0
 WITHIN_MS = 15_000
@@ -25,57 +32,69 @@ _ADDRESS = re.compile(r"http://\S+/(?:\?token=\S+)?")
 class Served:
     """An executive that serves the page. `missions`: its folder of missions."""
 
-    process: asyncio.subprocess.Process
     address: str
     missions: Path
-    cookies: list[dict[str, object]] = field(default_factory=list)
+    state: StorageState | None = None
+    """Of a browser that has signed in: the address does so once."""
 
     @property
     def base(self) -> str:
         return self.address.partition("/?")[0].rstrip("/")
 
+    def tidy(self) -> None:
+        """The missions of this repository, and nothing of the test before."""
+        shutil.rmtree(self.missions, ignore_errors=True)
+        shutil.copytree(ROOT / "missions", self.missions)
 
-@asynccontextmanager
-async def serving(folder: Path, fleet: str = "mehds.yaml") -> AsyncIterator[Served]:
-    """Serve a copy of this repository's missions on a free port."""
+
+@contextmanager
+def serving(folder: Path, fleet: str = "mehds.yaml") -> Iterator[Served]:
+    """Serve a folder of missions on a free port, from a process of its own."""
     assert BUILT.is_file(), "the page is not built: npm run build in plugins/ocu/web/ui"
     missions = folder / "missions"
-    shutil.copytree(ROOT / "missions", missions)
+    missions.mkdir()
     environment = os.environ | {
         "M2PEM_WEB_PORT": "0",
         "M2PEM_WEB_MISSIONS": str(missions),
         "XDG_RUNTIME_DIR": str(folder),
     }
     arguments = ["serve", "--fleet", str(ROOT / "fleet_configs" / fleet), "--simulate"]
-    process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "m2pem", *arguments, "--ocu", "web", "--journal", "memory:"),
-        env=environment,
-        cwd=folder,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.STDOUT,
-    )
-    assert process.stdout is not None
-    said = ""
-    try:
-        async with asyncio.timeout(WITHIN_S):
-            while not (found := _ADDRESS.search(said)):
-                line = await process.stdout.readline()
-                assert line, f"it ended: {said}"
-                said += line.decode()
-        draining = asyncio.create_task(process.stdout.read())
-        yield Served(process, found.group(0), missions)
-        draining.cancel()
-    finally:
-        if process.returncode is None:
+    with (folder / "said").open("w+") as said:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "m2pem", *arguments, "--ocu", "web", "--journal", "memory:"],
+            env=environment,
+            cwd=folder,
+            stdout=said,
+            stderr=subprocess.STDOUT,
+        )
+        try:
+            yield Served(_address(process, folder / "said"), missions)
+        finally:
             process.terminate()
-        await process.wait()
+            process.wait(WITHIN_S)
+
+
+def _address(process: "subprocess.Popen[bytes]", said: Path) -> str:
+    until = time.monotonic() + WITHIN_S
+    while not (found := _ADDRESS.search(said.read_text())):
+        assert process.poll() is None, f"it ended: {said.read_text()}"
+        assert time.monotonic() < until, f"it says no address: {said.read_text()}"
+        time.sleep(0.05)
+    return found.group(0)
+
+
+@pytest.fixture(scope="session")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    """One server for all tests of this process: it takes seconds to start."""
+    with serving(tmp_path_factory.mktemp("served")) as running:
+        yield running
 
 
 @pytest.fixture
-async def served(tmp_path: Path) -> AsyncIterator[Served]:
+def served(server: Served) -> Served:
     """A server with the missions of this repository."""
-    async with serving(tmp_path) as server:
-        yield server
+    server.tidy()
+    return server
 
 
 class Browsing:
@@ -92,6 +111,7 @@ class Browsing:
         self.context = await self._browser.new_context(
             viewport={"width": width, "height": height},
             permissions=["clipboard-read", "clipboard-write"],
+            storage_state=self.served.state,
         )
         self.context.set_default_timeout(WITHIN_MS)
         page = await self.context.new_page()
@@ -100,7 +120,9 @@ class Browsing:
             "console",
             lambda message: self.faults.append(message.text) if message.type == "error" else None,
         )
-        await page.goto(self.served.address)
+        await page.goto(self.served.base if self.served.state else self.served.address)
+        await page.wait_for_selector("h1")
+        self.served.state = self.served.state or await self.context.storage_state()
         return page
 
     async def edit(self, mission: str, page: Page | None = None) -> Page:

@@ -4,6 +4,6 @@ import pytest
 
 pytest.register_assert_rewrite("browser_world")
 
-from browser_world import browsing, served  # noqa: E402  # after its assertions are rewritten
+from browser_world import browsing, served, server  # noqa: E402  # after its assertions are rewritten
 
-__all__ = ["browsing", "served"]
+__all__ = ["browsing", "served", "server"]

@@ -87,6 +87,7 @@ async def test_a_mission_is_drawn_by_keyboard_and_saved(browsing: Browsing) -> N
     assert [(role.name, role.resource) for role in drive.behavior.roles] == [("driver", "evsg1")]
     assert [each.name for each in drive.behavior.parameters] == ["route"]
     ask = next(each for each in mission.nodes if isinstance(each, UserTask))
+    assert ask.prompt is not None
     assert ask.prompt.text == "Drive on?"
     assert [each.value for each in ask.prompt.decisions] == ["continue", "abort"]
 

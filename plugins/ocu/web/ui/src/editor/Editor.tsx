@@ -24,6 +24,9 @@ import "./forms.css";
 
 const words = strings.editor;
 
+/** Of a tablet held upright: blocks are then in the menus alone, until somebody asks for more. */
+const NARROW = 1000;
+
 export default function Editor({ mission }: { mission: string }) {
   const [work, setWork] = useState<MissionWork | null>(null);
   const [problem, setProblem] = useState("");
@@ -63,7 +66,7 @@ interface WorkplaceProps {
 function Workplace({ work, fail }: WorkplaceProps) {
   const { session } = work;
   const canvas = useRef<HTMLDivElement>(null);
-  const [showsBlocks, setBlocks] = useRemembered("editor-blocks", true);
+  const [showsBlocks, setBlocks] = useRemembered("editor-blocks", innerWidth > NARROW);
   const [showsPanel, setPanel] = useRemembered("editor-panel", true);
   useEffect(() => {
     if (!canvas.current) return;
@@ -72,6 +75,12 @@ function Workplace({ work, fail }: WorkplaceProps) {
     work.begin().catch(fail);
   }, [work]);
   useEffect(() => followKeys(work), [work]);
+  useEffect(() => {
+    // Somebody may have drawn a route or area on the map in the meantime.
+    const refresh = () => void session.catalogue.refreshGeometries().catch(() => undefined);
+    addEventListener("focus", refresh);
+    return () => removeEventListener("focus", refresh);
+  }, [session]);
   useEffect(() => {
     const leave = guardLeaving(() => !session.isDirty.peek() || confirm(words.leave));
     const unload = (event: BeforeUnloadEvent) => {

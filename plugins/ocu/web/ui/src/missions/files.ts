@@ -13,8 +13,7 @@ export interface Version extends SavedVersion {
 }
 
 export type Outcome =
-  | { kind: "saved"; saved: SavedVersion }
-  | { kind: "conflict"; current: SavedVersion };
+  { kind: "saved"; saved: SavedVersion } | { kind: "conflict"; current: SavedVersion };
 
 const path = (mission: string) => `/missions/${encodeURIComponent(mission)}`;
 

@@ -47,9 +47,18 @@ export function guardLeaving(mayLeave: Guard): () => void {
 export function go(path: string): void {
   if (!guard()) return;
   history.pushState(null, "", path);
+  show();
+}
+
+/** The address of what is shown: the browser's is another one while it goes back. */
+let shown = location.href;
+
+function show(): void {
+  shown = location.href;
   route.value = routeOf(location.pathname);
 }
 
 addEventListener("popstate", () => {
-  route.value = routeOf(location.pathname);
+  if (guard()) show();
+  else history.pushState(null, "", shown);
 });

@@ -71,10 +71,7 @@ export const m2pemDescriptor = {
     {
       name: "Requirement",
       superClass: ["Element"],
-      properties: [
-        ...["id", "ltl", "pattern", "text"].map(attribute),
-        children("args", "Arg"),
-      ],
+      properties: [...["id", "ltl", "pattern", "text"].map(attribute), children("args", "Arg")],
     },
     { name: "Arg", superClass: ["Element"], properties: ["name", "value"].map(attribute) },
     { name: "AskingTask", extends: ["bpmn:UserTask"], properties: task },
@@ -88,8 +85,16 @@ export const m2pemDescriptor = {
       extends: ["bpmn:MultiInstanceLoopCharacteristics"],
       properties: ["collection", "elementVariable"].map(attribute),
     },
-    { name: "Choice", extends: ["bpmn:AdHocSubProcess"], properties: [attribute("activeElements")] },
+    {
+      name: "Choice",
+      extends: ["bpmn:AdHocSubProcess"],
+      properties: [attribute("activeElements")],
+    },
     { name: "Sent", extends: ["bpmn:Signal"], properties: ["from", "returned"].map(attribute) },
-    { name: "Posted", extends: ["bpmn:Message"], properties: ["from", "correlationKey"].map(attribute) },
+    {
+      name: "Posted",
+      extends: ["bpmn:Message"],
+      properties: ["from", "correlationKey"].map(attribute),
+    },
   ],
 };

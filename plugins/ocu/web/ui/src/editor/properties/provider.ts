@@ -8,9 +8,11 @@ import { referencesOf } from "../moddle/roots";
 import type { EditorContext } from "../panels/panel";
 import type { Element, PropertiesPanel } from "../session/services";
 import type { FormProps } from "./form";
+import { AdHocForm } from "./forms/AdHocForm";
 import { BehaviorForm } from "./forms/BehaviorForm";
 import { CallForm } from "./forms/CallForm";
 import {
+  ActivationForm,
   ConditionalEventForm,
   conditionalEventOf,
   ConditionForm,
@@ -29,7 +31,7 @@ import { TimerForm, timerOf } from "./forms/TimerForm";
 const AFTER_BPMN = 500;
 const REPLACED = new Set([
   ...["general", "documentation", "error", "message", "signal", "escalation", "timer"],
-  "multiInstance",
+  ...["multiInstance", "adHocCompletion"],
 ]);
 
 interface GroupDefinition {
@@ -89,6 +91,8 @@ function formsFor(object: ModdleElement): [GroupName, ComponentType<FormProps>][
   if (isA(object, "bpmn:SequenceFlow") && isConditional(object)) {
     forms.push(["condition", ConditionForm]);
   }
+  if (isA(object, "bpmn:ComplexGateway")) forms.push(["condition", ActivationForm]);
+  if (isA(object, "bpmn:AdHocSubProcess")) forms.push(["adHoc", AdHocForm]);
   if (conditionalEventOf(object)) forms.push(["condition", ConditionalEventForm]);
   if (referencesOf(object).length > 0) forms.push(["references", ReferenceForm]);
   if (timerOf(object)) forms.push(["timer", TimerForm]);

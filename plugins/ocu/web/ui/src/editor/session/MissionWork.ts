@@ -9,7 +9,13 @@ import { Autosave } from "./Autosave";
 import type { Catalogue } from "./catalogue";
 import { dropDraft, readDraft, type Draft } from "./drafts";
 import { EditorSession } from "./EditorSession";
-import { makeEditable, openMission, openVersion, saveMission, type SavedVersion } from "../../missions/files";
+import {
+  makeEditable,
+  openMission,
+  openVersion,
+  saveMission,
+  type SavedVersion,
+} from "../../missions/files";
 
 const words = strings.editor;
 
@@ -42,6 +48,8 @@ export class MissionWork {
       () => this.saved.value?.version ?? null,
     );
     this.session.changes.subscribe(() => {
+      // It would take back what was drawn since, too.
+      this.putBack.value = null;
       if (this.session.isDirty.peek()) this.autosave.soon();
     });
   }
@@ -61,7 +69,8 @@ export class MissionWork {
   async recover(draft: Draft): Promise<void> {
     await this.session.open(draft.xml, false);
     // Somebody's newer version is not overwritten unasked.
-    if (this.saved.value && draft.base) this.saved.value = { ...this.saved.value, version: draft.base };
+    if (this.saved.value && draft.base)
+      this.saved.value = { ...this.saved.value, version: draft.base };
   }
 
   discardDraft(): void {

@@ -51,7 +51,10 @@ function badge(
   made.className = `m2-badge m2-badge-${severity}`;
   made.textContent = String(findings.length);
   made.title = findings.map((each) => each.message).join("\n");
-  made.setAttribute("aria-label", fill(strings.editor.problems.badge, { count: findings.length, element: id }));
+  made.setAttribute(
+    "aria-label",
+    fill(strings.editor.problems.badge, { count: findings.length, element: id }),
+  );
   made.tabIndex = -1;
   made.addEventListener("click", () => choose(id));
   return made;

@@ -56,12 +56,14 @@ export function CallForm(form: FormProps) {
 function Mappings({ form, direction }: { form: FormProps; direction: Direction }) {
   const call = objectOf(form);
   const mappings = mappingsOf(call, direction);
-  const names = (form.editor.checks.outline.value?.names ?? []).map(({ name }) => ({ value: name }));
+  const names = (form.editor.checks.outline.value?.names ?? []).map(({ name }) => ({
+    value: name,
+  }));
   const write = (next: Mapping[]) =>
     apply(form, setMappings(factoryOf(form), call, direction, next));
   return (
     <>
-      <h4 class="m2-heading">{words[direction]}</h4>
+      <h2 class="m2-heading">{words[direction]}</h2>
       <Rows
         rows={mappings}
         write={write}

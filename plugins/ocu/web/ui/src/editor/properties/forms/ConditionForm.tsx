@@ -1,4 +1,5 @@
 // When a sequence flow is taken, a gateway's default, and what conditional events wait for.
+import type { Finding } from "../../../shared/types";
 import { strings } from "../../../strings";
 import { child, isA, list, text, type ModdleElement } from "../../moddle/moddle";
 import { expressionProperties, expressionText } from "../expressions";
@@ -7,7 +8,12 @@ import { factoryOf, objectOf, set, type FormProps } from "../form";
 import { ExpressionField } from "./ExpressionField";
 
 const words = strings.editor.condition;
-const CHOOSING = ["bpmn:ExclusiveGateway", "bpmn:InclusiveGateway", "bpmn:ComplexGateway", "bpmn:Activity"];
+const CHOOSING = [
+  "bpmn:ExclusiveGateway",
+  "bpmn:InclusiveGateway",
+  "bpmn:ComplexGateway",
+  "bpmn:Activity",
+];
 
 /** Whether a condition may stand on a flow. */
 export function isConditional(flow: ModdleElement): boolean {
@@ -19,6 +25,10 @@ export function conditionalEventOf(element: ModdleElement): ModdleElement | unde
   return list(element, "eventDefinitions").find((each) =>
     isA(each, "bpmn:ConditionalEventDefinition"),
   );
+}
+
+function said({ message, remedy }: Finding): string {
+  return [message, remedy].filter(Boolean).join("; ");
 }
 
 export function ConditionForm(form: FormProps) {
@@ -35,7 +45,7 @@ export function ConditionForm(form: FormProps) {
         value={expressionText(flow, "conditionExpression")}
         hint={isDefault ? words.defaultHint : words.hint}
         rows={3}
-        error={findings.map(({ message, remedy }) => [message, remedy].filter(Boolean).join("; ")).join("\n") || undefined}
+        error={findings.map(said).join("\n") || undefined}
         write={(body) =>
           set(form, flow, expressionProperties(factoryOf(form), flow, "conditionExpression", body))
         }
@@ -48,6 +58,28 @@ export function ConditionForm(form: FormProps) {
         write={(chosen) => set(form, source, { default: chosen ? flow : undefined })}
       />
     </>
+  );
+}
+
+/** When a complex gateway goes on. */
+export function ActivationForm(form: FormProps) {
+  const gateway = objectOf(form);
+  return (
+    <ExpressionField
+      form={form}
+      id="m2-activation"
+      label={words.activation}
+      value={expressionText(gateway, "activationCondition")}
+      hint={words.activationHint}
+      rows={3}
+      write={(body) =>
+        set(
+          form,
+          gateway,
+          expressionProperties(factoryOf(form), gateway, "activationCondition", body),
+        )
+      }
+    />
   );
 }
 
