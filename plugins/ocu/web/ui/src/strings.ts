@@ -40,6 +40,7 @@ export const strings = {
     hint: "On the executive's own machine, open the address that it printed, or a new one:",
     command: "m2pem web url",
     wrong: "Name or password is wrong.",
+    used: "That address was used already, or is too old. Ask for a new one.",
     unreachable: "The executive does not answer.",
   },
   home: {
@@ -583,6 +584,8 @@ export const strings = {
       latitude: "Latitude °",
       longitude: "Longitude °",
       altitude: "Altitude m",
+      above: "Altitudes above",
+      frames: { relative: "home", amsl: "sea level", terrain: "the ground" },
       addCentre: "Add map centre",
       vertex: "Vertex {number}",
       removeVertex: "Remove vertex {number}",
