@@ -25,7 +25,7 @@ WITHIN_S = 60.0
 WITHIN_MS = 15_000
 ROOT = Path(__file__).parents[5]
 BUILT = Path(plugin_file).parent / "static" / "index.html"
-_ADDRESS = re.compile(r"http://\S+token=\S+")
+_ADDRESS = re.compile(r"http://\S+/(?:\?token=\S+)?")
 
 
 @dataclass
@@ -39,7 +39,7 @@ class Served:
 
     @property
     def base(self) -> str:
-        return self.address.partition("/?")[0]
+        return self.address.partition("/?")[0].rstrip("/")
 
     def tidy(self) -> None:
         """The missions of this repository, and nothing of the test before."""

@@ -15,7 +15,9 @@ export function RunList() {
   const { lines, failed } = useList<RunSummary>("/runs");
   const [all, setAll] = useState(false);
   const sorted = [...(lines ?? [])].sort(
-    (a, b) => Number(GOING_ON.has(b.status)) - Number(GOING_ON.has(a.status)) || b.started_us - a.started_us,
+    (a, b) =>
+      Number(GOING_ON.has(b.status)) - Number(GOING_ON.has(a.status)) ||
+      b.started_us - a.started_us,
   );
   const shown = all ? sorted : sorted.slice(0, SHOWN);
   return (

@@ -119,7 +119,8 @@ function summaryOf(source: Source): Promise<RunSummary> {
 }
 
 function problemOf(error: unknown, source: Source): string {
-  if (!(error instanceof ApiError)) return `${text.run.loadFailed} ${String(error)}`;
+  if (!(error instanceof ApiError))
+    return `${text.run.loadFailed} ${error instanceof Error ? error.message : ""}`;
   if (error.status !== 404) return error.message;
   return fill(text.run.noRun, { run: source.kind === "run" ? source.run : source.id });
 }

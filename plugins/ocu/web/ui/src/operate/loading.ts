@@ -2,8 +2,8 @@
 import { signal, type Signal } from "@preact/signals";
 import { get } from "../shared/api";
 import type { Fleet, Geometry, RunRecord, RunSummary } from "../shared/types";
-import { readDefinitions } from "./mission/moddle";
 import { missionModel, type MissionModel } from "./mission/missionModel";
+import { readDefinitions } from "./mission/reading";
 import type { Page } from "./scene/recordFeed";
 import { ReplayScene } from "./scene/replayScene";
 import type { TelemetrySample } from "./scene/telemetryTrack";

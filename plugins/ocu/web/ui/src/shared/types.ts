@@ -61,13 +61,18 @@ export interface Fleet {
   }[];
   payloads: { id: string; vehicle: string; detector: boolean; arbiter: string }[];
   teams: { name: string; members: string[]; lead: string }[];
-  fence?: GeoJSON.Geometry;
+  /** No vehicle may leave it. */
+  fence: GeoJSON.Geometry | null;
 }
+
+/** What altitudes are above: home, the sea, or the ground. */
+export type AltitudeFrame = "relative" | "amsl" | "terrain";
 
 export interface Geometry {
   name: string;
   kind: "route" | "area" | "point";
   geometry: GeoJSON.Geometry;
+  altitude_frame: AltitudeFrame;
   from: "fleet" | "operator";
   by: string;
   at_us: number | null;

@@ -12,7 +12,7 @@ const text = strings.signIn;
 export default function SignIn() {
   const [name, setName] = useState("");
   const [password, setPassword] = useState("");
-  const [problem, setProblem] = useState("");
+  const [problem, setProblem] = useState(refused());
   const [busy, setBusy] = useState(false);
 
   async function submit(event: Event): Promise<void> {
@@ -70,6 +70,10 @@ export default function SignIn() {
     </div>
   );
 }
+
+/** Why one was sent here. */
+const refused = (): string =>
+  new URLSearchParams(location.search).get("refused") === "token" ? text.used : "";
 
 function problemOf(error: unknown): string {
   if (!(error instanceof ApiError)) return text.unreachable;

@@ -81,7 +81,9 @@ function BlockButton({ session, block }: { session: EditorSession; block: Block 
 function place(session: EditorSession, shape: Element): void {
   const [selected, ...more] = session.selected.value;
   const mayFollow =
-    selected && !more.length && session.service("rules").allowed("shape.append", { element: selected });
+    selected &&
+    !more.length &&
+    session.service("rules").allowed("shape.append", { element: selected });
   if (selected && mayFollow) {
     session.service("autoPlace").append(selected, shape);
     return;

@@ -82,7 +82,10 @@ function groupOf(catalogue: Catalogue, use: BehaviorUse): BlockGroup {
   return catalogue.domainOf(role?.resource ?? "") ?? candidate?.domain ?? "ground";
 }
 
-function whoOf(roles: readonly Role[], isNeeded: boolean): { who: string | undefined; missing: boolean } {
+function whoOf(
+  roles: readonly Role[],
+  isNeeded: boolean,
+): { who: string | undefined; missing: boolean } {
   const named = roles.filter((role) => role.resource !== "");
   if (named.length > 0) {
     return { who: named.map((role) => role.resource).join(", "), missing: false };

@@ -34,11 +34,7 @@ export function contentChanges(factory: Factory, block: Block, task: ModdleEleme
   });
 }
 
-export function makeShape(
-  factory: Factory,
-  elementFactory: ElementFactory,
-  block: Block,
-): Element {
+export function makeShape(factory: Factory, elementFactory: ElementFactory, block: Block): Element {
   const type = typeOf(block);
   const task = factory.create(type, { name: block.title });
   for (const { target, properties } of contentChanges(factory, block, task)) {

@@ -8,7 +8,14 @@ import { strings } from "../../strings";
 import { isA, type ModdleElement } from "../moddle/moddle";
 import type { Catalogue } from "../session/catalogue";
 import type { Edits } from "../session/edits";
-import type { Create, Element, ElementFactory, PopupMenu, Rules, Services } from "../session/services";
+import type {
+  Create,
+  Element,
+  ElementFactory,
+  PopupMenu,
+  Rules,
+  Services,
+} from "../session/services";
 import { blocksOf, type Block } from "./blocks";
 import { iconSvg } from "./icons";
 import { contentChanges, makeShape, typeOf } from "./making";

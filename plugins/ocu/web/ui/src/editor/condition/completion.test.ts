@@ -58,7 +58,8 @@ describe("what is offered in a condition", () => {
   });
 
   it("is nothing right behind a value", () => {
-    for (const text of ["user.decision == 'abort'", "(a)", "a == 5"]) expect(values(text)).toEqual([]);
+    for (const text of ["user.decision == 'abort'", "(a)", "a == 5"])
+      expect(values(text)).toEqual([]);
   });
 
   it("looks at what stands before the cursor only", () => {

@@ -31,7 +31,19 @@ const CONSTANTS = ["true", "false", "null"];
 /** docs/conditions.md */
 const FUNCTIONS = [
   ...["abs", "ceil", "contains", "date", "distance", "duration", "ends_with", "exists", "floor"],
-  ...["is_empty", "length", "lower", "max", "min", "mod", "number", "round", "sqrt", "starts_with", "sum"],
+  ...[
+    "is_empty",
+    "length",
+    "lower",
+    "max",
+    "min",
+    "mod",
+    "number",
+    "round",
+    "sqrt",
+    "starts_with",
+    "sum",
+  ],
   ...["text", "upper"],
 ];
 
@@ -89,7 +101,11 @@ function word(before: string, names: Outline["names"]): Completions {
   if (typed === "" && ENDED.test(before)) return { from: before.length, options: [] };
   const fits = (value: string) => value.toLowerCase().includes(typed.toLowerCase());
   const starts = (value: string) => typed !== "" && value.startsWith(typed);
-  const known = names.map(({ name, from }) => ({ value: name, note: from, group: "names" as const }));
+  const known = names.map(({ name, from }) => ({
+    value: name,
+    note: from,
+    group: "names" as const,
+  }));
   const constants = CONSTANTS.map((value) => ({ value, group: "values" as const }));
   const functions = FUNCTIONS.map((value) => ({ value: `${value}(`, group: "functions" as const }));
   const options = [

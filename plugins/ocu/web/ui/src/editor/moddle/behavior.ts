@@ -36,7 +36,13 @@ export interface ServiceUse extends Commanded {
 const BEHAVIOR = "m2pem:Behavior";
 const SERVICE = "m2pem:Service";
 const SERVICE_ATTRIBUTES = ["m2pem:service", "m2pem:class"];
-const FOREIGN_ATTRIBUTES = ["class", "camunda:class", "camunda:topic", "flowable:class", "activiti:class"];
+const FOREIGN_ATTRIBUTES = [
+  "class",
+  "camunda:class",
+  "camunda:topic",
+  "flowable:class",
+  "activiti:class",
+];
 
 export function behaviorOf(task: ModdleElement): BehaviorUse | undefined {
   const element = extension(task, BEHAVIOR);
@@ -45,7 +51,8 @@ export function behaviorOf(task: ModdleElement): BehaviorUse | undefined {
 
 export function readBehavior(element: ModdleElement): BehaviorUse {
   const head = (name: string) =>
-    text(element, name) || valueOf(list(element, "head").find((each) => text(each, "name") === name));
+    text(element, name) ||
+    valueOf(list(element, "head").find((each) => text(each, "name") === name));
   return {
     type: head("type").trim(),
     name: head("name").trim(),
@@ -62,7 +69,9 @@ export function serviceOf(task: ModdleElement): ServiceUse | undefined {
   return {
     name,
     parameters: [...nested("parameters"), ...list(element, "loose")].map(readParameter),
-    roles: [...nested("allocation"), ...list(element, "roles")].map((each) => readRole(each, "payload")),
+    roles: [...nested("allocation"), ...list(element, "roles")].map((each) =>
+      readRole(each, "payload"),
+    ),
   };
 }
 
@@ -82,7 +91,11 @@ export function writeBehavior(
   use: BehaviorUse,
   before?: ModdleElement,
 ): ModdleElement {
-  const parameters = writeParameters(factory, use.parameters, before && child(before, "parameters"));
+  const parameters = writeParameters(
+    factory,
+    use.parameters,
+    before && child(before, "parameters"),
+  );
   const allocation = writeRoles(factory, use.roles, before && child(before, "allocation"));
   const others = list(before, "others");
   const made = successor(
@@ -185,7 +198,11 @@ function writeRoles(
 ): ModdleElement {
   const olds = list(before, "values");
   const made = roles.map((role) =>
-    writeRole(factory, role, olds.find((other) => text(other, "name") === role.name)),
+    writeRole(
+      factory,
+      role,
+      olds.find((other) => text(other, "name") === role.name),
+    ),
   );
   const outer = successor(factory, "m2pem:Resources", { values: made }, before);
   adopt(outer, ...made);

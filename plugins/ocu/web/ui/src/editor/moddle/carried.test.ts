@@ -146,7 +146,9 @@ describe("signals, messages, errors and escalations", () => {
     apply([made.change]);
     expect(rootNamed(definitions, "signal", "Stop driving")).toBe(made.root);
     expect(referencesOf(element)).toMatchObject([{ kind: "signal", root: undefined }]);
-    expect(await written(definitions)).toMatch(/<signal id="[a-f][0-9a-f-]{35}" name="Stop driving"/);
+    expect(await written(definitions)).toMatch(
+      /<signal id="[a-f][0-9a-f-]{35}" name="Stop driving"/,
+    );
     for (let count = 0; count < 100; count += 1) expect(uuid()).toMatch(/^[a-f]/);
   });
 

@@ -88,8 +88,16 @@ export const m2pemDescriptor = {
       extends: ["bpmn:MultiInstanceLoopCharacteristics"],
       properties: ["collection", "elementVariable"].map(attribute),
     },
-    { name: "Choice", extends: ["bpmn:AdHocSubProcess"], properties: [attribute("activeElements")] },
+    {
+      name: "Choice",
+      extends: ["bpmn:AdHocSubProcess"],
+      properties: [attribute("activeElements")],
+    },
     { name: "Sent", extends: ["bpmn:Signal"], properties: ["from", "returned"].map(attribute) },
-    { name: "Posted", extends: ["bpmn:Message"], properties: ["from", "correlationKey"].map(attribute) },
+    {
+      name: "Posted",
+      extends: ["bpmn:Message"],
+      properties: ["from", "correlationKey"].map(attribute),
+    },
   ],
 };

@@ -27,7 +27,9 @@ export interface Asked {
 }
 
 export function promptOf(task: ModdleElement): Asked {
-  const carriers = saysSomething(task) ? [task] : [...dataObjects(task).filter(saysSomething), task];
+  const carriers = saysSomething(task)
+    ? [task]
+    : [...dataObjects(task).filter(saysSomething), task];
   const carrier = carriers[0] ?? task;
   return { carrier, prompt: readPrompt(carrier) };
 }
@@ -72,7 +74,9 @@ export function setPrompt(factory: Factory, carrier: ModdleElement, use: PromptU
   }
   if (use.text) made.push(factory.create("m2pem:Prompt", { body: use.text }));
   for (const { value, label } of use.decisions) {
-    made.push(factory.create("m2pem:Decision", label && label !== value ? { value, label } : { value }));
+    made.push(
+      factory.create("m2pem:Decision", label && label !== value ? { value, label } : { value }),
+    );
   }
   const changes = [replaced(factory, carrier, TYPES, made)];
   if (isA(carrier, "bpmn:UserTask")) {
@@ -94,7 +98,9 @@ function dataObjects(task: ModdleElement): ModdleElement[] {
   return list(task, "dataInputAssociations")
     .flatMap((each) => list(each, "sourceRef"))
     .flatMap((each) => {
-      const object = isA(each, "bpmn:DataObjectReference") ? child(each, "dataObjectRef") : undefined;
+      const object = isA(each, "bpmn:DataObjectReference")
+        ? child(each, "dataObjectRef")
+        : undefined;
       return object ? [each, object] : [each];
     });
 }

@@ -30,8 +30,7 @@ export class Locator {
     const direct = registry.get(id) as Element | undefined;
     if (direct) return direct;
     return registry.filter((each) => standsFor(each.businessObject as ModdleElement, id))[0] as
-      | Element
-      | undefined;
+      Element | undefined;
   }
 
   private async drawnElsewhere(id: string): Promise<Element | undefined> {

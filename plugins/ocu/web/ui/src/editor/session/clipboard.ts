@@ -87,8 +87,7 @@ export class SystemClipboard {
 /** An element of another tool goes with its namespace, which cannot be told from its type. */
 function withNamespace(_: string, value: unknown): unknown {
   const descriptor = (value as ModdleElement | null)?.$descriptor as
-    | { isGeneric?: boolean; ns?: { uri: string } }
-    | undefined;
+    { isGeneric?: boolean; ns?: { uri: string } } | undefined;
   if (!descriptor?.isGeneric) return value;
   return { ...(value as object), $uri: descriptor.ns?.uri };
 }

@@ -79,7 +79,10 @@ export class Diagrams {
     const gone = new Set<ModdleElement | undefined>([owner, ...pools]);
     const owners = new Set([...gone].filter((each) => each).map((each) => text(each!, "id")));
     const stays = (each: ModdleElement) => !owners.has(outermostOf(ownerOf(each)));
-    definitions.set("rootElements", list(definitions, "rootElements").filter((each) => !gone.has(each)));
+    definitions.set(
+      "rootElements",
+      list(definitions, "rootElements").filter((each) => !gone.has(each)),
+    );
     definitions.set("diagrams", list(definitions, "diagrams").filter(stays));
     this.refresh();
   }

@@ -37,7 +37,10 @@ export class ForeignCopy {
     void $parent;
     void $instanceOf;
     const { ns } = $descriptor as unknown as { ns: { uri: string } };
-    const made = this.moddle.createAny($type, ns.uri, { ...attributes, ...($body ? { $body } : {}) });
+    const made = this.moddle.createAny($type, ns.uri, {
+      ...attributes,
+      ...($body ? { $body } : {}),
+    });
     made.$parent = parent;
     if ($children) made.$children = $children.map((each) => this.copied(each, made));
     return made;

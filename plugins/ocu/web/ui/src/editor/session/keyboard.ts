@@ -60,7 +60,9 @@ export function stepThrough(session: EditorSession, event: KeyboardEvent): void 
   if (!next) return;
   event.preventDefault();
   session.service("selection").select(next as never);
-  session.service("canvas").scrollToElement(next as never, { top: 80, bottom: 80, left: 80, right: 80 });
+  session
+    .service("canvas")
+    .scrollToElement(next as never, { top: 80, bottom: 80, left: 80, right: 80 });
 }
 
 function inOrder(session: EditorSession): Element[] {
@@ -68,7 +70,10 @@ function inOrder(session: EditorSession): Element[] {
   const root = canvas.getRootElement();
   const shown = session
     .service("elementRegistry")
-    .filter((each) => each !== root && !("labelTarget" in each && each.labelTarget) && !("waypoints" in each))
+    .filter(
+      (each) =>
+        each !== root && !("labelTarget" in each && each.labelTarget) && !("waypoints" in each),
+    )
     .filter((each) => canvas.findRoot(each) === root) as unknown as (Element & Box)[];
   const elements = shown.filter((each) => !isEmptyPool(each));
   return elements.sort((a, b) => a.x + a.y * 0.2 - (b.x + b.y * 0.2));

@@ -37,8 +37,11 @@ export async function pngFile(svg: string): Promise<Blob> {
 }
 
 function onWhite(svg: string): string {
-  return svg.replace(/(<svg [^>]*viewBox="([^" ]+) ([^" ]+) ([^" ]+) ([^" ]+)"[^>]*>)/, (_, tag, ...box) => {
-    const [x, y, width, height] = box as string[];
-    return `${tag}<rect x="${x}" y="${y}" width="${width}" height="${height}" fill="white"/>`;
-  });
+  return svg.replace(
+    /(<svg [^>]*viewBox="([^" ]+) ([^" ]+) ([^" ]+) ([^" ]+)"[^>]*>)/,
+    (_, tag, ...box) => {
+      const [x, y, width, height] = box as string[];
+      return `${tag}<rect x="${x}" y="${y}" width="${width}" height="${height}" fill="white"/>`;
+    },
+  );
 }

@@ -31,7 +31,10 @@ describe("values of parameters", () => {
     expect(examine(parameter({}), "5 km")).toBeUndefined();
     expect(examine(parameter({}), "5")).toBeUndefined();
     expect(examine(parameter({}), "5 s")).toMatchObject({ problem: "unit", unit: "s" });
-    expect(examine(parameter({ kind: "angle" }), "45")).toMatchObject({ problem: "unit", unit: "" });
+    expect(examine(parameter({ kind: "angle" }), "45")).toMatchObject({
+      problem: "unit",
+      unit: "",
+    });
     expect(examine(parameter({ kind: "angle" }), "45 deg")).toBeUndefined();
     expect(examine(parameter({}), "far")).toEqual({ problem: "number" });
     expect(examine(parameter({ kind: "number" }), "5 m")).toMatchObject({ problem: "unit" });

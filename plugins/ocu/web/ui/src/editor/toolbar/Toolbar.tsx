@@ -56,11 +56,19 @@ export function Toolbar(props: ToolbarProps) {
         act={() => session.service("commandStack").redo()}
       />
       <span class="m2-gap" />
-      <IconButton icon="search" label={words.search} act={() => actions().trigger("find", {} as never)} />
+      <IconButton
+        icon="search"
+        label={words.search}
+        act={() => actions().trigger("find", {} as never)}
+      />
       <IconButton icon="minus" label={words.zoomOut} act={() => zoom(-1)} />
       <IconButton icon="plus" label={words.zoomIn} act={() => zoom(1)} />
       <IconButton icon="fit" label={words.fit} act={() => session.fit()} />
-      <IconButton icon="map" label={words.minimap} act={() => session.service("minimap").toggle()} />
+      <IconButton
+        icon="map"
+        label={words.minimap}
+        act={() => session.service("minimap").toggle()}
+      />
       <IconButton
         icon="layout"
         label={words.layout}

@@ -38,6 +38,7 @@ export class Painter {
   private readonly pen: CanvasRenderingContext2D;
   private frame = 0;
   private drawn_ms = 0;
+  private changed = false;
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
@@ -90,14 +91,20 @@ export class Painter {
   }
 
   private soon(): void {
-    if (this.frame === 0) this.frame = requestAnimationFrame(() => this.tick(true));
+    this.changed = true;
+    this.next();
   }
 
-  private tick(changed: boolean): void {
+  private next(): void {
+    if (this.frame === 0) this.frame = requestAnimationFrame(() => this.tick());
+  }
+
+  private tick(): void {
     this.frame = 0;
     const now = performance.now();
-    if (changed || now - this.drawn_ms >= FADE_FRAME_MS) this.draw();
-    if (this.fades(now)) this.frame = requestAnimationFrame(() => this.tick(false));
+    const fades = this.fades(now);
+    if (this.changed || !fades || now - this.drawn_ms >= FADE_FRAME_MS) this.draw();
+    if (fades) this.next();
   }
 
   private fades(now: number): boolean {
@@ -110,6 +117,7 @@ export class Painter {
   private draw(): void {
     const { pen, canvas, window } = this;
     this.drawn_ms = performance.now();
+    this.changed = false;
     pen.setTransform(1, 0, 0, 1, 0, 0);
     pen.clearRect(0, 0, canvas.width, canvas.height);
     const scale = window.scale * devicePixelRatio;

@@ -4,11 +4,11 @@ import { useEffect, useRef } from "preact/hooks";
 import { get, put } from "../../shared/api";
 import { attempt, toast } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
-import type { Geometry } from "../../shared/types";
+import type { AltitudeFrame, Geometry } from "../../shared/types";
 import { useOperating } from "../context";
 import {
   added,
-  geometryOf,
+  featureOf,
   moved,
   problemOf,
   removed,
@@ -19,6 +19,8 @@ import {
 import "./draw.css";
 
 const text = strings.operate.map;
+
+const FRAMES: AltitudeFrame[] = ["relative", "amsl", "terrain"];
 
 export function DrawForm({ draft }: { draft: Draft }) {
   const { scene, geometries, draft: drawn, middle } = useOperating();
@@ -33,7 +35,7 @@ export function DrawForm({ draft }: { draft: Draft }) {
 
   const save = async () => {
     const { name } = draft;
-    const body = { geometry: geometryOf(draft), ...(runOnly.value && run ? { run } : {}) };
+    const body = { geometry: featureOf(draft), ...(runOnly.value && run ? { run } : {}) };
     saving.value = true;
     const done = await attempt(() => put(`/geometries/${encodeURIComponent(name)}`, body));
     saving.value = false;
@@ -66,6 +68,21 @@ export function DrawForm({ draft }: { draft: Draft }) {
             spellcheck={false}
             onInput={(event) => change({ ...draft, name: event.currentTarget.value })}
           />
+        </label>
+        <label>
+          {text.above}
+          <select
+            value={draft.frame}
+            onChange={(event) =>
+              change({ ...draft, frame: event.currentTarget.value as AltitudeFrame })
+            }
+          >
+            {FRAMES.map((frame) => (
+              <option key={frame} value={frame}>
+                {text.frames[frame]}
+              </option>
+            ))}
+          </select>
         </label>
         {run && (
           <label>

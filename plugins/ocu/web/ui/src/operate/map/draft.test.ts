@@ -1,5 +1,15 @@
 import { describe, expect, it } from "vitest";
-import { added, draftOf, emptyDraft, geometryOf, moved, problemOf, removed, undone } from "./draft";
+import {
+  added,
+  draftOf,
+  emptyDraft,
+  featureOf,
+  geometryOf,
+  moved,
+  problemOf,
+  removed,
+  undone,
+} from "./draft";
 
 const at = (latitude: number, longitude: number, altitude: number | null = null) => ({
   latitude,
@@ -38,6 +48,31 @@ describe("draft", () => {
       name: "a",
       kind: "area",
       geometry,
+      altitude_frame: "amsl",
+      from: "fleet",
+      by: "",
+      at_us: null,
+    } as const;
+    expect(featureOf(draftOf(known))).toEqual({
+      type: "Feature",
+      properties: { altitude_frame: "amsl" },
+      geometry,
+    });
+  });
+
+  it("keeps the holes of an area", () => {
+    const ring = [
+      [0, 0],
+      [9, 0],
+      [9, 9],
+      [0, 0],
+    ];
+    const geometry = { type: "Polygon" as const, coordinates: [ring, ring] };
+    const known = {
+      name: "a",
+      kind: "area",
+      geometry,
+      altitude_frame: "relative",
       from: "fleet",
       by: "",
       at_us: null,

@@ -1,9 +1,9 @@
 // A route, area or point while it is drawn.
-import type { Geometry } from "../../shared/types";
+import type { AltitudeFrame, Geometry } from "../../shared/types";
 
 export type Kind = Geometry["kind"];
 
-/** WGS-84 degrees, and metres above mean sea level where somebody gave it. */
+/** WGS-84 degrees, and metres in the draft's frame where somebody gave them. */
 export interface Vertex {
   latitude: number;
   longitude: number;
@@ -13,15 +13,26 @@ export interface Vertex {
 export interface Draft {
   kind: Kind;
   name: string;
+  frame: AltitudeFrame;
   vertices: readonly Vertex[];
+  /** Of an area: what it goes around. They stay as they are. */
+  holes: readonly GeoJSON.Position[][];
   /** Earlier vertices, newest last. */
   before: readonly (readonly Vertex[])[];
 }
 
-export const emptyDraft = (kind: Kind): Draft => ({ kind, name: "", vertices: [], before: [] });
+export const emptyDraft = (kind: Kind): Draft => ({
+  kind,
+  name: "",
+  frame: "relative",
+  vertices: [],
+  holes: [],
+  before: [],
+});
 
-export function draftOf({ kind, name, geometry }: Geometry): Draft {
-  return { kind, name, vertices: verticesOf(geometry), before: [] };
+export function draftOf({ kind, name, geometry, altitude_frame: frame }: Geometry): Draft {
+  const holes = geometry.type === "Polygon" ? geometry.coordinates.slice(1) : [];
+  return { kind, name, frame, vertices: verticesOf(geometry), holes, before: [] };
 }
 
 const changed = (draft: Draft, vertices: readonly Vertex[]): Draft => ({
@@ -64,7 +75,14 @@ export function problemOf({ kind, name, vertices }: Draft): Problem | null {
   return /^[\w.-]{1,100}$/.test(name) ? null : "name";
 }
 
-export function geometryOf({ kind, vertices }: Draft): GeoJSON.Geometry {
+/** As the server takes it: a Feature, which says what its altitudes are above. */
+export const featureOf = (draft: Draft): GeoJSON.Feature => ({
+  type: "Feature",
+  properties: { altitude_frame: draft.frame },
+  geometry: geometryOf(draft),
+});
+
+export function geometryOf({ kind, vertices, holes }: Draft): GeoJSON.Geometry {
   const positions = vertices.map(({ latitude, longitude, altitude }) => {
     const flat = [round(longitude), round(latitude)];
     return altitude === null ? flat : [...flat, altitude];
@@ -75,7 +93,7 @@ export function geometryOf({ kind, vertices }: Draft): GeoJSON.Geometry {
     case "route":
       return { type: "LineString", coordinates: positions };
     case "area":
-      return { type: "Polygon", coordinates: [[...positions, positions[0]!]] };
+      return { type: "Polygon", coordinates: [[...positions, positions[0]!], ...holes] };
   }
 }
 

@@ -3,6 +3,7 @@ import { BpmnModdle } from "bpmn-moddle";
 import vignette1 from "../../../../../../../missions/vignette1.bpmn?raw";
 import { describe, expect, it } from "vitest";
 import { missionModel } from "./missionModel";
+import { drawnAs, keyOf } from "./names";
 import type { Definitions } from "./moddle";
 
 async function modelOf(xml: string, first = "", qualifier = "") {
@@ -108,5 +109,14 @@ describe("mission model", () => {
     const model = await modelOf(vignette1, "VIGNETTE1");
     expect(model.views.map(({ title }) => title)).toEqual(["VIGNETTE1 + DETECTION"]);
     expect(model.viewOf("DETECTION", "DriveRoute")).toBe(model.views[0]);
+  });
+});
+
+describe("names of records", () => {
+  it("are those of the drawing, also where it must have others", () => {
+    expect(drawnAs("sub:1f3c-99")).toBe("sub:_1f3c-99");
+    expect(drawnAs("a~b")).toBe("_a_b");
+    expect(drawnAs("sub:Task_1")).toBe("sub:Task_1");
+    expect(keyOf("P", "9a")).toBe(keyOf("P", "_9a"));
   });
 });

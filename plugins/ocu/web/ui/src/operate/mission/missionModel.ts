@@ -1,7 +1,7 @@
 // A mission as it is shown: its elements as a tree, and the diagrams in which they are drawn.
 import { strings } from "../../strings";
 import type { Collaboration, Definitions, Element, FlowNode, Process } from "./moddle";
-import { keyOf, qualified } from "./names";
+import { drawnAs, keyOf, qualified } from "./names";
 import { viewsOf, type View } from "./views";
 
 export interface MissionNode {
@@ -72,7 +72,7 @@ export function missionModel(sources: readonly MissionSource[], first: string): 
     node: (process, element) => nodes.get(keyOf(process, element)),
     viewOf: (process, element) => viewByElement.get(keyOf(process, element)),
     label: (process, element) => nodes.get(keyOf(process, element))?.label ?? element,
-    definition: (id) => definitions.get(id) ?? id,
+    definition: (id) => definitions.get(id) ?? definitions.get(drawnAs(id)) ?? id,
   };
 }
 

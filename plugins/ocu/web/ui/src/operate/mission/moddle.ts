@@ -1,5 +1,4 @@
-// What is read of a BPMN file as bpmn-moddle gives it.
-import NavigatedViewer from "bpmn-js/lib/NavigatedViewer";
+// What is looked at in a BPMN file, as bpmn-moddle gives it.
 
 export interface Element {
   $type: string;
@@ -45,19 +44,6 @@ export interface Diagram {
 export interface Definitions extends Element {
   rootElements?: Element[];
   diagrams?: Diagram[];
-}
-
-interface Reader {
-  fromXML(xml: string): Promise<{ rootElement: Definitions }>;
-}
-
-export async function readDefinitions(xml: string): Promise<Definitions> {
-  const viewer = new NavigatedViewer();
-  try {
-    return (await viewer.get<Reader>("moddle").fromXML(xml)).rootElement;
-  } finally {
-    viewer.destroy();
-  }
 }
 
 /** The process that contains an element; "": none does. */

@@ -25,9 +25,16 @@ export function SendDialog({ what, onClose }: { what: "signal" | "message"; onCl
       what === "signal" && everywhere.value
         ? "/signals"
         : `/runs/${encodeURIComponent(scene.run)}/${what}s`;
-    if (!(await attempt(() => post(path, { [what]: chosen.value, data: parsed })))) return;
+    const body = { [what]: what === "signal" ? nameOf(chosen.value) : chosen.value, data: parsed };
+    if (!(await attempt(() => post(path, body)))) return;
     toast(fill(text.sent, { name: mission.definition(chosen.value) }), "good");
     onClose();
+  };
+
+  // The drawing may have another id for it than the mission; a name says it as well.
+  const nameOf = (id: string) => {
+    const name = mission.definition(id);
+    return offered.filter((other) => other.name === name).length === 1 ? name : id;
   };
 
   return (

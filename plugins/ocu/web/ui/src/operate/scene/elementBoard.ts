@@ -1,6 +1,7 @@
 // The states of a run's elements. Who draws is told what changed at once; lists that people read
 // are renewed a few times a second (`slow`).
 import { signal, type ReadonlySignal } from "@preact/signals";
+import { keyOf } from "../mission/names";
 import type { Elements, ElementState } from "../../shared/types";
 
 export interface ElementChange {
@@ -8,6 +9,12 @@ export interface ElementChange {
   element: string;
   state: ElementState;
   before: ElementState | undefined;
+}
+
+interface Seen {
+  process: string;
+  element: string;
+  state: ElementState;
 }
 
 type Listener = (changes: ElementChange[]) => void;
@@ -19,7 +26,7 @@ const EACH_MS = 2;
 const IDLE: ElementState = { active: 0, hits: 0, last: 0, failed: false, asking: false };
 
 export class ElementBoard {
-  private states = new Map<string, Map<string, ElementState>>();
+  private readonly states = new Map<string, Seen>();
   private readonly listeners = new Set<Listener>();
   private readonly version = signal(0);
   private timer: ReturnType<typeof setTimeout> | undefined;
@@ -29,14 +36,13 @@ export class ElementBoard {
     return this.version;
   }
 
+  /** By the ids of records, or those of the drawing. */
   get(process: string, element: string): ElementState | undefined {
-    return this.states.get(process)?.get(element);
+    return this.states.get(keyOf(process, element))?.state;
   }
 
   *all(): Generator<[process: string, element: string, state: ElementState]> {
-    for (const [process, states] of this.states) {
-      for (const [element, state] of states) yield [process, element, state];
-    }
+    for (const { process, element, state } of this.states.values()) yield [process, element, state];
   }
 
   listen(listener: Listener): () => void {
@@ -75,12 +81,11 @@ export class ElementBoard {
     state: ElementState,
     changes: ElementChange[],
   ): void {
-    let states = this.states.get(process);
-    if (!states) this.states.set(process, (states = new Map()));
-    const before = states.get(element);
+    const key = keyOf(process, element);
+    const before = this.states.get(key)?.state;
     if (before && same(before, state)) return;
     const kept = { ...state };
-    states.set(element, kept);
+    this.states.set(key, { process, element, state: kept });
     changes.push({ process, element, state: kept, before });
   }
 

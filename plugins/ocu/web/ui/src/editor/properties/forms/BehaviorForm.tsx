@@ -59,7 +59,10 @@ function Parameters({ form, use, meant, write }: ParametersProps) {
   const unknown = use.parameters.filter(({ name }) => !known.some((each) => each.name === name));
   const needed = isNeeded(meant);
   // Sorted when the behavior is chosen, not while values are typed: fields would jump away.
-  const given = useMemo(() => new Set(use.parameters.map(({ name }) => name)), [form.element, use.name]);
+  const given = useMemo(
+    () => new Set(use.parameters.map(({ name }) => name)),
+    [form.element, use.name],
+  );
   const first = known.filter((each) => needed(each) || given.has(each.name));
   const further = known.filter((each) => !first.includes(each));
   const change = (name: string, value: string) => write(withParameter(use, name, value));
@@ -118,7 +121,8 @@ function isNeeded(behavior: Behavior | undefined) {
 function missingGroups(behavior: Behavior | undefined, use: BehaviorUse): string[] {
   const groups = behavior?.required_one_of ?? [];
   const given = new Set(use.parameters.filter((each) => each.value !== "").map(({ name }) => name));
-  if (groups.length === 0 || groups.some((names) => names.every((name) => given.has(name)))) return [];
+  if (groups.length === 0 || groups.some((names) => names.every((name) => given.has(name))))
+    return [];
   return [groups.map((names) => names.map(titleOf).join(words.and)).join(words.or)];
 }
 

@@ -56,7 +56,9 @@ export function CallForm(form: FormProps) {
 function Mappings({ form, direction }: { form: FormProps; direction: Direction }) {
   const call = objectOf(form);
   const mappings = mappingsOf(call, direction);
-  const names = (form.editor.checks.outline.value?.names ?? []).map(({ name }) => ({ value: name }));
+  const names = (form.editor.checks.outline.value?.names ?? []).map(({ name }) => ({
+    value: name,
+  }));
   const write = (next: Mapping[]) =>
     apply(form, setMappings(factoryOf(form), call, direction, next));
   return (

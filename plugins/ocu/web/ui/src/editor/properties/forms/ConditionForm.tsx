@@ -8,7 +8,12 @@ import { factoryOf, objectOf, set, type FormProps } from "../form";
 import { ExpressionField } from "./ExpressionField";
 
 const words = strings.editor.condition;
-const CHOOSING = ["bpmn:ExclusiveGateway", "bpmn:InclusiveGateway", "bpmn:ComplexGateway", "bpmn:Activity"];
+const CHOOSING = [
+  "bpmn:ExclusiveGateway",
+  "bpmn:InclusiveGateway",
+  "bpmn:ComplexGateway",
+  "bpmn:Activity",
+];
 
 /** Whether a condition may stand on a flow. */
 export function isConditional(flow: ModdleElement): boolean {

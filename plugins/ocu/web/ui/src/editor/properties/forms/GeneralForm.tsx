@@ -75,7 +75,16 @@ function IdField({ form, target, label }: IdProps) {
       set(form, target, { id: said });
     }
   };
-  return <TextField id={`m2-id-${label}`} label={label} mono value={id} hint={words.idHint} write={write} />;
+  return (
+    <TextField
+      id={`m2-id-${label}`}
+      label={label}
+      mono
+      value={id}
+      hint={words.idHint}
+      write={write}
+    />
+  );
 }
 
 interface Ids {

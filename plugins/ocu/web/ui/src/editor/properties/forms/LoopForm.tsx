@@ -54,7 +54,9 @@ export function LoopForm(form: FormProps) {
         label={words.cardinality}
         mono
         value={cardinality}
-        error={cardinality && counted ? words.both : !cardinality && !counted ? words.neither : undefined}
+        error={
+          cardinality && counted ? words.both : !cardinality && !counted ? words.neither : undefined
+        }
         hint={words.cardinalityHint}
         write={writeExpression("loopCardinality")}
       />

@@ -52,7 +52,8 @@ export function ParameterField({ editor, parameter, value, write, error }: Param
 function suggestionsOf(catalogue: Catalogue, parameter: Parameter): Suggestion[] {
   const { kind } = parameter;
   if (parameter.choices.length > 0) return parameter.choices.map((value) => ({ value }));
-  if (kind === "boolean") return ["true", "false"].map((value) => ({ value, label: words[value as "true"] }));
+  if (kind === "boolean")
+    return ["true", "false"].map((value) => ({ value, label: words[value as "true"] }));
   if (kind === "position") return [...geometries(catalogue, "point"), ...vehicles(catalogue)];
   if (kind === "vehicle") return vehicles(catalogue);
   return GEOMETRIES.includes(kind) ? geometries(catalogue, kind) : [];
@@ -121,11 +122,7 @@ function Coordinates({ editor, parameter, value, write }: ParameterFieldProps) {
     const { lat, lon, alt } = editor.catalogue.fleet.origin;
     void alt;
     return (
-      <button
-        type="button"
-        class="m2-link-button"
-        onClick={() => write(`[${lat}, ${lon}, 0]`)}
-      >
+      <button type="button" class="m2-link-button" onClick={() => write(`[${lat}, ${lon}, 0]`)}>
         {words.useCoordinates}
       </button>
     );

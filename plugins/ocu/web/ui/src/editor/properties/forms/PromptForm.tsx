@@ -1,7 +1,13 @@
 // What a user task asks the operators, and what they may answer.
 import { fill, strings } from "../../../strings";
 import { text } from "../../moddle/moddle";
-import { DEFAULT_STORE, promptOf, setPrompt, type Decision, type PromptUse } from "../../moddle/prompts";
+import {
+  DEFAULT_STORE,
+  promptOf,
+  setPrompt,
+  type Decision,
+  type PromptUse,
+} from "../../moddle/prompts";
 import { ComboField } from "../fields/ComboField";
 import { TextField } from "../fields/TextField";
 import { apply, factoryOf, objectOf, type FormProps } from "../form";
@@ -20,7 +26,9 @@ export function PromptForm(form: FormProps) {
   return (
     <>
       {carrier !== task && (
-        <p class="m2-note">{fill(words.inDataObject, { name: text(carrier, "name") || text(carrier, "id") })}</p>
+        <p class="m2-note">
+          {fill(words.inDataObject, { name: text(carrier, "name") || text(carrier, "id") })}
+        </p>
       )}
       <TextField
         id="m2-prompt"
@@ -124,7 +132,10 @@ function newDecision(all: readonly Decision[]): Decision {
 
 /** "Take route B!" as a value: take_route_b. */
 export function valueFrom(label: string): string {
-  const joined = label.trim().toLowerCase().replace(/[^\p{L}\p{N}]+/gu, "_");
+  const joined = label
+    .trim()
+    .toLowerCase()
+    .replace(/[^\p{L}\p{N}]+/gu, "_");
   return joined.replace(/^_+|_+$/g, "");
 }
 

@@ -47,7 +47,9 @@ function ReferenceFields({ form, reference, index }: ReferenceProps) {
         required={kind === "signal" || kind === "message"}
         value={root ? shownName(kind, root) : ""}
         suggestions={suggestionsOf(definitions, kind)}
-        hint={catchesAll(objectOf(form), kind) && !root ? words.catchesAll[kind as "error"] : words.hint}
+        hint={
+          catchesAll(objectOf(form), kind) && !root ? words.catchesAll[kind as "error"] : words.hint
+        }
         write={(name) => refer(form, reference, name.trim())}
       />
       {root && <RootFields form={form} kind={kind} root={root} index={index} />}
@@ -55,7 +57,17 @@ function ReferenceFields({ form, reference, index }: ReferenceProps) {
   );
 }
 
-function RootFields({ form, kind, root, index }: { form: FormProps; kind: RootKind; root: ModdleElement; index: number }) {
+function RootFields({
+  form,
+  kind,
+  root,
+  index,
+}: {
+  form: FormProps;
+  kind: RootKind;
+  root: ModdleElement;
+  index: number;
+}) {
   const { code } = ROOT_TYPES[kind];
   const write = (properties: Record<string, unknown>) => set(form, root, properties);
   return (

@@ -1,13 +1,7 @@
 // Who does what a task commands: roles, each with a vehicle, a payload or a team.
 import { fill, strings } from "../../../strings";
 import { roleName } from "../../blocks/blocks";
-import {
-  behaviorOf,
-  serviceOf,
-  setBehavior,
-  setService,
-  type Role,
-} from "../../moddle/behavior";
+import { behaviorOf, serviceOf, setBehavior, setService, type Role } from "../../moddle/behavior";
 import type { Candidate, Catalogue } from "../../session/catalogue";
 import { CheckField, SelectField, type Option } from "../fields/SelectField";
 import { TextField } from "../fields/TextField";
@@ -26,7 +20,8 @@ export function RolesForm(form: FormProps) {
   const write = (next: Role[]) => {
     const factory = factoryOf(form);
     if (behavior) apply(form, setBehavior(factory, task, { ...behavior, roles: next }));
-    else apply(form, setService(factory, task, { name: "", parameters: [], ...service, roles: next }));
+    else
+      apply(form, setService(factory, task, { name: "", parameters: [], ...service, roles: next }));
   };
   const change = (index: number, role: Role) => write(roles.with(index, role));
   return (
@@ -80,7 +75,8 @@ function candidatesOf(form: FormProps): Candidate[] {
     );
     return sameName.flatMap((each) => catalogue.candidates(each));
   }
-  if (behavior) return (["vehicle", "payload", "team"] as const).flatMap((kind) => catalogue.everybody(kind));
+  if (behavior)
+    return (["vehicle", "payload", "team"] as const).flatMap((kind) => catalogue.everybody(kind));
   const isDetector = serviceOf(objectOf(form))?.name === "Detector";
   return isDetector
     ? catalogue.detectors()
@@ -121,5 +117,7 @@ function errorOf(
   const { vehicles, payloads, teams } = catalogue.fleet;
   const known = [...vehicles, ...payloads].some(({ id }) => id === role.resource);
   const isTeam = teams.some(({ name }) => name === role.resource);
-  return known || isTeam ? fill(words.unfit, { id: role.resource }) : fill(words.unknown, { id: role.resource });
+  return known || isTeam
+    ? fill(words.unfit, { id: role.resource })
+    : fill(words.unknown, { id: role.resource });
 }

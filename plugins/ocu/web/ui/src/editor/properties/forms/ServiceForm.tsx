@@ -27,7 +27,9 @@ export function ServiceForm(form: FormProps) {
           note: writes.length ? fill(words.writes, { names: writes.join(", ") }) : "",
         }))}
         error={use.name && !known ? fill(words.unknown, { name: use.name }) : undefined}
-        hint={known?.writes.length ? fill(words.writes, { names: known.writes.join(", ") }) : undefined}
+        hint={
+          known?.writes.length ? fill(words.writes, { names: known.writes.join(", ") }) : undefined
+        }
         write={(name) => write({ ...use, name: name.trim() })}
       />
       <Rows
