@@ -228,3 +228,16 @@ async def test_keys_typed_into_a_field_are_for_the_field(browsing: Browsing, key
     await page.get_by_label("Documentation").press(key)
     await expect(page.locator("[data-element-id=Reverse]")).to_have_count(1)
     await expect(page.locator(".djs-popup")).to_have_count(0)
+
+
+async def test_a_mission_that_somebody_removed_is_saved_again_only_when_asked(
+    browsing: Browsing,
+) -> None:
+    page = await browsing.edit("vignette1")
+    await renamed(page, "MINE")
+    (browsing.served.missions / "vignette1.bpmn").unlink()
+    await page.get_by_role("button", name="Save", exact=True).click()
+    await page.get_by_role("button", name="Save it again").click()
+    await expect(page.locator(SAVED)).to_have_text("Saved")
+    assert "MINE" in (browsing.served.missions / "vignette1.bpmn").read_text()
+    browsing.faults[:] = [fault for fault in browsing.faults if "409" not in fault]

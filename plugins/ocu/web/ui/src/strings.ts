@@ -74,7 +74,7 @@ export const strings = {
       title: "New mission",
       name: "Name",
       nameHint: "Letters, digits, spaces, - _ .",
-      badName: "A name begins with a letter or digit and has letters, digits, spaces, - _ . only.",
+      badName: "A name has letters, digits, spaces, - _ . only, and neither begins nor ends with a point.",
       taken: "There is a mission of that name already.",
       begin: "Begin with",
       empty: "An empty page",
@@ -412,6 +412,8 @@ export const strings = {
       theirs: "Take theirs, drop mine",
       overwrite: "Save mine as the newest version",
       kept: "Versions are kept: nothing is lost either way.",
+      gone: "Somebody removed this mission after you had opened it.",
+      again: "Save it again",
       name: "New name",
     },
     recovery: {

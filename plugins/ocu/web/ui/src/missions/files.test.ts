@@ -6,7 +6,7 @@ describe("names of missions", () => {
   it("are names of files without a path", () => {
     for (const name of ["vignette1", "Bridge 2", "a.b-c_d", "Brücke"])
       expect(isName(name)).toBe(true);
-    for (const name of ["", ".hidden", "a/b", "..", "a ", "-x", "x".repeat(101)]) {
+    for (const name of ["", ".hidden", "a/b", "..", "a ", "a.", "a.bpmn", "x".repeat(101)]) {
       expect(isName(name)).toBe(false);
     }
   });

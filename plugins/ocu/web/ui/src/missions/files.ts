@@ -12,8 +12,9 @@ export interface Version extends SavedVersion {
   number: number;
 }
 
+/** `current`: what somebody else saved meanwhile; null: somebody removed it. */
 export type Outcome =
-  { kind: "saved"; saved: SavedVersion } | { kind: "conflict"; current: SavedVersion };
+  { kind: "saved"; saved: SavedVersion } | { kind: "conflict"; current: SavedVersion | null };
 
 const path = (mission: string) => `/missions/${encodeURIComponent(mission)}`;
 
@@ -22,9 +23,9 @@ export const versionsOf = (mission: string) => get<Version[]>(`${path(mission)}/
 export const openVersion = (mission: string, number: number) =>
   get<MissionFile>(`${path(mission)}/versions/${number}`);
 
-/** A file as the editor can take it: with a diagram for every process, say. */
-export const makeEditable = (xml: string) =>
-  post<{ xml: string; notes: string[] }>("/editable", { xml });
+/** A file as the editor can take it. `layout`: with everything in a new place. */
+export const makeEditable = (xml: string, layout = false) =>
+  post<{ xml: string; notes: string[] }>("/editable", { xml, layout });
 
 /** `base`: the version that it was drawn from; null: there must be none of that name. */
 export async function saveMission(
@@ -36,24 +37,25 @@ export async function saveMission(
     return { kind: "saved", saved: await put<SavedVersion>(path(mission), { xml, base }) };
   } catch (error) {
     if (error instanceof ApiError && error.status === 409) {
-      const current = error.problem.current as SavedVersion | undefined;
-      if (current) return { kind: "conflict", current };
+      const current = error.problem.current as SavedVersion | null | undefined;
+      if (current !== undefined) return { kind: "conflict", current };
     }
     throw error;
   }
 }
 
-const NAME = /^[\p{L}\p{N}][\p{L}\p{N} ._-]{0,99}$/u;
+const NAME = /^[\p{L}\p{N}_-][\p{L}\p{N}_. -]{0,99}$/u;
+const BAD_END = /[ .]$|\.bpmn$/i;
 
 export function isName(name: string): boolean {
-  return NAME.test(name) && !name.endsWith(" ");
+  return NAME.test(name) && !BAD_END.test(name);
 }
 
 /** "My mission.bpmn" of somebody's disk as the name of a mission. */
 export function nameOfFile(file: string): string {
   const stem = file.replace(/(\.bpmn20)?\.(bpmn2?|xml)$/i, "");
   const clean = stem.replace(/[^\p{L}\p{N} ._-]/gu, "_").replace(/^[^\p{L}\p{N}]+/u, "");
-  return clean.slice(0, 100).trim() || "mission";
+  return clean.slice(0, 100).replace(/[ .]+$/, "") || "mission";
 }
 
 export function freeName(name: string, taken: readonly string[]): string {

@@ -40,33 +40,37 @@ export function Questions({ work }: { work: MissionWork }) {
 }
 
 function Conflict({ work, question, close }: QuestionProps<"conflict">) {
-  const { by, saved_at_us } = question.current;
-  const at = moment(saved_at_us / 1000);
+  const { current } = question;
+  const text = current
+    ? fill(words.conflict.text, { by: current.by || "?", at: moment(current.saved_at_us / 1000) })
+    : words.conflict.gone;
   return (
     <Dialog
       title={words.conflict.title}
       onClose={close}
       actions={
         <>
+          {current && (
+            <button
+              type="button"
+              class="secondary"
+              onClick={() => {
+                close();
+                void work.takeTheirs();
+              }}
+            >
+              {words.conflict.theirs}
+            </button>
+          )}
           <button
             type="button"
             class="secondary"
             onClick={() => {
               close();
-              void work.takeTheirs();
+              void work.overwrite(current);
             }}
           >
-            {words.conflict.theirs}
-          </button>
-          <button
-            type="button"
-            class="secondary"
-            onClick={() => {
-              close();
-              void work.overwrite(question.current);
-            }}
-          >
-            {words.conflict.overwrite}
+            {current ? words.conflict.overwrite : words.conflict.again}
           </button>
           <button
             type="button"
@@ -78,7 +82,7 @@ function Conflict({ work, question, close }: QuestionProps<"conflict">) {
         </>
       }
     >
-      <p>{fill(words.conflict.text, { by: by || "?", at })}</p>
+      <p>{text}</p>
       <p class="m2-note">{words.conflict.kept}</p>
     </Dialog>
   );

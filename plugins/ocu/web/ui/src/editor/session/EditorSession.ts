@@ -1,5 +1,7 @@
 // One mission that is being drawn: the modeler, and what the page shows of its state.
 import { signal } from "@preact/signals";
+import { post } from "../../shared/api";
+import type { Check } from "../../shared/types";
 import type { EditorContext } from "../panels/panel";
 import type { Catalogue } from "./catalogue";
 import { Checks } from "./checks";
@@ -31,7 +33,10 @@ export class EditorSession implements EditorContext {
     private readonly saving: () => Promise<boolean>,
   ) {
     this.modeler = makeModeler(catalogue, { editorContext: ["value", this] });
-    this.checks = new Checks(() => this.xml());
+    this.checks = new Checks(
+      () => this.xml(),
+      (xml) => post<Check>("/checks", { xml, mission }),
+    );
     this.diagrams = new Diagrams(this.modeler, () => this.detachFromStack());
     this.locator = new Locator(this.modeler, this.diagrams);
     this.marks = new Marks(this.modeler);

@@ -20,7 +20,7 @@ import {
 const words = strings.editor;
 
 export type Question =
-  | { kind: "conflict"; current: SavedVersion }
+  | { kind: "conflict"; current: SavedVersion | null }
   | { kind: "recovery"; draft: Draft; isOlder: boolean }
   | { kind: "versions" }
   | { kind: "saveAs" }
@@ -87,8 +87,8 @@ export class MissionWork {
   }
 
   /** Over a version that somebody else saved: theirs is kept as an older one. */
-  async overwrite(current: SavedVersion): Promise<boolean> {
-    return this.put(this.mission, current.version);
+  async overwrite(current: SavedVersion | null): Promise<boolean> {
+    return this.put(this.mission, current?.version ?? null);
   }
 
   /** Under a name that is free: the page goes there. */
@@ -129,8 +129,7 @@ export class MissionWork {
   /** New places for everything. */
   async layOut(): Promise<void> {
     const before = await this.session.xml();
-    const bare = before.replace(/<(\w+:)?BPMNDiagram\b[\s\S]*<\/\1BPMNDiagram>/, "");
-    const { xml } = await makeEditable(bare);
+    const { xml } = await makeEditable(before, true);
     await this.session.open(xml, false);
     this.putBack.value = () => this.session.open(before, false);
   }
