@@ -1,8 +1,11 @@
 """The operator page in a real browser: questions, STOP, colours, drawing, and runs of the past."""
 
+import asyncio
 import re
+from collections.abc import AsyncIterator
 
-from browser_world import WITHIN_MS, Browsing
+import pytest
+from browser_world import WITHIN_MS, WITHIN_S, Browsing
 from playwright.async_api import Locator, Page, WebSocketRoute, expect
 
 expect.set_options(timeout=WITHIN_MS)
@@ -44,6 +47,21 @@ async def start(browsing: Browsing, page: Page | None = None) -> Page:
     await expect(page.get_by_role("alertdialog")).to_be_focused()
     await page.wait_for_selector(".glow")
     return page
+
+
+@pytest.fixture(autouse=True)
+async def released(browsing: Browsing) -> AsyncIterator[None]:
+    """Others shall find no run, and all vehicles free."""
+    yield
+    page = await browsing.begin()
+    await ask(page, "POST", "/api/stop", {"reason": "the test is over"})
+    async with asyncio.timeout(WITHIN_S):
+        while True:
+            answer = await ask(page, "GET", "/api/resources")
+            assert isinstance(answer, dict)
+            if not any(answer["holders"].values()):
+                break
+            await asyncio.sleep(0.1)
 
 
 def active(page: Page, name: str) -> Locator:

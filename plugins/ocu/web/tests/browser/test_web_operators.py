@@ -1,7 +1,7 @@
 """Several named operators at the same executive: who may what, and who was first."""
 
 import re
-from collections.abc import AsyncIterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,14 +17,15 @@ PASSWORD = "correct horse"
 
 
 @pytest.fixture
-async def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Served]:
+def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
     """A server that knows anna (commander), bob (operator) and vera (viewer)."""
     users = tmp_path / "users.json"
     hashed = hash_password(PASSWORD)
     roles = {"anna": Role.COMMANDER, "bob": Role.OPERATOR, "vera": Role.VIEWER}
     write_users(users, {name: User(role, hashed) for name, role in roles.items()})
     monkeypatch.setenv("M2PEM_WEB_USERS", str(users))
-    async with serving(tmp_path) as server:
+    with serving(tmp_path) as server:
+        server.tidy()
         yield server
 
 

@@ -7,9 +7,11 @@ export interface PaneProps {
   tools?: ComponentChildren;
   children: ComponentChildren;
   class?: string;
+  /** What is in it may be longer than it: the keyboard scrolls it. */
+  scrolls?: boolean;
 }
 
-export function Pane({ title, tools, children, class: more = "" }: PaneProps) {
+export function Pane({ title, tools, children, class: more = "", scrolls = false }: PaneProps) {
   const id = useId();
   return (
     <section class={`pane ${more}`} aria-labelledby={id}>
@@ -17,7 +19,13 @@ export function Pane({ title, tools, children, class: more = "" }: PaneProps) {
         <h2 id={id}>{title}</h2>
         {tools}
       </header>
-      <div class="pane-body">{children}</div>
+      {scrolls ? (
+        <div class="pane-body" role="group" aria-labelledby={id} tabIndex={0}>
+          {children}
+        </div>
+      ) : (
+        <div class="pane-body">{children}</div>
+      )}
     </section>
   );
 }

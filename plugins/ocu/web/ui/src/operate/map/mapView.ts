@@ -21,6 +21,9 @@ export interface MapListener {
 const OF_FLEET = "#56687a";
 const OF_OPERATOR = "#8347c7";
 const FENCE = "#c2262e";
+/** From how large on a geometry's name is shown. */
+const NAMED_PX = 120;
+const NAMED_ZOOM = 17;
 const DRAFT = "#0b63ce";
 
 export class MapView {
@@ -62,6 +65,7 @@ export class MapView {
       L.geoJSON(fleet.fence, { style }).addTo(this.map);
     }
     this.geometries.addTo(this.map);
+    this.map.on("zoomend", () => this.nameGeometries());
     this.drafted.addTo(this.map);
     this.vehicles = new VehicleLayer(this.map, fleet, (resource) => listener.chosen(resource));
     this.map.on("click", ({ latlng }) => {
@@ -84,6 +88,20 @@ export class MapView {
         .bindTooltip(geometry.name, { permanent: true, direction: "center", className: "map-name" })
         .addTo(this.geometries);
     }
+    this.nameGeometries();
+  }
+
+  /** Names of what is small would lie on top of each other. */
+  private nameGeometries(): void {
+    this.geometries.eachLayer((layer) => {
+      if (!(layer instanceof L.GeoJSON)) return;
+      const bounds = layer.getBounds();
+      const from = this.map.latLngToLayerPoint(bounds.getNorthWest());
+      const size = from.distanceTo(this.map.latLngToLayerPoint(bounds.getSouthEast()));
+      const isPoint = bounds.getNorthWest().equals(bounds.getSouthEast());
+      const named = isPoint ? this.map.getZoom() >= NAMED_ZOOM : size >= NAMED_PX;
+      layer.getTooltip()?.getElement()?.classList.toggle("map-unnamed", !named);
+    });
   }
 
   turnGeometries(on: boolean): void {

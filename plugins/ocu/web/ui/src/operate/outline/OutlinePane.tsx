@@ -147,11 +147,7 @@ function Item({ row, state, selected, reached, onKeyDown, onClick, onTurn }: Ite
         </i>
       )}
       <span class="name">{node.label}</span>
-      {state && state.hits > 0 && (
-        <span class="hits" aria-hidden="true">
-          {state.hits}
-        </span>
-      )}
+      {state && state.hits > 0 && <span class="hits" data-hits={state.hits} />}
     </li>
   );
 }

@@ -74,6 +74,7 @@ export function TimelinePane({ onSeek }: { onSeek?: ((t: number) => void) | unde
     <Pane
       title={strings.operate.panes.timeline}
       class="timeline-pane"
+      scrolls
       tools={
         <div class="tools">
           <button

@@ -27,7 +27,7 @@ export function VehiclesPane() {
   // Ages grow without anything being told.
   usePaced(scene.time, 1000);
   return (
-    <Pane title={strings.operate.panes.vehicles} class="vehicles-pane">
+    <Pane title={strings.operate.panes.vehicles} class="vehicles-pane" scrolls>
       {fleet.vehicles.length === 0 && <p class="nothing">{text.none}</p>}
       <ul class="cards">
         {fleet.vehicles.map((vehicle) => (
