@@ -171,6 +171,15 @@ class Drawing:
         await self.put_down(x, y)
         return await self.flow(source, target)
 
+    async def bend(self, source: str, target: str, x: float, y: float, to_y: float) -> None:
+        """Drag a piece of a flow, at a place, up or down."""
+        await self.select_flow(source, target)
+        await self.page.mouse.move(x, y)
+        await self.page.mouse.down()
+        await self.page.mouse.move(x, (y + to_y) / 2, steps=4)
+        await self.page.mouse.move(x, to_y, steps=4)
+        await self.page.mouse.up()
+
     async def condition(self, source: str, target: str, text: str, name: str = "") -> None:
         """Say when a flow is taken."""
         await self.select_flow(source, target)

@@ -95,4 +95,7 @@ async def draw_detection(drawing: Drawing) -> None:
     await drawing.drag(driven, (await drawing.centre(detected))[0], 290)
     await drawing.condition(source, throw, "detection.type == 'gpr'", "gpr")
     await drawing.connect(source, detector)
+    x, y = await drawing.centre(detector)
+    # Beside the menu of the flow, which lies next to its end.
+    await drawing.bend(source, detector, x + 128, y, (await drawing.centre(source))[1])
     await drawing.condition(source, detector, "detection.type != 'gpr'", "other")
