@@ -250,6 +250,17 @@ PROGRAMS = (
             Goal("alone_cpu_percent", "the same without the page, of a core", "%"),
         ),
     ),
+    Program(
+        "The same, looked at in Chromium as well, which draws without a graphics card",
+        ("web_page", "60"),
+        ("web_page", "2"),
+        (
+            Goal("fps", "the page, pictures drawn", "/s", 25, at_least=True),
+            Goal("told_per_s", "the page, frames told to it", "/s", 20, at_least=True),
+            Goal("per_s", "the page, token events, all of them counted", "/s"),
+            Goal("longest_ms", "the page, the longest time between two pictures", "ms"),
+        ),
+    ),
     _ros_command("memory", 3),
     _ros_command("sqlite", None),
     _team_orders("memory"),

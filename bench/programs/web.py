@@ -32,6 +32,8 @@ TOKENS = 2
 """In each ring."""
 ROUND_S = 0.1
 """In which each token passes 20 elements: 30 * 20 * 2 / 0.1 = 12,000 token events in a second."""
+SPREAD_S = 0.003
+"""From ring to ring, around that: else all would flash at once, and nothing between."""
 
 WARM_S = 0.5
 
@@ -42,11 +44,12 @@ def mission() -> bytes:
     for ring in range(RINGS):
         tasks = [f"t{ring}_{number}" for number in range(TASKS)]
         meet, timer = f"m{ring}", f"w{ring}"
+        round_s = ROUND_S + (ring - RINGS // 2) * SPREAD_S
         parts.append(f'<exclusiveGateway id="{meet}"/>')
         parts += [f'<task id="{task}"/>' for task in tasks]
         parts.append(
             f'<intermediateCatchEvent id="{timer}"><timerEventDefinition id="d{ring}">'
-            f'<timeDuration xsi:type="tFormalExpression">PT{ROUND_S}S</timeDuration>'
+            f'<timeDuration xsi:type="tFormalExpression">PT{round_s:.3f}S</timeDuration>'
             "</timerEventDefinition></intermediateCatchEvent>"
         )
         parts.append(flows([meet, *tasks, timer, meet]))
@@ -59,7 +62,10 @@ def mission() -> bytes:
 
 @asynccontextmanager
 async def watched(running: Executive, run: str, folder: Path) -> AsyncIterator[Any]:
-    """Serve the page and have it looked at; what is yielded waits for what the browsers say."""
+    """Serve the page and have it looked at.
+
+    Yields what waits for the browsers' answer, and what says at which address one more comes in.
+    """
     environment = {"M2PEM_WEB_PORT": "0", "XDG_STATE_HOME": str(folder)}
     ocu = WebOcu(running.control, environment=environment)
     url = ocu.url
@@ -79,7 +85,7 @@ async def watched(running: Executive, run: str, folder: Path) -> AsyncIterator[A
             if browsers.returncode is not None:
                 raise RuntimeError("the browsers did not come")
             await asyncio.sleep(0.02)
-        yield said
+        yield said, lambda: ocu.url
     finally:
         serving.cancel()
         with suppress(asyncio.CancelledError):
@@ -93,7 +99,7 @@ async def turn(running: Executive, seconds: float, folder: Path | None) -> dict[
     async with AsyncExitStack() as stack:
         said = None
         if folder is not None:
-            said = await stack.enter_async_context(watched(running, run, folder))
+            said, _ = await stack.enter_async_context(watched(running, run, folder))
         await asyncio.sleep(WARM_S)
         state = running.runners[run].run.state
         seq, began, cpu_s = state.seq, time.perf_counter(), time.process_time()

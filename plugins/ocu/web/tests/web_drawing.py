@@ -171,14 +171,13 @@ class Drawing:
         await self.put_down(x, y)
         return await self.flow(source, target)
 
-    async def bend(self, source: str, target: str, down: float) -> None:
-        """Drag a straight flow away from others that lie on it."""
-        flow = await self.select_flow(source, target)
-        x, y = await self.element(flow).locator(".djs-hit").first.evaluate(ON_LINE)
+    async def bend(self, source: str, target: str, x: float, y: float, to_y: float) -> None:
+        """Drag a piece of a flow, at a place, up or down."""
+        await self.select_flow(source, target)
         await self.page.mouse.move(x, y)
         await self.page.mouse.down()
-        await self.page.mouse.move(x, y + down / 2, steps=4)
-        await self.page.mouse.move(x, y + down, steps=4)
+        await self.page.mouse.move(x, (y + to_y) / 2, steps=4)
+        await self.page.mouse.move(x, to_y, steps=4)
         await self.page.mouse.up()
 
     async def condition(self, source: str, target: str, text: str, name: str = "") -> None:
@@ -194,7 +193,7 @@ class Drawing:
         await expect(self.page.locator(SAVED)).to_have_text("Saved")
 
 
-# On a line where no label lies on it, as in its middle.
+# A quarter of the way along a line: in the middle, a label may lie on it.
 ON_LINE = """(line) => {
   const length = line.getTotalLength();
   const at = line.getPointAtLength(length / 4).matrixTransform(line.getScreenCTM());

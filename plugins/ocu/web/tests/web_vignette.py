@@ -41,7 +41,7 @@ async def draw_main(drawing: Drawing) -> Mission:
     x, y = await drawing.centre(caught)
     await drawing.drag(f"{caught}_label", x + 65, y + 25)
     x, _ = await drawing.centre(ask)
-    reverse = await drawing.block("Reverse", x, 600, "REVERSE")
+    reverse = await drawing.block("Reverse", x + 6, 600, "REVERSE")
     await drawing.fill("Distance", "10 m")
     await drawing.who("evsg1")
     await drawing.connect(caught, reverse)
@@ -67,6 +67,9 @@ async def draw_detection(drawing: Drawing) -> None:
     detector = await drawing.append(fork, "Detector", "DETECTOR")
     await drawing.drag(detector, 600, 560)
     source = await drawing.append(detector, "Exclusive gateway", "Source?")
+    # Lower, so that the way back does not lie on the way there.
+    x, y = await drawing.centre(source)
+    await drawing.drag(source, x + 20, y + 110)
     throw = await drawing.append(source, "Signal intermediate throw event", "stop")
     await drawing.fill("Signal", STOP)
     x, _ = await drawing.centre(detector)
@@ -92,5 +95,7 @@ async def draw_detection(drawing: Drawing) -> None:
     await drawing.drag(driven, (await drawing.centre(detected))[0], 290)
     await drawing.condition(source, throw, "detection.type == 'gpr'", "gpr")
     await drawing.connect(source, detector)
-    await drawing.bend(source, detector, 80)
+    x, y = await drawing.centre(detector)
+    # Beside the menu of the flow, which lies next to its end.
+    await drawing.bend(source, detector, x + 128, y, (await drawing.centre(source))[1])
     await drawing.condition(source, detector, "detection.type != 'gpr'", "other")
