@@ -16,7 +16,7 @@ FLEETS = {
     "team_column": "mehds_mixed",
     "vignette1": "vignette1",
 }
-"""By mission of the folder `missions`."""
+"""By mission of the folder `missions`: the fleet of `fleet_configs` that it is flown with."""
 
 TASKS = 3
 """Of a branch."""

@@ -136,6 +136,10 @@ class Variable:
     """The name in the data store; `name` also says whose it is, in a called process."""
 
 
+UNDOES, UNDONE = "is undone", "has been undone"
+"""Details of steps: an activity that has completed begins to be undone, or that is over."""
+
+
 class Action(StrEnum):
     """What happens to an element in a step."""
 

@@ -105,7 +105,7 @@ def test_a_formula_in_the_mission_is_pointed_at_too(invoke: Invoke, tmp_path: Pa
         (
             "t06_timers",
             "1 place",
-            "note: EveryMinute (every minute): it comes again only when what it began has ended; "
+            "note: EveryMinute (every minute): it begins again only when it has ended; "
             "what holds, holds up to that",
         ),
         (

@@ -6,23 +6,8 @@ from types import SimpleNamespace
 
 from m2pem.verify.explore import Exploration, Limits, explore
 from m2pem.verify.labels import Labels
+from m2pem.verify.ltl import formula as f
 from m2pem.verify.ltl import propositions
-from m2pem.verify.ltl.formula import (
-    Active,
-    Always,
-    And,
-    Completed,
-    Count,
-    Eventually,
-    Formula,
-    Implies,
-    Not,
-    Once,
-    Or,
-    Since,
-    Until,
-    WeakUntil,
-)
 from m2pem.verify.mission_runs import MissionRuns
 from m2pem.verify.product import Result, check
 from m2pem.verify.reduction import StubbornSets
@@ -34,7 +19,7 @@ NO_FEWER = Limits(states=2 * FEW.states, tokens=3, seconds=1e9)
 """For what must be seen whole: a search may see a few more than its limit before it stops."""
 
 
-def atoms_of(dice: Random, system: System, count: int = 3) -> list[Formula]:
+def atoms_of(dice: Random, system: System, count: int = 3) -> list[f.Formula]:
     """Some things that may be true in the system."""
     active = sorted({p.element for p in system.places if p.role is not Role.END})
     done = [
@@ -43,36 +28,36 @@ def atoms_of(dice: Random, system: System, count: int = 3) -> list[Formula]:
         for step in rule.steps
         if step.action is Action.COMPLETED and (rule.kind is Kind.OUTSIDE or dice.random() < 0.3)
     ]
-    found: list[Formula] = []
+    found: list[f.Formula] = []
     for _ in range(count):
         if done and dice.random() < 0.7:
-            found.append(Completed(dice.choice(sorted(done))))
+            found.append(f.Completed(dice.choice(sorted(done))))
         else:
-            found.append(Active(dice.choice(active)))
+            found.append(f.Active(dice.choice(active)))
     return found
 
 
-def formula_of(dice: Random, atoms: list[Formula], depth: int = 3) -> Formula:
+def formula_of(dice: Random, atoms: list[f.Formula], depth: int = 3) -> f.Formula:
     """A random formula in which no single steps are told apart; some that people write."""
     a, b, c = (dice.choice(atoms) for _ in range(3))
     if depth == 3 and dice.random() < 0.5:
         return dice.choice(
             (
-                Always(Implies(a, Eventually(b))),
-                WeakUntil(Not(a), b),
-                Always(Not(And((a, b)))),
-                Eventually(a),
-                Eventually(And((a, Eventually(b)))),
-                Always(Implies(a, Always(Not(b)))),
-                Always(Implies(a, Always(Not(b)))),
-                Always(Eventually(a)),
-                Eventually(Always(Not(a))),
-                Always(Implies(a, WeakUntil(Not(b), c))),
-                Always(Implies(a, Once(b))),
-                Implies(Always(Eventually(a)), Always(Eventually(b))),
-                Always(Implies(a, Or((Eventually(b), Always(c))))),
-                Always(Implies(a, Since(Not(b), c))),
-                Always(Count((a,), "<=", 1)),
+                f.Always(f.Implies(a, f.Eventually(b))),
+                f.WeakUntil(f.Not(a), b),
+                f.Always(f.Not(f.And((a, b)))),
+                f.Eventually(a),
+                f.Eventually(f.And((a, f.Eventually(b)))),
+                f.Always(f.Implies(a, f.Always(f.Not(b)))),
+                f.Always(f.Implies(a, f.Always(f.Not(b)))),
+                f.Always(f.Eventually(a)),
+                f.Eventually(f.Always(f.Not(a))),
+                f.Always(f.Implies(a, f.WeakUntil(f.Not(b), c))),
+                f.Always(f.Implies(a, f.Once(b))),
+                f.Implies(f.Always(f.Eventually(a)), f.Always(f.Eventually(b))),
+                f.Always(f.Implies(a, f.Or((f.Eventually(b), f.Always(c))))),
+                f.Always(f.Implies(a, f.Since(f.Not(b), c))),
+                f.Always(f.Count((a,), "<=", 1)),
             )
         )
     if not depth or dice.random() < 0.15:
@@ -80,16 +65,16 @@ def formula_of(dice: Random, atoms: list[Formula], depth: int = 3) -> Formula:
     one, other = (formula_of(dice, atoms, depth - 1) for _ in range(2))
     return dice.choice(
         (
-            Not(one),
-            And((one, other)),
-            Or((one, other)),
-            Implies(one, other),
-            Always(one),
-            Always(one),
-            Eventually(one),
-            Eventually(one),
-            Until(one, other),
-            WeakUntil(one, other),
+            f.Not(one),
+            f.And((one, other)),
+            f.Or((one, other)),
+            f.Implies(one, other),
+            f.Always(one),
+            f.Always(one),
+            f.Eventually(one),
+            f.Eventually(one),
+            f.Until(one, other),
+            f.WeakUntil(one, other),
         )
     )
 
@@ -103,12 +88,12 @@ class Both:
     answers: tuple[Result, Result]
 
 
-def labels_of(system: System, formula: Formula) -> Labels:
+def labels_of(system: System, formula: f.Formula) -> Labels:
     world = SimpleNamespace(elements={}), SimpleNamespace(teams={})
     return Labels(system, *world, propositions(formula))  # type: ignore[arg-type]
 
 
-def both(system: System, formula: Formula, whole: Exploration | None = None) -> Both | None:
+def both(system: System, formula: f.Formula, whole: Exploration | None = None) -> Both | None:
     """The formula's answers without and with reduction."""
     whole = whole or explore(system, FEW)
     if not whole.complete:

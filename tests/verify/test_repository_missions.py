@@ -1,9 +1,10 @@
-"""Every mission of the repository holds on the fleet that it is flown with."""
+"""Every mission and example of the repository holds on the fleet that it is flown with."""
 
 from pathlib import Path
 
 import pytest
 
+from bench.verification.works import FLEETS, Subject, subjects
 from m2pem.model.bpmn import read_mission
 from m2pem.plugins import PluginManager
 from m2pem.resources.fleet_file import load_fleet
@@ -12,28 +13,21 @@ from m2pem.verify.derive import Options
 from m2pem.verify.results import Verdict
 
 ROOT = Path(__file__).parents[2]
-FLEETS = {
-    "mehds_vignette_1": "mehds",
-    "mehds_vignette_2": "mehds",
-    "mehds_vignette_3": "mehds",
-    "mehds_vignette_4": "mehds",
-    "survey_pair": "survey_pair",
-    "team_column": "mehds_mixed",
-    "vignette1": "vignette1",
-}
+OURS = [each for each in subjects() if not each.file.startswith("docs/broken/")]
 
 
 def test_no_mission_is_forgotten() -> None:
     assert {path.stem for path in (ROOT / "missions").glob("*.bpmn")} == FLEETS.keys()
+    assert {each.file.split("/")[0] for each in OURS} == {"missions", "examples"}
 
 
-@pytest.mark.parametrize("name", FLEETS)
-def test_a_mission_holds_on_its_fleet(name: str) -> None:
+@pytest.mark.parametrize("subject", OURS, ids=lambda each: each.file)
+def test_a_mission_holds_on_its_fleet(subject: Subject) -> None:
     plugins = PluginManager()
     writes = {each: tuple(plugins.service(each)().writes) for each in plugins.services()}
     report = check(
-        read_mission(ROOT / "missions" / f"{name}.bpmn"),
-        load_fleet(ROOT / "fleet_configs" / f"{FLEETS[name]}.yaml"),
+        read_mission(ROOT / subject.file),
+        load_fleet(ROOT / subject.fleet) if subject.fleet else None,
         options=Options(service_writes=writes),
     )
     assert report.found.complete

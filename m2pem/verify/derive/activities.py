@@ -6,7 +6,6 @@ from m2pem.model.expression.expression import literal
 from m2pem.resources.units import Dimension, UnitError, quantity
 from m2pem.verify.derive import containers
 from m2pem.verify.derive.catching import catching
-from m2pem.verify.derive.compensation import undoable, undone
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.holding import behavior_of, held_by, resources
 from m2pem.verify.derive.leaving import leave
@@ -15,6 +14,7 @@ from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
 from m2pem.verify.derive.throwing import catchable, message_effects, throw_error
 from m2pem.verify.derive.timers import due_us, runs, written
+from m2pem.verify.derive.undoable import noted
 from m2pem.verify.derive.waiting import boundaries
 from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step, Trigger
 
@@ -30,6 +30,7 @@ def activity(making: Making, node: e.FlowNode, area: Area) -> None:
     active = net.place(node, area, Role.ACTIVE, several=repeated, resources=held, behavior=behavior)
     host = Host(node, area, inside, active, lambda: [])
     host.done = lambda: pass_on(making, host)
+    host.cut = lambda: pass_on(making, host, well=False)
     inside.host = host
     boundaries(making, host)
     if node.loop is not None:
@@ -44,15 +45,17 @@ def activity(making: Making, node: e.FlowNode, area: Area) -> None:
         net.rule(effect)
 
 
-def pass_on(making: Making, host: Host) -> list[Effect]:
-    """An activity is done: it leaves by its flows. Its token is taken off already."""
+def pass_on(making: Making, host: Host, *, well: bool = True) -> list[Effect]:
+    """An activity is done: it leaves by its flows. Its token is taken off already.
+
+    `well`: it was not ended early, so that it can be undone.
+    """
     node = host.node
-    noted = undoable(making, host)
-    ways = [noted] if noted is not None else [Effect()]
+    ways = [noted(making, host) if well else Effect()]
     for mapping in node.data_flow.outputs:
         ways = making.data.write(ways, mapping.target, None, host.outer, node)
     if node.for_compensation:
-        return product(ways, [undone(making, host)])
+        return ways
     out = leave(
         making,
         host.outer,
@@ -253,6 +256,6 @@ def _receive(making: Making, host: Host, node: e.ReceiveTask) -> list[Effect]:
     assert node.message is not None
     catching(making, "message", node.message.id, host.active, told, False, node)
     stop = Effect(consume=(told,), kill_scopes=frozenset({host.inside.index}))
-    for effect in product([_ended(host, stop)], host.done()):
-        making.net.rule(effect)
+    come = making.data.receive([_ended(host, stop)], host.outer, node)
+    making.rules(product(come, host.done()))
     return [host.begin()]

@@ -1,11 +1,14 @@
 """How areas begin, are quiet, and hold their event subprocesses."""
 
+from collections.abc import Sequence
+
 from m2pem.model import elements as e
 from m2pem.model.events import ConditionalEventDefinition, TimerEventDefinition, TimerKind
 from m2pem.verify.derive.effect import Effect
+from m2pem.verify.derive.gathering import all_must_come, gathering
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
-from m2pem.verify.system import Role
+from m2pem.verify.system import Action, Role, Step
 
 
 def begin(making: Making, container: e.Container, area: Area) -> Effect:
@@ -34,11 +37,32 @@ def handler_host(making: Making, area: Area, container: e.SubProcess) -> Host:
     return host
 
 
+def begin_event_subprocess(
+    making: Making, area: Area, container: e.SubProcess, starts: Sequence[e.StartEvent]
+) -> Effect:
+    """An event subprocess of an area begins with a token on some of its starts."""
+    host = handler_host(making, area, container)
+    inside = begin(making, container, host.inside)
+    entries = {at(making.net, entry, host.inside) for entry in container.entries}
+    begun = Effect(
+        steps=tuple(Step(start.id, Action.TRIGGERED) for start in starts),
+        produce=(
+            *(at(making.net, start, host.inside) for start in starts),
+            *(place for place in inside.produce if place not in entries),
+        ),
+    ).then(host.begin())
+    assert begun is not None
+    return begun
+
+
 def armed_handlers(making: Making, container: e.Container, area: Area) -> list[int]:
     """Places that get a token when an area begins, for its event subprocesses."""
     armed: list[int] = []
     for each in container.event_subprocesses:
         for start in each.starts:
+            if all_must_come(start):
+                armed += gathering(making, start, area).awaited
+                continue
             if start.interrupting:
                 continue
             for number, definition in enumerate(start.definitions):

@@ -4,12 +4,12 @@ from dataclasses import replace
 from itertools import combinations
 
 from m2pem.model import elements as e
-from m2pem.model.events import CompensateEventDefinition
 from m2pem.verify.derive.areas import begin, handler_host, quiet
-from m2pem.verify.derive.compensation import forget
 from m2pem.verify.derive.effect import Effect, product
+from m2pem.verify.derive.gathering import all_must_come, gathering
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
+from m2pem.verify.derive.undoable import ended, forget, noted
 from m2pem.verify.derive.waiting import arm_handler
 from m2pem.verify.system import Action, Exactness, Kind, Place, Role, Step, Trigger
 
@@ -29,20 +29,20 @@ def ends_with_its_inside(making: Making, host: Host) -> None:
     over = host.leave().then(quiet(host.inside))
     assert over is not None
     over = over.saying(host.node.id, Action.COMPLETED)
-    making.rules(product([over], host.done()))
+    making.rules(ended(making, host, host.inside, [over]))
 
 
 def event_subprocess(making: Making, container: e.SubProcess, area: Area) -> None:
     """Its inside, and how it begins."""
     host = handler_host(making, area, container)
+    host.done = lambda: [noted(making, host)]
+    host.cut = lambda: [Effect()]
     host.inside.several = area.several or any(not s.interrupting for s in container.starts)
     if host.inside.several:
         making.net.places[host.active] = _several(making.net.places[host.active])
     build(making, container, host.inside)
     ends_with_its_inside(making, host)
     for start in container.starts:
-        if any(isinstance(d, CompensateEventDefinition) for d in start.definitions):
-            making.net.approximate(container, Exactness.BOUNDED, "when it undoes is not followed")
         arm_handler(making, area, start)
 
 
@@ -56,7 +56,11 @@ def _completing(making: Making, container: e.Container, area: Area) -> None:
     assert area.open is not None
     others: set[int] = {n for n in area.places if net.places[n].role is not Role.CONTROL}
     hosts = []
+    awaited: set[int] = set()
     for each in container.event_subprocesses:
+        for start in each.starts:
+            if all_must_come(start):
+                awaited.update(gathering(making, start, area).places)
         host = handler_host(making, area, each)
         others.discard(host.active)
         hosts.append(host)
@@ -67,6 +71,7 @@ def _completing(making: Making, container: e.Container, area: Area) -> None:
                 consume=(area.open,),
                 read=frozenset({host.active}),
                 inhibit=frozenset(others),
+                kill=frozenset(awaited),
             )
         )
 
@@ -97,6 +102,7 @@ def ad_hoc(making: Making, host: Host) -> list[Effect]:
         ends_with_its_inside(making, host)
         begun = host.begin().then(begin(making, node, inside))
         assert begun is not None
+        begun = replace(begun, kill=forget(making, inside, node).kill)
         bare = replace(
             begun,
             produce=tuple(
@@ -141,6 +147,7 @@ def ad_hoc(making: Making, host: Host) -> list[Effect]:
             making.rules(product([looked], going))
     begun = host.begin().then(begin(making, node, inside))
     assert begun is not None
+    begun = replace(begun, kill=forget(making, inside, node).kill)
     entries = {at(net, x, inside) for x in node.entries}
     return [replace(begun, produce=tuple(n for n in begun.produce if n not in entries))]
 
@@ -197,5 +204,5 @@ def call(making: Making, host: Host) -> list[Effect]:
     overs = [over.saying(node.id, Action.COMPLETED)]
     for mapping in node.mappings.outputs:
         overs = data.write_out(overs, mapping.target, mapping.source, inside, host.outer, node)
-    making.rules(product(overs, host.done()))
+    making.rules(ended(making, host, inside, overs))
     return product([host.begin()], ways)

@@ -19,6 +19,7 @@ from m2pem.verify.derive.domains import MOST_COMBINATIONS, Domains, Write, tells
 from m2pem.verify.derive.effect import Effect
 from m2pem.verify.derive.net import Area
 from m2pem.verify.derive.options import Options
+from m2pem.verify.derive.payloads import Payloads
 from m2pem.verify.system import Variable
 
 ERROR = "error"
@@ -37,6 +38,7 @@ class Data:
         self._options = options
         self._hidden: dict[e.FlowNode, frozenset[str]] = {}
         self._initial = dict(_flat(options.data))
+        self._payloads = Payloads(mission, open_world=options.open_world)
         self.domains = Domains(self._conditions(), self._writes(), self._initial)
         self.variables: list[Variable] = []
         self._known: dict[tuple[str, tuple[str, ...]], int] = {}
@@ -193,6 +195,21 @@ class Data:
                     unable.append(both)
         return found
 
+    def receive(self, effects: list[Effect], area: Area, node: e.FlowNode) -> list[Effect]:
+        """Effects that also write what a signal or message brings to who catches it."""
+        for each in self._payloads.brought(node):
+            if self._follows(each.key, self.hidden(node)):
+                found = list(effects) if each.perhaps else []
+                for source in each.sources:
+                    found += self.write(effects, each.key, source, area, node)
+                effects = found
+        return effects
+
+    def receives(self, node: e.FlowNode) -> bool:
+        """Whether anything that is followed may come to it with a signal or message."""
+        hidden = self.hidden(node)
+        return any(self._follows(each.key, hidden) for each in self._payloads.brought(node))
+
     def _values(
         self,
         effect: Effect,
@@ -306,9 +323,12 @@ class Data:
                     yield write
 
     def _writes_of(self, node: e.FlowNode, hidden: frozenset[str]) -> Iterator[Write]:
-        if isinstance(node, e.Activity | e.Event):
+        if isinstance(node, e.Activity):
             for mapping in node.data_flow.outputs:
                 yield Write(mapping.target, None)
+        for brought in self._payloads.brought(node):
+            for source in brought.sources:
+                yield Write(brought.key, source)
         loop = node.loop if isinstance(node, e.Activity) else None
         if isinstance(loop, MultiInstance) and loop.output_collection:
             yield Write(loop.output_collection, None)

@@ -15,9 +15,11 @@ from m2pem.verify.derive.activities import contend
 from m2pem.verify.derive.areas import begin
 from m2pem.verify.derive.bound import Bound
 from m2pem.verify.derive.catching import what_and_ref
+from m2pem.verify.derive.compensation import give_back
 from m2pem.verify.derive.containers import build, choose
 from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.events import after, awaited
+from m2pem.verify.derive.gathering import AWAITED, all_must_come, gathering
 from m2pem.verify.derive.making import Catcher, Making
 from m2pem.verify.derive.net import Area, at
 from m2pem.verify.derive.nodes import build_node
@@ -62,11 +64,10 @@ def derive(
     initial = (making.running, *first.produce)
     for late in making.later:
         late()
-    for late in making.at_last:
-        late()
     contend(making)
     choose(making)
     _outside(making)
+    give_back(making)
     if making.options.timers_in_order:
         put_in_order(making)
     _completes(making)
@@ -114,10 +115,11 @@ def _instances(making: Making, process: e.Process) -> None:
         area = making.net.area(process, making.everything, step=step, frame=(process.id, step))
         build(making, process, area)
         alive = making.net.place(process, area, Role.CONTROL, ":alive")
+        notes = making.kept.get(area.index, area)
         over = Effect(
             steps=(Step(process.id, Action.COMPLETED),),
             consume=(alive,),
-            kill_scopes=frozenset({area.index}),
+            kill_scopes=frozenset({area.index, notes.index}),
             quiet_scopes=frozenset({area.index}),
         )
         making.net.rule(over)
@@ -142,6 +144,7 @@ def _begun_by(
     definition: EventDefinition,
     areas: list[tuple[Area, int]],
 ) -> None:
+    brings = isinstance(definition, SignalEventDefinition | MessageEventDefinition)
     ways: list[Effect] = []
     for number, (area, alive) in enumerate(areas):
         free = Effect(
@@ -151,11 +154,14 @@ def _begun_by(
             produce=(alive,),
         )
         inside = [Effect(produce=tuple(begin_without_entries(making, process, area)))]
-        if isinstance(start, e.StartEvent):
+        if isinstance(start, e.StartEvent) and all_must_come(start):
+            more = [_first_of_several(making, start, definition, area)]
+        elif isinstance(start, e.StartEvent):
             more = [Effect(produce=(at(making.net, start, area),))]
         else:
             more = after(making, start, area)
-        ways += product(product([free], inside), more)
+        come = making.data.receive([free], area, start) if brings else [free]
+        ways += product(product(come, inside), more)
     full = Effect(read=frozenset(alive for _, alive in areas))
     match definition:
         case SignalEventDefinition() | MessageEventDefinition():
@@ -173,6 +179,20 @@ def _begun_by(
                 )
         case _:
             pass
+
+
+def _first_of_several(
+    making: Making, start: e.StartEvent, definition: EventDefinition, area: Area
+) -> Effect:
+    """One of the triggers that must all come has come: the others are awaited in the instance."""
+    places = gathering(making, start, area)
+    waiting = making.net.place(start, area, Role.ACTIVE)
+    triggers = [each for each in awaited(start) if isinstance(each, AWAITED)]
+    came = [
+        there if each is definition else yet
+        for each, there, yet in zip(triggers, places.came, places.awaited, strict=True)
+    ]
+    return Effect(produce=(waiting, *came))
 
 
 def begin_without_entries(making: Making, process: e.Process, area: Area) -> list[int]:

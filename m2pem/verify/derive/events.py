@@ -16,7 +16,7 @@ from m2pem.model.events import (
 from m2pem.verify.derive.catching import catching, first, what_and_ref
 from m2pem.verify.derive.compensation import cancel, compensate
 from m2pem.verify.derive.effect import Effect, product
-from m2pem.verify.derive.gathering import all_must_come, gather
+from m2pem.verify.derive.gathering import Gathering, all_must_come, gather
 from m2pem.verify.derive.leaving import along, leave
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, Draft, at
@@ -49,6 +49,9 @@ def start(making: Making, node: e.FlowNode, area: Area) -> None:
     begun = begun or (area.parent is making.everything and container is not making.process)
     if node.definitions and not begun:
         _wait(making, node, area)
+    elif area.parent is making.everything and all_must_come(node):
+        waiting = making.net.place(node, area, Role.ACTIVE)  # for the others of its triggers
+        _all_have_come(making, node, area, waiting, gather(making, node, area, area))
     else:
         come = _come(making, node, area, Action.COMPLETED)
         making.rules(product([come], _leave(making, node, area)))
@@ -89,8 +92,15 @@ def _wait_for_all(making: Making, node: e.Event, area: Area, waiting: int) -> No
                 produce=(awaited_place,),
             )
         )
+    _all_have_come(making, node, area, waiting, gathering)
+
+
+def _all_have_come(
+    making: Making, node: e.Event, area: Area, waiting: int, gathering: Gathering
+) -> None:
     done = Effect(steps=(Step(node.id, Action.COMPLETED),), consume=(waiting, *gathering.came))
-    making.rules(product([done], _leave(making, node, area)))
+    ways = making.data.receive([done], area, node)
+    making.rules(product(ways, _leave(making, node, area)))
 
 
 def _trigger(
@@ -116,7 +126,7 @@ def _trigger(
             what, ref = what_and_ref(definition)
             catching(making, what, ref, waiting, told, False, node)
             came = Effect(steps=came.steps, consume=(told,))
-            making.rules(product([came], ways))
+            making.rules(product(making.data.receive([came], area, node), ways))
         case ConditionalEventDefinition(condition=condition):
             if not making.data.is_followed([condition], node):
                 net.approximate(node, Exactness.MORE, "its condition may become true at any time")
@@ -154,6 +164,10 @@ def event_based(making: Making, node: e.FlowNode, area: Area) -> None:
             made = _trigger(making, target, area, definition, waiting, ways, number)
             number += 1
             together = isinstance(target, e.Event) and all_must_come(target)
+            if together:
+                net.approximate(
+                    target, Exactness.MORE, "one of its triggers is enough, not all of them"
+                )
             if isinstance(definition, TimerEventDefinition) and not (node.parallel or together):
                 runs(making, waiting, fixed(definition), (waiting,), made)
 
@@ -168,7 +182,9 @@ def awaited(node: e.FlowNode) -> tuple[EventDefinition, ...]:
 def after(making: Making, node: e.FlowNode, area: Area) -> list[Effect]:
     """What follows a catch event or receive task whose trigger has come already."""
     if isinstance(node, e.Activity):
-        done = Effect(steps=(Step(node.id, Action.COMPLETED),))
+        done = [Effect(steps=(Step(node.id, Action.COMPLETED),))]
+        for mapping in node.data_flow.outputs:
+            done = making.data.write(done, mapping.target, None, area, node)
         out = leave(
             making,
             area,
@@ -177,7 +193,7 @@ def after(making: Making, node: e.FlowNode, area: Area) -> list[Effect]:
             lambda code: throw_error(making, area, node, None, code),
             times=node.completion_quantity,
         )
-        return product([done], out)
+        return product(done, out)
     return _leave(making, node, area)
 
 
@@ -264,7 +280,7 @@ def _terminate(making: Making, area: Area) -> list[Effect]:
         return [stop]
     left = host.leave().then(stop)
     assert left is not None
-    return product([left], host.done())
+    return product([left], host.cut() if host.cut is not None else host.done())
 
 
 __all__ = ["along", "catch", "end", "event_based", "start", "throw"]

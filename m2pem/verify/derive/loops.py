@@ -1,6 +1,7 @@
 """Standard loops and multi-instance activities."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from m2pem.errors import ExpressionError
 from m2pem.model.loops import InstanceBehavior, MultiInstance, StandardLoop
@@ -9,6 +10,7 @@ from m2pem.verify.derive.effect import Effect, product
 from m2pem.verify.derive.holding import behavior_of, resources
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.throwing import throw_error
+from m2pem.verify.derive.undoable import forget_instances, noted_instance
 from m2pem.verify.system import Action, Exactness, Flag, Role, Step
 
 Work = Callable[[Making, Host], list[Effect]]
@@ -85,11 +87,16 @@ class _Turns:
         self.host = _instance(making, whole, 0)
         self.begins = making.net.place(whole.node, whole.inside, Role.ENTERING, ":round")
         self.ended = making.net.place(whole.node, whole.inside, Role.ENTERING, ":rounded")
-        self.host.done = lambda: [Effect(produce=(self.ended,))]
+        self.host.cut = self.ends
+        self.host.done = lambda: product([noted_instance(making, self.host, 0)], self.ends())
         for effect in product(
             [Effect(consume=(self.begins,))], _begin_instance(work, making, self.host)
         ):
             making.net.rule(effect)
+
+    def ends(self) -> list[Effect]:
+        """A round has ended."""
+        return [Effect(produce=(self.ended,))]
 
 
 def _rounds(making: Making, whole: Host, loop: StandardLoop, work: Work) -> list[Effect]:
@@ -130,6 +137,7 @@ def _rounds(making: Making, whole: Host, loop: StandardLoop, work: Work) -> list
         making.rules(product([last.saying(node.id, Action.COMPLETED, "a round")], _over(whole)))
     begun = Effect(produce=(turns.begins, *rounds[:1])).then(whole.begin())
     assert begun is not None
+    begun = replace(begun, kill=forget_instances(making, whole, 1).kill)
     if most == 0:
         return whole.done()
     if not loop.test_before or loop.condition is None:
@@ -189,7 +197,15 @@ def _in_turn(
             )
     begun = Effect(produce=(turns.begins, *rounds[:1])).then(whole.begin())
     assert begun is not None
+    begun = replace(begun, kill=forget_instances(making, whole, 1).kill)
     return [begun] if counted else [begun, *whole.done()]
+
+
+def _well(
+    making: Making, host: Host, number: int, ends: list[Effect]
+) -> Callable[[], list[Effect]]:
+    """How an instance ends that can be undone."""
+    return lambda: product([noted_instance(making, host, number)], ends)
 
 
 def _at_a_time(
@@ -214,8 +230,9 @@ def _at_a_time(
         enough = making.net.place(node, whole.inside, Role.TRIGGERED, ":enough")
         ends.append(Effect(produce=(enough,)))
         making.rules(product([Effect(consume=(enough,))], _over(whole)))
-    for host, begin in zip(hosts, begins, strict=True):
-        host.done = lambda: ends
+    for number, (host, begin) in enumerate(zip(hosts, begins, strict=True)):
+        host.cut = lambda: ends
+        host.done = _well(making, host, number, ends)
         for effect in product([Effect(consume=(begin,))], _begin_instance(work, making, host)):
             making.net.rule(effect)
     quiet = Effect(quiet_scopes=frozenset({whole.inside.index}))
@@ -228,5 +245,6 @@ def _at_a_time(
             continue
         begun = whole.begin().then(Effect(produce=tuple(begins[:size])))
         assert begun is not None
+        begun = replace(begun, kill=forget_instances(making, whole, total).kill)
         found.append(begun)
     return found

@@ -21,8 +21,9 @@ class Host:
 
     `outer`: the area that the token is in. `inside`: that of what belongs to the activity alone.
     `active`: the token's place. `done`: what happens when its work has ended, its token being
-    taken off already. `armed`: places that get a token when it begins. `boundary`: whether its
-    boundary events are asked for errors (not those of an instance: they are the whole's).
+    taken off already. `cut`: the same, of work that was ended early. `armed`: places that get a
+    token when it begins. `boundary`: whether its boundary events are asked for errors (not those of
+    an instance: they are the whole's).
     """
 
     node: e.Activity
@@ -32,6 +33,7 @@ class Host:
     done: Callable[[], list[Effect]]
     boundary: bool = True
     armed: list[int] = field(default_factory=list)
+    cut: Callable[[], list[Effect]] | None = None
 
     def begin(self) -> Effect:
         """The token comes to work."""
@@ -79,9 +81,12 @@ class Making:
         self.messages: dict[str, list[Catcher]] = {}
         self.begins: dict[tuple[str, str], list[list[Effect]]] = {}
         self.later: list[Callable[[], None]] = []
-        self.at_last: list[Callable[[], None]] = []
         self.contended: list[tuple[Host, int, tuple[str, ...]]] = []
         self.choices: list[tuple[Effect, e.FlowNode, Area]] = []
+        self.ways: dict[e.Activity, str | None] = {}
+        self.kept: dict[int, Area] = {}
+        self.claims: dict[int, list[tuple[int, int]]] = {}
+        self.undoing: dict[int, object] = {}
         self.root = self.everything
         self.repeated = _repeated_nodes(mission)
         self.again = _ends_reached_again(mission)

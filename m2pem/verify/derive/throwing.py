@@ -12,10 +12,11 @@ from m2pem.model.events import (
     MessageEventDefinition,
     SignalEventDefinition,
 )
-from m2pem.verify.derive.areas import begin, handler_host
+from m2pem.verify.derive.areas import begin_event_subprocess, handler_host
 from m2pem.verify.derive.effect import Effect
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
+from m2pem.verify.derive.undoable import Way, cut_short, forget, way_back
 from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step
 
 Catching = TypeVar("Catching", bound=e.Event)
@@ -80,8 +81,11 @@ def throw_escalation(
         if host is not None and host.boundary:
             event = best(host.node.boundary, code, _escalation_code)
             if event is not None:
-                found.append(_at_boundary(making, condition, host, event, taken_off=False))
-                return found
+                there, without = _there(making, condition, host)
+                found.append(_at_boundary(making, there, host, event, taken_off=False))
+                if without is None:
+                    return found
+                condition = without
         if here.open is not None:
             start = best(_starts(here, node), code, _escalation_code)
             if start is not None:
@@ -102,6 +106,20 @@ def throw_escalation(
     assert ignored is not None
     found.append((ignored, True))
     return found
+
+
+def _there(
+    making: Making, condition: Effect, host: Host, *, taken_off: bool = False
+) -> tuple[Effect, Effect | None]:
+    """When an activity's boundary events can catch what is thrown in it, and when not, if ever.
+
+    They cannot while it is undone: it has completed (as in the engine).
+    """
+    if taken_off or way_back(making, host.node) is not Way.INSIDE:
+        return condition, None
+    there = condition.then(Effect(read=frozenset({host.active})))
+    assert there is not None
+    return there, condition.then(Effect(inhibit=frozenset({host.active})))
 
 
 def _at_boundary(
@@ -143,8 +161,11 @@ def _go_up(
         if host is not None and host.boundary:
             event = best(host.node.boundary, code, _error_code)
             if event is not None:
-                found.append(_at_boundary(making, condition, host, event, taken_off=taken_off)[0])
-                return found
+                there, without = _there(making, condition, host, taken_off=taken_off)
+                found.append(_at_boundary(making, there, host, event, taken_off=taken_off)[0])
+                if without is None:
+                    return found
+                condition = without
         if here.open is not None:
             start = best(_starts(here, node), code, _error_code)
             if start is not None:
@@ -174,19 +195,12 @@ def begin_handler(making: Making, area: Area, start: e.StartEvent) -> list[Effec
     """An event subprocess begins in an area; an interrupting one ends all else there first."""
     container = start.container
     assert isinstance(container, e.SubProcess)
-    host = handler_host(making, area, container)
-    inside = begin(making, container, host.inside)
-    entries = {at(making.net, entry, host.inside) for entry in container.entries}
-    begun = Effect(
-        steps=(Step(start.id, Action.TRIGGERED),),
-        produce=(
-            at(making.net, start, host.inside),
-            *(place for place in inside.produce if place not in entries),
-        ),
-    ).then(host.begin())
-    assert begun is not None
+    begun = begin_event_subprocess(making, area, container, (start,))
+    anew = forget(making, handler_host(making, area, container).inside, container).then(begun)
+    assert anew is not None
+    begun = anew
     if start.interrupting:
-        stop = Effect(kill_scopes=frozenset({area.index}))
+        stop = Effect(kill_scopes=frozenset({area.index}), produce=cut_short(making, area))
         both = stop.then(begun)
         assert both is not None
         return [both]

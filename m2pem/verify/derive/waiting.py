@@ -1,5 +1,7 @@
 """What waits for something: boundary events, the starts of event subprocesses, catch events."""
 
+from dataclasses import replace
+
 from m2pem.model import elements as e
 from m2pem.model.events import (
     CancelEventDefinition,
@@ -16,7 +18,7 @@ from m2pem.verify.derive.areas import handler_host
 from m2pem.verify.derive.catching import catching, first, what_and_ref
 from m2pem.verify.derive.data import ERROR
 from m2pem.verify.derive.effect import Effect, product
-from m2pem.verify.derive.gathering import all_must_come, can_be_gathered, gather
+from m2pem.verify.derive.gathering import all_must_come, gather
 from m2pem.verify.derive.leaving import leave
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at, is_join
@@ -34,12 +36,8 @@ def boundaries(making: Making, host: Host) -> None:
         out = at(making.net, event, host.outer)
         _leave_boundary(making, host, event, out)
         if all_must_come(event):
-            if can_be_gathered(event):
-                _gathered(making, host, event, out)
-                continue
-            making.net.approximate(
-                event, Exactness.MORE, "one of its triggers is enough, not all of them"
-            )
+            _gathered(making, host, event, out)
+            continue
         for number, definition in enumerate(event.definitions):
             _boundary(making, host, event, definition, out, number)
 
@@ -89,15 +87,14 @@ def _boundary(
                 running = net.place(event, host.inside, Role.CONTROL, f":armed{number}")
                 comes = _once(host, comes, running)
             made = net.rule(comes, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
-            if not all_must_come(event):
-                runs(making, host.active, fixed(definition), (running,), [made])
+            runs(making, host.active, fixed(definition), (running,), [made])
         case SignalEventDefinition() | MessageEventDefinition():
             told = net.place(event, host.outer, Role.TRIGGERED, f":{number}")
             what, ref = what_and_ref(definition)
             catching(making, what, ref, host.active, told, not event.interrupting, event)
             both = told_comes.then(Effect(consume=(told,)))
             assert both is not None
-            net.rule(both)
+            making.rules(making.data.receive([both], host.outer, event))
         case ConditionalEventDefinition(condition=condition):
             _boundary_condition(making, host, event, condition, comes, number)
         case CancelEventDefinition():
@@ -116,8 +113,8 @@ def _gathered(making: Making, host: Host, event: e.BoundaryEvent, out: int) -> N
     if event.interrupting:
         stop = host.leave().saying(host.node.id, Action.INTERRUPTED)
     else:
-        stop = Effect(read=frozenset({host.active}), produce=gathering.awaited)
-    making.rules(product([caught], [stop]))
+        stop = Effect(read=frozenset({host.active}), produce=gathering.again)
+    making.rules(product(making.data.receive([caught], host.outer, event), [stop]))
 
 
 def _once(host: Host, comes: Effect, armed: int) -> Effect:
@@ -209,7 +206,8 @@ def arm_handler(making: Making, area: Area, start: e.StartEvent) -> None:
     net = making.net
     assert area.open is not None
     if all_must_come(start):
-        net.approximate(start, Exactness.MORE, "one of its triggers is enough, not all of them")
+        _gathered_start(making, area, start)
+        return
     for number, definition in enumerate(start.definitions):
         begun = begin_handler(making, area, start)
         when = Effect(read=frozenset({area.open}))
@@ -227,9 +225,8 @@ def arm_handler(making: Making, area: Area, start: e.StartEvent) -> None:
                     net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
                     for effect in product([when], begun)
                 ]
-                if not all_must_come(start):
-                    holder = holder_of(making, area)
-                    runs(making, holder, fixed(definition), (area.open, *running), made)
+                holder = holder_of(making, area)
+                runs(making, holder, fixed(definition), (area.open, *running), made)
             case SignalEventDefinition() | MessageEventDefinition():
                 told = net.place(start, area, Role.TRIGGERED, f":told{number}")
                 what, ref = what_and_ref(definition)
@@ -241,11 +238,32 @@ def arm_handler(making: Making, area: Area, start: e.StartEvent) -> None:
                     net.rule(
                         Effect(steps=come.steps, consume=(told,), read=frozenset({host.active}))
                     )
-                making.rules(product([come], begun))
+                making.rules(product(making.data.receive([come], area, start), begun))
             case ConditionalEventDefinition(condition=condition):
                 _handler_condition(making, area, start, condition, when, begun, number)
             case _:
                 pass
+
+
+def _gathered_start(making: Making, area: Area, start: e.StartEvent) -> None:
+    """All of its triggers must come; what does not interrupt then awaits them all anew."""
+    assert area.open is not None
+    gathering = gather(making, start, area, area)
+    come = Effect(read=frozenset({area.open}), consume=gathering.came)
+    if not start.interrupting:
+        missed = Effect(
+            steps=(Step(start.id, Action.TRIGGERED),),
+            consume=gathering.came,
+            read=frozenset({_host_of(making, area, start).active}),
+            produce=gathering.again,
+        )
+        making.net.rule(missed)
+        come = (
+            replace(come, produce=gathering.again).then(_once_at_a_time(making, area, start))
+            or come
+        )
+    ways = making.data.receive([come], area, start)
+    making.rules(product(ways, begin_handler(making, area, start)))
 
 
 def _once_at_a_time(making: Making, area: Area, start: e.StartEvent) -> Effect:

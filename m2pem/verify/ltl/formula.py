@@ -202,6 +202,19 @@ PROPOSITIONS = (Active, Completed, Commanded, Ended, Data)
 PAST = (Once, Historically, Since, Count)
 FUTURE = (Always, Eventually, Until, WeakUntil, Next)
 
+PREFIXES: dict[type[Not] | type[Always] | type[Eventually], str] = {
+    Always: "[]",
+    Eventually: "<>",
+    Not: "!",
+}
+"""How operators of one formula are written, which stand before it."""
+OPERATORS: dict[type[Until] | type[WeakUntil] | type[Since], str] = {
+    Until: "U",
+    WeakUntil: "W",
+    Since: "since",
+}
+"""How operators of two formulas over time are written, between them."""
+
 TRUE = Constant(True)
 FALSE = Constant(False)
 

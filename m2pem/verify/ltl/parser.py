@@ -14,31 +14,7 @@ from m2pem.model.expression.dialect import Dialect
 from m2pem.model.expression.functions import FUNCTIONS
 from m2pem.model.expression.parser import Parser
 from m2pem.resources.nearmiss import did_you_mean
-from m2pem.verify.ltl.formula import (
-    FUTURE,
-    OUTCOMES,
-    Active,
-    Always,
-    And,
-    Commanded,
-    Completed,
-    Constant,
-    Count,
-    Data,
-    Ended,
-    Eventually,
-    Formula,
-    Historically,
-    Iff,
-    Implies,
-    Not,
-    Once,
-    Or,
-    Since,
-    Until,
-    WeakUntil,
-    walk,
-)
+from m2pem.verify.ltl import formula as f
 from m2pem.verify.ltl.reading import WORDS, Reader
 
 MAX_DEPTH = 100
@@ -46,13 +22,13 @@ MAX_COUNT = 1_000
 ATOMS = ("active(E)", "completed(E)", "commanded(RESOURCE, BEHAVIOR)", "ended", "count(...) >= N")
 """What a formula can ask of a moment, beside comparisons of data."""
 
-_PREFIXES: dict[str, Callable[[Formula], Formula]] = {"[]": Always, "<>": Eventually, "!": Not}
-_OPERATORS: dict[str, Callable[[Formula, Formula], Formula]] = {
-    "U": Until,
-    "W": WeakUntil,
-    "since": Since,
+_PREFIXES: dict[str, Callable[[f.Formula], f.Formula]] = {
+    word: kind for kind, word in f.PREFIXES.items()
 }
-_OPERATOR = re.compile(r"(U|W|since)(?![\w.])")
+_OPERATORS: dict[str, Callable[[f.Formula, f.Formula], f.Formula]] = {
+    word: kind for kind, word in f.OPERATORS.items()
+}
+_OPERATOR = re.compile(rf"({'|'.join(_OPERATORS)})(?![\w.])")
 _WORD = re.compile(r"[^\W\d][\w.]*")
 _CALL = re.compile(r"([^\W\d][\w.]*)\s*\(")
 _OF_DATA = re.compile(r"\+|-(?!>)|\*|/|<=|<(?!->|>)|>|==|!=|\?|in\b|not\s+in\b")
@@ -67,7 +43,7 @@ _OTHER_NOTATIONS = {
 }
 
 
-def parse(text: str) -> Formula:
+def parse(text: str) -> f.Formula:
     """The formula that a text says.
 
     Raises:
@@ -81,7 +57,7 @@ class _Parser:
         self.reader = reader
         self.depth = 0
 
-    def whole(self) -> Formula:
+    def whole(self) -> f.Formula:
         formula = self._equivalence()
         if not self.reader.at_end():
             self._unexpected("an operator or the end")
@@ -94,38 +70,40 @@ class _Parser:
             hint = "; of two formulas there are U, W and since"
         self.reader.fail(f"expected {expected}, found {self.reader.found()}{hint}")
 
-    def _equivalence(self) -> Formula:
+    def _equivalence(self) -> f.Formula:
         self.depth += 1
         if self.depth > MAX_DEPTH:
             self.reader.fail(f"nested deeper than {MAX_DEPTH} levels")
         left = self._implication()
         while self.reader.take("<->"):
-            left = Iff(left, self._implication())
+            left = f.Iff(left, self._implication())
         self.depth -= 1
         return left
 
-    def _implication(self) -> Formula:
-        left = self._joined(Or, _OPERATOR_OR, lambda: self._joined(And, _OPERATOR_AND, self._until))
+    def _implication(self) -> f.Formula:
+        left = self._joined(
+            f.Or, _OPERATOR_OR, lambda: self._joined(f.And, _OPERATOR_AND, self._until)
+        )
         if self.reader.take("->"):
             self.depth += 1
             if self.depth > MAX_DEPTH:
                 self.reader.fail(f"nested deeper than {MAX_DEPTH} levels")
-            left = Implies(left, self._implication())
+            left = f.Implies(left, self._implication())
             self.depth -= 1
         return left
 
     def _joined(
         self,
-        make: type[And] | type[Or],
+        make: type[f.And] | type[f.Or],
         operator: re.Pattern[str],
-        operand: Callable[[], Formula],
-    ) -> Formula:
+        operand: Callable[[], f.Formula],
+    ) -> f.Formula:
         operands = [operand()]
         while self.reader.match(operator):
             operands.append(operand())
         return operands[0] if len(operands) == 1 else make(tuple(operands))
 
-    def _until(self) -> Formula:
+    def _until(self) -> f.Formula:
         start = self.reader.skip()
         left = self._unary()
         found = self.reader.match(_OPERATOR)
@@ -137,7 +115,7 @@ class _Parser:
         formula = _OPERATORS[found[1]](left, right)
         return self._past(formula, "since", start) if found[1] == "since" else formula
 
-    def _unary(self) -> Formula:
+    def _unary(self) -> f.Formula:
         signs: list[str] = []
         while not self.reader.text.startswith("!=", self.reader.skip()):
             sign = next((each for each in _PREFIXES if self.reader.take(each)), None)
@@ -158,7 +136,7 @@ class _Parser:
         found = self.reader.peek(_WORD)
         return found[0] if found else ""
 
-    def _primary(self) -> Formula:
+    def _primary(self) -> f.Formula:
         start = self.reader.skip()
         text = self.reader.text
         if start == len(text):
@@ -171,11 +149,11 @@ class _Parser:
         word = self._next_word()
         if word in ("true", "false") and self._alone(start + len(word)):
             self.reader.match(_WORD)
-            return Constant(word == "true")
+            return f.Constant(word == "true")
         if word in ("once", "historically"):
             self.reader.match(_WORD)
             operand = self._unary()
-            formula = Once(operand) if word == "once" else Historically(operand)
+            formula = f.Once(operand) if word == "once" else f.Historically(operand)
             return self._past(formula, word, start)
         if word == "ended" and self._alone(start + len(word)):
             return self._ended(start)
@@ -184,7 +162,7 @@ class _Parser:
         if word in WORDS and word not in ("true", "false"):
             self.reader.fail(f"expected a formula, found '{word}'; " + _listed())
         if called := self.reader.peek(_CALL):
-            readers: dict[str, Callable[[int], Formula]] = {
+            readers: dict[str, Callable[[int], f.Formula]] = {
                 "active": self._active,
                 "completed": self._completed,
                 "commanded": self._commanded,
@@ -209,38 +187,38 @@ class _Parser:
         end = self.reader.after_parenthesis(start)
         return end > 0 and bool(_OF_DATA.match(self.reader.text[end:].lstrip()))
 
-    def _active(self, _start: int) -> Formula:
+    def _active(self, _start: int) -> f.Formula:
         element, position = self._only("the id of an element")
-        return Active(element, position)
+        return f.Active(element, position)
 
-    def _completed(self, _start: int) -> Formula:
+    def _completed(self, _start: int) -> f.Formula:
         element, position = self._only("the id of an element")
-        return Completed(element, position)
+        return f.Completed(element, position)
 
     def _only(self, what: str) -> tuple[str, int]:
         name, position = self.reader.argument(what)
         self.reader.expect(")", f"after {what}")
         return name, position
 
-    def _commanded(self, _start: int) -> Formula:
+    def _commanded(self, _start: int) -> f.Formula:
         resource, position = self.reader.argument("a vehicle, payload or team")
         behavior, there = "", position
         if self.reader.take(","):
             behavior, there = self.reader.argument("the name of a behavior")
         self.reader.expect(")", "after commanded(RESOURCE, BEHAVIOR")
-        return Commanded(resource, behavior, position, there)
+        return f.Commanded(resource, behavior, position, there)
 
-    def _ended(self, start: int) -> Formula:
+    def _ended(self, start: int) -> f.Formula:
         self.reader.match(_WORD)
         if not self.reader.take("("):
-            return Ended("", start)
+            return f.Ended("", start)
         outcome, position = self._only("how it ended")
-        if outcome not in OUTCOMES:
-            choices = ", ".join(OUTCOMES)
+        if outcome not in f.OUTCOMES:
+            choices = ", ".join(f.OUTCOMES)
             self.reader.fail(f"a run ends as one of {choices}, not '{outcome}'", position)
-        return Ended(outcome, position)
+        return f.Ended(outcome, position)
 
-    def _count(self, start: int) -> Formula:
+    def _count(self, start: int) -> f.Formula:
         operands = [self._equivalence()]
         while self.reader.take(","):
             operands.append(self._equivalence())
@@ -251,14 +229,14 @@ class _Parser:
             self.reader.fail(f"expected a bound such as '>= 2' after count(...), found {found}")
         if int(bound[2]) > MAX_COUNT:
             self.reader.fail(f"counts go up to {MAX_COUNT}", bound.start(2))
-        return self._past(Count(tuple(operands), bound[1], int(bound[2])), "count", start)
+        return self._past(f.Count(tuple(operands), bound[1], int(bound[2])), "count", start)
 
-    def _past(self, formula: Formula, word: str, start: int) -> Formula:
-        if any(isinstance(each, FUTURE) for each in walk(formula)):
+    def _past(self, formula: f.Formula, word: str, start: int) -> f.Formula:
+        if any(isinstance(each, f.FUTURE) for each in f.walk(formula)):
             self.reader.fail(f"{word} looks back: no [], <>, U or W can stand in it", start)
         return formula
 
-    def _data(self, start: int) -> Formula:
+    def _data(self, start: int) -> f.Formula:
         end = self.reader.comparison_end(start)
         if end == start:
             self._unexpected("a formula")
@@ -270,7 +248,7 @@ class _Parser:
             hint = "" if known else "; " + _listed()
             self.reader.fail(error.message.partition(";")[0] + hint, error.position)
         self.reader.position = end
-        return Data(Expression(self.reader.text[span], Dialect.BARE, tree), start)
+        return f.Data(Expression(self.reader.text[span], Dialect.BARE, tree), start)
 
     def _looks_like_data(self, start: int) -> bool:
         return bool(re.match(r"[^\W\d][\w.]*\s*(?:[=!<>]=|[<>])", self.reader.text[start:]))

@@ -1,6 +1,8 @@
 """Formulas as people write them; reading the text gives the same formula."""
 
 from m2pem.verify.ltl.formula import (
+    OPERATORS,
+    PREFIXES,
     Active,
     Always,
     And,
@@ -19,21 +21,15 @@ from m2pem.verify.ltl.formula import (
     Not,
     Once,
     Or,
-    Since,
-    Until,
-    WeakUntil,
 )
 
 _LOOSE, _IFF, _IMPLIES, _OR, _AND, _UNTIL, _UNARY = range(7)
 
-_BINARY = {
+_BINARY: dict[type[Formula], tuple[str, int]] = {
     Iff: ("<->", _IFF),
     Implies: ("->", _IMPLIES),
-    Until: ("U", _UNTIL),
-    WeakUntil: ("W", _UNTIL),
-    Since: ("since", _UNTIL),
+    **{kind: (word, _UNTIL) for kind, word in OPERATORS.items()},
 }
-_PREFIX = {Not: "!", Always: "[]", Eventually: "<>", Next: "X "}
 
 
 def show(formula: Formula) -> str:
@@ -65,8 +61,10 @@ def _show(formula: Formula, around: int) -> str:
             return f"once({show(formula.operand)})"
         case Historically():
             return f"historically({show(formula.operand)})"
-        case Not() | Always() | Eventually() | Next():
-            return _PREFIX[type(formula)] + _show(formula.operand, _UNARY)
+        case Not() | Always() | Eventually():
+            return PREFIXES[type(formula)] + _show(formula.operand, _UNARY)
+        case Next():
+            return f"X {_show(formula.operand, _UNARY)}"
         case And():
             return _joined(" && ", formula.operands, _AND, around)
         case Or():

@@ -222,14 +222,7 @@ def no_dead_element(searched: Searched) -> Result:
 
 
 def _undoes(element: object) -> bool:
-    """Compensation is not entered by the flow."""
-    if isinstance(element, e.BoundaryEvent):
-        return any(isinstance(d, CompensateEventDefinition) for d in element.definitions)
-    around = element.container if isinstance(element, e.FlowNode) else None
-    return (
-        isinstance(around, e.SubProcess)
-        and around.triggered_by_event
-        and any(
-            isinstance(d, CompensateEventDefinition) for s in around.starts for d in s.definitions
-        )
+    """No token comes to the boundary event of a compensation: it says by what it is done."""
+    return isinstance(element, e.BoundaryEvent) and any(
+        isinstance(d, CompensateEventDefinition) for d in element.definitions
     )

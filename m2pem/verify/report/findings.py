@@ -132,11 +132,10 @@ def _unreached(mission: Mission, report: Report) -> frozenset[str]:
     nodes = {n.id for n in mission.nodes if n.container.process.id in begun}
     flows = {f.id for f in mission.flows if f.source.container.process.id in begun}
     undoing = {
-        flow
+        node.id
         for node in mission.nodes
-        if isinstance(node, e.Event)
+        if isinstance(node, e.BoundaryEvent)
         and any(isinstance(each, CompensateEventDefinition) for each in node.definitions)
-        for flow in (node.id,)
     }
     return frozenset(nodes | flows) - reached - undoing
 

@@ -8,7 +8,7 @@ from m2pem.model import elements as e
 from m2pem.model.values import Value
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.report.words import Words
-from m2pem.verify.system import Action, Kind, Rule, Step, System, Trigger
+from m2pem.verify.system import UNDOES, UNDONE, Action, Kind, Rule, Step, System, Trigger
 
 COMMANDS = "commands"
 """Detail of the step in which a task's behavior is asked for, after the task was entered."""
@@ -263,7 +263,7 @@ def _internal(first: Step, actions: Sequence[Step], words: Words) -> str:
         case Action.THROWN:
             return ""
         case Action.TRIGGERED:
-            return f"{name} is triggered"
+            return f"{name} {first.detail if first.detail in (UNDOES, UNDONE) else 'is triggered'}"
         case Action.COMPLETED if isinstance(node, e.EndEvent):
             return f"{name} is reached"
         case Action.COMPLETED if isinstance(node, e.StartEvent):

@@ -11,28 +11,7 @@ from itertools import product
 
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.labels import Labels
-from m2pem.verify.ltl.formula import (
-    PAST,
-    PROPOSITIONS,
-    Always,
-    And,
-    Completed,
-    Constant,
-    Count,
-    Data,
-    Eventually,
-    Formula,
-    Historically,
-    Iff,
-    Implies,
-    Not,
-    Once,
-    Or,
-    Since,
-    Until,
-    WeakUntil,
-    children,
-)
+from m2pem.verify.ltl import formula as f
 from m2pem.verify.ltl.lasso import holds
 
 _COUNTED = {True: "byte", False: "int"}
@@ -46,31 +25,31 @@ class Watch:
         UnknownDataError: the rules do not know what it asks of the data.
     """
 
-    def __init__(self, formula: Formula, labels: Labels, encoding: Encoding) -> None:
+    def __init__(self, formula: f.Formula, labels: Labels, encoding: Encoding) -> None:
         self.formula = formula
         self._labels = labels
         self._encoding = encoding
         self._true_in = labels.of_states(encoding)
-        self._names: dict[Formula, str] = {}
+        self._names: dict[f.Formula, str] = {}
         self._rules: dict[int, list[str]] = {}
         for number, each in enumerate(labels.propositions):
-            completed = isinstance(each, Completed)
+            completed = isinstance(each, f.Completed)
             self._names[each] = f"now_{number}" if completed else f"is_{number}"
             if completed:
                 for rule, bits in enumerate(labels.of_rules):
                     if bits >> number & 1:
                         self._rules.setdefault(rule, []).append(self._names[each])
-        self._past: list[Formula] = []
+        self._past: list[f.Formula] = []
         self._find_past(formula)
         for number, past in enumerate(self._past):
-            word = "count" if isinstance(past, Count) else "past"
+            word = "count" if isinstance(past, f.Count) else "past"
             self._names[past] = f"{word}_{number}"
 
-    def _find_past(self, formula: Formula) -> None:
+    def _find_past(self, formula: f.Formula) -> None:
         """Those inside others come first."""
-        for each in children(formula):
+        for each in f.children(formula):
             self._find_past(each)
-        if isinstance(formula, PAST) and formula not in self._past:
+        if isinstance(formula, f.PAST) and formula not in self._past:
             self._past.append(formula)
 
     # --- for the model --------------------------------------------------------------------------
@@ -78,7 +57,7 @@ class Watch:
     @property
     def size_bytes(self) -> int:
         """An upper bound of what it adds to a state."""
-        return 4 * len(self._names) + sum(len(children(each)) for each in self._past)
+        return 4 * len(self._names) + sum(len(f.children(each)) for each in self._past)
 
     @property
     def needs_quiet(self) -> bool:
@@ -91,13 +70,13 @@ class Watch:
         first = self._true_in(self._encoding.initial)
         moment = [p for n, p in enumerate(self._labels.propositions) if first >> n & 1]
 
-        def at_first(formula: Formula) -> bool:
+        def at_first(formula: f.Formula) -> bool:
             return holds(formula, [frozenset(moment)], [frozenset(moment)])
 
         does: list[str] = []
         for number, each in enumerate(self._labels.propositions):
             lines.append(f"bit {self._names[each]} = {int(bool(first >> number & 1))};")
-            if not isinstance(each, Completed):
+            if not isinstance(each, f.Completed):
                 does.append(f"{self._names[each]} = {self._truth(number, places, variables)}")
         for past in self._past:
             self._remember(past, at_first, lines, does)
@@ -106,20 +85,20 @@ class Watch:
 
     def _remember(
         self,
-        past: Formula,
-        at_first: Callable[[Formula], bool],
+        past: f.Formula,
+        at_first: Callable[[f.Formula], bool],
         lines: list[str],
         does: list[str],
     ) -> None:
         name = self._names[past]
-        if not isinstance(past, Count):
+        if not isinstance(past, f.Count):
             lines.append(f"bit {name} = {int(at_first(past))};")
             match past:
-                case Once(operand):
+                case f.Once(operand):
                     does.append(f"{name} = {name} || {self.text(operand)}")
-                case Historically(operand):
+                case f.Historically(operand):
                     does.append(f"{name} = {name} && {self.text(operand)}")
-                case Since(left, right):
+                case f.Since(left, right):
                     does.append(f"{name} = {self.text(right)} || ({name} && {self.text(left)})")
             return
         most = past.number + 1  # more makes no difference
@@ -134,7 +113,7 @@ class Watch:
 
     def _truth(self, number: int, places: Sequence[str], variables: Sequence[str]) -> str:
         """When a proposition of states is true."""
-        if not isinstance(self._labels.propositions[number], Data):
+        if not isinstance(self._labels.propositions[number], f.Data):
             names = [places[p] for p in sorted(self._labels.places_of(number))]
             return "(" + (" || ".join(f"{name} > 0" for name in names) or "false") + ")"
         asked = sorted(self._labels.variables_of(number))
@@ -165,33 +144,31 @@ class Watch:
         """The formula, for Spin to prove."""
         return f"ltl required {{ {self.text(self.formula)} }}"
 
-    def text(self, formula: Formula) -> str:
+    def text(self, formula: f.Formula) -> str:
         """A formula in Spin's words."""
-        if isinstance(formula, Count):
+        if isinstance(formula, f.Count):
             return f"({self._names[formula]} {formula.operator} {formula.number})"
-        if isinstance(formula, PROPOSITIONS) or formula in self._names:
+        if isinstance(formula, f.PROPOSITIONS) or formula in self._names:
             return self._names[formula]
-        inside = [self.text(each) for each in children(formula)]
+        inside = [self.text(each) for each in f.children(formula)]
         match formula:
-            case Constant():
+            case f.Constant():
                 return "true" if formula.value else "false"
-            case Not():
+            case f.Not():
                 return f"(!{inside[0]})"
-            case And():
+            case f.And():
                 return f"({' && '.join(inside)})"
-            case Or():
+            case f.Or():
                 return f"({' || '.join(inside)})"
-            case Implies():
+            case f.Implies():
                 return f"(!{inside[0]} || {inside[1]})"
-            case Iff():
+            case f.Iff():
                 return f"(({inside[0]} && {inside[1]}) || (!{inside[0]} && !{inside[1]}))"
-            case Always():
-                return f"([] {inside[0]})"
-            case Eventually():
-                return f"(<> {inside[0]})"
-            case Until():
-                return f"({inside[0]} U {inside[1]})"
-            case WeakUntil():
+            case f.Always() | f.Eventually():
+                return f"({f.PREFIXES[type(formula)]} {inside[0]})"
+            case f.Until():
+                return f"({inside[0]} {f.OPERATORS[f.Until]} {inside[1]})"
+            case f.WeakUntil():
                 return f"({inside[1]} V ({inside[0]} || {inside[1]}))"
             case _:
                 raise TypeError(f"Spin cannot be asked {formula}")
