@@ -194,6 +194,13 @@ def _exact(found: Exploration, run: Sequence[int], limits: Limits) -> bool:
     return True
 
 
+def _complete_only(*columns: "list[int] | array[int]") -> None:
+    """Leave out the last row if it is there in part: interruptions come between any two steps."""
+    rows = min(map(len, columns))
+    for column in columns:
+        del column[rows:]
+
+
 class _Search:
     def __init__(
         self, system: System, encoding: Encoding, limits: Limits, began: float, keep_edges: bool
@@ -251,6 +258,8 @@ class _Search:
             self._loop(found, states, index, parents, via, waiting, choose, progress)
         except KeyboardInterrupt:
             found.stopped = Stopped.INTERRUPTED
+            _complete_only(states, parents, via)
+            _complete_only(edge_rule, edge_state)
         finally:
             if collecting:
                 gc.enable()

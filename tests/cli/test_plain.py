@@ -213,7 +213,7 @@ async def test_stop_always_stops_whatever_is_asked(operator: Operator) -> None:
 
 async def until(condition: Callable[[], bool]) -> None:
     """Files are read in a thread; the next turns of the loop see what came of it."""
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(60):
         while not condition():  # noqa: ASYNC110 - the unit says it on its screen alone
             await asyncio.sleep(0)
 

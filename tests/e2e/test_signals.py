@@ -26,7 +26,7 @@ def test_a_signal_stops_the_run_and_releases_its_vehicles(
     m2pem: CommandLine, tmp_path: Path, number: signal.Signals
 ) -> None:
     fleet, state = fleet_with_state(tmp_path)
-    program = driving(m2pem, fleet, "--speed", "20")
+    program = driving(m2pem, fleet, "--speed", "2")  # the mission itself stops it after 9 s
     program.send(number)
     assert program.until_record("RunEnded")["detail"] == f"stopped by {number.name}"
     program.until_record("BehaviorEnded", state="CANCELLED")

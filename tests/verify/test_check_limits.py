@@ -74,7 +74,7 @@ def test_the_limit_of_time_holds_for_the_making_of_rules() -> None:
     began = time.monotonic()
     report = check(choice_of(30), limits=Limits(seconds=0.05))
     assert report.found.stopped is Stopped.TIME
-    assert time.monotonic() - began < 5
+    assert time.monotonic() - began < 60  # without the limit: for ever
     assert "while spelling out Which" in report.results[0].covered
 
 

@@ -17,7 +17,7 @@ from tests.model.bpmn_text import flow
 from tests.verify.missions import mission, task
 from tests.verify.models import branches
 
-SMALL = Limits(states=1_000, tokens=3, seconds=2.0)
+SMALL = Limits(states=1_000, tokens=3, seconds=60.0)
 
 
 def seen(found: Exploration) -> tuple[object, ...]:

@@ -202,7 +202,7 @@ def test_ctrl_c_ends_the_checker_and_tells_what_was_seen(folders: Path) -> None:
     found = search(rows(12), progress=interrupt)
     assert found.stopped is Stopped.INTERRUPTED
     assert found.states > 100
-    assert time.monotonic() - began < 20
+    assert time.monotonic() - began < 60
     assert not list(folders.iterdir())
     assert not [each for each in Path("/proc").glob("[0-9]*/cwd") if _leads_to(each, folders)], (
         "a checker still runs"

@@ -10,7 +10,7 @@ from typing import Any
 
 from pymavlink import mavutil
 
-WAIT_S = 10.0
+WAIT_S = 40.0
 
 
 class Ground:

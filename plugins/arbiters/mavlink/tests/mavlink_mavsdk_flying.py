@@ -22,7 +22,7 @@ from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.component_type import ComponentType
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-WITHIN_S = 20.0
+WITHIN_S = 40.0
 SPEED = 20.0
 GUIDED = {Kind.COPTER: 4, Kind.ROVER: 15}
 

@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 GROUND = Address(255, 190)
 ONE = Address(1, 1)
+WITHIN_S = 40.0
 
 
 class WallClock:
@@ -73,7 +74,7 @@ class Scripted(asyncio.DatagramProtocol):
             await asyncio.sleep(0.1)
 
     async def hears(self, true: Callable[[Any], bool]) -> Any:
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(WITHIN_S):
             while True:
                 for message in self.heard:
                     if true(message):
@@ -108,7 +109,7 @@ async def linked(url: str, *addresses: Address) -> AsyncIterator[list[MavsdkLink
             await link.close()
 
 
-async def until(true: Callable[[], bool], within_s: float = 10.0) -> None:
+async def until(true: Callable[[], bool], within_s: float = WITHIN_S) -> None:
     async with asyncio.timeout(within_s):
         while not true():  # noqa: ASYNC110  # what is waited for has no event
             await asyncio.sleep(0.01)
@@ -122,7 +123,7 @@ def native_threads() -> int:
 
 def threads_fall_to(number: int) -> bool:
     """Whether no more than so many are left; those of executors take a moment to end."""
-    end_s = time.monotonic() + 2.0
+    end_s = time.monotonic() + WITHIN_S
     while native_threads() > number and time.monotonic() < end_s:
         time.sleep(0.01)
     return native_threads() <= number

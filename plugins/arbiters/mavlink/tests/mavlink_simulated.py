@@ -1,6 +1,7 @@
 """Arbiters on simulated autopilots, over real UDP."""
 
 import asyncio
+import math
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -16,8 +17,11 @@ from m2pem.testing.contracts.bench import ArbiterBench, context
 
 HOME = (47.397742, 8.545594)
 HOME_ALTITUDE_M = 488.0
-PATIENT = {"lost_after_s": 10.0}
-"""Half a second of the wall clock, at twenty times its speed: tests share their processors."""
+AMPLE_S = 800.0
+"""Of a clock that is twenty times as fast."""
+
+PATIENT = {"lost_after_s": 40.0}
+"""Two seconds of the wall clock, at twenty times its speed: tests share their processors."""
 
 DOMAINS = {Kind.COPTER: "air", Kind.ROVER: "ground", Kind.PLANE: "air", Kind.BOAT: "surface"}
 
@@ -73,8 +77,21 @@ class Bench(ArbiterBench):
     async def do(self, id_: str, behavior: str, vehicle: str = "v1", **parameters: Any) -> None:
         """Start it and see it succeed."""
         await self.start(id_, behavior, vehicle, **parameters)
-        end = await self.ended(id_, 600.0)
+        end = await self.ended(id_, AMPLE_S)
         assert end.state == "SUCCEEDED", end
+
+    async def stands(self, number: int = 1) -> tuple[float, float]:
+        """Wait until a vehicle stands; where."""
+        truth = self.truth(number)
+        places = [self.level(number)]
+        async with asyncio.timeout(AMPLE_S / 20):
+            while (
+                len(places) < 6 or max(math.dist(places[-1], each) for each in places[-6:]) > 0.02
+            ):
+                stepped_s = truth.autopilot.now_s
+                await self.simulator.until(lambda: truth.autopilot.now_s > stepped_s + 0.5)  # noqa: B023
+                places.append(self.level(number))
+        return places[-1]
 
 
 def fly(

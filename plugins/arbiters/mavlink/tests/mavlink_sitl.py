@@ -15,7 +15,7 @@ from pathlib import Path
 
 HOME = (47.397742, 8.545594, 488.0)
 SPEED = 5
-ENDED_WITHIN_S = 10
+ENDED_WITHIN_S = 30
 
 
 def free_port() -> int:

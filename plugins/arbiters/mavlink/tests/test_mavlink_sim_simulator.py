@@ -27,7 +27,7 @@ class Listener(asyncio.DatagramProtocol):
         self.came.set()
 
     async def until(self, condition: Callable[[], bool]) -> None:
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(40):
             while not condition():
                 self.came.clear()
                 await self.came.wait()
@@ -90,7 +90,7 @@ async def test_a_port_where_nobody_listens_stops_nothing() -> None:
         free.bind(("127.0.0.1", 0))
         nobody = free.getsockname()
     async with Simulator([VehicleSpec(estimator_s=1)], speed=50, to=nobody) as sim:
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(40):
             await sim.until(lambda: sim[1].autopilot.estimator.ready)
 
 

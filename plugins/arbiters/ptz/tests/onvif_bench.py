@@ -30,7 +30,7 @@ def write_credentials(folder: Path, password: str = ACCOUNT.password) -> Path:
     return path
 
 
-async def until(condition: Callable[[], object], within_s: float = 10.0) -> None:
+async def until(condition: Callable[[], object], within_s: float = 40.0) -> None:
     deadline = time.monotonic() + within_s
     while not condition():
         assert time.monotonic() < deadline, "it did not come about in time"
@@ -42,7 +42,7 @@ class Bench:
 
     def __init__(self, port: int, reach: Reach, own: dict[str, object]) -> None:
         self.heard = 0
-        settings = {"driver": "onvif", "host": "127.0.0.1", "port": port, "timeout": "1 s", **own}
+        settings = {"driver": "onvif", "host": "127.0.0.1", "port": port, "timeout": "5 s", **own}
         own_keys = {key: value for key, value in settings.items() if key != "driver"}
         self.driver = OnvifDriver(
             Seat(

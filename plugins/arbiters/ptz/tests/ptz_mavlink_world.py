@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+import pytest
 from m2pem_plugin_mavlink.sim.camera import Camera
 from m2pem_plugin_mavlink.sim.gimbal.gimbal import Gimbal
 from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
@@ -22,7 +23,7 @@ from m2pem.executive.clock import SystemClock
 from m2pem.gateway.bus import Bus
 
 SPEED = 10.0
-AMPLE_S = 20.0
+AMPLE_S = 40.0
 VEHICLE, CAMERA = ResourceId("v1"), ResourceId("v1/ptz")
 REACH = Reach(zoom_max=11.0, rate_rad_s=2.0)
 
@@ -64,6 +65,16 @@ class World:
         await until(lambda: self.driver.refusal(behavior) == "")
         if behavior.startswith("ptz"):
             await until(lambda: self.driver.look is not None)
+
+    async def stands(self) -> tuple[float, float]:
+        """Wait until it has not turned for half a second of its own time; where it points."""
+        async with asyncio.timeout(AMPLE_S):
+            while True:
+                before, flown = self.truly_deg, self.real.autopilot
+                since_s = flown.now_s
+                await until(lambda: flown.now_s > since_s + 0.5)  # noqa: B023
+                if self.truly_deg == pytest.approx(before, abs=0.1):
+                    return self.truly_deg
 
     def is_at(self, pan_deg: float, tilt_deg: float, within_deg: float = 0.6) -> bool:
         pan, tilt = self.truly_deg

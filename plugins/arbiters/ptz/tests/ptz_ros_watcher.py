@@ -13,8 +13,9 @@ from std_msgs.msg import String
 
 from m2pem.api import ResourceId
 
-STOOD_S = 0.5
-"""A head that stood for so long begins a new motion when it moves."""
+STOOD = 10
+"""A head that has said so often that it stands begins a new motion when it moves. Time does not
+tell: who looks, or the head itself, may be late."""
 
 
 class Watcher:
@@ -25,7 +26,7 @@ class Watcher:
         self.motions = dict.fromkeys(namespaces, 0)
         self._namespaces = namespaces
         self._at: dict[ResourceId, tuple[float, ...]] = {}
-        self._moved_s = dict.fromkeys(namespaces, 0.0)
+        self._stood = dict.fromkeys(namespaces, STOOD)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="watcher", daemon=True)
         self._thread.start()
@@ -63,9 +64,10 @@ class Watcher:
         return ros
 
     def _hear(self, camera: ResourceId, at: tuple[float, ...]) -> None:
-        now_s = self._loop.time()
         before = self._at.get(camera, at)
         self._at[camera] = at
         if math.dist(before, at) > 1e-6:
-            self.motions[camera] += now_s - self._moved_s[camera] > STOOD_S
-            self._moved_s[camera] = now_s
+            self.motions[camera] += self._stood[camera] >= STOOD
+            self._stood[camera] = 0
+        else:
+            self._stood[camera] += 1

@@ -25,7 +25,7 @@ from m2pem.gateway.bus import Bus
 
 CAMERA = ResourceId("evsg2/ptz")
 PEER = Path(__file__).with_name("ptz_ros_camera_peer.py")
-AMPLE_S = 20.0
+AMPLE_S = 40.0
 
 
 async def until(true: Callable[[], Any]) -> None:
@@ -70,6 +70,20 @@ class World:
 
     async def ready(self) -> None:
         await until(lambda: self.driver.refusal("ptz_point_at") == "" and self.joints)
+        await until(lambda: self.driver.refusal("take_picture") == "")
+
+    async def stands(self, count: int = 10) -> None:
+        """Wait until so many samples, heard from now on, say the same."""
+        since = len(self.history)
+
+        def alike() -> bool:
+            last = self.history[since:][-count:]
+            return len(last) == count and all(
+                max(each[name] for each in last) - min(each[name] for each in last) < 1e-3
+                for name in last[0]
+            )
+
+        await until(alike)
 
     async def fault(self, name: str) -> None:
         await until(self._faults.get_subscription_count)

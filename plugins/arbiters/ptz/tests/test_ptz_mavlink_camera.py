@@ -149,7 +149,7 @@ async def test_halt_stops_a_zoom_on_its_way() -> None:
         def slowly(command):
             told.append((command.param1, command.param2))
             if command.param1 == 2:
-                it.camera._zoom_rate = 5.0
+                it.camera._zoom_rate = 2.0
                 return Result.ACCEPTED
             return real(command)
 

@@ -67,7 +67,7 @@ class _Gimbals(ArbiterContract):
 
         thread = threading.Thread(target=loop.run_until_complete, args=(main(),), name="simulator")
         thread.start()
-        assert started.wait(20)
+        assert started.wait(60)
         yield simulator
         loop.call_soon_threadsafe(stop.set)
         thread.join()
@@ -94,7 +94,7 @@ class _Gimbals(ArbiterContract):
                 "pictures": str(tmp_path),
                 "reach": {"rate": "60 deg/s"},
             }
-            return Connection(camera, "air", settings, lost_after_s=8.0)
+            return Connection(camera, "air", settings, lost_after_s=20.0)
 
         def make(context):
             for camera in NUMBERS:

@@ -82,8 +82,11 @@ async def test_where_it_points_and_who_controls_it(kind: Kind) -> None:
                 return (angles.pitch_deg, angles.yaw_deg) == near
 
             await first(gimbal.subscribe_attitude(), points)
-            status = await first(gimbal.subscribe_control_status(), lambda each: True)
-            assert (status.sysid_primary_control, status.compid_primary_control) == (255, 191)
+
+            def is_ours(each: Any) -> bool:
+                return (each.sysid_primary_control, each.compid_primary_control) == (255, 191)
+
+            assert await first(gimbal.subscribe_control_status(), is_ours)
         finally:
             gimbal.destroy()
 

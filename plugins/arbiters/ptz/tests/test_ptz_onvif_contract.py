@@ -44,7 +44,7 @@ class _Cameras:
         self._loop.close()
 
     def _do(self, coroutine):
-        return asyncio.run_coroutine_threadsafe(coroutine, self._loop).result(10)
+        return asyncio.run_coroutine_threadsafe(coroutine, self._loop).result(40)
 
     def silence(self, camera):
         self._loop.call_soon_threadsafe(self.servers[camera].faults.silent, True)

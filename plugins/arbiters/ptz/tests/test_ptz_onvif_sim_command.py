@@ -43,11 +43,11 @@ def test_a_camera_is_simulated_until_ctrl_c():
             line = process.stdout.readline().split()
             picture = line[1].replace("/onvif/device_service", "/snapshot.jpg")
             direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
-            with direct.open(picture, timeout=10) as answer:
+            with direct.open(picture, timeout=40) as answer:
                 assert answer.read(3) == b"\xff\xd8\xff"
         finally:
             process.send_signal(signal.SIGINT)
-        process.wait(10)
+        process.wait(40)
     assert line[0] == "camera"
     assert line[1].startswith("http://127.0.0.1:")
 
@@ -97,7 +97,7 @@ def test_a_fault_is_read_with_its_times(words, at_s, for_s):
 
 async def test_planned_faults_begin_and_end():
     async with camera() as server:
-        for words in ('fault "too hot" for 0.3 s', "slow 2 s for 0.3 s", "clock +60 s for 0.3 s"):
+        for words in ('fault "too hot" for 3 s', "slow 2 s for 3 s", "clock +60 s for 3 s"):
             server.faults.plan(parse(words))
         troubles = server.camera.troubles
         await until(lambda: (troubles.fault, troubles.slow_s) == ("too hot", 2.0))
@@ -122,7 +122,7 @@ async def test_a_camera_that_reboots_comes_back_at_its_address_looking_ahead():
             writer.close()
             return True
 
-        for _ in range(100):
+        for _ in range(2000):
             if await answers():
                 break
             await asyncio.sleep(0.02)

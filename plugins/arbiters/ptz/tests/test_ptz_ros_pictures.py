@@ -14,6 +14,7 @@ async def test_a_picture_shows_where_the_camera_looked(ros_domain, tmp_path) -> 
         await it.ready()
         it.point(30.0, -10.0)
         await until(lambda: it.joints_are(0.05, pan_joint=-30.0, tilt_joint=-10.0))
+        await it.stands()
         picture = await it.driver.take_picture()
         assert picture.suffix == ".jpg"
         assert picture.content.startswith(b"\xff\xd8")
@@ -31,6 +32,9 @@ async def test_images_are_listened_to_only_while_they_are_wanted(
         topic = "/evsg2/camera/image_raw/compressed"
         assert it.ros.node.count_subscribers(topic) == 0
         await it.driver.take_picture()
+        await it.driver.start_recording()
+        await until(lambda: it.ros.node.count_subscribers(topic) == 1)
+        await it.driver.stop_recording()
         await until(lambda: it.ros.node.count_subscribers(topic) == 0)
 
 
@@ -59,6 +63,7 @@ async def test_a_video_is_a_file_of_pictures(ros_domain, tmp_path) -> None:
         await until(lambda: it.joints_are(pan_joint=-40.0))
         (path,) = (tmp_path / "new").iterdir()
         await until(lambda: b"pan 40.00" in path.read_bytes())
+        await until(lambda: path.read_bytes().count(b"pan ") >= 2)
         told = await it.driver.stop_recording()
         assert Path(told) == path.absolute()
         assert path.name.startswith("evsg2_ptz_20")

@@ -23,7 +23,7 @@ DOMAINS = range(1, 101)
 """On Linux, the ports of higher ones are where the system picks free ports from."""
 
 FIRST_PORT = 18500
-STOP_WITHIN_S = 10
+STOP_WITHIN_S = 30
 
 
 @contextmanager

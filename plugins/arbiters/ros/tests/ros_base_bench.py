@@ -34,7 +34,7 @@ from m2pem.gateway.bus import Bus
 BASE = Path(__file__).with_name("ros_base_peer.py")
 ORIGIN = (38.1075, -77.3192, 60.0)
 RUN = UUID("7a4f3c52-6d0e-5c6d-9a3b-2d8a6d7e9f10")
-AMPLE_S = 20.0
+AMPLE_S = 40.0
 
 
 class Whereabouts:
@@ -73,6 +73,7 @@ class Bench:
         self.outcomes: list[tuple[UUID, Outcome]] = []
         self.said: list[tuple[float, float]] = []
         self.where = Whereabouts(ros, namespace, clock)
+        self.ros = ros
         self._orders = ros.node.create_publisher(String, f"{namespace}/orders", 10)
         ros.subscribe(String, f"{namespace}/said", self._say, qos.EVENTS)
         settings = Settings(namespace, **{"bounds": Bounds(acceleration_m_s2=2.0), **options})

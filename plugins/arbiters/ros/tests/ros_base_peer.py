@@ -20,6 +20,9 @@ from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import String
 
 PERIOD_S = 0.02
+LATE_S = 3 * PERIOD_S
+"""Of what is later than that on a busy computer, nothing passes for the base."""
+
 COMMAND_LASTS_S = 0.5
 LAG_S = 0.1
 
@@ -53,7 +56,7 @@ class Base:
 
     def move(self) -> None:
         now = time.monotonic()
-        dt, self.last = (now - self.last) * self.speed, now
+        dt, self.last = min(now - self.last, LATE_S) * self.speed, now
         heard = now - self.wanted_at < COMMAND_LASTS_S
         wanted = self.wanted if heard and not self.blocked else (0.0, 0.0)
         part = 1.0 - math.exp(-dt / LAG_S)

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import math
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -16,6 +17,8 @@ from m2pem_plugin_ros.frames import to_geodetic, to_local
 from m2pem_plugin_ros.localization import TopicLocalization
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.settings import DriverName, RouteAction, Settings
+from nav_msgs.msg import Odometry
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String, UInt32
 
 from m2pem.api import (
@@ -34,7 +37,10 @@ from m2pem.api import (
 PEER = Path(__file__).with_name("ros_nav2_peer.py")
 ORIGIN = (38.1075, -77.3192, 60.0)
 VEHICLE = ResourceId("ugv1")
-AMPLE_S = 15.0
+AMPLE_S = 40.0
+
+ALL = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""For who looks only now and then, and must miss nothing."""
 
 
 class WallClock:
@@ -97,13 +103,15 @@ class Diary:
 
 
 class Bench:
-    """The driver, and what it has told."""
+    """The driver, and what it has told. `track`: speed, east and north in all odometry so far."""
 
     def __init__(self, ros: RosRuntime, route_action: RouteAction, name: ResourceId) -> None:
         self.ros = ros
+        self.name = name
         self.told = Diary()
         self.bus = Bus()
         self.motions = -1
+        self.track: list[tuple[float, float, float]] = []
         settings = Settings(f"/{name}", driver=DriverName.NAV2, route_action=route_action)
         context = ArbiterContext(WallClock(), self.bus, logging.getLogger("bench"), ORIGIN)
         self.localization = TopicLocalization(ros, name, settings, context)
@@ -115,12 +123,14 @@ class Bench:
         self._obeyed_topic = f"/{name}/obeyed"
         ros.subscribe(String, self._obeyed_topic, lambda m: self._obeyed.append(m.data), qos.EVENTS)
         ros.subscribe(UInt32, f"/{name}/motions", self._count, qos.STATUS)
+        ros.subscribe(Odometry, f"/{name}/odom", self._follow, ALL)
 
     async def ready(self) -> None:
         await self.until(lambda: self.driver.health.ready and self.localization.pose is not None)
         await self.until(self._words.get_subscription_count)
         await self.until(lambda: self.ros.node.count_publishers(self._obeyed_topic))
         await self.until(lambda: self.motions >= 0)
+        await self.until(lambda: self.ros.node.count_subscribers(f"/{self.name}/speed_limit"))
 
     def order(self, behavior: str, goal: UUID | None = None, **wishes: ResolvedValue) -> Order:
         request = BehaviorRequest("r1.b1", 1, behavior, wishes, (VEHICLE,))
@@ -148,6 +158,23 @@ class Bench:
         async with asyncio.timeout(within_s):
             while not holds():  # noqa: ASYNC110  # what is looked at has no event
                 await asyncio.sleep(0.01)
+
+    async def later(self, count: int = 20) -> None:
+        """Wait for so much odometry from now on: what was said before it was heard, too."""
+        since = len(self.track)
+        await self.until(lambda: len(self.track) >= since + count)
+
+    async def passed(self, *places: tuple[float, float], within_m: float = 0.5) -> None:
+        """Wait until it has come by these places, one after the other."""
+
+        def all_passed() -> bool:
+            left = list(places)
+            for _, *here in self.track:
+                if left and math.dist(here, left[0]) <= within_m:
+                    del left[0]
+            return not left
+
+        await self.until(all_passed)
 
     async def moving(self, goal: UUID | None = None) -> None:
         if goal is not None:
@@ -179,6 +206,10 @@ class Bench:
 
     def _count(self, message: Any) -> None:
         self.motions = message.data
+
+    def _follow(self, message: Any) -> None:
+        place = message.pose.pose.position
+        self.track.append((abs(message.twist.twist.linear.x), place.x, place.y))
 
 
 @asynccontextmanager

@@ -7,15 +7,16 @@ from contextlib import asynccontextmanager
 from typing import Any, cast
 from uuid import UUID, uuid4, uuid5
 
+from m2pem_interfaces.msg import VehicleStatus
 from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
 from m2pem_plugin_ros.drivers.node import NodeDriver
-from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.settings import Settings, Via
 
 from m2pem.api import ArbiterContext, BehaviorRequest, BehaviorState, Connection, ResourceId
 from m2pem.executive.clock import SystemClock
 
-AMPLE_S = 20.0
+AMPLE_S = 40.0
 LOOK_S = 0.005
 
 
@@ -52,6 +53,8 @@ class Bench:
         connection = Connection(self.vehicle, "ground")
         seat = Seat(connection, settings, context, ros, cast("Any", None), self.told)
         self.driver = NodeDriver(seat)
+        self.statuses = 0
+        ros.subscribe(VehicleStatus, f"/{vehicle}/vehicle_status", self._count, qos.STATUS)
 
     def order(self, behavior: str, *, preempts: tuple[UUID, ...] = (), **parameters: Any) -> Order:
         """An order of a run of its own."""
@@ -85,6 +88,12 @@ class Bench:
         """Wait until the vehicle was heard."""
         await self.until(lambda: self.told.times_heard)
 
+    async def later(self) -> None:
+        """Wait until the vehicle has said some more of how it is, which it does after all that was
+        heard of behaviors by now: `begun` is up to date then."""
+        before = self.statuses
+        await self.until(lambda: self.statuses >= before + 3)
+
     async def running(self, order: Order) -> None:
         """Wait until the vehicle does it."""
         await self.until(lambda: order.goal in self.told.begun)
@@ -93,6 +102,9 @@ class Bench:
         """How it ended."""
         await self.until(lambda: order.goal in [goal for goal, _ in self.told.ends])
         return next(outcome for goal, outcome in self.told.ends if goal == order.goal)
+
+    def _count(self, _: object) -> None:
+        self.statuses += 1
 
     @property
     def begun(self) -> int:

@@ -19,7 +19,7 @@ from m2pem.executive.clock import SystemClock
 from m2pem.testing.contracts.bench import ArbiterBench, context
 
 PEER = Path(__file__).with_name("ros_sensors_peer.py")
-AMPLE_S = 20.0
+AMPLE_S = 40.0
 V, GPR = ResourceId("evsg1"), ResourceId("evsg1/gpr")
 TOPICS = (
     "nav_msgs/Odometry@/evsg1/odom",

@@ -16,7 +16,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-WITHIN_S = 20.0
+WITHIN_S = 30.0
 
 
 def message_type(name: str) -> Any:

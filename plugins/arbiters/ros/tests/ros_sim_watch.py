@@ -11,7 +11,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
 COMMAND = Path(__file__).with_name("ros_sim_command.py")
-AMPLE_S = 20.0
+AMPLE_S = 40.0
 LOOK_S = 0.01
 
 
@@ -78,6 +78,16 @@ class Joystick:
         while True:
             self._publisher.publish(self._message)
             await asyncio.sleep(0.05)
+
+
+async def insist(ros: RosRuntime, fault: str, heard: Heard) -> Any:
+    """Have a fault happen until what it does is heard, and return that: what is said just when DDS
+    has two find each other may be lost."""
+    async with asyncio.timeout(AMPLE_S):
+        while not heard.last:
+            assert (await switch(ros, fault)).successful
+            await asyncio.sleep(0.2)
+    return heard.last
 
 
 async def switch(ros: RosRuntime, fault: str) -> Any:

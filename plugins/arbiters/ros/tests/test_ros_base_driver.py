@@ -1,5 +1,6 @@
 """A base in another process, driven over real DDS."""
 
+import asyncio
 import logging
 import math
 from collections.abc import AsyncIterator, Iterator
@@ -9,12 +10,12 @@ import pytest
 from m2pem_plugin_ros.drivers.driver import Outcome
 from m2pem_plugin_ros.settings import Bounds
 from m2pem_plugin_ros.testing import Peer, reserved_domain
-from ros_base_bench import BASE, Bench, bench, geo, point, route, until
+from ros_base_bench import AMPLE_S, BASE, Bench, bench, geo, point, route, until
 
 from m2pem.api import Area, BehaviorState, GeoPosition, ResourceId, VehiclePosition, VehicleState
 from m2pem.executive.clock import SystemClock
 
-SPEED = 8.0
+SPEED = 4.0
 """Of time: the peer and the driver's clock run so much faster than the world."""
 
 
@@ -41,8 +42,9 @@ async def test_a_route_is_driven_to_its_end(base: Bench) -> None:
     assert await base.ending(order) == Outcome(BehaviorState.SUCCEEDED)
     assert math.dist(base.place, (6, 5)) < 0.5
     assert base.goals == [order.goal]
+    await until(lambda: base.said)
     assert max(forward for forward, _ in base.said) <= 1.5 + 1e-9
-    assert base.heard_count > 10
+    await until(lambda: base.heard_count > 10)
 
 
 async def test_goto_ends_within_the_tolerance_and_points_as_asked(base: Bench) -> None:
@@ -63,14 +65,14 @@ async def test_a_base_that_is_dragged_out_of_the_fence_is_stopped(domain: int, p
         outcome = await base.ending(order)
         assert outcome.state is BehaviorState.FAILED
         assert outcome.reason.endswith("m outside the fleet's fence")
-        assert 6.0 < base.place[0] < 12.0
-        assert base.said[-1] == (0.0, 0.0)
+        assert 6.0 < base.place[0] < 30.0
+        await until(lambda: base.said and base.said[-1] == (0.0, 0.0))
 
 
 async def test_reverse_goes_straight_back(base: Bench) -> None:
-    order = base.begin("reverse", distance=2.0)
+    order = base.begin("reverse", distance=2.0, speed=0.4)
     assert (await base.ending(order)).state is BehaviorState.SUCCEEDED
-    assert base.place[0] == pytest.approx(-2.0, abs=0.2)
+    assert base.place[0] == pytest.approx(-2.0, abs=0.8)
     assert base.place[1] == pytest.approx(0.0, abs=0.2)
 
 
@@ -89,17 +91,16 @@ async def test_a_cancelled_base_stands_before_that_is_told(base: Bench) -> None:
 async def test_a_base_that_stands_is_left_to_others_after_a_while(base: Bench) -> None:
     await base.ending(base.begin("drive_stop"))
     await until(lambda: base.said)
-    began_us = base.clock.now_us()
     count = -1
-    while count != len(base.said):
-        count = len(base.said)
-        await base.clock.sleep(1.0)
+    async with asyncio.timeout(AMPLE_S):
+        while count != len(base.said):
+            count = len(base.said)
+            await base.clock.sleep(8.0)
     assert set(base.said) == {(0.0, 0.0)}
-    assert base.clock.now_us() - began_us < 8_000_000
 
 
 async def test_hold_keeps_the_order_and_resume_goes_on_with_it(base: Bench) -> None:
-    order = base.begin("single_vehicle_routing", route=route((12, 0)))
+    order = base.begin("single_vehicle_routing", route=route((30, 0)))
     await until(lambda: base.place[0] > 3)
     base.driver.hold()
     await until(lambda: abs(base.speed_m_s) < 0.02)
@@ -108,8 +109,8 @@ async def test_hold_keeps_the_order_and_resume_goes_on_with_it(base: Bench) -> N
     assert base.outcomes == []
     base.driver.resume()
     assert (await base.ending(order)).state is BehaviorState.SUCCEEDED
-    assert held < 11
-    assert math.dist(base.place, (12, 0)) < 0.5
+    assert held < 28
+    assert math.dist(base.place, (30, 0)) < 0.5
 
 
 async def test_a_new_order_takes_over_and_the_old_one_is_not_told_of(base: Bench) -> None:
@@ -122,10 +123,11 @@ async def test_a_new_order_takes_over_and_the_old_one_is_not_told_of(base: Bench
 
 
 async def test_without_odometry_it_stands_and_goes_on_when_it_is_heard_again(base: Bench) -> None:
-    order = base.begin("goto", target=point(12, 0))
+    order = base.begin("goto", target=point(40, 0))
     await until(lambda: base.speed_m_s > 1.0)
     await base.tell_base("mute")
-    await until(lambda: base.said[-1] == (0.0, 0.0))
+    await until(lambda: base.where.age_s > 8.0)
+    await until(lambda: base.said and base.said[-1] == (0.0, 0.0))
     assert base.driver.health.ready is False
     assert "odometry" in base.driver.health.not_ready_reasons[0]
     heard = base.heard_count
@@ -147,7 +149,7 @@ async def test_teleop_hands_the_stick_on_until_it_is_let_go(base: Bench) -> None
     order = base.begin("teleop")
     assert base.driver.health.mode == "manual"
     await base.tell_base("stick 9.0 0.2")
-    await until(lambda: base.speed_m_s > 1.5)
+    await until(lambda: base.speed_m_s > 1.5 and base.said)
     assert max(forward for forward, _ in base.said) <= 2.0
     await base.tell_base("stick off")
     await until(lambda: abs(base.speed_m_s) < 0.05)
@@ -182,6 +184,7 @@ async def test_somebody_else_who_commands_the_base_is_told_of_once(
 ) -> None:
     caplog.set_level(logging.WARNING)
     await base.tell_base("intrude")
+    await until(lambda: base.ros.node.count_publishers("/ugv1/cmd_vel") == 2)
     order = base.begin("goto", target=point(12, 0))
     assert (await base.ending(order)).state is BehaviorState.SUCCEEDED
     warnings = [record for record in caplog.records if "others publish" in record.message]
@@ -215,9 +218,13 @@ async def test_after_a_restart_only_a_reached_place_is_told(base: Bench) -> None
 
 async def test_nothing_is_sent_for_a_vehicle_that_is_forgotten(base: Bench) -> None:
     base.begin("goto", target=point(30, 0))
-    await until(lambda: base.speed_m_s > 1.0)
+    await until(lambda: base.said and base.said[-1][0] > 0)
+    await until(lambda: base.speed_m_s > 1.0 and base.where.age_s < 1.0)
     base.driver.forget()
     await until(lambda: abs(base.speed_m_s) < 0.05)  # of itself: nobody commands it any more
+    said = len(base.said)
+    await base.clock.sleep(4.0)
+    assert len(base.said) == said
     assert base.said[-1][0] > 0
     assert base.outcomes == []
 
@@ -226,7 +233,7 @@ async def test_a_driver_that_closes_leaves_the_base_standing(base: Bench, domain
     async with bench(domain, "/ugv1", SystemClock(SPEED)) as closing:
         closing.begin("goto", target=point(30, 0))
         await until(lambda: base.speed_m_s > 1.0)
-    await until(lambda: base.said and base.said[-1] == (0.0, 0.0), 5.0)
+    await until(lambda: base.said and base.said[-1] == (0.0, 0.0))
 
 
 async def test_stamped_commands_of_a_base_with_a_turning_circle(domain: int) -> None:

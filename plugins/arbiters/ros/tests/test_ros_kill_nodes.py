@@ -9,7 +9,7 @@ from ros_e2e_watch import Watch, watching
 from ros_e2e_world import convoy, fleet_file
 
 SPEED = 4.0
-LENGTH_M = 80.0
+LENGTH_M = 120.0
 VEHICLES = {
     "soon": {},
     "late": {},
@@ -48,16 +48,16 @@ def ends(program: Program, vehicle: str) -> list[tuple[str, str]]:
 def test_a_killed_node_is_a_lost_link_and_the_vehicle_is_used_again_after(
     m2pem: Programs, watch: Watch
 ) -> None:
-    fleet = fleet_file(m2pem.folder, VEHICLES, LENGTH_M, lost_after="6 s")
+    fleet = fleet_file(m2pem.folder, VEHICLES, LENGTH_M, lost_after="16 s")
     simulated = m2pem.simulate(fleet, SPEED)
     watch.until_heard()
-    mission = convoy(m2pem.folder, VEHICLES, again="PT20S")
+    mission = convoy(m2pem.folder, VEHICLES, again="PT50S")
     words = ("--speed", f"{SPEED:g}", "--ocu", "none", "--format", "json")
     program = m2pem.m2pem("run", mission, "--fleet", fleet, *words)
     program.until_record("BehaviorProgressed", count=len(VEHICLES), state="RUNNING")
     watch.until(lambda: all(watch[name].north_m > 5.0 for name in VEHICLES))
     for name in VEHICLES:
-        simulated.type(f"{name}: kill node for {1 if name in SOON else 20} s")
+        simulated.type(f"{name}: kill node for {1 if name in SOON else 28} s")
     # Without a node nobody drives it: it stands until the mission has it drive again.
     watch.until(lambda: all(watch[name].stands for name in VEHICLES))
     assert all(watch[name].north_m < LENGTH_M - 5.0 for name in VEHICLES)
@@ -72,4 +72,5 @@ def test_a_killed_node_is_a_lost_link_and_the_vehicle_is_used_again_after(
         soon = asked["resources"][0] in SOON
         assert SAYS[soon] in lost["reason"], lost
     for name in ("soon", "late"):
+        watch.until(lambda name=name: len(watch[name].accepted()) >= 2)
         assert len(watch[name].accepted()) == 2

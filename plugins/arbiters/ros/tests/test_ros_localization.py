@@ -20,8 +20,9 @@ from m2pem.testing.contracts.bench import context
 NAN, INF = math.nan, math.inf
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def domain() -> Iterator[int]:
+    # A peer for each test: to one that others have listened to, they may seem to listen still.
     with reserved_domain() as domain, Peer(PEER, domain, TOPICS):
         yield domain
 

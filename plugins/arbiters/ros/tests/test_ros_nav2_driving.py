@@ -53,19 +53,21 @@ async def test_goto_drives_there_and_turns_to_the_heading(ugv1: Bench) -> None:
     assert await ugv1.state(goal) is BehaviorState.SUCCEEDED
     assert goal in ugv1.told.begun
     await ugv1.until(lambda: near(ugv1.place, there))
-    pose = ugv1.localization.pose
-    assert pose is not None
-    assert math.isclose(pose.yaw_rad, math.pi / 2, abs_tol=0.01)
+
+    def looks_north() -> bool:
+        pose = ugv1.localization.pose
+        return pose is not None and math.isclose(pose.yaw_rad, math.pi / 2, abs_tol=0.01)
+
+    await ugv1.until(looks_north)
 
 
 async def test_a_route_is_driven_through_all_its_places(ugv1: Bench) -> None:
     start = ugv1.place
     places = [elsewhere(start, 5.0, 0.0), elsewhere(start, 5.0, 5.0), elsewhere(start, 0.0, 5.0)]
     goal = ugv1.begin("single_vehicle_routing", route=along(*places))
-    for place in places:
-        await ugv1.until(lambda place=place: near(ugv1.place, place))
-        assert goal not in ugv1.told.outcomes or place is places[-1]
     assert await ugv1.state(goal) is BehaviorState.SUCCEEDED
+    await ugv1.passed(*places)
+    await ugv1.until(lambda: near(ugv1.place, places[-1]))
 
 
 async def test_a_route_that_is_repeated_begins_again_and_ends_when_it_is_asked_to(
@@ -74,8 +76,7 @@ async def test_a_route_that_is_repeated_begins_again_and_ends_when_it_is_asked_t
     start = ugv1.place
     first, second = elsewhere(start, 3.0, 0.0), elsewhere(start, 3.0, 3.0)
     goal = ugv1.begin("single_vehicle_routing", route=along(first, second), loop=True)
-    for place in (first, second, first, second, first):
-        await ugv1.until(lambda place=place: near(ugv1.place, place, 0.7))
+    await ugv1.passed(first, second, first, second, first, within_m=0.7)
     ugv1.driver.end(goal)
     assert await ugv1.state(goal) is BehaviorState.CANCELLED
     assert ugv1.speed_m_s < 0.05
@@ -83,31 +84,28 @@ async def test_a_route_that_is_repeated_begins_again_and_ends_when_it_is_asked_t
 
 async def test_a_held_route_goes_on_with_the_places_that_remain(ugv1: Bench) -> None:
     start = ugv1.place
-    first, last = elsewhere(start, 4.0, 0.0), elsewhere(start, 4.0, 12.0)
-    goal = ugv1.begin("single_vehicle_routing", route=along(first, last))
+    first, last = elsewhere(start, 4.0, 0.0), elsewhere(start, 4.0, 16.0)
+    goal = ugv1.begin("single_vehicle_routing", route=along(first, last), speed=4.0)
     await ugv1.until(lambda: ugv1.place[1] > start[1] + 3.0)
     ugv1.driver.hold()
     await ugv1.until(lambda: ugv1.speed_m_s < 0.05)
     await ugv1.until(lambda: not ugv1.driver.health.mode.startswith("navigate"))
-    held = ugv1.place
-    changes = ugv1.localization.changes
-    await ugv1.until(lambda: ugv1.localization.changes > changes + 20)
+    await ugv1.later()
+    held, since = ugv1.place, len(ugv1.track)
+    await ugv1.later()
     assert ugv1.place == held
     ugv1.driver.resume()
-    lowest = held[1]
-    while goal not in ugv1.told.outcomes:
-        lowest = min(lowest, ugv1.place[1])
-        await asyncio.sleep(0.02)
-    assert lowest > held[1] - 0.5, "it must not go back to the place that it has passed"
     assert await ugv1.state(goal) is BehaviorState.SUCCEEDED
     await ugv1.until(lambda: near(ugv1.place, last))
+    lowest = min(north_m for _, _, north_m in ugv1.track[since:])
+    assert lowest > held[1] - 0.5, "it must not go back to the place that it has passed"
 
 
 async def test_waypoints_are_followed_if_the_fleet_says_so(domain: int, nav2: Peer) -> None:
     async with bench(domain, RouteAction.WAYPOINTS) as ugv1:
         start = ugv1.place
-        places = [elsewhere(start, 4.0, 0.0), elsewhere(start, 4.0, 4.0)]
-        goal = ugv1.begin("single_vehicle_routing", route=along(*places))
+        places = [elsewhere(start, 4.0, 0.0), elsewhere(start, 4.0, 12.0)]
+        goal = ugv1.begin("single_vehicle_routing", route=along(*places), speed=4.0)
         await ugv1.until(lambda: ugv1.place[1] > start[1] + 1.0)
         ugv1.driver.hold()
         await ugv1.until(lambda: ugv1.speed_m_s < 0.05)
@@ -128,9 +126,12 @@ async def test_waypoints_that_nav2_leaves_out_are_a_blocked_route(domain: int, n
 
 
 async def test_speed_is_a_limit_that_can_change_and_ends_with_the_order(ugv1: Bench) -> None:
-    goal = ugv1.begin("goto", target=at(*elsewhere(ugv1.place, 30.0, 0.0)), speed=1.0)
-    await ugv1.until(lambda: ugv1.speed_m_s > 0.9)
-    assert ugv1.speed_m_s < 1.1
+    goal = ugv1.begin("goto", target=at(*elsewhere(ugv1.place, 60.0, 0.0)), speed=1.0)
+    await ugv1.until(lambda: 0.9 < ugv1.speed_m_s < 1.1)
+    await ugv1.later()
+    since = len(ugv1.track)
+    await ugv1.later()
+    assert all(0.9 < speed_m_s < 1.1 for speed_m_s, *_ in ugv1.track[since:])
     ugv1.driver.adjust(goal, {"speed": 3.0})
     await ugv1.until(lambda: 2.9 < ugv1.speed_m_s < 3.1)
     ugv1.driver.end(goal)
@@ -140,12 +141,14 @@ async def test_speed_is_a_limit_that_can_change_and_ends_with_the_order(ugv1: Be
 
 
 async def test_a_new_order_takes_over_without_a_stop(ugv1: Bench) -> None:
-    first = ugv1.begin("goto", target=at(*elsewhere(ugv1.place, 40.0, 0.0)))
+    first = ugv1.begin("goto", target=at(*elsewhere(ugv1.place, 120.0, 0.0)))
     await ugv1.moving()
+    await ugv1.later()
     motions = ugv1.motions
     second = ugv1.begin("goto", target=at(*elsewhere(ugv1.place, 4.0, 2.0)))
     assert await ugv1.state(second) is BehaviorState.SUCCEEDED
     assert first not in ugv1.told.outcomes, "what is replaced is not told of"
+    await ugv1.later()
     assert ugv1.motions == motions
 
 

@@ -38,7 +38,7 @@ def via(request: pytest.FixtureRequest) -> Via:
 @pytest.fixture
 async def one(domain: int, via: Via) -> AsyncIterator[Bench]:
     async with bench(domain, "evsg1", via) as one:
-        await one.heard()
+        await one.until(lambda: one.driver.health.mode)
         yield one
 
 
@@ -65,11 +65,12 @@ async def test_a_behavior_that_fails_says_with_which_code(one: Bench) -> None:
 async def test_what_cannot_be_done_is_rejected_with_a_reason(
     one: Bench, behavior: str, parameters: dict[str, object], reason: str
 ) -> None:
-    await one.until(lambda: one.driver.health.mode)
+    await one.later()
     before = one.begun
     end = await one.end_of(one.begin(behavior, **parameters))
     assert end.state is REJECTED
     assert reason in end.reason
+    await one.later()
     assert one.begun == before
 
 
@@ -118,11 +119,11 @@ async def test_a_behavior_takes_over_and_the_old_one_is_not_told_of(one: Bench) 
 
 
 async def test_a_held_vehicle_goes_on_when_it_is_resumed(one: Bench) -> None:
-    order = one.begin("hold", duration=0.3)
+    order = one.begin("hold", duration=2.0)
     await one.running(order)
     one.driver.hold()
     with pytest.raises(TimeoutError):
-        async with asyncio.timeout(1.0):
+        async with asyncio.timeout(3.0):
             await one.end_of(order)
     one.driver.resume()
     assert (await one.end_of(order)).state is SUCCEEDED
@@ -168,16 +169,18 @@ async def test_another_driver_finds_what_runs_and_what_has_ended(
     await one.end_of(ended)
     order = one.begin("single_vehicle_routing", route=ROUTE)
     await one.running(order)
-    await one.until(lambda: one.driver.health.mode)
+    await one.later()
     begun = one.begun
     await one.driver.close()
     async with bench(domain, "evsg1", via) as other:
+        await other.later()
         assert (await other.driver.look(order)).state is RUNNING
         found = await other.driver.look(ended)
         assert (found.state, found.code) == (FAILED, "ROUTE_BLOCKED")
         assert (await other.driver.look(other.order("drive_stop"))).state is UNKNOWN
         other.driver.end(order.goal)
         assert (await other.end_of(order)).state is CANCELLED
+        await other.later()
         assert other.begun == begun
 
 
@@ -186,8 +189,7 @@ async def test_a_start_of_what_is_done_already_begins_nothing(
 ) -> None:
     running = one.begin("single_vehicle_routing", route=ROUTE)
     await one.running(running)
-    await one.until(lambda: one.begun)
-    await one.until(lambda: one.driver.health.mode)
+    await one.later()
     begun = one.begun
     await one.driver.close()
     async with bench(domain, "evsg1", via) as other:
@@ -197,7 +199,7 @@ async def test_a_start_of_what_is_done_already_begins_nothing(
         await other.end_of(running)
         other.driver.begin(running)
         assert (await other.end_of(running)).state is CANCELLED
-        await other.until(lambda: other.begun)
+        await other.later()
         assert other.begun == begun
 
 

@@ -1,13 +1,14 @@
 """Nodes that are not there yet, are killed, restarted, or ended, while a behavior goes on."""
 
 import asyncio
+import re
 import signal
 from pathlib import Path
 
 import pytest
 from m2pem_plugin_ros.settings import Via
 from m2pem_plugin_ros.testing import Peer
-from ros_node_bench import CANCELLED, LOST, RUNNING, SUCCEEDED, UNKNOWN, Bench, bench
+from ros_node_bench import CANCELLED, LOST, RUNNING, SUCCEEDED, UNKNOWN, bench
 
 from m2pem.api import Route
 
@@ -32,12 +33,6 @@ async def end_peer(peer: Peer) -> None:
     await asyncio.to_thread(peer.__exit__, None, None, None)
 
 
-async def gone_on(one: Bench) -> None:
-    """Until the vehicle has said some more."""
-    before = one.told.times_heard
-    await one.until(lambda: one.told.times_heard > before + 3)
-
-
 async def test_a_start_before_the_node_is_there_is_done_once_it_is(
     ros_domain: int, via: Via
 ) -> None:
@@ -45,7 +40,7 @@ async def test_a_start_before_the_node_is_there_is_done_once_it_is(
         order = one.begin("single_vehicle_routing", route=ROUTE)
         peer = await start_peer(ros_domain)
         await one.running(order)
-        await gone_on(one)
+        await one.later()
         assert one.begun == 1
         await end_peer(peer)
         end = await one.end_of(order)
@@ -65,6 +60,7 @@ async def test_a_node_that_is_killed_and_restarted_has_lost_the_behavior(
         assert (end.state, end.code) == (LOST, "LINK_LOST")
         assert end.reason == "the vehicle's node was restarted and knows nothing of it"
         assert (await one.end_of(one.begin("drive_stop"))).state is SUCCEEDED
+        await one.later()
         assert one.begun == 1
         await end_peer(again)
 
@@ -77,6 +73,7 @@ async def test_both_sides_are_restarted_and_nothing_is_known(ros_domain: int, vi
         peer.kill()
     again = await start_peer(ros_domain)
     async with bench(ros_domain, "evsg1", via, SPEED) as other:
+        await other.later()
         assert (await other.driver.look(order)).state is UNKNOWN
         await end_peer(again)
 
@@ -96,6 +93,7 @@ async def test_what_ended_while_nobody_listened_is_found(ros_domain: int, via: V
         order = one.begin("hold", duration=2.5)
         await one.running(order)
     async with bench(ros_domain, "evsg1", via, SPEED) as other:
+        await other.later()
         if (found := await other.driver.look(order)).state is RUNNING:
             found = await other.end_of(order)
         assert found.state is SUCCEEDED
@@ -110,7 +108,7 @@ async def test_a_node_that_hears_no_vehicle_any_more_says_it_is_lost(ros_domain:
         peer.process.send_signal(signal.SIGUSR1)
         end = await one.end_of(order)
         assert (end.state, end.code) == (LOST, "LINK_LOST")
-        assert "the vehicle was not heard for 3" in end.reason
+        assert re.search(r"the vehicle was not heard for \d+\.\d s", end.reason)
         await one.until(lambda: one.driver.health.ready is False)
         assert "not heard for" in one.driver.health.not_ready_reasons[0]
         refused = await one.end_of(one.begin("drive_stop"))

@@ -25,8 +25,7 @@ FASTER = 20.0
 MISSION_SPEED = 10.0
 """Whoever is silent for 3 s of a clock that is faster is lost on a busy machine."""
 
-PATIENCE_S = 20.0
-STANDING_M_S = 0.01
+PATIENCE_S = 60.0
 
 ACCEPTED, RUNNING, SUCCEEDED = (
     BehaviorStatus.ACCEPTED,
@@ -138,9 +137,9 @@ def _is_heard(publisher: Any) -> bool:
 
 
 async def test_it_sweeps_and_says_so(ros_domain: int) -> None:
-    async with commanded(ros_domain) as sweeper:
+    async with commanded(ros_domain, "faster:=5.0") as sweeper:
         sweeper.say(START, "b1", "sweep_street", route=east(2, 12), passes=2, speed=3.0)
-        await sweeper.until(lambda: sweeper.states[-1].behavior == "b1")
+        await sweeper.until(lambda: any(each.behavior == "b1" for each in sweeper.states))
         assert (await sweeper.ended("b1")).state == SUCCEEDED
         assert sweeper.of("b1") == [(1, ACCEPTED), (2, RUNNING), (3, SUCCEEDED)]
         await sweeper.fresh()
@@ -167,7 +166,7 @@ async def test_a_start_that_comes_again_is_done_once(ros_domain: int) -> None:
             sweeper.say(START, "b1", "hold", duration=2.0)
         assert (await sweeper.ended("b1")).state == SUCCEEDED
         sweeper.say(START, "b1", "hold", duration=2.0)
-        await sweeper.until(lambda: sweeper.of("b1").count((3, SUCCEEDED)) == 2)
+        await sweeper.until(lambda: sweeper.of("b1").count((3, SUCCEEDED)) >= 2)
         assert {number for number, _ in sweeper.of("b1")} == {1, 2, 3}
         assert sorted(set(sweeper.of("b1"))) == [(1, ACCEPTED), (2, RUNNING), (3, SUCCEEDED)]
 
@@ -218,11 +217,11 @@ async def test_a_busy_vehicle_takes_over_only_from_what_it_is_told_to(ros_domain
 
 async def test_it_stands_while_it_is_held_and_then_goes_on(ros_domain: int) -> None:
     async with commanded(ros_domain) as sweeper:
-        sweeper.say(START, "b1", "goto", target=east(40))
+        sweeper.say(START, "b1", "goto", target=east(200))
         await sweeper.until(lambda: sweeper.speed_m_s > 1.0)
         sweeper.say(HOLD)
         await sweeper.until(lambda: sweeper.states[-1].held)
-        await sweeper.until(lambda: sweeper.speed_m_s < STANDING_M_S)
+        await sweeper.until(lambda: sweeper.speed_m_s == 0.0)
         stood_m = sweeper.east_m
         await sweeper.fresh()
         assert (sweeper.east_m, sweeper.states[-1].behavior) == (stood_m, "b1")
@@ -261,7 +260,7 @@ async def test_who_asks_is_told_how_a_behavior_stands(ros_domain: int) -> None:
         sweeper.say(START, "b1", "goto", target=east(500))
         await sweeper.until(lambda: (2, RUNNING) in sweeper.of("b1"))
         sweeper.say(QUERY, "b1")
-        await sweeper.until(lambda: sweeper.of("b1").count((2, RUNNING)) == 2)
+        await sweeper.until(lambda: sweeper.of("b1").count((2, RUNNING)) >= 2)
         sweeper.say(QUERY, "b7")
         await sweeper.until(lambda: sweeper.of("b7") == [(0, BehaviorStatus.UNKNOWN)])
 

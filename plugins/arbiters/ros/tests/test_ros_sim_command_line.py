@@ -65,7 +65,7 @@ def test_it_ends_cleanly_by_a_signal(number: int, ros_domain: int) -> None:
     with program(BASE, ros_domain) as process:
         lines_until(process, "ready")
         process.send_signal(number)
-        _, errors = process.communicate(timeout=10)
+        _, errors = process.communicate(timeout=60)
         assert (process.returncode, errors) == (0, "")
 
 

@@ -1,5 +1,6 @@
 """What is simulated for a fleet file: what an executive with the same file looks for."""
 
+import asyncio
 import math
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from m2pem_plugin_ros.sim.specification import VehicleSpec
 from m2pem_plugin_ros.testing import Peer
 from nav_msgs.msg import Odometry
 from ros_sim_command import cli
-from ros_sim_watch import COMMAND, Heard, switch, until
+from ros_sim_watch import AMPLE_S, COMMAND, Heard, insist, until
 from std_msgs.msg import String
 
 from m2pem import load_fleet
@@ -144,7 +145,8 @@ async def test_it_speaks_on_the_topics_of_the_fleet(tmp_path: Path, ros_domain: 
             forward = TwistStamped()
             forward.twist.linear.x = 2.0
             east_m = (await odometry.next()).pose.pose.position.x
-            drive.publish(forward)
-            await odometry.next(lambda m: m.pose.pose.position.x > east_m + 0.1)
-            assert (await switch(ros, "evsg1: detect nose")).successful
-            assert (await until(lambda: smells.last)).data == "smell"
+            async with asyncio.timeout(AMPLE_S):
+                while odometry.last.pose.pose.position.x <= east_m + 0.1:
+                    drive.publish(forward)
+                    await asyncio.sleep(0.05)
+            assert (await insist(ros, "evsg1: detect nose", smells)).data == "smell"

@@ -1,12 +1,16 @@
-"""A simulated vehicle whose node cannot begin leaves nothing half open."""
+"""Simulated vehicles whose node cannot begin, or whose process was not run."""
 
+import asyncio
+import time
 from typing import Any
 
 import pytest
+from m2pem_plugin_ros.pose import Twist
 from m2pem_plugin_ros.runtime import RosRuntime
-from m2pem_plugin_ros.settings import Settings
+from m2pem_plugin_ros.settings import DriverName, Settings
 from m2pem_plugin_ros.sim import host as hosts
 from m2pem_plugin_ros.sim.clock import SimulatedClock
+from m2pem_plugin_ros.sim.simulation import LATE_S, Simulation
 from m2pem_plugin_ros.sim.specification import VehicleSpec
 from m2pem_plugin_ros.sim.vehicle import Vehicle
 from ros_sim_watch import until
@@ -44,3 +48,21 @@ async def test_a_node_that_failed_to_begin_can_be_begun_again(
         host.kill()
         await until(lambda: nodes() == {"hosting"})
         await host.close()
+
+
+async def test_for_a_process_that_was_not_run_no_time_has_passed(ros_domain: int) -> None:
+    spec, speed = VehicleSpec("ugv1", Settings("/ugv1", driver=DriverName.BASE)), 20.0
+    async with Simulation([spec], speed=speed, domain_id=ros_domain) as simulation:
+        vehicle = simulation["ugv1"].vehicle
+
+        def drives() -> bool:
+            vehicle.command(Twist(1.0))
+            return vehicle.body.twist.forward_m_s > 0.9
+
+        await until(drives)
+        before_s = vehicle.now_s
+        time.sleep(1.5)  # noqa: ASYNC251  # it stands for a busy computer
+        await asyncio.sleep(0)
+        await until(lambda: vehicle.now_s > before_s)
+        assert vehicle.now_s - before_s < 3 * LATE_S * speed
+        assert vehicle.body.twist.forward_m_s > 0.9, "it does not stop for want of commands"

@@ -54,7 +54,7 @@ async def test_it_goes_where_it_is_sent(ros: RosRuntime) -> None:
 async def test_it_rejects_on_request(ros: RosRuntime) -> None:
     await switch(ros, "ugv1: nav2 reject")
     assert not (await go(ros, 0.0, 0.0)).accepted
-    await switch(ros, "ugv1: kill node for 2 s")
+    await switch(ros, "ugv1: kill node for 20 s")
     await until(lambda: ros.node.count_publishers("/ugv1/navigate_to_pose/_action/status") == 0)
     await until(lambda: ros.node.count_publishers("/ugv1/navigate_to_pose/_action/status") == 1)
     assert (await go(ros, 0.0, 0.0)).accepted  # a new one, and a good one

@@ -9,7 +9,7 @@ from m2pem_interfaces.msg import TargetState
 from m2pem_plugin_ros.runtime import qos
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from ros_double import ORIGIN, at
-from ros_sensors import GPR, PEER, TOPICS, V, connected, fix, odometry, sensors, until
+from ros_sensors import AMPLE_S, GPR, PEER, TOPICS, V, connected, fix, odometry, sensors, until
 
 from m2pem.api import GeoPosition, PayloadState, ResourceId, ServiceContext, VehicleState
 from m2pem.gateway.bus import Bus
@@ -157,7 +157,7 @@ async def test_a_detector_that_publishes_words_completes_the_service_detector(do
         )
         for state in bench.states:
             bus.publish(state)
-        written = await asyncio.wait_for(waiting, 5)
+        written = await asyncio.wait_for(waiting, AMPLE_S)
         assert written["detection.type"] == "mine"
         assert written["detection.source"] == "evsg1/gpr"
         assert written["detection.position"] == pytest.approx(list(ORIGIN), abs=1e-6)

@@ -1,6 +1,9 @@
 """What operators hear of payloads and teams by topics."""
 
+import asyncio
 import math
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
@@ -22,8 +25,25 @@ def the_camera(message: Message) -> Message:
     return found[0] if found else {"pan_rad": math.nan, "behavior": "", "footprint": []}
 
 
-def say(world: World, state: Any) -> None:
-    world.control._executive.bus.publish(state)  # type: ignore[attr-defined]
+SAID_EVERY_S = 0.05
+
+
+@asynccontextmanager
+async def said(world: World, state: Any) -> AsyncIterator[None]:
+    """It is said again and again while the block lasts: of what changes quickly, such as a camera
+    that is heard again, only the latest is told, which somebody slow may miss."""
+
+    async def say() -> None:
+        while True:
+            world.control._executive.bus.publish(state)  # type: ignore[attr-defined]
+            await asyncio.sleep(SAID_EVERY_S)
+
+    saying = asyncio.create_task(say())
+    try:
+        yield
+    finally:
+        saying.cancel()
+        await asyncio.gather(saying, return_exceptions=True)
 
 
 async def test_operators_hear_where_a_camera_looks_and_what_it_sees(
@@ -60,8 +80,8 @@ async def test_what_a_lost_camera_saw_is_wiped_out(world: World, client: Client)
 
     await client.hears("footprints/ugv2/camera", lambda each: points(each) == 4)
     since = len(client.said)
-    say(world, PayloadState(CAMERA, 0, link=LinkState.LOST))
-    await client.hears("footprints/ugv2/camera", lambda each: points(each) == 0, since=since)
+    async with said(world, PayloadState(CAMERA, 0, link=LinkState.LOST)):
+        await client.hears("footprints/ugv2/camera", lambda each: points(each) == 0, since=since)
 
 
 async def test_who_comes_late_hears_what_a_camera_sees(world: World, client: Client) -> None:
@@ -81,8 +101,8 @@ async def test_operators_hear_how_a_team_marches_and_that_it_does_no_more(
         TeamMemberState(ResourceId("ugv1"), 0.0, -0.5),
         TeamMemberState(ResourceId("ugv2"), -4.5, 0.25, 19.5),
     )
-    say(world, TeamState("r1.b1", "road_sweep", 5, members, 15.0))
-    heard = await client.hears("teams", lambda each: len(each["teams"]) == 1)
+    async with said(world, TeamState("r1.b1", "road_sweep", 5, members, 15.0)):
+        heard = await client.hears("teams", lambda each: len(each["teams"]) == 1)
     (team,) = heard["teams"]
     assert (team["behavior"], team["name"], team["spacing_m"]) == ("r1.b1", "road_sweep", 15.0)
     lead, other = team["members"]

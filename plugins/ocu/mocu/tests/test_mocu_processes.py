@@ -43,7 +43,8 @@ def environment(tmp_path: Path) -> Iterator[dict[str, str]]:
 
 @pytest.fixture
 def served(environment: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
-    words = f"serve --fleet {EXAMPLE / 'fleet.yaml'} --ocu mocu --speed 500 --journal memory:"
+    speed = "--speed 50"  # so that an operator on a busy computer sees what goes on
+    words = f"serve --fleet {EXAMPLE / 'fleet.yaml'} --ocu mocu {speed} --journal memory:"
     process = subprocess.Popen(
         [sys.executable, "-m", "m2pem", *words.split()],
         env=environment,

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 import pytest
-from mocu_world import Client, World, until
+from mocu_world import Client, Message, World, until
 
 from m2pem.api import RunStatus
 from m2pem.api import records as r
@@ -22,6 +22,10 @@ def mission(tmp_path: Path) -> Path:
     path = tmp_path / "ask.bpmn"
     path.write_bytes(scenarios.question())
     return path
+
+
+def statuses(status: Message) -> list[int]:
+    return [each["status"] for each in status["runs"]]
 
 
 async def started_by(world: World, run: str) -> str:
@@ -150,11 +154,12 @@ async def test_fifty_megabytes_are_refused_and_disturb_nobody(
 async def test_a_run_is_paused_resumed_and_stopped(world: World, client: Client) -> None:
     run = await world.drives()
     for verb, status in ((PAUSE, PAUSED), (RESUME, RUNNING)):
+        since = len(client.said)
         assert (await client.call("control_run", verb=verb, run=run, by="anna"))["success"]
-        await client.hears("status", lambda s, want=status: s["runs"][0]["status"] == want)
+        await client.hears("status", lambda s, want=status: statuses(s) == [want], since=since)
     told = {"verb": STOP, "run": run, "by": "anna", "reason": "people on the road"}
     assert (await client.call("control_run", **told))["success"]
-    ended = await client.hears("status", lambda s: s["runs"][0]["status"] == STOPPED)
+    ended = await client.hears("status", lambda s: statuses(s) == [STOPPED])
     assert "people on the road" in ended["runs"][0]["detail"]
     assert (await world.control.wait(run)).status is RunStatus.STOPPED
 

@@ -27,7 +27,7 @@ START_US = 1_767_225_600_000_000
 SIZE = (80, 24)
 CELL_WIDTH = 12.2
 MISSION = Path(__file__).with_name("patrol.bpmn")
-PATIENCE_S = 10.0
+PATIENCE_S = 40.0
 
 
 class StillClock:

@@ -17,7 +17,11 @@ from m2pem_plugin_ros.sim.vehicle import Vehicle
 TICK_S = 0.02
 """How often vehicles are moved on and publish, in seconds of the wall clock: at most 50 Hz."""
 
-COMMANDS_WITHIN_S = 0.25
+LATE_S = 0.2
+"""In seconds of the wall clock. A process that was not run for longer simulates no more of it than
+that: nobody could have steered a vehicle meanwhile."""
+
+COMMANDS_WITHIN_S = 0.5
 """A base never stops for want of commands before so long, in seconds of the wall clock."""
 
 NODE = "m2pem_sim"
@@ -52,6 +56,7 @@ class Simulation:
         for fault in self._planned:
             self.check(fault)
         self._now_s = 0.0
+        self._left_out_s = 0.0
         self._task: asyncio.Task[None] | None = None
 
     def __getitem__(self, name: str) -> Host:
@@ -144,7 +149,9 @@ class Simulation:
             due_s = max(due_s + TICK_S, loop.time())
             await asyncio.sleep(due_s - loop.time())
             wall_s = loop.time()
-            self._now_s = self.clock.elapsed_s
+            late_s = max(0.0, wall_s - last_s - LATE_S)
+            self._left_out_s += late_s * self.clock.speed
+            self._now_s = self.clock.elapsed_s - self._left_out_s
             for host in self:
                 host.step(self._now_s, wall_s - last_s)
             last_s = wall_s

@@ -7,7 +7,7 @@ from m2pem.api import Clock
 LEAST_S = 0.02
 """Real seconds between two commands, however fast the clock is."""
 
-PATIENCE_S = 0.25
+PATIENCE_S = 0.5
 """Real seconds in which a message may be late, for no other reason than that computers are slow."""
 
 
