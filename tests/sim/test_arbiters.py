@@ -2,8 +2,8 @@ import asyncio
 import math
 
 import pytest
-from conftest import START_US, Fleet, Simulate, area, local, make, place, route
 
+from conftest import START_US, Fleet, Simulate, area, local, make, place, route
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import VehicleState

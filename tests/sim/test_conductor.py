@@ -4,10 +4,10 @@ import asyncio
 import math
 
 import pytest
-from conftest import START_US, Fleet, make, place, route
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import START_US, Fleet, make, place, route
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.api.clock import Clock
 from m2pem.executive.clock import run_virtual

@@ -1,6 +1,6 @@
 import pytest
-from conftest import START_US, Simulate, local, place, route
 
+from conftest import START_US, Simulate, local, place, route
 from m2pem.api.telemetry import Detection, PayloadState, VehicleState
 from m2pem.model.catalogue import ResourceId
 from m2pem.sim.arbiters import SimArbiter

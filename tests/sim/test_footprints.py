@@ -3,8 +3,8 @@
 import math
 
 import pytest
-from conftest import ORIGIN, Fleet, Simulate
 
+from conftest import ORIGIN, Fleet, Simulate
 from m2pem.api.telemetry import PayloadState
 from m2pem.sim.arbiters import SimArbiter
 from m2pem.sim.footprints import RANGE_M, around, seen

@@ -1,8 +1,8 @@
 import math
 
 import pytest
-from conftest import START_US, Fleet, Simulate, area, place
 
+from conftest import START_US, Fleet, Simulate, area, place
 from m2pem.api.telemetry import PayloadState
 from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import BehaviorState, ResourceId

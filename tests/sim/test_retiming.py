@@ -4,10 +4,10 @@ import math
 from itertools import pairwise
 
 import pytest
-from conftest import Fleet, Simulate, area, local, place, route
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import Fleet, Simulate, area, local, place, route
 from m2pem.api.arbiter import AdjustingArbiter
 from m2pem.api.telemetry import VehicleState
 from m2pem.model.catalogue import BehaviorState, ResourceId

@@ -5,8 +5,8 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
-from conftest import START_US, local, make, place, route
 
+from conftest import START_US, local, make, place, route
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import VehicleState
 from m2pem.executive.clock import run_virtual
