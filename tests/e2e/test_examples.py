@@ -260,7 +260,7 @@ EXPECTED = {
     "t06": [
         Course(
             [
-                *("Watch: uav1 area_observe", *PICTURE, *PICTURE, *PICTURE, *PICTURE),
+                *("WatchField: uav1 area_observe", *PICTURE, *PICTURE, *PICTURE, *PICTURE),
                 *("Watch interrupted", "at TimeIsUp", "FlyHome: uav1 return_to_launch"),
                 *("at Home", "completed"),
             ],

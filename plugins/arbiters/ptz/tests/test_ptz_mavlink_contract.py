@@ -94,7 +94,7 @@ class _Gimbals(ArbiterContract):
                 "pictures": str(tmp_path),
                 "reach": {"rate": "60 deg/s"},
             }
-            return Connection(camera, "air", settings, lost_after_s=20.0)
+            return Connection(camera, "air", settings, lost_after_s=8.0)
 
         def make(context):
             for camera in NUMBERS:

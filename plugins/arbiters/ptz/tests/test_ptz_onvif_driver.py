@@ -52,7 +52,8 @@ async def test_a_halt_stops_at_once_even_while_a_call_is_under_way(tmp_path):
         await until(lambda: server.camera.look[0] > 0.3)
         bench.driver.halt()
         await until(lambda: server.camera.calls["Stop"] >= 1)
-        await until(lambda: server.camera.look and not server.camera.head.pan.moving)
+        head = server.camera.head
+        await until(lambda: server.camera.look and not any(axis.moving for axis in head.axes))
         pan, _, zoom = server.camera.look
         await until(lambda: server.camera.calls["Stop"] >= 2)
         assert server.camera.look[0] == pan < 2.9
