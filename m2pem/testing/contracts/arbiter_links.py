@@ -123,7 +123,8 @@ class ArbiterLinks(ArbiterFixtures):
             assert moving, "the long behavior must move the vehicle"
             await bench.arbiter.hold(case.vehicle)
             bound_s = bench.arbiter.limits(case.vehicle).hold_within_s
-            stands = await bench.until(lambda: speed(bench, case.vehicle) < STANDING_M_S, bound_s)
+            within_s = bound_s + bench.late_s
+            stands = await bench.until(lambda: speed(bench, case.vehicle) < STANDING_M_S, within_s)
             assert stands, f"still at {speed(bench, case.vehicle):.1f} m/s after {bound_s:g} s"
             await bench.clock.sleep(case.watch_s)
             assert speed(bench, case.vehicle) < STANDING_M_S, "it does not move by itself"
@@ -184,7 +185,7 @@ class ArbiterLinks(ArbiterFixtures):
             await bench.running("r1.b2")
             cut_link(bench.arbiter, case.vehicle)
             bound_s = bench.arbiter.limits(case.vehicle).lost_after_s
-            end = await bench.ended("r1.b1", bound_s + 1)
+            end = await bench.ended("r1.b1", bound_s + 1 + bench.late_s)
             assert end.state is BehaviorState.LOST, end
             assert not terminal(bench, "r1.b2"), "the other vehicle's link is up"
 

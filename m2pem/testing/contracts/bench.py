@@ -14,6 +14,7 @@ from m2pem.api.arbiter import (
 )
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import PayloadState, TeamState, VehicleState
+from m2pem.executive.clock import SystemClock
 from m2pem.gateway.bus import Bus
 from m2pem.model.catalogue import BehaviorState, ResourceId
 
@@ -40,6 +41,12 @@ class ArbiterBench:
         self.states: list[VehicleState | PayloadState] = []
         self._news = asyncio.Event()
         self._readers: list[asyncio.Task[None]] = []
+
+    @property
+    def late_s(self) -> float:
+        """How much later than promised one may hear of it: a computer may be busy for two real
+        seconds."""
+        return 2.0 * self.clock.speed if isinstance(self.clock, SystemClock) else 0.0
 
     async def __aenter__(self) -> "ArbiterBench":
         await self.arbiter.connect()
