@@ -123,8 +123,7 @@ class ArbiterLinks(ArbiterFixtures):
             assert moving, "the long behavior must move the vehicle"
             await bench.arbiter.hold(case.vehicle)
             bound_s = bench.arbiter.limits(case.vehicle).hold_within_s
-            within_s = bound_s + bench.late_s
-            stands = await bench.until(lambda: speed(bench, case.vehicle) < STANDING_M_S, within_s)
+            stands = await bench.until(lambda: speed(bench, case.vehicle) < STANDING_M_S, bound_s)
             assert stands, f"still at {speed(bench, case.vehicle):.1f} m/s after {bound_s:g} s"
             await bench.clock.sleep(case.watch_s)
             assert speed(bench, case.vehicle) < STANDING_M_S, "it does not move by itself"

@@ -37,7 +37,7 @@ class _Point:
 
 
 @dataclass(frozen=True, slots=True)
-class _Undoing:
+class Undoing:
     """What undoes the points of an area: how it begins, and when it is over."""
 
     thrown: Effect
@@ -156,7 +156,7 @@ def _hosts(area: Area) -> list[Host]:
 
 def _undo(
     making: Making, thrower: e.FlowNode, mark: str, area: Area, points: Sequence[_Point]
-) -> _Undoing:
+) -> Undoing:
     """Undo some points of an area, one after the other, while a token says that it is done.
 
     It is the area's: when that ends, or is interrupted, it undoes nothing more.
@@ -184,7 +184,7 @@ def _undo(
         is_over = Effect(steps=(Step(node.id, Action.TRIGGERED, UNDONE),), consume=(mine,))
         making.rules(product([is_over], [over]))
     making.claims.setdefault(area.index, []).extend((claim, noted) for noted, claim in claimed)
-    return _Undoing(
+    return Undoing(
         Effect(kill=frozenset({undoing}), produce=(undoing,), moves=tuple(claimed)),
         Effect(consume=(undoing,), inhibit=frozenset({*busy, *(claim for _, claim in claimed)})),
     )
@@ -217,14 +217,13 @@ def _undone(making: Making, area: Area, point: _Point) -> tuple[list[Effect], Ef
     return [_undo_all(making, host.node, inner).thrown], quiet(host.inside)
 
 
-def _undo_all(making: Making, node: e.Activity, inner: Area) -> _Undoing:
+def _undo_all(making: Making, node: e.Activity, inner: Area) -> Undoing:
     """Undo an activity by undoing all that was done in it."""
     known = making.undoing.get(inner.index)
     if known is None:
         known = _undo(making, node, "all", inner, _points(making, inner))
         making.undoing[inner.index] = known
         making.net.rule(known.over.saying(node.id, Action.TRIGGERED, UNDONE))
-    assert isinstance(known, _Undoing)
     return known
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from m2pem.model import elements as e
 from m2pem.model.mission import Mission
@@ -13,6 +14,10 @@ from m2pem.verify.derive.effect import Effect
 from m2pem.verify.derive.net import Area, Net
 from m2pem.verify.derive.options import Options
 from m2pem.verify.system import Kind, Role
+
+if TYPE_CHECKING:
+    from m2pem.verify.derive.compensation import Undoing
+    from m2pem.verify.derive.undoable import Way
 
 
 @dataclass(slots=True, eq=False)
@@ -56,7 +61,12 @@ class Catcher:
 
 
 class Making:
-    """A derivation under way."""
+    """A derivation under way.
+
+    Of compensation: `ways` has by what each activity is undone; by index of an area, `kept` where
+    is noted what was done in it, `claims` which notes are claimed and as what, and `undoing` how
+    all in it is undone.
+    """
 
     def __init__(
         self, mission: Mission, process: e.Process, fleet: Fleet, options: Options, bound: Bound
@@ -83,10 +93,10 @@ class Making:
         self.later: list[Callable[[], None]] = []
         self.contended: list[tuple[Host, int, tuple[str, ...]]] = []
         self.choices: list[tuple[Effect, e.FlowNode, Area]] = []
-        self.ways: dict[e.Activity, str | None] = {}
+        self.ways: dict[e.Activity, Way | None] = {}
         self.kept: dict[int, Area] = {}
         self.claims: dict[int, list[tuple[int, int]]] = {}
-        self.undoing: dict[int, object] = {}
+        self.undoing: dict[int, Undoing] = {}
         self.root = self.everything
         self.repeated = _repeated_nodes(mission)
         self.again = _ends_reached_again(mission)

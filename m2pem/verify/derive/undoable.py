@@ -29,10 +29,8 @@ def way_back(making: Making, node: e.Activity) -> Way | None:
     """By what an activity can be undone; None: by nothing."""
     if node not in making.ways:
         making.ways[node] = None  # while it is looked at: a process may call itself
-        found = _way_back(making, node)
-        making.ways[node] = found.value if found is not None else None
-    known = making.ways[node]
-    return Way(known) if known is not None else None
+        making.ways[node] = _way_back(making, node)
+    return making.ways[node]
 
 
 def _way_back(making: Making, node: e.Activity) -> Way | None:

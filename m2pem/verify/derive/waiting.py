@@ -258,10 +258,10 @@ def _gathered_start(making: Making, area: Area, start: e.StartEvent) -> None:
             produce=gathering.again,
         )
         making.net.rule(missed)
-        come = (
-            replace(come, produce=gathering.again).then(_once_at_a_time(making, area, start))
-            or come
-        )
+        again = replace(come, produce=gathering.again)
+        alone = again.then(_once_at_a_time(making, area, start))
+        assert alone is not None
+        come = alone
     ways = making.data.receive([come], area, start)
     making.rules(product(ways, begin_handler(making, area, start)))
 
