@@ -142,6 +142,6 @@ class TestGimbalsOfRovers(_Gimbals):
     kind = Kind.ROVER
 
 
-@pytest.mark.long
 class TestGimbalsOfPx4Copters(_Gimbals):
     firmware = "px4"
+    quick: ClassVar = {"test_a_cut_link_is_lost_within_the_declared_bound"}

@@ -74,9 +74,13 @@ class GimbalHead:
 
     @property
     def direction(self) -> Direction | None:
-        """Where it points, as it said last; None: it has not, or from what is not known."""
-        attitude = self._attitude
-        if attitude is None:
+        """Where it points, as it said last; None: it has not, or from what is not known.
+
+        PX4 tells it before its manager was found, and could be pointed: then it counts only if the
+        search was in vain.
+        """
+        attitude, is_searching = self._attitude, self._found is None and not self._why
+        if attitude is None or is_searching:
             return None
         yaw_rad = attitude.yaw_from_bow_rad
         if yaw_rad is None:
