@@ -138,7 +138,7 @@ export const strings = {
       newName: "Name of the process",
       remove: "Remove {name}",
       removeTitle: "Remove {name}?",
-      removeText: "The process goes with everything that is drawn in it. This cannot be undone.",
+      removeText: "The process goes with everything that is drawn in it.",
       removeAct: "Remove",
     },
     blocks: {

@@ -52,7 +52,10 @@ export class EditorSession implements EditorContext {
       this.diagrams.refresh();
       this.showFindings();
     });
-    this.modeler.on("root.set", () => this.showFindings());
+    this.modeler.on("root.set", () => {
+      this.diagrams.refresh();
+      this.showFindings();
+    });
     this.checks.findings.subscribe(() => this.showFindings());
   }
 
@@ -97,12 +100,6 @@ export class EditorSession implements EditorContext {
     fitTo(this.service("canvas"));
   }
 
-  /** Something changed that cannot be undone: a process was added or removed. */
-  changedBeside(): void {
-    this.savedAt = null;
-    this.stackChanged();
-  }
-
   end(): void {
     this.checks.end();
     this.modeler.destroy();
@@ -114,10 +111,11 @@ export class EditorSession implements EditorContext {
     this.canRedo.value = stack.canRedo();
     this.isDirty.value = this.savedAt === null || this.stackIndex() !== this.savedAt;
     this.changes.value += 1;
+    this.diagrams.refresh();
     this.checks.soon();
   }
 
-  /** Another diagram is about to be drawn, with a command stack of its own. */
+  /** Another diagram is about to be drawn in place of these, with a command stack of its own. */
   private detachFromStack(): void {
     this.savedAt = this.isDirty.value ? null : -1;
   }

@@ -1,9 +1,11 @@
 // The diagrams of a file: one a process or collaboration; those of collapsed subprocesses open from
 // within them.
 import { signal } from "@preact/signals";
-import { adopt, child, isA, list, text, type Factory, type ModdleElement } from "../moddle/moddle";
+import { list, text, type ModdleElement } from "../moddle/moddle";
 import { fitTo } from "./fitting";
 import type { MissionModeler } from "./modeler";
+import { draws, isOutermost, outermostOf, ownerOf } from "./planes";
+import type { Canvas } from "./services";
 
 export interface Diagram {
   id: string;
@@ -12,33 +14,44 @@ export interface Diagram {
   owner: string;
 }
 
+type Root = ReturnType<Canvas["getRootElement"]>;
+
 export class Diagrams {
   readonly all = signal<readonly Diagram[]>([]);
   readonly current = signal("");
+  private readonly seen = new WeakSet<Root>();
 
   constructor(
     private readonly modeler: MissionModeler,
-    private readonly beforeOpening: () => void,
+    private readonly beforeReplacing: () => void,
   ) {}
 
-  /** What is drawn has changed, or a name has. */
+  /** What is drawn or shown has changed, or a name has. */
   refresh(): void {
+    if (!this.definitions()) return;
     this.all.value = this.elements().map((diagram) => {
-      const owner = child(child(diagram, "plane")!, "bpmnElement")!;
+      const owner = ownerOf(diagram)!;
       return { id: text(diagram, "id"), title: titleOf(diagram, owner), owner: text(owner, "id") };
     });
-    const root = this.modeler.get("canvas").getRootElement().businessObject as ModdleElement;
-    const outermost = outermostOf(root);
-    const shown = this.all.value.find(({ owner }) => owner === outermost);
+    const root = this.modeler.get("canvas").getRootElement();
+    const own = this.all.value.find(({ id }) => id === diagramOf(root));
+    const outermost = outermostOf(root.businessObject as ModdleElement);
+    const shown = own ?? this.all.value.find(({ owner }) => owner === outermost);
     if (shown) this.current.value = shown.id;
   }
 
   async open(id: string): Promise<void> {
     if (id === this.current.value) return;
-    this.beforeOpening();
-    await this.modeler.open(id);
-    this.current.value = id;
-    fitTo(this.modeler.get("canvas"));
+    const canvas = this.modeler.get("canvas");
+    const root = this.rootOf(id);
+    this.seen.add(canvas.getRootElement());
+    if (root) canvas.setRootElement(root);
+    else {
+      this.beforeReplacing();
+      await this.modeler.open(id);
+      this.refresh();
+    }
+    if (!root || !this.seen.has(root)) fitTo(canvas);
   }
 
   /** The diagram on which an element is drawn, or that of the process around it. */
@@ -46,45 +59,37 @@ export class Diagrams {
     const found = this.elements().find((diagram) => draws(diagram, element));
     if (found) return this.all.value.find(({ id }) => id === text(found, "id"));
     const inner = list(this.definitions(), "diagrams").find((diagram) => draws(diagram, element));
-    const owner = inner && child(child(inner, "plane")!, "bpmnElement");
+    const owner = inner && ownerOf(inner);
     if (!owner) return this.all.value.find((each) => each.owner === element);
     const outermost = outermostOf(owner);
     return this.all.value.find((each) => each.owner === outermost);
   }
 
   /** An empty process with a diagram of its own. */
-  async add(name: string): Promise<void> {
-    const definitions = this.definitions();
-    const factory = this.modeler.get("bpmnFactory") as unknown as Factory;
-    const process = factory.create("bpmn:Process", { name, isExecutable: true });
-    const plane = factory.create("bpmndi:BPMNPlane", { bpmnElement: process, planeElement: [] });
-    const diagram = factory.create("bpmndi:BPMNDiagram", { plane });
-    adopt(definitions, process, diagram);
-    adopt(diagram, plane);
-    list(definitions, "rootElements").push(process);
-    list(definitions, "diagrams").push(diagram);
-    this.refresh();
-    await this.open(text(diagram, "id"));
+  add(name: string): void {
+    this.modeler.get("processes").add(this.definitions(), name);
   }
 
-  /** Removes a diagram with its process, or with all processes of its pools. */
-  async remove(id: string): Promise<void> {
-    const definitions = this.definitions();
-    const diagram = this.elements().find((each) => text(each, "id") === id);
-    const other = this.all.value.find((each) => each.id !== id);
-    if (!diagram || !other) return;
-    await this.open(other.id);
-    const owner = child(child(diagram, "plane")!, "bpmnElement")!;
-    const pools = list(owner, "participants").map((each) => child(each, "processRef"));
-    const gone = new Set<ModdleElement | undefined>([owner, ...pools]);
-    const owners = new Set([...gone].filter((each) => each).map((each) => text(each!, "id")));
-    const stays = (each: ModdleElement) => !owners.has(outermostOf(ownerOf(each)));
-    definitions.set(
-      "rootElements",
-      list(definitions, "rootElements").filter((each) => !gone.has(each)),
-    );
-    definitions.set("diagrams", list(definitions, "diagrams").filter(stays));
-    this.refresh();
+  /** Whether something else is drawn that can be shown without it. */
+  isRemovable(id: string): boolean {
+    return this.otherThan(id) !== undefined;
+  }
+
+  /** Removes what is shown: a process, or all processes of its pools. */
+  remove(id: string): void {
+    const other = this.otherThan(id);
+    if (id !== this.current.value || !other) return;
+    this.modeler.get("processes").remove(this.definitions(), other);
+  }
+
+  private otherThan(id: string): Root | undefined {
+    const others = this.all.value.filter((each) => each.id !== id);
+    return others.map((each) => this.rootOf(each.id)).find((root) => root);
+  }
+
+  private rootOf(diagram: string): Root | undefined {
+    const roots = this.modeler.get("canvas").getRootElements() as Root[];
+    return roots.find((root) => diagramOf(root) === diagram);
   }
 
   private definitions(): ModdleElement {
@@ -92,36 +97,13 @@ export class Diagrams {
   }
 
   private elements(): ModdleElement[] {
-    return list(this.definitions(), "diagrams").filter((diagram) => {
-      const owner = ownerOf(diagram);
-      return isA(owner, "bpmn:Process") || isA(owner, "bpmn:Collaboration");
-    });
+    return list(this.definitions(), "diagrams").filter(isOutermost);
   }
 }
 
-function ownerOf(diagram: ModdleElement): ModdleElement | undefined {
-  const plane = child(diagram, "plane");
-  return plane && child(plane, "bpmnElement");
-}
-
-function draws(diagram: ModdleElement, element: string): boolean {
-  const shapes = list(child(diagram, "plane"), "planeElement");
-  return shapes.some((shape) => {
-    const drawn = child(shape, "bpmnElement");
-    return drawn !== undefined && text(drawn, "id") === element;
-  });
-}
-
-/** The id of the process or collaboration that something stands in. */
-function outermostOf(element: ModdleElement | undefined): string {
-  let at = element;
-  while (at?.$parent && !isA(at.$parent, "bpmn:Definitions")) at = at.$parent;
-  if (!at) return "";
-  const siblings = list(at.$parent, "rootElements");
-  const collaboration = siblings.find((each) =>
-    list(each, "participants").some((pool) => child(pool, "processRef") === at),
-  );
-  return text(collaboration ?? at, "id");
+function diagramOf(root: Root): string {
+  const { di } = root as unknown as { di?: ModdleElement };
+  return di?.$parent ? text(di.$parent, "id") : "";
 }
 
 function titleOf(diagram: ModdleElement, owner: ModdleElement): string {

@@ -16,6 +16,7 @@ import type Selection from "diagram-js/lib/features/selection/Selection";
 import type { Catalogue } from "./catalogue";
 import type { Edits } from "./edits";
 import type { FindingMarks } from "./findingMarks";
+import type { Processes } from "./processes";
 
 export type { Element };
 export type { AutoPlace, BpmnFactory, BpmnReplace, Canvas, CommandStack, ElementFactory };
@@ -58,6 +59,7 @@ export interface Services {
   modeling: Modeling;
   overlays: Overlays;
   popupMenu: PopupMenu;
+  processes: Processes;
   propertiesPanel: PropertiesPanel;
   rules: Rules;
   selection: Selection;

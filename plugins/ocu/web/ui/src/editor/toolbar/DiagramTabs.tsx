@@ -66,7 +66,7 @@ export function DiagramTabs({ session }: { session: EditorSession }) {
                 class="primary"
                 onClick={() => {
                   setLeaving(null);
-                  void diagrams.remove(leaving.id).then(() => session.changedBeside());
+                  diagrams.remove(leaving.id);
                 }}
               >
                 {words.removeAct}
@@ -89,7 +89,7 @@ interface RemoveProps {
 
 function RemoveButton({ session, choose }: RemoveProps) {
   const shown = session.diagrams.all.value.find(({ id }) => id === session.diagrams.current.value);
-  if (!shown) return null;
+  if (!shown || !session.diagrams.isRemovable(shown.id)) return null;
   const label = fill(words.remove, { name: shown.title });
   return (
     <button
@@ -108,7 +108,7 @@ function NewProcess({ session, close }: { session: EditorSession; close(): void 
   const [name, setName] = useState("");
   const make = () => {
     close();
-    void session.diagrams.add(name.trim()).then(() => session.changedBeside());
+    session.diagrams.add(name.trim());
   };
   return (
     <Dialog

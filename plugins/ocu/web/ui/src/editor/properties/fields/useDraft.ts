@@ -10,20 +10,37 @@ export interface Draft {
   commit(): void;
 }
 
+const DRAWING = ".djs-container";
+const APPROACHES = ["pointerover", "pointermove", "pointerdown"] as const;
+
 export function useDraft(value: string, write: (value: string) => void): Draft {
   const [typed, setTyped] = useState<string | null>(null);
   const state = useRef({ typed, value, write, timer: 0 });
   Object.assign(state.current, { typed, value, write });
 
-  const commit = () => {
+  const settle = () => {
     const { typed: now, value: before, write: put, timer } = state.current;
     clearTimeout(timer);
+    state.current.timer = 0;
     if (now !== null && now !== before) put(now);
+  };
+  const commit = () => {
+    settle();
     state.current.typed = null;
     setTyped(null);
   };
-  // Another element may be selected before the pause is over: nothing that was typed is lost.
-  useEffect(() => commit, []);
+  useEffect(() => {
+    // What changes in the mission draws the menu at an element anew: not under a click.
+    const approach = ({ target }: PointerEvent) => {
+      if (state.current.timer && (target as Element).closest?.(DRAWING)) settle();
+    };
+    for (const event of APPROACHES) addEventListener(event, approach, true);
+    return () => {
+      for (const event of APPROACHES) removeEventListener(event, approach, true);
+      // Another element may be selected before the pause is over: nothing that was typed is lost.
+      commit();
+    };
+  }, []);
 
   return {
     value: typed ?? value,
@@ -31,10 +48,7 @@ export function useDraft(value: string, write: (value: string) => void): Draft {
       state.current.typed = next;
       setTyped(next);
       clearTimeout(state.current.timer);
-      state.current.timer = window.setTimeout(() => {
-        const { typed: now, value: before, write: put } = state.current;
-        if (now !== null && now !== before) put(now);
-      }, PAUSE_MS);
+      state.current.timer = window.setTimeout(settle, PAUSE_MS);
     },
     commit,
   };
