@@ -8,6 +8,7 @@ from fastapi.openapi.utils import get_openapi
 from starlette.types import ASGIApp
 
 from m2pem_plugin_web import pages
+from m2pem_plugin_web import tiles as map_tiles
 from m2pem_plugin_web.access.bodies import BoundedBodies
 from m2pem_plugin_web.access.entry import Entry
 from m2pem_plugin_web.access.guard import Guard
@@ -39,8 +40,9 @@ OPENAPI = "/api/openapi.json"
 def routers_of(services: Services, settings: Settings, hub: Hub, entry: Entry) -> list[APIRouter]:
     """All that browsers may ask for."""
     control, folder = services.control, services.folder
+    tiles = map_tiles.Tiles(settings.tiles) if settings.tiles is not None else None
     return [
-        session.router(control, settings, entry),
+        session.router(control, settings, entry, tiles.pictured if tiles is not None else None),
         runs.router(control, folder),
         steering.router(control),
         prompts.router(control, hub),
@@ -52,6 +54,7 @@ def routers_of(services: Services, settings: Settings, hub: Hub, entry: Entry) -
         rehearsals.router(control, folder, services.rehearsals),
         catalogue.router(control),
         geometries.router(control),
+        map_tiles.router(tiles),
         socket.router(hub, entry),
         pages.router(entry, Pages()),
     ]

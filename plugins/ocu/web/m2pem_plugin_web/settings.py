@@ -16,6 +16,8 @@ MISSIONS = "M2PEM_WEB_MISSIONS"
 USERS = "M2PEM_WEB_USERS"
 CERTIFICATE = "M2PEM_WEB_CERT"
 KEY = "M2PEM_WEB_KEY"
+TILES = "M2PEM_WEB_TILES"
+"""A file of pictures for the map."""
 
 DEFAULT_HOST = "127.0.0.1"
 DEFAULT_PORT = 8700
@@ -43,6 +45,7 @@ class Settings:
     users: Path | None = None
     certificate: Path | None = None
     key: Path | None = None
+    tiles: Path | None = None
 
     @property
     def scheme(self) -> str:
@@ -79,6 +82,7 @@ def read_settings(environment: Mapping[str, str] = os.environ) -> Settings:
         users=path(USERS),
         certificate=path(CERTIFICATE),
         key=path(KEY),
+        tiles=path(TILES),
     )
     _refuse_what_is_unsafe(settings)
     return settings
@@ -118,7 +122,11 @@ def _is_unspecified(host: str) -> bool:
 def _refuse_what_is_unsafe(settings: Settings) -> None:
     if (settings.certificate is None) != (settings.key is None):
         raise SettingError(f"{CERTIFICATE} and {KEY} go together: give both, or neither")
-    for name, path in ((CERTIFICATE, settings.certificate), (KEY, settings.key)):
+    for name, path in (
+        (CERTIFICATE, settings.certificate),
+        (KEY, settings.key),
+        (TILES, settings.tiles),
+    ):
         if path is not None and not path.is_file():
             raise SettingError(f"{name}={path}: there is no such file")
     if is_loopback(settings.host):

@@ -15,10 +15,18 @@ from m2pem_plugin_web.pages import set_cookie
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.models import Body, Name
 from m2pem_plugin_web.settings import Settings
+from m2pem_plugin_web.tiles import Pictured
+
+
+class TilesModel(BaseModel):
+    """Pictures for the map; `attribution`: whom to name, a plain text."""
+
+    max_zoom: int
+    attribution: str
 
 
 class SessionModel(BaseModel):
-    """Who asks, and where they are."""
+    """Who asks, and where they are. `tiles` null: the map has no pictures."""
 
     user: str
     role: Role
@@ -26,6 +34,7 @@ class SessionModel(BaseModel):
     simulated: bool
     version: str
     missions_folder: str
+    tiles: TilesModel | None
 
 
 class SignInModel(Body):
@@ -35,10 +44,15 @@ class SignInModel(Body):
     password: Annotated[str, Field(max_length=LONGEST)]
 
 
-def router(control: MissionControl, settings: Settings, entry: Entry) -> APIRouter:
+def router(
+    control: MissionControl, settings: Settings, entry: Entry, tiles: Pictured | None = None
+) -> APIRouter:
     """The routes of a session."""
     routes = APIRouter(prefix="/api/session", tags=["session"], responses=RESPONSES)
     installed = version("m2pem")
+    pictures = None
+    if tiles is not None:
+        pictures = TilesModel(max_zoom=tiles.max_zoom, attribution=tiles.attribution)
 
     def session_of(person: Person) -> SessionModel:
         return SessionModel(
@@ -48,6 +62,7 @@ def router(control: MissionControl, settings: Settings, entry: Entry) -> APIRout
             simulated=control.simulated(),
             version=installed,
             missions_folder=str(settings.missions),
+            tiles=pictures,
         )
 
     @routes.get("")

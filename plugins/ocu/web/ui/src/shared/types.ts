@@ -10,8 +10,8 @@ export interface Session {
   simulated: boolean;
   version: string;
   missions_folder: string;
-  /** Served at /tiles/{z}/{x}/{y}.png, if there are any. */
-  tiles?: { max_zoom: number; attribution: string };
+  /** Served at /tiles/{z}/{x}/{y}.png; null: there are none. */
+  tiles: { max_zoom: number; attribution: string } | null;
 }
 
 export interface Finding {

@@ -28,7 +28,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
   const shows = useSignal<MapShows>({ ...SHOWS, ...remembered<Partial<MapShows>>("map", {}) });
 
   useEffect(() => {
-    const made = new MapView(host.current!, fleet, session.peek()?.tiles, {
+    const made = new MapView(host.current!, fleet, session.peek()?.tiles ?? null, {
       chosen: (resource) => {
         const [work] = workOf(resource, scene.commands.peek());
         if (work) selected.value = { ...work.command, show: true };

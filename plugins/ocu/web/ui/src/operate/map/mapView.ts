@@ -37,7 +37,7 @@ export class MapView {
   constructor(
     host: HTMLElement,
     private readonly fleet: Fleet,
-    tiles: Tiles | undefined,
+    tiles: Tiles | null,
     private readonly listener: MapListener,
   ) {
     const { lat, lon } = fleet.origin;
@@ -46,7 +46,7 @@ export class MapView {
       zoom: 17,
       maxZoom: 22,
       preferCanvas: true,
-      attributionControl: tiles !== undefined,
+      attributionControl: tiles !== null,
       zoomSnap: 0.5,
     });
     this.map.attributionControl?.setPrefix(false);
@@ -54,7 +54,7 @@ export class MapView {
       const options = {
         maxNativeZoom: tiles.max_zoom,
         maxZoom: 22,
-        attribution: tiles.attribution,
+        attribution: escaped(tiles.attribution),
       };
       L.tileLayer("/tiles/{z}/{x}/{y}.png", options).addTo(this.map);
     }
@@ -164,6 +164,10 @@ export class MapView {
     marker.addTo(this.drafted);
   }
 }
+
+/** Leaflet takes it as HTML. */
+const escaped = (text: string) =>
+  text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
 
 const vertexOf = ({ lat, lng }: L.LatLng): Vertex => ({
   latitude: lat,
