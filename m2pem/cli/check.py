@@ -95,6 +95,7 @@ def _against_fleet(
 ) -> list[Finding]:
     from m2pem.cli.options import MADE_UP
     from m2pem.executive.loading import findings_for
+    from m2pem.executive.requiring import requirement_findings
     from m2pem.plugins import PluginManager
 
     if mission is None:
@@ -115,6 +116,7 @@ def _against_fleet(
         except FleetError as error:
             failed = error
     findings = findings_for(mission, arbiters, plugins, tuple(data), process)
+    findings += requirement_findings(mission, arbiters, plugins, tuple(data))
     if failed is not None:
         raise FleetError(failed.what, [*findings, *failed.findings])
     return findings

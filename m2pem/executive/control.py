@@ -33,6 +33,7 @@ from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import MissionError, OperatorError
 from m2pem.executive.loading import findings_for, library_of, load_source
 from m2pem.executive.prover import verify_apart
+from m2pem.executive.requiring import requirement_findings
 from m2pem.findings import Finding
 from m2pem.journal.base import RunLine
 from m2pem.journal.mission import mission_of
@@ -247,14 +248,12 @@ class Control:
             loaded = load_source(mission, executive.search_path)
         except MissionError as error:
             return error.findings
-        return findings_for(
-            loaded,
-            executive.arbiters,
-            executive.plugins,
-            data,
-            process,
-            simulated=executive.simulated,
-        )
+        names, arbiters, plugins = tuple(data), executive.arbiters, executive.plugins
+        simulated = executive.simulated
+        return [
+            *findings_for(loaded, arbiters, plugins, names, process, simulated=simulated),
+            *requirement_findings(loaded, arbiters, plugins, names),
+        ]
 
     async def simulate(self, mission: MissionSource, **options: Any) -> SimulationResult:
         """Rehearse a mission with this fleet on a virtual clock."""

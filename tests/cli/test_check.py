@@ -138,3 +138,25 @@ def m2pem_check_mission(mission, fleet):
     status, out, _ = m2pem.run("check", MISSION, **install_plugin(tmp_path, "tide", code))
     assert status == 1
     assert f"{MISSION}:3: error: low tide [tide]" in out
+
+
+@pytest.mark.parametrize("fleet", [(), ("--fleet", FLEET)], ids=["alone", "fleet"])
+def test_a_requirement_in_the_file_that_cannot_be_verified_is_a_warning(
+    invoke: Invoke, tmp_path: Path, fleet: tuple[object, ...]
+) -> None:
+    mission = tmp_path / "mission.bpmn"
+    mission.write_text(
+        DOUBTFUL.replace(
+            "<startEvent",
+            '<extensionElements><r:requirement xmlns:r="https://m2pem.org/schema/1" id="ends"'
+            ' ltl="&lt;> endd"/></extensionElements>\n    <startEvent',
+        )
+    )
+    status, out, _ = invoke("check", mission, *fleet, "--data", "mission.speed=3")
+    assert status == 0
+    first, formula, caret, last = out.splitlines()
+    assert "ends: warning: " in first
+    assert first.endswith("at column 4 [requirement]")
+    assert (formula, caret) == ("    <> endd", "       ^")
+    assert last == f"{mission}: 1 warning"
+    assert invoke("check", mission, *fleet, "--data", "mission.speed=3", "--strict")[0] == 1

@@ -89,11 +89,11 @@ async def test_requirements_are_written_verified_undone_and_kept(tmp_path: Path)
         await parts.get_by_role("button", name="Add", exact=True).click()
         formula = parts.get_by_role("textbox", name="Formula", exact=True)
         await formula.fill("[](activ(Reverse) -> <> ended)")
-        await formula.blur()
+        caret = parts.locator(".m2v-caret")  # of the check, while it is being typed
+        await expect(caret).to_have_text("[](activ(Reverse) -> <> ended)\n   ^")
         await verify(page)
         problem = page.get_by_role("alert").filter(has_text="could not be verified")
         await expect(problem).to_contain_text("there is no 'activ(...)'")
-        caret = parts.locator(".m2v-caret")
         await expect(caret).to_have_text("[](activ(Reverse) -> <> ended)\n   ^")
 
         # What may come next: an element.

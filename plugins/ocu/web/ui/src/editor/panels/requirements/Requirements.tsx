@@ -39,7 +39,7 @@ export function Requirements({ editor, verification }: RequirementsProps) {
         {all.map((one, index) => {
           const { requirement } = one;
           const isOpen = open === requirement.id;
-          const findings = findingsOf(verification, requirement.id);
+          const findings = findingsOf(editor, verification, requirement.id);
           return (
             <li key={index} class={isOpen ? "m2v-requirement m2v-open" : "m2v-requirement"}>
               <Line
@@ -76,9 +76,16 @@ export function Requirements({ editor, verification }: RequirementsProps) {
   );
 }
 
-function findingsOf(verification: Verification, id: string): Finding[] {
-  const findings = verification.job.refusal.value?.findings ?? [];
-  return findings.filter(({ element }) => element === id);
+const OF_CHECK = "requirement";
+
+/** What the check of the drawing found, and what it leaves to a verification. */
+function findingsOf(editor: EditorContext, verification: Verification, id: string): Finding[] {
+  const refused = verification.job.refusal.value?.findings ?? [];
+  const all = [
+    ...editor.checks.findings.value.filter(({ rule }) => rule === OF_CHECK),
+    ...refused.filter(({ rule }) => rule !== OF_CHECK),
+  ];
+  return all.filter(({ element }) => element === id);
 }
 
 /** One, or one for each vehicle. */
