@@ -22,7 +22,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages page demo demo-air demo-ros demo-ros-vehicle demo-ros-team demo-team
+.PHONY: help setup python-packages npm-packages page demo demo-web demo-air demo-ros demo-ros-vehicle demo-ros-team demo-team
 .PHONY: test test-long test-ros fuzz lint format docs pictures
 .PHONY: bench bench-quick conformance clean ros
 
@@ -120,6 +120,15 @@ demo: python-packages ## run the paper's mission on simulated vehicles, in two w
 	echo; \
 	echo "The second way: nothing is detected. Continue, and the route is driven to its end."; \
 	$(DEMO) --answers $(ANSWERS)_route$$operator.yaml
+
+DEMO_WEB := .demo-web
+
+# Missions are copied: what is drawn in the demo changes none of the repository.
+demo-web: python-packages page ## draw, prove and run missions in a browser, on simulated vehicles
+	@mkdir -p $(DEMO_WEB)/missions && { [ -e $(DEMO_WEB)/missions/vignette1.bpmn ] || cp missions/vignette1.bpmn $(DEMO_WEB)/missions; }
+	@echo "Open this address in a browser. Ctrl-C ends it."
+	@M2PEM_WEB_MISSIONS=$(DEMO_WEB)/missions $(BIN)/m2pem serve --fleet fleet_configs/vignette1.yaml --simulate \
+	  --ocu web --journal $(DEMO_WEB)/journal.db
 
 AUTOPILOTS := $(BIN)/m2pem sim mavlink --copters 2 --rovers 1 --speed 10 --home 38.1075,-77.3192,60 \
   --set FS_GCS_ENABLE=1 --set FS_GCS_TIMEOUT=10 --set BATT_FS_LOW_ACT=2

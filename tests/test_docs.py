@@ -23,8 +23,9 @@ from tests.console import (
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
 EXAMPLES = sorted((REPOSITORY / "examples").rglob("README.md"))
 MAKE_TARGETS = {
-    *("setup", "demo", "demo-air", "demo-ros", "demo-team", "test", "test-long", "test-ros", "ros"),
-    *("fuzz", "lint", "format", "docs", "pictures", "conformance", "bench", "bench-quick", "clean"),
+    *("setup", "demo", "demo-air", "demo-ros", "demo-team", "demo-web", "test", "test-long"),
+    *("test-ros", "ros", "fuzz", "lint", "format", "docs", "pictures", "conformance", "bench"),
+    *("bench-quick", "clean"),
 }
 
 BLOCKS = {

@@ -33,9 +33,12 @@ export interface Block {
   content: Content;
 }
 
+/** Pan, tilt and zoom. */
+const ABBREVIATION = /^ptz\b/;
+
 /** "single_vehicle_routing" for people: "Single vehicle routing". */
 export function titleOf(name: string): string {
-  const words = name.replaceAll("_", " ").trim();
+  const words = name.replaceAll("_", " ").trim().replace(ABBREVIATION, (each) => each.toUpperCase());
   return words.charAt(0).toUpperCase() + words.slice(1);
 }
 
