@@ -33,7 +33,7 @@ export function RunBar() {
       {scene.mode === "replay" && (
         <span class="mode">
           {scene.run ? text.replay : text.rehearsal}
-          {scene.run && summary && ` · ${dateTime(summary.started_us)}`}
+          {scene.run && summary && ` · ${dateTime(summary.began_us)}`}
         </span>
       )}
       <Clock />
