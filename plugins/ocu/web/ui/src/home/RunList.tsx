@@ -2,6 +2,7 @@
 import { useState } from "preact/hooks";
 import { go } from "../shared/router";
 import { moment } from "../shared/moments";
+import { titleOf } from "../shared/runs";
 import type { RunLine } from "../shared/types";
 import { fill, strings } from "../strings";
 import { Link } from "./Link";
@@ -64,7 +65,7 @@ function RunRow({ run }: { run: RunLine }) {
         <Link to={path}>{run.run}</Link>
       </td>
       <td>
-        {run.mission}
+        {titleOf(run)}
         {run.process && <span class="home-title">{run.process}</span>}
       </td>
       <td>
