@@ -3,6 +3,7 @@
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, Union
 
 from m2pem.api.authoring import (
@@ -54,7 +55,11 @@ class RunStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class RunSummary:
-    """One line of `m2pem runs`. Times are microseconds since the Unix epoch."""
+    """One line of `m2pem runs`. Times are microseconds since the Unix epoch.
+
+    `started_us` and `ended_us` are by the executive's clock, which `--speed` takes ahead of the
+    wall clock; `began_us` is by that one. 0: not known.
+    """
 
     run: RunId
     mission: str
@@ -64,6 +69,7 @@ class RunSummary:
     ended_us: int | None = None
     records: int = 0
     detail: str = ""
+    began_us: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,6 +233,10 @@ class MissionControl(Protocol):
 
     def speed(self) -> float:
         """Seconds of mission time in a real second."""
+        ...
+
+    def journal_file(self) -> Path | None:
+        """Where the journal is, for what belongs beside it; None: it ends with its process."""
         ...
 
     def check(

@@ -33,7 +33,7 @@ def runs(journal: str | None, output: str) -> None:
         (
             run.run,
             run.status.value,
-            _time(run.started_us),
+            _time(run.began_us or run.started_us),
             str(run.records),
             run.process,
             run.mission,

@@ -101,6 +101,11 @@ async def _speed(control: MissionControl, _: Nothing) -> Any:
     return control.speed()
 
 
+async def _journal_file(control: MissionControl, _: Nothing) -> Any:
+    path = control.journal_file()
+    return None if path is None else str(path)
+
+
 async def _mission(control: MissionControl, p: OfRun) -> Any:
     mission = await control.mission(p.run)
     return {"file": mission.file, "source": mission.source, "library": mission.library}
@@ -127,6 +132,7 @@ METHODS: dict[str, Method] = {
     "catalogue": (Nothing, _catalogue),
     "simulated": (Nothing, _simulated),
     "speed": (Nothing, _speed),
+    "journal_file": (Nothing, _journal_file),
 }
 """Calls, answered once."""
 

@@ -59,6 +59,7 @@ class RemoteControl:
         self._catalogue = msgspec.convert(catalogue, dict[ResourceId, tuple[BehaviorSpec, ...]])
         self._simulated = bool(await self._ask("simulated"))
         self._speed = float(await self._ask("speed"))
+        self._journal_file: str | None = await self._ask("journal_file")
         self._listening = asyncio.create_task(self._follow_prompts())
         return self
 
@@ -238,6 +239,10 @@ class RemoteControl:
     def speed(self) -> float:
         """Seconds of mission time in a real second."""
         return self._speed
+
+    def journal_file(self) -> Path | None:
+        """Where the journal is, on this same machine."""
+        return None if self._journal_file is None else Path(self._journal_file)
 
     def check(
         self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()

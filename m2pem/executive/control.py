@@ -239,6 +239,10 @@ class Control:
         """Seconds of mission time in a real second."""
         return self._executive.speed
 
+    def journal_file(self) -> Path | None:
+        """Where the journal is; None: in memory."""
+        return self._executive.journal.file
+
     def check(
         self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
     ) -> Sequence[Finding]:
@@ -339,4 +343,5 @@ def summary(line: RunLine) -> RunSummary:
         line.ended_us,
         line.last_seq,
         line.detail,
+        line.header.created_us,
     )

@@ -9,6 +9,7 @@ Leaving the block stops what still runs, waits until the vehicles are released, 
 
 import asyncio
 import logging
+import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import AsyncExitStack
 from functools import partial
@@ -272,7 +273,7 @@ class Executive:
             dump(self.fleet),
             self.simulated,
             self.speed,
-            self.clock.now_us(),
+            self.clock.now_us() if self.speed == 1.0 else time.time_ns() // 1000,
             loaded.library,
         )
         number = await self.journal.create(header)

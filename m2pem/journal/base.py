@@ -5,6 +5,7 @@
 
 from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 from uuid import UUID
 
@@ -20,7 +21,7 @@ class RunHeader:
     `mission_name` is the file's name for people, `mission` its bytes, `library` the other files
     that it uses; `fleet` is `m2pem.resources.snapshot.dump(fleet)`, or b"" without one.
     `simulated`: every arbiter was replaced by the simulated one; `speed`: of the clock against
-    the wall clock.
+    the wall clock. `created_us`: by the wall clock, also where the executive's runs ahead of it.
     """
 
     mission_name: str
@@ -76,6 +77,11 @@ class Journal(Protocol):
     @property
     def identity(self) -> UUID:
         """Tells this journal from every other one; the same each time that it is opened."""
+        ...
+
+    @property
+    def file(self) -> Path | None:
+        """Where it is, for what belongs beside it; None for one that ends with its process."""
         ...
 
     async def create(self, header: RunHeader) -> str:

@@ -5,6 +5,7 @@ from bisect import bisect_right
 from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
+from pathlib import Path
 from uuid import UUID, uuid4
 
 from m2pem.errors import InternalError, JournalError
@@ -41,6 +42,11 @@ class MemoryJournal:
     def identity(self) -> UUID:
         """See `Journal.identity`."""
         return self._identity
+
+    @property
+    def file(self) -> Path | None:
+        """See `Journal.file`: there is none."""
+        return None
 
     async def create(self, header: RunHeader) -> str:
         """See `Journal.create`."""

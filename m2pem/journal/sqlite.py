@@ -79,6 +79,11 @@ class SqliteJournal:
         return self._identity
 
     @property
+    def file(self) -> Path | None:
+        """See `Journal.file`."""
+        return self._path
+
+    @property
     def commits(self) -> int:
         """How many transactions have been written since it was opened."""
         return self._writer.commits

@@ -31,6 +31,7 @@ async def test_everything_that_is_asked_for_comes_as_it_is(served: Served) -> No
         assert remote.catalogue() == served.control.catalogue()
         assert remote.simulated() is served.control.simulated()
         assert remote.speed() == served.control.speed()
+        assert remote.journal_file() == served.control.journal_file()
         assert await remote.runs() == await served.control.runs()
         assert await remote.records(run) == await served.control.records(run)
         assert await remote.mission_time_s(run) <= await served.control.mission_time_s(run)

@@ -39,3 +39,7 @@ async def test_reading_what_was_not_kept_is_refused_rather_than_left_out():
 
 def test_two_journals_are_told_apart():
     assert MemoryJournal().identity != MemoryJournal().identity
+
+
+def test_nothing_belongs_beside_it() -> None:
+    assert MemoryJournal().file is None

@@ -205,3 +205,4 @@ async def test_a_journal_keeps_its_name_and_another_has_another(open_journal, tm
         assert again.identity == identity
     async with opened(lambda: SqliteJournal.open(tmp_path / "other.db")) as other:
         assert other.identity != identity
+        assert other.file == tmp_path / "other.db"

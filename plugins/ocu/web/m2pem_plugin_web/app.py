@@ -29,21 +29,26 @@ from m2pem_plugin_web.rest import (
     session,
     steering,
     templates,
+    tracks,
     verifications,
 )
 from m2pem_plugin_web.services import Services
 from m2pem_plugin_web.settings import Settings
+from m2pem_plugin_web.tracks.recorder import Recorder
 
 OPENAPI = "/api/openapi.json"
 
 
-def routers_of(services: Services, settings: Settings, hub: Hub, entry: Entry) -> list[APIRouter]:
+def routers_of(
+    services: Services, settings: Settings, hub: Hub, entry: Entry, recorder: Recorder
+) -> list[APIRouter]:
     """All that browsers may ask for."""
     control, folder = services.control, services.folder
     tiles = map_tiles.Tiles(settings.tiles) if settings.tiles is not None else None
     return [
         session.router(control, settings, entry, tiles.pictured if tiles is not None else None),
         runs.router(control, folder),
+        tracks.router(control, recorder),
         steering.router(control),
         prompts.router(control, hub),
         resources.router(control),
@@ -66,7 +71,7 @@ def create_app(routers: Iterable[APIRouter], entry: Entry, settings: Settings) -
     app = FastAPI(title="m2pem", openapi_url=OPENAPI, docs_url=None, redoc_url=None)
     for router in routers:
         app.include_router(router)
-    handle_problems(app)
+    handle_problems(app, settings.missions)
     app.openapi = lambda: _described(app)  # type: ignore[method-assign]
     guard = Guard(BoundedBodies(app), entry=entry, names=settings.names, scheme=settings.scheme)
     return SafeHeaders(guard)

@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import Generic, TypeVar
 
 from m2pem.errors import FindingsError, M2pemError
+from m2pem_plugin_web.missions.calling import Called
 from m2pem_plugin_web.problems import ProblemError
 
 T = TypeVar("T")
@@ -46,10 +47,11 @@ class Job(Generic[T]):
 
 
 class Jobs(Generic[T]):
-    """Those of one kind; `kind` is what messages call them."""
+    """Those of one kind; `kind` is what messages call them, `called` what they call files."""
 
-    def __init__(self, kind: str) -> None:
+    def __init__(self, kind: str, called: Called) -> None:
         self._kind = kind
+        self._called = called
         self._jobs: dict[str, Job[T]] = {}
         self._free = asyncio.Semaphore(AT_ONCE)
 
@@ -109,9 +111,10 @@ class Jobs(Generic[T]):
             job.state = JobState.CANCELLED
             raise
         except FindingsError as error:
-            job.state, job.problem, job.findings = JobState.FAILED, error.what, error.findings
+            job.state, job.problem = JobState.FAILED, self._called.text(error.what)
+            job.findings = self._called.findings(error.findings)
         except M2pemError as error:
-            job.state, job.problem = JobState.FAILED, str(error)
+            job.state, job.problem = JobState.FAILED, self._called.text(str(error))
         except Exception:  # one job must not end the page
             log.exception("%s %s", self._kind, job.id)
             job.state, job.problem = JobState.FAILED, "the server failed; its log says how"

@@ -30,6 +30,8 @@ class WebOcu:
         from m2pem_plugin_web.live.hub import Hub  # noqa: PLC0415
         from m2pem_plugin_web.server import Server  # noqa: PLC0415
         from m2pem_plugin_web.services import services_of  # noqa: PLC0415
+        from m2pem_plugin_web.tracks.places import place_beside  # noqa: PLC0415
+        from m2pem_plugin_web.tracks.recorder import Recorder  # noqa: PLC0415
 
         settings = read_settings(environment)
         self._where = places.folder(environment)
@@ -39,8 +41,10 @@ class WebOcu:
         try:
             entry = self._entry(settings)
             self.hub = Hub(control)
+            place = place_beside(control.journal_file())
+            self._recorder = Recorder(control, self.hub.feed.pictures, self.hub.fleet, place)
             self._services = services_of(control, settings.missions)
-            routers = routers_of(self._services, settings, self.hub, entry)
+            routers = routers_of(self._services, settings, self.hub, entry, self._recorder)
             self._app = create_app(routers, entry, settings)
         except BaseException:
             self._server.close()
@@ -58,6 +62,7 @@ class WebOcu:
         try:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self.hub.run(), name="web: hub")
+                tasks.create_task(self._recorder.run(), name="web: recorder")
                 tasks.create_task(self._server.serve(self._app), name="web: server")
         finally:
             self._server.close()

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Mapping
 from dataclasses import asdict
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -23,6 +24,7 @@ from m2pem.errors import (
     OperatorError,
     PluginError,
 )
+from m2pem_plugin_web.missions.calling import Called
 
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS")
 MEDIA_TYPE = "application/problem+json"
@@ -84,14 +86,16 @@ def problem(
     return JSONResponse(content, status, dict(headers or {}), media_type=MEDIA_TYPE)
 
 
-def handle_problems(app: FastAPI) -> None:
-    """Have whatever goes wrong in an app said in this form."""
+def handle_problems(app: FastAPI, missions: Path = Path()) -> None:
+    """Have whatever goes wrong in an app said in this form. `missions`: their folder."""
+    called = Called(missions)
 
     @app.exception_handler(M2pemError)
     def refused(_: Request, error: M2pemError) -> JSONResponse:
         status = next((s for kind, s in STATUS_OF if isinstance(error, kind)), 500)
         if isinstance(error, FindingsError):
-            return problem(status, error.what, findings=[asdict(each) for each in error.findings])
+            findings = [asdict(each) for each in called.findings(error.findings)]
+            return problem(status, called.text(error.what), findings=findings)
         if status == 500:
             log.error("a request failed: %s", error)
         return problem(status, str(error))

@@ -1,10 +1,11 @@
 """What the routers of missions work with, beside the executive."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from m2pem.api import MissionControl, SimulationResult
 from m2pem_plugin_web.jobs import Jobs
+from m2pem_plugin_web.missions.calling import Called
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.rest.verifications import Report
 
@@ -15,8 +16,8 @@ class Services:
 
     control: MissionControl
     folder: MissionFolder
-    verifications: Jobs[Report] = field(default_factory=lambda: Jobs("verification"))
-    rehearsals: Jobs[SimulationResult] = field(default_factory=lambda: Jobs("rehearsal"))
+    verifications: Jobs[Report]
+    rehearsals: Jobs[SimulationResult]
 
     async def close(self) -> None:
         """End the work that goes on."""
@@ -26,4 +27,7 @@ class Services:
 
 def services_of(control: MissionControl, missions: Path) -> Services:
     """Those of an executive; `missions`: the folder."""
-    return Services(control, MissionFolder(missions))
+    called = Called(missions)
+    return Services(
+        control, MissionFolder(missions), Jobs("verification", called), Jobs("rehearsal", called)
+    )

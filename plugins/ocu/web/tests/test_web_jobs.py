@@ -105,3 +105,19 @@ async def test_a_rehearsal_that_cannot_be_made_says_why(tmp_path: Path) -> None:
         assert job["state"] == "failed" and job["findings"][0]["line"] == 1
         await rest.get(f"{place}/records", 409)
         await rest.get("/rehearsals/none/telemetry", 404)
+
+
+async def test_problems_name_missions_and_not_where_they_are(tmp_path: Path) -> None:
+    async with rest_world(tmp_path) as rest:
+        broken = VIGNETTE.replace("route_alpha", "no_such_route")
+        called = LARGE.replace('id="S"', 'id="S" name=""').replace("startEvent", "zzz", 1)
+        (tmp_path / "broken.bpmn").write_text(called, encoding="utf-8")
+        said = []
+        for kind in ("verifications", "rehearsals"):
+            for body in ({"mission": "broken"}, {"xml": called}, {"xml": broken, "mission": "my"}):
+                job = await rest.until_over(await ordered(rest, f"/{kind}", body))
+                assert str(tmp_path) not in json.dumps([job["problem"], job["findings"]])
+                said.append(job["problem"])
+        assert [each for each in said if each and each.startswith("broken.bpmn: ")]
+        answer = await rest.post("/runs", {"mission": "broken"}, 422)
+        assert str(tmp_path) not in json.dumps(answer)

@@ -1,5 +1,6 @@
 """An executive that is started again: pages go on, and so do the runs that they watch."""
 
+import shutil
 import socket
 from contextlib import AsyncExitStack
 from pathlib import Path
@@ -21,7 +22,10 @@ def left_by_a_crash(folder: Path) -> Path:
     copy = folder / "crashed"
     copy.mkdir()
     for file in folder.glob("journal.db*"):
-        (copy / file.name).write_bytes(file.read_bytes())
+        if file.is_dir():
+            shutil.copytree(file, copy / file.name)
+        else:
+            (copy / file.name).write_bytes(file.read_bytes())
     return copy
 
 

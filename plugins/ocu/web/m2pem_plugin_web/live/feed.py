@@ -7,6 +7,7 @@ that every record is counted.
 import asyncio
 import logging
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from typing import Protocol
 
 from m2pem.api import (
@@ -164,12 +165,14 @@ class Feed:
         """A run that is new here: from its start, or taken up by this executive."""
         if not isinstance(stamped.record, r.RunStarted):
             return await self.load(stamped.run)
+        summary = RunSummary(stamped.run, "", "", RunStatus.RUNNING, 0)
         try:
             name = (await self._control.mission(stamped.run)).file
+            began_us = {each.run: each.began_us for each in await self._control.runs()}
+            summary = replace(summary, mission=name, began_us=began_us.get(stamped.run, 0))
         except M2pemError as error:
             log.warning("%s: its diagram cannot be read: %s", stamped.run, error)
-            name = ""
-        picture = Picture(RunSummary(stamped.run, name, "", RunStatus.RUNNING, 0))
+        picture = Picture(summary)
         self._remember(picture)
         return picture
 

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from m2pem.api import Draft, MissionControl, Outline, OutlineTrigger
 from m2pem.errors import MissionError
 from m2pem_plugin_web.access.people import Viewer
+from m2pem_plugin_web.missions.calling import Called
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of, source_of
@@ -90,6 +91,7 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
     """The routes of checks."""
     routes = APIRouter(prefix="/api", tags=["checks"], responses=RESPONSES)
     turn = asyncio.Semaphore(AT_ONCE)
+    called = Called(folder.path)
 
     @routes.post("/checks")
     async def check(_: Viewer, wanted: DraftModel) -> CheckModel:
@@ -100,7 +102,7 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
                 lambda: control.check(draft, process=wanted.process, data=wanted.data or ())
             )
             outline = await asyncio.to_thread(_outline, control, draft)
-        return CheckModel(findings=finding_models(findings), outline=outline)
+        return CheckModel(findings=finding_models(called.findings(findings)), outline=outline)
 
     @routes.post("/editable")
     async def editable(_: Viewer, wanted: EditModel) -> EditableModel:

@@ -19,7 +19,12 @@ class Body(BaseModel):
 
 
 class RunModel(BaseModel):
-    """A run. Times are microseconds since the Unix epoch."""
+    """A run. Times are microseconds since the Unix epoch.
+
+    `began_us` is by the clock on the wall, `started_us` and `ended_us` by the executive's, which
+    may run faster. `took_s`: seconds of that clock until the end, of mission time until now; null
+    when nobody drives the run.
+    """
 
     run: str
     mission: str
@@ -29,10 +34,14 @@ class RunModel(BaseModel):
     ended_us: int | None
     records: int
     detail: str
+    began_us: int
+    took_s: float | None
 
 
-def run_model(summary: RunSummary) -> RunModel:
-    """A summary as JSON."""
+def run_model(summary: RunSummary, took_s: float | None = None) -> RunModel:
+    """A summary as JSON. `took_s`: up to now, of a run that goes on."""
+    if summary.ended_us is not None:
+        took_s = max(0, summary.ended_us - summary.started_us) / 1_000_000
     return RunModel(
         run=summary.run,
         mission=summary.mission,
@@ -42,6 +51,8 @@ def run_model(summary: RunSummary) -> RunModel:
         ended_us=summary.ended_us,
         records=summary.records,
         detail=summary.detail,
+        began_us=summary.began_us or summary.started_us,
+        took_s=took_s,
     )
 
 

@@ -1,13 +1,15 @@
 """/api/runs: start them, list them, and read what happened in them."""
 
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel
 
-from m2pem.api import Draft, MissionControl, MissionFile
+from m2pem.api import Draft, MissionControl, MissionFile, RunStatus, RunSummary
+from m2pem.errors import M2pemError
 from m2pem_plugin_web.access.people import Commander, Viewer
 from m2pem_plugin_web.live.words import record_of
 from m2pem_plugin_web.missions.folder import MissionFolder
@@ -70,17 +72,24 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         run = await control.start(draft, process=wanted.process, data=wanted.data, by=person.name)
         return StartedModel(run=run)
 
+    async def now(summary: RunSummary) -> RunModel:
+        took_s = None
+        if summary.status in (RunStatus.RUNNING, RunStatus.PAUSED):
+            with suppress(M2pemError):  # another executive drives it
+                took_s = await control.mission_time_s(summary.run)
+        return run_model(summary, took_s)
+
     @routes.get("")
     async def runs(
         _: Viewer, limit: Annotated[int, Query(ge=1, le=MOST_RUNS)] = MOST_RUNS
     ) -> list[RunModel]:
         """The runs of the journal, the newest last; `limit` of them at most."""
-        return [run_model(each) for each in list(await control.runs())[-limit:]]
+        return [await now(each) for each in list(await control.runs())[-limit:]]
 
     @routes.get("/{run}")
     async def run(_: Viewer, run: str) -> RunModel:
         """How a run stands."""
-        return run_model(await find_run(control, run))
+        return await now(await find_run(control, run))
 
     @routes.get("/{run}/records", response_model=RecordPage)
     async def records(

@@ -807,7 +807,10 @@ export const strings = {
       needsName: "It needs a name: letters, digits, - _ .",
       saved: "{name} can be used in the mission now.",
       clickHint: "Click the map to add vertices, drag them to move.",
-      notKnown: "This record has no positions: they are kept of rehearsals only.",
+      notKnown:
+        "Nobody has kept where the vehicles were: this page was not served while the run went on.",
+      notKnownYet: "Where the vehicles were is known from {time} on.",
+      problem: "Some of it is missing: {problem}",
       kinds: { route: "Route", area: "Area", point: "Point" },
     },
     prompts: {

@@ -2,7 +2,8 @@
 import { useState } from "preact/hooks";
 import { go } from "../shared/router";
 import { moment } from "../shared/moments";
-import type { RunSummary } from "../shared/types";
+import { titleOf } from "../shared/runs";
+import type { RunLine } from "../shared/types";
 import { fill, strings } from "../strings";
 import { Link } from "./Link";
 import { useList } from "./useList";
@@ -12,12 +13,12 @@ const SHOWN = 12;
 const GOING_ON = new Set(["running", "paused"]);
 
 export function RunList() {
-  const { lines, failed } = useList<RunSummary>("/runs");
+  const { lines, failed } = useList<RunLine>("/runs");
   const [all, setAll] = useState(false);
   const sorted = [...(lines ?? [])].sort(
     (a, b) =>
       Number(GOING_ON.has(b.status)) - Number(GOING_ON.has(a.status)) ||
-      b.started_us - a.started_us,
+      b.began_us - a.began_us,
   );
   const shown = all ? sorted : sorted.slice(0, SHOWN);
   return (
@@ -56,16 +57,15 @@ export function RunList() {
   );
 }
 
-function RunRow({ run }: { run: RunSummary }) {
+function RunRow({ run }: { run: RunLine }) {
   const path = `/runs/${encodeURIComponent(run.run)}`;
-  const ended = run.ended_us ?? Date.now() * 1000;
   return (
     <tr onDblClick={() => go(path)}>
       <td>
         <Link to={path}>{run.run}</Link>
       </td>
       <td>
-        {run.mission}
+        {titleOf(run)}
         {run.process && <span class="home-title">{run.process}</span>}
       </td>
       <td>
@@ -73,8 +73,8 @@ function RunRow({ run }: { run: RunSummary }) {
           {strings.operate.run.status[run.status]}
         </span>
       </td>
-      <td class="home-when">{moment(run.started_us / 1000)}</td>
-      <td>{duration((ended - run.started_us) / 1_000_000)}</td>
+      <td class="home-when">{moment(run.began_us / 1000)}</td>
+      <td>{run.took_s === null ? "–" : duration(run.took_s)}</td>
     </tr>
   );
 }

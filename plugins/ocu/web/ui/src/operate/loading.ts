@@ -6,7 +6,8 @@ import { missionModel, type MissionModel } from "./mission/missionModel";
 import { readDefinitions } from "./mission/reading";
 import type { Page } from "./scene/recordFeed";
 import { ReplayScene } from "./scene/replayScene";
-import type { TelemetrySample } from "./scene/telemetryTrack";
+import { loadTrack } from "./scene/telemetryPages";
+import { NO_TELEMETRY, type Telemetry, type TelemetrySample } from "./scene/telemetryTrack";
 
 export type Source = { kind: "run"; run: string } | { kind: "rehearsal"; id: string };
 
@@ -66,9 +67,20 @@ export async function loadReplay(
 ): Promise<ReplayScene> {
   const [records, telemetry] = await Promise.all([
     loadRecords(source, progress),
-    source.kind === "rehearsal"
-      ? get<TelemetrySample[]>(`${pathOf(source)}/telemetry`)
-      : Promise.resolve([]),
+    loadTelemetry(source),
   ]);
   return new ReplayScene(source.kind === "run" ? source.run : "", summary, records, telemetry);
+}
+
+/** A run can be looked at without its track: then it is said why there is none. */
+async function loadTelemetry(source: Source): Promise<Telemetry> {
+  if (source.kind === "rehearsal") {
+    const samples = await get<TelemetrySample[]>(`${pathOf(source)}/telemetry`);
+    return { samples, onlyNews: false, problem: null };
+  }
+  try {
+    return await loadTrack(source.run);
+  } catch (error) {
+    return { ...NO_TELEMETRY, problem: error instanceof Error ? error.message : String(error) };
+  }
 }

@@ -135,6 +135,13 @@ export interface RunSummary {
   ended_us: number | null;
   records: number;
   detail: string;
+  /** By the clock on the wall; those above are by the executive's, which may run faster. */
+  began_us: number;
+}
+
+/** As it stands now. `took_s`: null when nobody drives it. */
+export interface RunLine extends RunSummary {
+  took_s: number | null;
 }
 
 /** A record, with its own fields beside these (docs/records.md). */

@@ -1,9 +1,10 @@
 // Where everybody is; and routes, areas and points, which operators draw for the mission.
-import { useSignal } from "@preact/signals";
+import { useComputed, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
+import { clock } from "../../shared/format";
 import { remember, remembered } from "../../shared/memory";
 import { may, session } from "../../shared/session";
-import { strings } from "../../strings";
+import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import { STALE_S } from "../vehicles/VehiclesPane";
@@ -57,6 +58,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
         }
         if (followed.value) made.follow(followed.value);
       }),
+      scene.jumps.subscribe(() => made.vehicles.retrace((resource) => scene.trail(resource))),
       scene.payloads.subscribe((states) => made.vehicles.payloads(states)),
       followed.subscribe((resource) => made.centre(resource)),
       centred.subscribe((wanted) => wanted && made.centre(wanted.resource)),
@@ -105,7 +107,19 @@ export function MapPane({ formInside }: { formInside: boolean }) {
         }}
       />
       {formInside && draft.value && <DrawForm draft={draft.value} />}
-      {!scene.hasTelemetry && <p class="map-nobody">{text.notKnown}</p>}
+      <Nobody />
     </Pane>
   );
+}
+
+/** Why a replay shows no vehicles. */
+function Nobody() {
+  const { scene } = useOperating();
+  const early = useComputed(() => scene.time.value < scene.knownFrom_s);
+  const why = scene.telemetryProblem && fill(text.problem, { problem: scene.telemetryProblem });
+  if (!early.value) return why ? <p class="map-nobody">{why}</p> : null;
+  const known = scene.hasTelemetry
+    ? fill(text.notKnownYet, { time: clock(scene.knownFrom_s) })
+    : text.notKnown;
+  return <p class="map-nobody">{[known, why].filter(Boolean).join(" ")}</p>;
 }

@@ -2,11 +2,11 @@
 import L from "leaflet";
 import type { Fleet, GeoPosition, PayloadState, VehicleState } from "../../shared/types";
 import { heading_deg } from "../../shared/format";
+import { TRAIL_POINTS } from "../scene/scene";
 import { DOMAIN_PATHS } from "../vehicles/DomainSymbol";
 
 type Vehicle = Fleet["vehicles"][number];
 
-const TRAIL_POINTS = 2000;
 const TRAIL_STEP_M = 1;
 
 const TRAIL: L.PolylineOptions = { color: "#3a7bd0", weight: 2, opacity: 0.65, interactive: false };
@@ -39,6 +39,7 @@ export class VehicleLayer {
   private readonly shown = new Map<string, Shown>();
   private readonly trails = L.layerGroup();
   private readonly footprints = L.layerGroup();
+  private been: (resource: string) => GeoPosition[] = () => [];
   private readonly seen = new Map<string, { polygon: L.Polygon; state: PayloadState }>();
 
   constructor(
@@ -77,6 +78,14 @@ export class VehicleLayer {
     }
   }
 
+  /** Draw trails anew: `been` says where a vehicle was, and where it is ends the trail. */
+  retrace(been: (resource: string) => GeoPosition[]): void {
+    this.been = been;
+    for (const [resource, { marker, trail }] of this.shown) {
+      trail.setLatLngs([...been(resource).map(place), marker.getLatLng()]);
+    }
+  }
+
   /** Gray where nothing was heard for a while. */
   ages(isStale: (resource: string) => boolean): void {
     for (const [resource, { marker, state }] of this.shown) {
@@ -111,7 +120,7 @@ export class VehicleLayer {
     const marker = L.marker(place(position), { icon, keyboard: false, zIndexOffset: 1000 });
     marker.on("click", () => this.chosen(vehicle.id)).addTo(this.map);
     const symbol = marker.getElement()?.querySelector("svg") ?? null;
-    const trail = L.polyline([], TRAIL).addTo(this.trails);
+    const trail = L.polyline(this.been(vehicle.id).map(place), TRAIL).addTo(this.trails);
     const shown: Shown = { marker, trail, state: undefined, symbol };
     this.shown.set(vehicle.id, shown);
     return shown;
@@ -123,13 +132,11 @@ export class VehicleLayer {
     if (state.yaw_rad !== null && shown.symbol) {
       shown.symbol.style.transform = `rotate(${heading_deg(state.yaw_rad).toFixed(1)}deg)`;
     }
-    this.draw(shown, state, at);
+    this.draw(shown, at);
     shown.state = state;
   }
 
-  private draw({ trail, state: before }: Shown, state: VehicleState, at: L.LatLng): void {
-    // A replay that went back draws it anew.
-    if (before && state.time_us < before.time_us) trail.setLatLngs([]);
+  private draw({ trail }: Shown, at: L.LatLng): void {
     const points = trail.getLatLngs() as L.LatLng[];
     const last = points.at(-1);
     if (last && last.distanceTo(at) < TRAIL_STEP_M) return;

@@ -4,11 +4,11 @@ import { post } from "../../shared/api";
 import { activeRuns } from "../../shared/executive";
 import { clock, dateTime } from "../../shared/format";
 import { go } from "../../shared/router";
+import { titleOf } from "../../shared/runs";
 import { may } from "../../shared/session";
 import { StopButton } from "../../shared/StopButton";
 import { attempt } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
-import type { RunSummary } from "../../shared/types";
 import { useOperating } from "../context";
 import { Icon } from "../layout/icons";
 import { usePaced } from "../layout/pace";
@@ -33,7 +33,7 @@ export function RunBar() {
       {scene.mode === "replay" && (
         <span class="mode">
           {scene.run ? text.replay : text.rehearsal}
-          {scene.run && summary && ` · ${dateTime(summary.started_us)}`}
+          {scene.run && summary && ` · ${dateTime(summary.began_us)}`}
         </span>
       )}
       <Clock />
@@ -44,9 +44,6 @@ export function RunBar() {
     </div>
   );
 }
-
-export const titleOf = ({ mission, process }: RunSummary): string =>
-  mission.replace(/^.*[\\/]/, "").replace(/\.bpmn$/, "") || process;
 
 function Runs({ shown }: { shown: string }) {
   const others = activeRuns.value;

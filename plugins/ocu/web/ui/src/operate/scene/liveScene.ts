@@ -2,10 +2,18 @@
 import { batch, computed, signal } from "@preact/signals";
 import { get } from "../../shared/api";
 import * as executive from "../../shared/executive";
-import type { Command, RunStatus, RunSummary, ServerMessage } from "../../shared/types";
+import type {
+  Command,
+  GeoPosition,
+  RunStatus,
+  RunSummary,
+  ServerMessage,
+} from "../../shared/types";
 import { ElementBoard } from "./elementBoard";
 import { RecordFeed, type Page } from "./recordFeed";
-import type { Scene } from "./scene";
+import { TRAIL_POINTS, type Scene } from "./scene";
+import { loadTrack } from "./telemetryPages";
+import { NO_TELEMETRY, TelemetryTrack } from "./telemetryTrack";
 
 const TICK_MS = 200;
 
@@ -15,6 +23,9 @@ type Snapshot = Extract<ServerMessage, { type: "snapshot" }>;
 export class LiveScene implements Scene {
   readonly mode = "live";
   readonly hasTelemetry = true;
+  readonly knownFrom_s = 0;
+  readonly telemetryProblem = "";
+  readonly jumps = signal(0);
   readonly elements = new ElementBoard();
   readonly summary = computed<RunSummary | null>(
     () => executive.runs.value.find(({ run }) => run === this.run) ?? null,
@@ -32,6 +43,8 @@ export class LiveScene implements Scene {
   readonly silentFor_s = executive.silentFor_s;
   readonly end = this.time;
   private readonly feed: RecordFeed;
+  /** Of the time before the page was opened. */
+  private before = new TelemetryTrack(NO_TELEMETRY);
   private begun = false;
   private toldAt = performance.now();
   private told_s = 0;
@@ -46,6 +59,7 @@ export class LiveScene implements Scene {
     this.stopListening = executive.listen((message) => this.take(message));
     this.ticking = setInterval(() => (this.time.value = this.now()), TICK_MS);
     executive.watch(run);
+    void this.lookBack();
   }
 
   get timeline() {
@@ -60,6 +74,10 @@ export class LiveScene implements Scene {
     return this.feed.older();
   }
 
+  trail(resource: string): GeoPosition[] {
+    return this.before.trail(resource, Infinity, TRAIL_POINTS);
+  }
+
   /** Frames come only when something changes; in between the clock goes on. */
   now(): number {
     if (this.status.value !== "running" || executive.connection.value !== "open")
@@ -72,6 +90,15 @@ export class LiveScene implements Scene {
     this.stopListening();
     this.feed.dispose();
     executive.watch(null);
+  }
+
+  private async lookBack(): Promise<void> {
+    try {
+      this.before = new TelemetryTrack(await loadTrack(this.run));
+    } catch {
+      return; // Trails begin now, then.
+    }
+    this.jumps.value += 1;
   }
 
   private take(message: ServerMessage): void {

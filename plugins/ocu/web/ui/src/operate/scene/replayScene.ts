@@ -4,6 +4,7 @@ import { Reel } from "../../records/reel";
 import { Spans } from "../../records/spans";
 import type {
   Command,
+  GeoPosition,
   PayloadState,
   Prompt,
   RunRecord,
@@ -13,8 +14,8 @@ import type {
   VehicleState,
 } from "../../shared/types";
 import { ElementBoard } from "./elementBoard";
-import type { LogPage, Scene } from "./scene";
-import { TelemetryTrack, type TelemetrySample } from "./telemetryTrack";
+import { TRAIL_POINTS, type LogPage, type Scene } from "./scene";
+import { TelemetryTrack, type Telemetry } from "./telemetryTrack";
 
 export const SLOWEST = 0.25;
 export const FASTEST = 100;
@@ -42,6 +43,9 @@ export class ReplayScene implements Scene {
   readonly log = signal<LogPage>({ records: [], more: false, skipped: 0 });
   readonly end;
   readonly hasTelemetry: boolean;
+  readonly knownFrom_s: number;
+  readonly telemetryProblem: string;
+  readonly jumps = signal(0);
   private readonly reel: Reel;
   private readonly track: TelemetryTrack;
   private position_s = 0;
@@ -54,12 +58,14 @@ export class ReplayScene implements Scene {
     readonly run: string,
     summary: RunSummary,
     records: readonly RunRecord[],
-    telemetry: readonly TelemetrySample[],
+    telemetry: Telemetry,
   ) {
     this.summary = signal<RunSummary | null>(summary);
     this.reel = new Reel(records);
     this.track = new TelemetryTrack(telemetry);
-    this.hasTelemetry = telemetry.length > 0;
+    this.hasTelemetry = this.track.moves;
+    this.knownFrom_s = this.track.begin;
+    this.telemetryProblem = telemetry.problem ?? "";
     this.end = signal(this.reel.end);
     const spans = new Spans();
     for (const record of records) spans.add(record);
@@ -79,11 +85,16 @@ export class ReplayScene implements Scene {
     return this.track.silentFor_s(resource, this.position_s);
   }
 
+  trail(resource: string): GeoPosition[] {
+    return this.track.trail(resource, this.position_s, TRAIL_POINTS);
+  }
+
   /** All that happened up to and at this time. */
   seek(t: number): void {
     this.position_s = Math.max(0, Math.min(t, this.end.value));
     this.show(this.reel.countAt(this.position_s));
     this.tick();
+    this.jumps.value += 1;
   }
 
   /** One record on, or back. */
@@ -93,6 +104,7 @@ export class ReplayScene implements Scene {
     this.position_s = this.reel.records[count - 1]?.t ?? 0;
     this.show(count);
     this.tick();
+    this.jumps.value += 1;
   }
 
   play(): void {

@@ -4,6 +4,7 @@ import type { ReadonlySignal } from "@preact/signals";
 import type { Spans } from "../../records/spans";
 import type {
   Command,
+  GeoPosition,
   PayloadState,
   Prompt,
   RunRecord,
@@ -13,6 +14,9 @@ import type {
   VehicleState,
 } from "../../shared/types";
 import type { ElementBoard } from "./elementBoard";
+
+/** Places of a trail. */
+export const TRAIL_POINTS = 2000;
 
 export interface LogPage {
   records: readonly RunRecord[];
@@ -42,8 +46,16 @@ export interface Scene {
   readonly vehicles: ReadonlySignal<Record<string, VehicleState>>;
   readonly payloads: ReadonlySignal<Record<string, PayloadState>>;
   readonly teams: ReadonlySignal<Record<string, TeamState>>;
-  /** Whether anything is known of where vehicles are and how: not of runs of the past. */
+  /** Whether anything is known of where vehicles are and how: not of all runs of the past. */
   readonly hasTelemetry: boolean;
+  /** From when on it is known, in seconds. */
+  readonly knownFrom_s: number;
+  /** Why it is not known, or has gaps; "": nothing went wrong. */
+  readonly telemetryProblem: string;
+  /** Where a vehicle has been up to now, the newest last. */
+  trail(resource: string): GeoPosition[];
+  /** Rises when trails are to be drawn anew: time has jumped, or more is known of before. */
+  readonly jumps: ReadonlySignal<number>;
   /** Seconds since a resource was heard; null: never. */
   silentFor_s(resource: string): number | null;
   /** Its `spans` change in place; the signal tells that they did. */

@@ -1,0 +1,220 @@
+"""Keeps tracks while the page is served: of every run that this executive drives.
+
+Nobody waits for this. It looks at what the fleet said last, a few times in a second of mission
+time, and hands what is new to a thread, which writes it once a second.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+
+import msgspec
+
+from m2pem.api import MissionControl, PayloadState, RunId, RunStatus, VehicleState
+from m2pem.errors import M2pemError
+from m2pem_plugin_web.live.fleet import FleetPicture
+from m2pem_plugin_web.live.picture import Picture
+from m2pem_plugin_web.tracks.places import HeldError, Place
+from m2pem_plugin_web.tracks.thinning import SPACING_S, Sample, State
+from m2pem_plugin_web.tracks.track import Head, Track, head_of
+
+LOOK_S = 0.25
+"""Of mission time, between two looks; not less than `QUICKEST_S` of the wall's."""
+QUICKEST_S = 0.05
+
+WRITE_S = 1.0
+AGAIN_S = 2.0
+"""After it could not be done."""
+
+MOST_WAITING = 2000
+"""Samples of a run that wait for the disk."""
+
+MOST_PROBLEMS = 100
+
+LONGEST_HEAD = 1000
+
+GOES_ON = (RunStatus.RUNNING, RunStatus.PAUSED)
+
+_encode = msgspec.json.Encoder().encode
+log = logging.getLogger("m2pem.ocu.web")
+
+
+@dataclass(slots=True, eq=False)
+class _Writing:
+    """A track that is written, and what waits for that."""
+
+    track: Track
+    waiting: list[Sample] = field(default_factory=list)
+    turn: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+
+class Recorder:
+    """`pictures` and `fleet`: what is told of runs and resources."""
+
+    def __init__(
+        self,
+        control: MissionControl,
+        pictures: Mapping[RunId, Picture],
+        fleet: FleetPicture,
+        place: Place,
+    ) -> None:
+        self.place = place
+        self.problems: dict[RunId, str] = {}
+        """Why tracks of runs have gaps, for people."""
+        self._control = control
+        self._pictures = pictures
+        self._fleet = fleet
+        self._before: list[State] = []
+        """As it was at the last look."""
+        self._soon_s = SPACING_S + control.speed()
+        self._writing: dict[RunId, _Writing] = {}
+        self._not_before: dict[RunId, float] = {}
+
+    async def run(self) -> None:
+        """Go on until cancelled; what waits is written in the end."""
+        try:
+            await self._forget_runs_of_before()
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self._look(), name="web: where vehicles are")
+                tasks.create_task(self._write(), name="web: tracks")
+        except* Exception as group:  # the page is of more use than this
+            log.error("where vehicles are is kept no more", exc_info=group)
+        finally:
+            for run in list(self._writing):
+                await self._close(run)
+
+    async def flush(self, run: RunId) -> None:
+        """Write what waits of a run."""
+        writing = self._writing.get(run)
+        if writing is None:
+            return
+        async with writing.turn:
+            samples = list(writing.waiting)
+            if not samples:
+                return
+
+            def write() -> None:
+                writing.track.append(samples)
+                del writing.waiting[: len(samples)]
+
+            try:
+                await _to_the_end(write)
+            except OSError as error:
+                self._complain(run, error)
+
+    # --- looking --------------------------------------------------------------------------------
+
+    async def _look(self) -> None:
+        loop = asyncio.get_running_loop()
+        every_s = max(QUICKEST_S, LOOK_S / self._control.speed())
+        while True:
+            for run, picture in list(self._pictures.items()):
+                if picture.summary.status in GOES_ON and picture.summary.started_us:
+                    if loop.time() >= self._not_before.get(run, 0.0):
+                        await self._look_at(run, picture)
+                elif run in self._writing:
+                    await self._close(run)
+            for run in self._writing.keys() - self._pictures.keys():
+                await self._close(run)
+            self._before = self._states()
+            await asyncio.sleep(every_s)
+
+    async def _look_at(self, run: RunId, picture: Picture) -> None:
+        try:
+            t_s = await self._control.mission_time_s(run)
+            writing = self._writing.get(run)
+            if writing is None:
+                writing = await self._open(run, picture.summary.started_us, t_s)
+                t_s = await self._control.mission_time_s(run)
+                if writing is not None and writing.track.is_new and t_s <= self._soon_s:
+                    self._take(writing, 0.0, self._before)
+        except M2pemError:
+            self._leave_alone(run)  # another executive drives it, or it has just ended
+            return
+        if writing is not None and len(writing.waiting) < MOST_WAITING:
+            self._take(writing, t_s, self._states())
+
+    def _states(self) -> list[State]:
+        """What is known of vehicles and payloads now."""
+        heard = (*self._fleet.vehicles.states.values(), *self._fleet.payloads.states.values())
+        return [each for each in heard if isinstance(each, VehicleState | PayloadState)]
+
+    def _take(self, writing: _Writing, t_s: float, states: Iterable[State]) -> None:
+        """Have those kept that say something new."""
+        thinner = writing.track.thinner
+        fresh: dict[str, dict[str, msgspec.Raw]] = {"vehicles": {}, "payloads": {}}
+        for state in states:
+            if thinner.wants(t_s, state):
+                thinner.keep(t_s, state)
+                kind = "vehicles" if isinstance(state, VehicleState) else "payloads"
+                fresh[kind][state.resource] = msgspec.Raw(_encode(state))
+        if any(fresh.values()):
+            writing.waiting.append(Sample(t_s, **fresh))
+
+    async def _open(self, run: RunId, started_us: int, t_s: float) -> _Writing | None:
+        try:
+            track = await asyncio.to_thread(Track, self.place, Head(run, started_us), t_s)
+        except HeldError:
+            self._leave_alone(run)
+            return None
+        except OSError as error:
+            self._complain(run, error)
+            self._leave_alone(run)
+            return None
+        self._writing[run] = _Writing(track)
+        return self._writing[run]
+
+    def _leave_alone(self, run: RunId) -> None:
+        self._not_before[run] = asyncio.get_running_loop().time() + AGAIN_S
+
+    # --- writing --------------------------------------------------------------------------------
+
+    async def _write(self) -> None:
+        while True:
+            await asyncio.sleep(WRITE_S)
+            for run in list(self._writing):
+                await self.flush(run)
+
+    async def _close(self, run: RunId) -> None:
+        await self.flush(run)
+        writing = self._writing.pop(run, None)
+        if writing is not None:
+            async with writing.turn:
+                await asyncio.to_thread(writing.track.close)
+
+    def _complain(self, run: RunId, error: OSError) -> None:
+        """Say it once; where the file is, is for the log alone."""
+        text = f"where vehicles are in {run} cannot be kept: {error.strerror}"
+        if self.problems.get(run) == text:
+            return
+        log.warning("where vehicles are in %s cannot be kept: %s", run, error)
+        self.problems[run] = text
+        while len(self.problems) > MOST_PROBLEMS:
+            del self.problems[next(iter(self.problems))]
+
+    async def _forget_runs_of_before(self) -> None:
+        """Tracks go when their runs are in the journal no more."""
+        try:
+            kept = await asyncio.to_thread(self._heads)
+            there = {each.run: each.started_us for each in await self._control.runs()}
+            for run, started_us in kept.items():
+                if run not in there or (started_us and started_us != there[run]):
+                    await asyncio.to_thread(self.place.remove, run)
+        except (OSError, M2pemError) as error:
+            log.warning("tracks of runs that are gone cannot be removed: %s", error)
+
+    def _heads(self) -> dict[RunId, int]:
+        """When each run began of which there is a track; 0: its head cannot be read."""
+        heads = {run: head_of(self.place.read(run, LONGEST_HEAD)) for run in self.place.runs()}
+        return {run: head.started_us if head is not None else 0 for run, head in heads.items()}
+
+
+async def _to_the_end(work: Callable[[], None]) -> None:
+    """Do it in a thread; who is cancelled meanwhile goes when it is done."""
+    doing = asyncio.ensure_future(asyncio.to_thread(work))
+    try:
+        await asyncio.shield(doing)
+    except asyncio.CancelledError:
+        await asyncio.wait([doing])
+        raise

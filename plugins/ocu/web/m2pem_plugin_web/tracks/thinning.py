@@ -1,0 +1,145 @@
+"""Which states of vehicles and payloads say something new; and fewer of them, where many are."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TypeAlias
+
+import msgspec
+
+from m2pem.api import GeoPosition, PayloadState, VehicleState
+
+SPACING_S = 1.0
+"""Of mission time, at least, between two states of a resource; longer in long runs."""
+
+MOVED_M = 0.5
+TURNED_RAD = math.radians(5.0)
+ZOOMED = 1.05
+
+_M_PER_DEG = 111_320.0
+
+State: TypeAlias = VehicleState | PayloadState
+
+
+class Sample(msgspec.Struct, frozen=True):
+    """States at a moment of mission time, in seconds: of those only that say something new."""
+
+    t: float
+    vehicles: dict[str, msgspec.Raw]
+    payloads: dict[str, msgspec.Raw]
+
+    def kinds(self) -> Iterator[tuple[str, dict[str, msgspec.Raw]]]:
+        """Both kinds, by name."""
+        yield "vehicles", self.vehicles
+        yield "payloads", self.payloads
+
+
+class Thinner:
+    """Says of each state whether it is worth keeping. `spacing_s`: of mission time."""
+
+    def __init__(self, spacing_s: float = SPACING_S) -> None:
+        self.spacing_s = spacing_s
+        self._kept: dict[str, tuple[float, State]] = {}
+
+    def keep(self, t_s: float, state: State) -> None:
+        """It was kept."""
+        self._kept[state.resource] = (t_s, state)
+
+    def wants(self, t_s: float, state: State) -> bool:
+        """Whether to keep it: the last one of its resource is old enough, and said otherwise."""
+        kept = self._kept.get(state.resource)
+        if kept is None:
+            return True
+        at_s, before = kept
+        return state is not before and t_s - at_s >= self.spacing_s and differs(before, state)
+
+
+def differs(before: State, now: State) -> bool:
+    """Whether a resource has moved, turned, or stands otherwise than before."""
+    if before.link is not now.link:
+        return True
+    match before, now:
+        case VehicleState(), VehicleState():
+            return (
+                before.mode != now.mode
+                or _percent(before.battery_fraction) != _percent(now.battery_fraction)
+                or _moved(before.position, now.position)
+                or _turned(before.yaw_rad, now.yaw_rad)
+            )
+        case PayloadState(), PayloadState():
+            return (
+                _turned(before.pan_rad, now.pan_rad)
+                or _turned(before.tilt_rad, now.tilt_rad)
+                or _zoomed(before.zoom, now.zoom)
+                or len(before.footprint) != len(now.footprint)
+                or any(map(_moved, before.footprint, now.footprint))
+            )
+    return True
+
+
+def _percent(fraction: float | None) -> int | None:
+    return None if fraction is None or not math.isfinite(fraction) else round(fraction * 100)
+
+
+def _moved(before: GeoPosition | None, now: GeoPosition | None) -> bool:
+    before, now = _known_place(before), _known_place(now)
+    if before is None or now is None:
+        return before is not now
+    north_m = (now.latitude_deg - before.latitude_deg) * _M_PER_DEG
+    degrees = math.remainder(now.longitude_deg - before.longitude_deg, 360.0)
+    east_m = degrees * _M_PER_DEG * math.cos(math.radians(before.latitude_deg))
+    return math.hypot(north_m, east_m, now.altitude_m - before.altitude_m) > MOVED_M
+
+
+def _turned(before: float | None, now: float | None) -> bool:
+    before, now = _known(before), _known(now)
+    if before is None or now is None:
+        return before is not now
+    return abs(math.remainder(now - before, math.tau)) > TURNED_RAD
+
+
+def _zoomed(before: float | None, now: float | None) -> bool:
+    before, now = _known(before), _known(now)
+    if before is None or now is None:
+        return before is not now
+    low, high = sorted((before, now))
+    return high > low * ZOOMED
+
+
+def _known(value: float | None) -> float | None:
+    """Devices say NaN, too, where they do not know."""
+    return value if value is not None and math.isfinite(value) else None
+
+
+def _known_place(place: GeoPosition | None) -> GeoPosition | None:
+    if place is None:
+        return None
+    numbers = (place.latitude_deg, place.longitude_deg, place.altitude_m)
+    return place if all(map(math.isfinite, numbers)) else None
+
+
+def thinned(samples: Iterable[Sample], spacing_s: float) -> list[Sample]:
+    """Fewer of them: of each resource the last state within each `spacing_s` after a kept one.
+
+    So a resource stays where it came to rest. There are at most two in any `spacing_s`.
+    """
+    kept: dict[float, Mapping[str, dict[str, msgspec.Raw]]] = {}
+    base: dict[tuple[str, str], float] = {}
+    waiting: dict[tuple[str, str], tuple[float, msgspec.Raw]] = {}
+
+    def keep(key: tuple[str, str], t_s: float, state: msgspec.Raw) -> None:
+        kept.setdefault(t_s, {"vehicles": {}, "payloads": {}})[key[0]][key[1]] = state
+        base[key] = t_s
+
+    for sample in samples:
+        for kind, states in sample.kinds():
+            for name, state in states.items():
+                key = (kind, name)
+                if key not in base:
+                    keep(key, sample.t, state)
+                    continue
+                if sample.t - base[key] > spacing_s and key in waiting:
+                    keep(key, *waiting.pop(key))
+                waiting[key] = (sample.t, state)
+    for key, (t_s, state) in waiting.items():
+        keep(key, t_s, state)
+    return [Sample(t_s, **kept[t_s]) for t_s in sorted(kept)]

@@ -1,0 +1,135 @@
+"""The track of one run: a head, then a line of JSON for each moment at which there was news.
+
+A line that a crash has torn is not there. The text grows to what its place
+allows; then it is thinned.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from typing import Any
+
+import msgspec
+
+from m2pem.api import PayloadState, RunId, VehicleState
+from m2pem_plugin_web.tracks.places import Kept, Place
+from m2pem_plugin_web.tracks.thinning import SPACING_S, Sample, Thinner, thinned
+
+_encode = msgspec.json.Encoder().encode
+
+
+class Head(msgspec.Struct, frozen=True):
+    """`started_us` tells the run from one of that name in another journal."""
+
+    run: RunId
+    started_us: int
+    spacing_s: float = SPACING_S
+
+
+_head = msgspec.json.Decoder(Head)
+_sample = msgspec.json.Decoder(Sample)
+_STATES: dict[str, Any] = {
+    "vehicles": msgspec.json.Decoder(VehicleState),
+    "payloads": msgspec.json.Decoder(PayloadState),
+}
+
+
+def head_of(text: bytes) -> Head | None:
+    """What a text begins with; None: it is no track."""
+    try:
+        return _head.decode(text[: text.index(b"\n")])
+    except (ValueError, msgspec.DecodeError):
+        return None
+
+
+def samples_of(text: bytes) -> Iterator[Sample]:
+    """All samples of a text, in order; lines that are torn or damaged are passed over."""
+    _, *lines = text.split(b"\n")[:-1] or [b""]
+    for line in lines:
+        try:
+            yield _sample.decode(line)
+        except (ValueError, msgspec.DecodeError):
+            continue
+
+
+class Track:
+    """For writing: only samples later than those before them. `thinner` knows what was kept.
+
+    `t_s`: mission time of now; what is later in the text is of a past that did not come about, as
+    the run was taken up again from before it.
+
+    Raises:
+        OSError: it cannot be read or written.
+        HeldError: another writes it.
+    """
+
+    def __init__(self, place: Place, head: Head, t_s: float) -> None:
+        self._most = place.most_bytes
+        self._head = head
+        self._kept: Kept = place.open(head.run)
+        try:
+            self._begin(t_s)
+        except BaseException:
+            self._kept.close()
+            raise
+
+    def _begin(self, t_s: float) -> None:
+        text = self._kept.read()
+        found = head_of(text)
+        samples: list[Sample] = []
+        if found is not None and (found.run, found.started_us) == (
+            self._head.run,
+            self._head.started_us,
+        ):
+            self._head = found
+            samples = [each for each in samples_of(text) if each.t <= t_s]
+        whole = self._text(samples)
+        if whole != text:
+            self._kept.replace(whole)
+        self._size = len(whole)
+        self.thinner = Thinner(self._head.spacing_s)
+        self.is_new = not samples
+        """Whether nothing was kept before."""
+        self._remember(samples)
+
+    def append(self, samples: Sequence[Sample]) -> None:
+        """Keep samples.
+
+        Raises:
+            OSError: nothing was written.
+        """
+        text = b"".join(_encode(each) + b"\n" for each in samples)
+        if self._size + len(text) > self._most:
+            self._thin(samples)
+            return
+        self._kept.append(text)
+        self._size += len(text)
+
+    def close(self) -> None:
+        """Write no more."""
+        self._kept.close()
+
+    def _thin(self, more: Sequence[Sample]) -> None:
+        samples = [*samples_of(self._kept.read()), *more]
+        span_s = samples[-1].t - samples[0].t
+        head, text = self._head, b""
+        while not text or (len(text) > self._most // 2 and head.spacing_s <= span_s):
+            head = msgspec.structs.replace(head, spacing_s=head.spacing_s * 2)
+            samples = thinned(samples, head.spacing_s)
+            text = self._text(samples, head)
+        self._kept.replace(text)
+        self._head, self._size = head, len(text)
+        self.thinner.spacing_s = head.spacing_s
+
+    def _text(self, samples: Sequence[Sample], head: Head | None = None) -> bytes:
+        lines = [_encode(head or self._head), *map(_encode, samples)]
+        return b"".join(line + b"\n" for line in lines)
+
+    def _remember(self, samples: Sequence[Sample]) -> None:
+        last: dict[tuple[str, str], tuple[float, msgspec.Raw]] = {}
+        for sample in samples:
+            for kind, states in sample.kinds():
+                last.update({(kind, name): (sample.t, raw) for name, raw in states.items()})
+        for (kind, _), (t_s, raw) in last.items():
+            # What a device does not know may be nothing that a state can have.
+            with suppress(ValueError, msgspec.DecodeError):
+                self.thinner.keep(t_s, _STATES[kind].decode(raw))
