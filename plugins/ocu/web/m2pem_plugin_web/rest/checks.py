@@ -1,12 +1,11 @@
 """/api/checks, /api/editable: what is wrong with a drawing, and drawings for the editor."""
 
 import asyncio
-from collections.abc import Iterable
 
 from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 
-from m2pem.api import Draft, MissionControl, Outline, OutlineTrigger
+from m2pem.api import Draft, MissionControl, Outline
 from m2pem.errors import MissionError
 from m2pem_plugin_web.access.people import Viewer
 from m2pem_plugin_web.missions.calling import Called
@@ -142,7 +141,3 @@ def outline_model(outline: Outline) -> OutlineModel:
             TriggerModel(id=m.id, name=m.name, operators=m.operators) for m in outline.messages
         ],
     )
-
-
-def _triggers(found: Iterable[OutlineTrigger]) -> list[TriggerModel]:
-    return [TriggerModel(id=each.id, name=each.name, operators=each.operators) for each in found]

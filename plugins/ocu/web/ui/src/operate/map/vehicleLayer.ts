@@ -104,6 +104,11 @@ export class VehicleLayer {
       polygon.setLatLngs(corners);
       this.seen.set(resource, { polygon, state });
     }
+    for (const [resource, { polygon }] of this.seen) {
+      if (resource in states) continue;
+      polygon.remove(); // a replay has gone back to before it was heard
+      this.seen.delete(resource);
+    }
   }
 
   private turn(layer: L.LayerGroup, on: boolean): void {
