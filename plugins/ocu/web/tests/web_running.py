@@ -4,6 +4,7 @@ import asyncio
 import shutil
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import TypeAlias
 
 from playwright.async_api import Locator, Page, expect
 from web_served import FLEET
@@ -48,18 +49,32 @@ def fleet_with_mine(folder: Path) -> Path:
     return path
 
 
-async def wait_for_colour(page: Page, element: str, wanted: tuple[int, int, int]) -> None:
+Colour: TypeAlias = tuple[int, int, int]
+
+
+async def wait_for_colour(page: Page, element: str, wanted: Colour) -> None:
     """Until an element, known by its name or id, is drawn in a colour."""
+    await _until(page, element, lambda found: is_near(found, wanted), f"not {wanted}")
+
+
+async def wait_for_other_colour(page: Page, element: str, unwanted: Colour) -> None:
+    """Until it is drawn, in another colour than this."""
+    await _until(page, element, lambda found: bool(found) and not is_near(found, unwanted), "still")
+
+
+async def _until(
+    page: Page, element: str, is_right: Callable[[list[int] | None], bool], wrong: str
+) -> None:
     found: list[int] | None = None
     try:
         async with asyncio.timeout(WITHIN_S):
-            while not is_near(found := await page.evaluate(COLOUR, [element]), wanted):
+            while not is_right(found := await page.evaluate(COLOUR, [element])):
                 await page.evaluate("new Promise(requestAnimationFrame)")
     except TimeoutError:
-        raise AssertionError(f"{element} is {found}, not {wanted}") from None
+        raise AssertionError(f"{element} is {found}, {wrong}") from None
 
 
-def is_near(found: list[int] | None, wanted: tuple[int, int, int]) -> bool:
+def is_near(found: list[int] | None, wanted: Colour) -> bool:
     return found is not None and all(abs(a - b) <= NEAR for a, b in zip(found, wanted, strict=True))
 
 
