@@ -64,6 +64,10 @@ async def look_at_editor(eyes: Accessibility, desk: Desk) -> None:
     await drawing.fill("Distance", "10 s")
     await expect(page.locator(".m2-has-error").first).to_be_attached()
     await eyes.look("form with an error")
+    await page.get_by_role("tab", name="Problems").click()
+    await expect(page.locator(".m2-problem").first).to_be_visible()
+    await eyes.look("problems", FORM)
+    await page.get_by_role("tab", name="Properties").click()
     for action in ("append", "replace"):
         await page.click(f".djs-context-pad [data-action={action}]")
         await expect(page.locator(".djs-popup .entry").first).to_be_visible()
@@ -77,9 +81,7 @@ async def look_at_editor(eyes: Accessibility, desk: Desk) -> None:
 async def test_panels_of_the_editor_have_no_violation(desk: Desk, dark: bool) -> None:
     shutil.copy(STUCK, desk.executive.missions)
     eyes = await opened(desk, dark)
-    page = await desk.edit(STUCK.stem, tab="Problems")
-    await expect(page.locator(".m2-problems-head p")).not_to_be_empty()
-    await eyes.look("problems")
+    await desk.edit(STUCK.stem)
     await look_at_verification(eyes)
     await look_at_rehearsal(eyes)
     eyes.assert_well()

@@ -1,9 +1,9 @@
-"""Runs that are over and rehearsals, on the page that also shows runs that go on."""
+"""Runs that are over, on the page that also shows those that go on."""
 
 import re
 
 from playwright.async_api import expect
-from web_desk import IN_ONE_LOOP, MISSION, Desk, element
+from web_desk import IN_ONE_LOOP, Desk, element
 from web_running import answer, wait_for_status
 
 pytestmark = IN_ONE_LOOP
@@ -34,14 +34,3 @@ async def test_a_run_of_the_past_is_replayed(desk: Desk) -> None:
 
 
 SHOWS = """(t) => Math.abs(document.querySelector(".player-position").value - t) < 0.06"""
-
-
-async def test_a_rehearsal_shows_vehicles_on_the_way(desk: Desk) -> None:
-    page = desk.page
-    asked = await desk.ask("POST", "/api/rehearsals", {"mission": MISSION})
-    await page.goto(f"{desk.executive.origin}/rehearsals/{asked['id']}")
-    card = page.locator(".card", has_text="evsg1")
-    await expect(card).to_contain_text("DRIVE ROUTE")
-    await page.get_by_role("button", name="Play", exact=True).click()
-    await expect(card).to_contain_text(re.compile(r"[1-9]\.\d m/s"))
-    await expect(page.locator(".vehicle")).not_to_have_count(0)
