@@ -54,24 +54,13 @@ Colour: TypeAlias = tuple[int, int, int]
 
 async def wait_for_colour(page: Page, element: str, wanted: Colour) -> None:
     """Until an element, known by its name or id, is drawn in a colour."""
-    await _until(page, element, lambda found: is_near(found, wanted), f"not {wanted}")
-
-
-async def wait_for_other_colour(page: Page, element: str, unwanted: Colour) -> None:
-    """Until it is drawn, in another colour than this."""
-    await _until(page, element, lambda found: bool(found) and not is_near(found, unwanted), "still")
-
-
-async def _until(
-    page: Page, element: str, is_right: Callable[[list[int] | None], bool], wrong: str
-) -> None:
     found: list[int] | None = None
     try:
         async with asyncio.timeout(WITHIN_S):
-            while not is_right(found := await page.evaluate(COLOUR, [element])):
+            while not is_near(found := await page.evaluate(COLOUR, [element]), wanted):
                 await page.evaluate("new Promise(requestAnimationFrame)")
     except TimeoutError:
-        raise AssertionError(f"{element} is {found}, {wrong}") from None
+        raise AssertionError(f"{element} is {found}, not {wanted}") from None
 
 
 def is_near(found: list[int] | None, wanted: Colour) -> bool:
