@@ -2,94 +2,118 @@
 
 import re
 import shutil
-from pathlib import Path
 
 import pytest
-from playwright.async_api import Page, expect
+from playwright.async_api import Browser, Page, expect
 from web_axe import Accessibility
-from web_browsing import browser, page_at
+from web_browsing import page_at
+from web_desk import IN_ONE_LOOP, MISSION, Desk
 from web_drawing import Drawing
 from web_running import answer, press_twice, wait_for_status
-from web_served import REPOSITORY, Served, served
+from web_served import REPOSITORY, Served
 
-NAME = "vignette1"
+pytestmark = IN_ONE_LOOP
+
+FORM = "aside"
+
+STUCK = REPOSITORY / "docs" / "broken" / "join_fed_by_one_branch.bpmn"
 # One of each kind that has a form of its own.
 KINDS = ["StartVignette1", "UserSendRoute", "CallDetection", "EscalationDetected", "Reverse"]
 KINDS += ["GatewayDecision", "Detector", "ThrowStop", "RoutePromptReference", "PoolVignette1"]
 
 
-def put(executive: Served) -> None:
-    shutil.copy(REPOSITORY / "missions" / f"{NAME}.bpmn", executive.missions)
-
-
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-async def test_first_page_and_editor_have_no_violation(tmp_path: Path, dark: bool) -> None:
-    with served(tmp_path) as executive:
-        put(executive)
-        async with browser() as chromium, page_at(chromium, executive.url, dark=dark) as it:
-            eyes = Accessibility(it.page)
-            await look_at_home(eyes)
-            await look_at_editor(eyes, executive)
-            await look_at_panels(eyes)
-            await look_at_dialogs(eyes)
-            await look_at_sign_in(eyes, executive)
-            eyes.assert_well()
+async def test_first_page_and_editor_have_no_violation(desk: Desk, dark: bool) -> None:
+    eyes = await opened(desk, dark)
+    await look_at_home(eyes)
+    await look_at_editor(eyes, desk)
+    await look_at_dialogs(eyes)
+    eyes.assert_well()
+
+
+async def opened(desk: Desk, dark: bool) -> Accessibility:
+    """The first page, in one of the themes."""
+    page = await desk.home()
+    await expect(page.locator("html")).to_have_attribute("data-theme", "dark" if dark else "light")
+    return Accessibility(page)
 
 
 async def look_at_home(eyes: Accessibility) -> None:
     page = eyes.page
-    await expect(page.get_by_role("link", name=NAME)).to_be_visible()
+    await expect(page.get_by_role("link", name=MISSION)).to_be_visible()
     await eyes.look("home")
     await page.get_by_role("button", name="New mission").click()
     await expect(page.get_by_role("radio")).to_have_count(6)
     await eyes.look("new mission")
     await page.keyboard.press("Escape")
-    await page.get_by_role("button", name=f"Remove {NAME}").click()
+    await page.get_by_role("button", name=f"Remove {MISSION}").click()
     await eyes.look("remove mission")
     await page.keyboard.press("Escape")
 
 
-async def look_at_editor(eyes: Accessibility, executive: Served) -> None:
-    page = eyes.page
-    await page.goto(f"{executive.origin}/missions/{NAME}")
+async def look_at_editor(eyes: Accessibility, desk: Desk) -> None:
+    page = await desk.edit()
     drawing = Drawing(page)
-    await expect(drawing.element("Reverse")).to_be_attached()
     await eyes.look("editor")
     for kind in KINDS:
         await drawing.select(kind)
-        await eyes.look(f"form of {kind}")
+        await eyes.look(f"form of {kind}", FORM)
     await drawing.select_flow("GatewayDecision", "CallDetection")
-    await eyes.look("form of a flow")
+    await eyes.look("form of a flow", FORM)
     await drawing.select("Reverse")
     await drawing.fill("Distance", "10 s")
     await expect(page.locator(".m2-has-error").first).to_be_attached()
     await eyes.look("form with an error")
+    await page.get_by_role("tab", name="Problems").click()
+    await expect(page.locator(".m2-problem").first).to_be_visible()
+    await eyes.look("problems", FORM)
+    await page.get_by_role("tab", name="Properties").click()
     for action in ("append", "replace"):
         await page.click(f".djs-context-pad [data-action={action}]")
         await expect(page.locator(".djs-popup .entry").first).to_be_visible()
-        await eyes.look(f"{action} menu")
-        await page.keyboard.press("Escape")
+        await eyes.look(f"{action} menu", ".djs-popup")
+        await drawing.close_menu()
+    await page.get_by_role("combobox").first.click()
+    await eyes.look("list of a field")
 
 
-async def look_at_panels(eyes: Accessibility) -> None:
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+async def test_panels_of_the_editor_have_no_violation(desk: Desk, dark: bool) -> None:
+    shutil.copy(STUCK, desk.executive.missions)
+    eyes = await opened(desk, dark)
+    await desk.edit(STUCK.stem)
+    await look_at_verification(eyes)
+    await look_at_rehearsal(eyes)
+    eyes.assert_well()
+
+
+async def look_at_verification(eyes: Accessibility) -> None:
     page = eyes.page
-    await page.get_by_role("tab", name="Problems").click()
-    await expect(page.locator(".m2-problem").first).to_be_visible()
-    await eyes.look("problems")
-    await page.get_by_role("button", name="Undo").click()
     await page.get_by_role("tab", name="Verify").click()
     await page.get_by_text("Options", exact=True).click()
     parts = page.get_by_role("region", name="Requirements of this mission")
-    await parts.get_by_label("Pattern").select_option("operator_in_the_loop")
-    await parts.get_by_role("button", name="Add", exact=True).click()
+    for pattern in ("", "operator_in_the_loop"):
+        await parts.get_by_label("Pattern").last.select_option(pattern)
+        await parts.get_by_role("button", name="Add", exact=True).click()
     await eyes.look("requirements")
-    await page.get_by_role("button", name="Undo").click()
-    await page.get_by_role("button", name="Verify", exact=True).click()
+    verify = page.get_by_role("button", name="Verify", exact=True)
+    await verify.click()
+    await expect(page.get_by_role("alert").filter(has_text="not be verified")).to_be_visible()
+    await eyes.look("requirements that are wrong")
+    for _ in range(2):
+        await page.get_by_role("button", name="Undo (Ctrl+Z)").click()
+    await verify.click()
     report = page.get_by_role("region", name="Report")
-    await expect(report.get_by_role("heading", name="Everything holds")).to_be_visible()
+    await expect(report.get_by_role("heading", name="Violated")).to_be_visible()
     await eyes.look("report")
     await report.get_by_role("button", name=re.compile("Show the run")).first.click()
+    await expect(page.get_by_role("region", name="A run that breaks it")).to_be_visible()
     await eyes.look("run step by step")
+
+
+async def look_at_rehearsal(eyes: Accessibility) -> None:
+    """What the editor tells of it, and its page."""
+    page = eyes.page
     await page.get_by_role("tab", name="Run", exact=True).click()
     await page.get_by_text("What happens in the rehearsal").click()
     await eyes.look("run")
@@ -97,6 +121,16 @@ async def look_at_panels(eyes: Accessibility) -> None:
     outcome = page.get_by_role("region", name="What came of it")
     await expect(outcome.get_by_role("heading").first).to_be_visible()
     await eyes.look("rehearsed")
+    async with page.expect_popup() as opening:
+        await outcome.get_by_role("link", name="Watch the rehearsal").click()
+    watched = Accessibility(await opening.value, eyes.wrong, eyes.looked)
+    await expect(watched.page.get_by_label("Position")).to_be_visible()
+    await expect(watched.page.locator(".vehicle").first).to_be_visible()
+    await watched.look("rehearsal, from the start")
+    await watched.page.get_by_role("button", name="To the end").click()
+    await wait_for_status(watched.page, "Failed")
+    await watched.look("rehearsal, at its end")
+    await watched.page.close()
 
 
 async def look_at_dialogs(eyes: Accessibility) -> None:
@@ -117,34 +151,28 @@ async def look_at_dialogs(eyes: Accessibility) -> None:
     await eyes.look("minimap")
 
 
-async def look_at_sign_in(eyes: Accessibility, executive: Served) -> None:
-    page = eyes.page
-    page.on("dialog", lambda dialog: dialog.accept())
-    await page.goto(f"{executive.origin}/sign-in")
-    await expect(page.get_by_label("Password")).to_be_visible()
-    await eyes.look("sign-in")
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+async def test_signing_in_has_no_violation(
+    chromium: Browser, executive: Served, dark: bool
+) -> None:
+    async with page_at(chromium, f"{executive.origin}/sign-in", dark=dark) as it:
+        await expect(it.page.get_by_label("Password")).to_be_visible()
+        eyes = Accessibility(it.page)
+        await eyes.look("sign-in")
+        await it.page.goto(f"{executive.origin}/?token=wrong")
+        await expect(it.page.get_by_text("That address was used already")).to_be_visible()
+        await eyes.look("refused")
+        eyes.assert_well()
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-async def test_runs_and_replays_have_no_violation(tmp_path: Path, dark: bool) -> None:
-    with served(tmp_path) as executive:
-        put(executive)
-        async with browser() as chromium, page_at(chromium, executive.url, dark=dark) as it:
-            eyes = Accessibility(it.page)
-            await start(it.page, executive)
-            await look_at_run(eyes)
-            await look_at_map(eyes)
-            await look_at_end(eyes)
-            eyes.assert_well()
-
-
-async def start(page: Page, executive: Served) -> None:
-    await expect(page.get_by_role("link", name=NAME)).to_be_visible()
-    await page.goto(f"{executive.origin}/missions/{NAME}")
-    await page.get_by_role("tab", name="Run", exact=True).click()
-    await page.get_by_role("button", name="Start", exact=True).click()
-    await page.wait_for_url("**/runs/*")
-    await expect(answer(page, "Continue")).to_be_enabled()
+async def test_runs_and_replays_have_no_violation(desk: Desk, dark: bool) -> None:
+    eyes = await opened(desk, dark)
+    await desk.start()
+    await look_at_run(eyes)
+    await look_at_map(eyes)
+    await look_at_end(eyes)
+    eyes.assert_well()
 
 
 async def look_at_run(eyes: Accessibility) -> None:
@@ -189,35 +217,32 @@ async def look_at_end(eyes: Accessibility) -> None:
     await eyes.look("replay")
 
 
-async def test_a_run_needs_no_mouse(tmp_path: Path) -> None:
-    with served(tmp_path) as executive:
-        put(executive)
-        async with browser() as chromium, page_at(chromium, executive.url) as it:
-            page = it.page
-            await expect(page.get_by_role("link", name=NAME)).to_be_visible()
-            await tab_to(page, NAME)
-            await page.keyboard.press("Enter")
-            await page.wait_for_url("**/missions/*")
-            await tab_to(page, "Properties")
-            await page.keyboard.press("End")
-            await tab_to(page, "Start")
-            await page.keyboard.press("Enter")
-            await page.wait_for_url("**/runs/*")
-            await expect(answer(page, "Continue")).to_be_enabled()
-            # The question has the focus: nobody needs to look for it.
-            await expect(page.get_by_role("alertdialog")).to_be_focused()
-            await page.keyboard.press("1")
-            await expect(page.get_by_role("alertdialog")).to_have_count(0)
-            await tab_to(page, "Pause")
-            await page.keyboard.press("Enter")
-            await wait_for_status(page, "Paused")
-            await tab_to(page, "Resume")
-            await page.keyboard.press("Space")
-            await wait_for_status(page, "Running")
-            await press_twice(page, lambda: page.keyboard.press("Shift+Escape"))
-            await expect(page.get_by_role("dialog", name="The run has ended")).to_be_visible()
-            await wait_for_status(page, "Stopped")
-            it.assert_well()
+async def test_a_run_needs_no_mouse(desk: Desk) -> None:
+    page = await desk.home()
+    await tab_to(page, MISSION)
+    await page.keyboard.press("Enter")
+    await page.wait_for_url("**/missions/*")
+    await tab_to(page, "Properties")
+    await page.keyboard.press("End")
+    await tab_to(page, "Start")
+    await page.keyboard.press("Enter")
+    await page.wait_for_url("**/runs/*")
+    await expect(answer(page, "Continue")).to_be_enabled()
+    # The question has the focus: nobody needs to look for it.
+    await expect(page.get_by_role("alertdialog")).to_be_focused()
+    await page.keyboard.press("1")
+    await expect(page.get_by_role("alertdialog")).to_have_count(0)
+    active = page.get_by_role("treeitem", name=re.compile("^DRIVE ROUTE, .*, active"))
+    await expect(active).to_have_count(1)
+    await tab_to(page, "Pause")
+    await page.keyboard.press("Enter")
+    await wait_for_status(page, "Paused")
+    await tab_to(page, "Resume")
+    await page.keyboard.press("Space")
+    await wait_for_status(page, "Running")
+    await press_twice(page, lambda: page.keyboard.press("Shift+Escape"))
+    await expect(page.get_by_role("dialog", name="The run has ended")).to_be_visible()
+    await wait_for_status(page, "Stopped")
 
 
 async def tab_to(page: Page, name: str) -> None:

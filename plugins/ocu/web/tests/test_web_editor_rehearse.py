@@ -1,18 +1,14 @@
 """Rehearsals and starts from the editor, in a real browser."""
 
-import shutil
-from collections.abc import AsyncIterator, Sequence
-from contextlib import asynccontextmanager
 from pathlib import Path
 
-from playwright.async_api import Page, expect
-from web_browsing import TIMEOUT_MS, browser, page_at
-from web_served import FLEET, REPOSITORY, Served, served
+from playwright.async_api import Browser, Page, expect
+from web_browsing import page_at
+from web_desk import IN_ONE_LOOP, Desk
+from web_served import served
 
-expect.set_options(timeout=TIMEOUT_MS)
+pytestmark = IN_ONE_LOOP
 
-VIGNETTE = REPOSITORY / "missions" / "vignette1.bpmn"
-SIMULATED = ("--simulate", "--speed", "1", "--journal", "memory:")
 REAL = """\
 version: 1
 name: field
@@ -41,21 +37,6 @@ TAKEOFF = """\
 """
 
 
-@asynccontextmanager
-async def editor_of(
-    folder: Path, mission: Path, *, fleet: Path = FLEET, words: Sequence[str] = SIMULATED
-) -> AsyncIterator[tuple[Page, Served]]:
-    """The editor with a mission, and its tab for runs."""
-    with served(folder, fleet=fleet, words=words) as executive:
-        shutil.copy(mission, executive.missions)
-        async with browser() as chromium, page_at(chromium, executive.url) as it:
-            await it.page.get_by_role("heading", name="Missions").wait_for()
-            await it.page.goto(f"{executive.origin}/missions/{mission.stem}")
-            await it.page.get_by_role("tab", name="Run", exact=True).click()
-            yield it.page, executive
-            it.assert_well()
-
-
 async def runs_of(page: Page) -> list[str]:
     """The missions of all runs."""
     found: list[str] = await page.evaluate(
@@ -65,77 +46,87 @@ async def runs_of(page: Page) -> list[str]:
     return [Path(each).stem for each in found]
 
 
-async def test_what_is_drawn_is_rehearsed_with_what_the_form_scripts(tmp_path: Path) -> None:
-    async with editor_of(tmp_path, VIGNETTE) as (page, _):
-        part = page.get_by_role("region", name="Rehearse")
-        await part.get_by_text("What happens in the rehearsal").click()
-        visits = part.get_by_role("group", name="USER SEND ROUTE")
-        await visits.get_by_role("button", name="+ visit").click()
-        await visits.get_by_role("button", name="+ visit").click()
-        await visits.get_by_label("visit 2").select_option("abort")
-        await part.get_by_role("button", name="Script a service").click()
-        await expect(part.get_by_role("button", name="Rehearse")).to_be_disabled()
-        await part.get_by_label("Value").fill("gpr")
-        await part.get_by_label("Value").blur()
-        await part.get_by_role("button", name="Write it as YAML").click()
-        await expect(part.get_by_label("Answers file (YAML)")).to_have_value(
-            "answers:\n  UserSendRoute: [continue, abort]\n"
-            "services:\n  Detector:\n    - {after: 5 s, write: {detection.type: gpr}}\n"
-        )
-        # Twice in a row is once.
-        posts: list[str] = []
-        page.on("request", lambda sent: posts.append(sent.url) if sent.method == "POST" else None)
-        await part.get_by_role("button", name="Rehearse").dblclick()
-        outcome = part.get_by_role("region", name="What came of it")
-        await expect(outcome.get_by_role("heading", name="Terminated")).to_be_visible()
-        await expect(outcome.get_by_role("button", name="reverse", exact=False)).to_be_visible()
-        assert len([url for url in posts if url.endswith("/api/rehearsals")]) == 1
-        async with page.expect_popup() as opened:
-            await outcome.get_by_role("link", name="Watch the rehearsal").click()
-        watched = await opened.value
-        assert "/rehearsals/" in watched.url
+async def test_what_is_drawn_is_rehearsed_with_what_the_form_scripts(desk: Desk) -> None:
+    page = await desk.edit(tab="Run")
+    part = page.get_by_role("region", name="Rehearse")
+    await part.get_by_text("What happens in the rehearsal").click()
+    visits = part.get_by_role("group", name="USER SEND ROUTE")
+    await visits.get_by_role("button", name="+ visit").click()
+    await visits.get_by_role("button", name="+ visit").click()
+    await visits.get_by_label("visit 2").select_option("abort")
+    await part.get_by_role("button", name="Script a service").click()
+    await expect(part.get_by_role("button", name="Rehearse")).to_be_disabled()
+    await part.get_by_label("Value").fill("gpr")
+    await part.get_by_label("Value").blur()
+    await part.get_by_role("button", name="Write it as YAML").click()
+    await expect(part.get_by_label("Answers file (YAML)")).to_have_value(
+        "answers:\n  UserSendRoute: [continue, abort]\n"
+        "services:\n  Detector:\n    - {after: 5 s, write: {detection.type: gpr}}\n"
+    )
+    # Twice in a row is once.
+    posts: list[str] = []
+    page.on("request", lambda sent: posts.append(sent.url) if sent.method == "POST" else None)
+    await part.get_by_role("button", name="Rehearse").dblclick()
+    outcome = part.get_by_role("region", name="What came of it")
+    await expect(outcome.get_by_role("heading", name="Terminated")).to_be_visible()
+    await expect(outcome.get_by_role("button", name="reverse", exact=False)).to_be_visible()
+    assert len([url for url in posts if url.endswith("/api/rehearsals")]) == 1
+    async with page.expect_popup() as opened:
+        await outcome.get_by_role("link", name="Watch the rehearsal").click()
+    watched = await opened.value
+    assert "/rehearsals/" in watched.url
 
 
-async def test_answers_that_do_not_fit_are_refused_with_the_reason(tmp_path: Path) -> None:
-    async with editor_of(tmp_path, VIGNETTE) as (page, _):
-        part = page.get_by_role("region", name="Rehearse")
-        await part.get_by_text("What happens in the rehearsal").click()
-        await part.get_by_role("button", name="Write it as YAML").click()
-        yaml = part.get_by_label("Answers file (YAML)")
-        await yaml.fill("answers: {UserSendRout: [continue]}\n")
-        await yaml.blur()
-        await part.get_by_role("button", name="Rehearse").click()
-        refused = page.get_by_role("alert").filter(has_text="could not be rehearsed")
-        await expect(refused).to_contain_text("UserSendRoute")
+async def test_answers_that_do_not_fit_are_refused_with_the_reason(desk: Desk) -> None:
+    page = await desk.edit(tab="Run")
+    part = page.get_by_role("region", name="Rehearse")
+    await part.get_by_text("What happens in the rehearsal").click()
+    await part.get_by_role("button", name="Write it as YAML").click()
+    yaml = part.get_by_label("Answers file (YAML)")
+    await yaml.fill("answers: {UserSendRout: [continue]}\n")
+    await yaml.blur()
+    await part.get_by_role("button", name="Rehearse").click()
+    refused = page.get_by_role("alert").filter(has_text="could not be rehearsed")
+    await expect(refused).to_contain_text("UserSendRoute")
 
 
-async def test_a_simulated_run_starts_once_and_is_shown(tmp_path: Path) -> None:
-    async with editor_of(tmp_path, VIGNETTE) as (page, _):
-        panel = page.get_by_role("tabpanel", name="Run")
-        await panel.get_by_role("button", name="Add data").click()
-        await panel.get_by_label("name", exact=True).fill("mission.speed")
-        await panel.get_by_label("Value of mission.speed").fill("1.5")
-        await expect(panel.get_by_text("number", exact=True)).to_be_visible()
-        await page.get_by_role("button", name="Start", exact=True).dblclick()
-        await page.wait_for_url("**/runs/*")
-        assert await runs_of(page) == ["vignette1"]
+async def test_a_simulated_run_starts_once_and_is_shown(desk: Desk) -> None:
+    page = await desk.edit(tab="Run")
+    panel = page.get_by_role("tabpanel", name="Run")
+    await panel.get_by_role("button", name="Add data").click()
+    await panel.get_by_label("name", exact=True).fill("mission.speed")
+    await panel.get_by_label("Value of mission.speed").fill("1.5")
+    await expect(panel.get_by_text("number", exact=True)).to_be_visible()
+    before = await runs_of(page)
+    await page.get_by_role("button", name="Start", exact=True).dblclick()
+    await page.wait_for_url("**/runs/*")
+    assert await runs_of(page) == [*before, "vignette1"]
+    reality = page.locator("header .reality")
+    await expect(reality).to_have_text("Simulated")
 
 
-async def test_real_vehicles_start_only_when_that_was_confirmed(tmp_path: Path) -> None:
-    fleet, mission = tmp_path / "field.yaml", tmp_path / "up.bpmn"
+async def test_real_vehicles_start_only_when_that_was_confirmed(
+    chromium: Browser, tmp_path: Path
+) -> None:
+    fleet = tmp_path / "field.yaml"
     fleet.write_text(REAL)
-    mission.write_text(TAKEOFF)
-    words = ("--journal", "memory:")
-    async with editor_of(tmp_path, mission, fleet=fleet, words=words) as (page, _):
-        start = page.get_by_role("button", name="Start with real vehicles")
-        await start.click()
-        dialog = page.get_by_role("dialog", name="Start with real vehicles?")
-        await expect(dialog).to_contain_text("REAL VEHICLES will move.")
-        await page.keyboard.press("Enter")  # the focus is not on what starts them
-        await dialog.get_by_role("button", name="Do not start").click()
-        await expect(dialog).to_have_count(0)
-        assert await runs_of(page) == []
-        await start.click()
-        await dialog.get_by_role("button", name="Start: real vehicles move").click()
-        await page.wait_for_url("**/runs/*")
-        assert await runs_of(page) == ["up"]
+    with served(tmp_path, fleet=fleet, words=("--journal", "memory:")) as executive:
+        (executive.missions / "up.bpmn").write_text(TAKEOFF)
+        async with page_at(chromium, executive.url) as it:
+            page = it.page
+            await expect(page.locator("header strong.reality")).to_have_text("REAL VEHICLES")
+            await page.get_by_role("link", name="up", exact=True).click()
+            await page.get_by_role("tab", name="Run", exact=True).click()
+            start = page.get_by_role("button", name="Start with real vehicles")
+            await start.click()
+            dialog = page.get_by_role("dialog", name="Start with real vehicles?")
+            await expect(dialog).to_contain_text("REAL VEHICLES will move.")
+            await page.keyboard.press("Enter")  # the focus is not on what starts them
+            await dialog.get_by_role("button", name="Do not start").click()
+            await expect(dialog).to_have_count(0)
+            assert await runs_of(page) == []
+            await start.click()
+            await dialog.get_by_role("button", name="Start: real vehicles move").click()
+            await page.wait_for_url("**/runs/*")
+            assert await runs_of(page) == ["up"]
+            it.assert_well()

@@ -1,35 +1,16 @@
 """Verification from the editor, in a real browser: the report, a run step by step, requirements."""
 
 import shutil
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
-from pathlib import Path
 from xml.etree import ElementTree
 
-import pytest
-from axe_playwright_python.async_playwright import Axe
 from playwright.async_api import Locator, Page, expect
-from web_browsing import TIMEOUT_MS, browser, page_at
-from web_served import REPOSITORY, Served, served
+from web_desk import IN_ONE_LOOP, MISSION, Desk
+from web_served import REPOSITORY
 
-expect.set_options(timeout=TIMEOUT_MS)
+pytestmark = IN_ONE_LOOP
 
 STUCK = REPOSITORY / "docs" / "broken" / "join_fed_by_one_branch.bpmn"
-VIGNETTE = REPOSITORY / "missions" / "vignette1.bpmn"
 REQUIREMENT = "{https://m2pem.org/schema/1}requirement"
-
-
-@asynccontextmanager
-async def editor_of(folder: Path, mission: Path) -> AsyncIterator[tuple[Page, Served]]:
-    """The editor with a mission, and its tab for verification."""
-    with served(folder) as executive:
-        shutil.copy(mission, executive.missions)
-        async with browser() as chromium, page_at(chromium, executive.url) as it:
-            await it.page.get_by_role("heading", name="Missions").wait_for()
-            await it.page.goto(f"{executive.origin}/missions/{mission.stem}")
-            await it.page.get_by_role("tab", name="Verify").click()
-            yield it.page, executive
-            it.assert_well()
 
 
 async def verify(page: Page) -> None:
@@ -45,162 +26,127 @@ def offered(page: Page) -> Locator:
     return page.locator(".m2-listbox")
 
 
-async def test_a_run_into_a_deadlock_is_stepped_through_on_the_diagram(tmp_path: Path) -> None:
-    async with editor_of(tmp_path, STUCK) as (page, _):
-        await verify(page)
-        report = page.get_by_role("region", name="Report")
-        await expect(report.get_by_role("heading", name="Violated")).to_be_visible()
-        await expect(drawn(page, "Reverse")).to_contain_class("m2v-unreached")
-        await expect(report.get_by_role("button", name="REVERSE", exact=True)).to_be_visible()
+async def test_a_run_into_a_deadlock_is_stepped_through_on_the_diagram(desk: Desk) -> None:
+    shutil.copy(STUCK, desk.executive.missions)
+    page = await desk.edit(STUCK.stem, tab="Verify")
+    await verify(page)
+    report = page.get_by_role("region", name="Report")
+    await expect(report.get_by_role("heading", name="Violated")).to_be_visible()
+    await expect(drawn(page, "Reverse")).to_contain_class("m2v-unreached")
+    await expect(report.get_by_role("button", name="REVERSE", exact=True)).to_be_visible()
 
-        await report.get_by_role("button", name="Show the run: 12 steps").first.click()
-        walk = page.get_by_role("region", name="A run that breaks it")
-        await expect(walk.get_by_text("12 of 12")).to_be_visible()
-        await expect(drawn(page, "JoinDetection")).to_contain_class("m2v-stuck")
-        await expect(drawn(page, "FlowStopped")).to_contain_class("m2v-missing")
-        await expect(page.locator(".m2v-reason")).to_contain_text("wait at JoinDetection")
+    await report.get_by_role("button", name="Show the run: 12 steps").first.click()
+    walk = page.get_by_role("region", name="A run that breaks it")
+    await expect(walk.get_by_text("12 of 12")).to_be_visible()
+    await expect(drawn(page, "JoinDetection")).to_contain_class("m2v-stuck")
+    await expect(drawn(page, "FlowStopped")).to_contain_class("m2v-missing")
+    await expect(page.locator(".m2v-reason")).to_contain_text("wait at JoinDetection")
 
-        # By keyboard alone, from where the focus is.
-        await expect(walk.get_by_role("button", name="All answers")).to_be_focused()
-        await page.keyboard.press("Home")
-        await expect(walk.get_by_text("1 of 12")).to_be_visible()
-        await expect(drawn(page, "StartVignette1")).to_contain_class("m2v-now")
-        await expect(drawn(page, "JoinDetection")).not_to_contain_class("m2v-stuck")
-        await page.keyboard.press("ArrowRight")
-        await expect(drawn(page, "UserSendRoute")).to_contain_class("m2v-now")
-        await expect(drawn(page, "StartVignette1")).to_contain_class("m2v-passed")
-        await expect(page.locator(".m2v-number")).to_have_text(["1", "2"])
-        await walk.get_by_role("slider", name="Step").focus()
-        await page.keyboard.press("End")
-        await expect(walk.get_by_text("12 of 12")).to_be_visible()
-        await walk.get_by_role("button", name="Previous step").click()
-        await expect(walk.locator('[aria-current="step"]')).to_contain_text("gpr")
+    # By keyboard alone, from where the focus is.
+    await expect(walk.get_by_role("button", name="All answers")).to_be_focused()
+    await page.keyboard.press("Home")
+    await expect(walk.get_by_text("1 of 12")).to_be_visible()
+    await expect(drawn(page, "StartVignette1")).to_contain_class("m2v-now")
+    await expect(drawn(page, "JoinDetection")).not_to_contain_class("m2v-stuck")
+    await page.keyboard.press("ArrowRight")
+    await expect(drawn(page, "UserSendRoute")).to_contain_class("m2v-now")
+    await expect(drawn(page, "StartVignette1")).to_contain_class("m2v-passed")
+    await expect(page.locator(".m2v-number")).to_have_text(["1", "2"])
+    await walk.get_by_role("slider", name="Step").focus()
+    await page.keyboard.press("End")
+    await expect(walk.get_by_text("12 of 12")).to_be_visible()
+    await walk.get_by_role("button", name="Previous step").click()
+    await expect(walk.locator('[aria-current="step"]')).to_contain_text("gpr")
 
-        await walk.get_by_role("button", name="All answers").click()
-        await expect(page.locator(".m2v-number")).to_have_count(0)
-        await report.get_by_role("button", name="Clear the report").click()
-        await expect(drawn(page, "Reverse")).not_to_contain_class("m2v-unreached")
-
-
-async def test_requirements_are_written_verified_undone_and_kept(tmp_path: Path) -> None:
-    async with editor_of(tmp_path, VIGNETTE) as (page, executive):
-        parts = page.get_by_role("region", name="Requirements of this mission")
-        await parts.get_by_label("Pattern").select_option("")
-        await parts.get_by_role("button", name="Add", exact=True).click()
-        formula = parts.get_by_role("textbox", name="Formula", exact=True)
-        await formula.fill("[](activ(Reverse) -> <> ended)")
-        caret = parts.locator(".m2v-caret")  # of the check, while it is being typed
-        await expect(caret).to_have_text("[](activ(Reverse) -> <> ended)\n   ^")
-        await verify(page)
-        problem = page.get_by_role("alert").filter(has_text="could not be verified")
-        await expect(problem).to_contain_text("there is no 'activ(...)'")
-        await expect(caret).to_have_text("[](activ(Reverse) -> <> ended)\n   ^")
-
-        # What may come next: an element.
-        await formula.fill("[](completed(rev")
-        await page.keyboard.press("ArrowDown")
-        await page.keyboard.press("Enter")
-        await expect(formula).to_have_value("[](completed(Reverse)")
-        await page.keyboard.type(" -> once(user.decision == ")
-        await offered(page).get_by_role("option", name="'continue'").click()
-        await page.keyboard.type("))")
-        await parts.get_by_label("What it is for").fill("nobody reverses unasked")
-        await parts.get_by_label("What it is for").blur()
-        await verify(page)
-        report = page.get_by_role("region", name="Report")
-        await expect(report.get_by_role("heading", name="Everything holds")).to_be_visible()
-        await expect(report).to_contain_text("“nobody reverses unasked”")
-        await expect(parts).to_contain_text("Whenever 'REVERSE' is completed")
-
-        await parts.get_by_label("What it is for").fill("another reason")
-        await parts.get_by_label("What it is for").blur()
-        await expect(report).to_contain_text("The mission has changed since")
-        await page.get_by_role("button", name="Undo (Ctrl+Z)").click()
-        await expect(report).not_to_contain_text("The mission has changed since")
-        await expect(parts.get_by_label("What it is for")).to_have_value("nobody reverses unasked")
-
-        await page.get_by_role("button", name="Save").click()
-        await expect(page.get_by_role("toolbar", name="Editor")).to_contain_text("Saved")
-        kept = ElementTree.parse(executive.missions / VIGNETTE.name)
-        assert [each.attrib for each in kept.iter(REQUIREMENT)] == [
-            {
-                "id": "formula",
-                "text": "nobody reverses unasked",
-                "ltl": "[](completed(Reverse) -> once(user.decision == 'continue'))",
-            }
-        ]
+    await walk.get_by_role("button", name="All answers").click()
+    await expect(page.locator(".m2v-number")).to_have_count(0)
+    await report.get_by_role("button", name="Clear the report").click()
+    await expect(drawn(page, "Reverse")).not_to_contain_class("m2v-unreached")
 
 
-async def test_a_pattern_gets_its_arguments_from_pickers(tmp_path: Path) -> None:
-    async with editor_of(tmp_path, VIGNETTE) as (page, _):
-        parts = page.get_by_role("region", name="Requirements of this mission")
-        await parts.get_by_label("Pattern").select_option("operator_in_the_loop")
-        await parts.get_by_role("button", name="Add", exact=True).click()
-        ask = parts.get_by_role("combobox", name="ask", exact=True)
-        await ask.click()
-        await expect(offered(page).get_by_role("option")).to_have_text(
-            ["UserSendRouteUSER SEND ROUTE"]
-        )
-        await offered(page).get_by_role("option").click()
-        await parts.get_by_role("combobox", name="decision").click()
-        await offered(page).get_by_role("option", name="continue").click()
-        before = parts.get_by_role("textbox", name="before")
-        await before.fill("active(DriveR")
-        await offered(page).get_by_role("option", name="DriveRoute").click()
-        await before.blur()
-        await verify(page)
-        report = page.get_by_role("region", name="Report")
-        await expect(report.get_by_role("heading", name="Everything holds")).to_be_visible()
-        await expect(parts).to_contain_text("an operator has answered 'USER SEND ROUTE'")
+async def test_requirements_are_written_verified_undone_and_kept(desk: Desk) -> None:
+    page = await desk.edit(tab="Verify")
+    parts = page.get_by_role("region", name="Requirements of this mission")
+    await parts.get_by_label("Pattern").select_option("")
+    await parts.get_by_role("button", name="Add", exact=True).click()
+    formula = parts.get_by_role("textbox", name="Formula", exact=True)
+    await formula.fill("[](activ(Reverse) -> <> ended)")
+    caret = parts.locator(".m2v-caret")  # of the check, while it is being typed
+    await expect(caret).to_have_text("[](activ(Reverse) -> <> ended)\n   ^")
+    await verify(page)
+    problem = page.get_by_role("alert").filter(has_text="could not be verified")
+    await expect(problem).to_contain_text("there is no 'activ(...)'")
+    await expect(caret).to_have_text("[](activ(Reverse) -> <> ended)\n   ^")
 
+    # What may come next: an element.
+    await formula.fill("[](completed(rev")
+    await page.keyboard.press("ArrowDown")
+    await page.keyboard.press("Enter")
+    await expect(formula).to_have_value("[](completed(Reverse)")
+    await page.keyboard.type(" -> once(user.decision == ")
+    await offered(page).get_by_role("option", name="'continue'").click()
+    await page.keyboard.type("))")
+    await parts.get_by_label("What it is for").fill("nobody reverses unasked")
+    await parts.get_by_label("What it is for").blur()
+    await verify(page)
+    report = page.get_by_role("region", name="Report")
+    await expect(report.get_by_role("heading", name="Everything holds")).to_be_visible()
+    await expect(report).to_contain_text("“nobody reverses unasked”")
+    await expect(parts).to_contain_text("Whenever 'REVERSE' is completed")
 
-async def test_requirements_typed_as_yaml_are_pointed_at_where_they_are_wrong(
-    tmp_path: Path,
-) -> None:
-    async with editor_of(tmp_path, VIGNETTE) as (page, _):
-        await page.get_by_text("Options", exact=True).click()
-        spec = page.get_by_label("More requirements (YAML)")
-        await spec.fill("requirements:\n  - id: ends\n    ltl: '<> endd'\n")
-        await spec.blur()
-        await verify(page)
-        problem = page.get_by_role("alert").filter(has_text="could not be verified")
-        await expect(problem).to_contain_text("Line 3")
-        await expect(problem.locator(".m2v-caret")).to_have_text("<> endd\n   ^")
-        await spec.fill("requirements:\n  - {id: ends, ltl: '<> ended', fair: true}\n")
-        await spec.blur()
-        await verify(page)
-        report = page.get_by_role("region", name="Report")
-        await expect(report).to_contain_text("Your requirements")
-        await expect(report).to_contain_text("ends")
+    await parts.get_by_label("What it is for").fill("another reason")
+    await parts.get_by_label("What it is for").blur()
+    await expect(report).to_contain_text("The mission has changed since")
+    await page.get_by_role("button", name="Undo (Ctrl+Z)").click()
+    await expect(report).not_to_contain_text("The mission has changed since")
+    await expect(parts.get_by_label("What it is for")).to_have_value("nobody reverses unasked")
 
-
-@pytest.mark.parametrize("theme", ["light", "dark"])
-async def test_axe_has_nothing_against_what_verification_shows(tmp_path: Path, theme: str) -> None:
-    async with editor_of(tmp_path, STUCK) as (page, _):
-        if theme == "dark":
-            await page.get_by_role("button", name="Dark theme").click()
-        parts = page.get_by_role("region", name="Requirements of this mission")
-        for pattern in ("", "visits_at_least"):
-            await parts.get_by_label("Pattern").last.select_option(pattern)
-            await parts.get_by_role("button", name="Add", exact=True).click()
-            assert await against(page) == []
-        await verify(page)
-        await expect(page.get_by_role("alert").filter(has_text="not be verified")).to_be_visible()
-        assert await against(page) == []
-        await page.get_by_role("button", name="Undo (Ctrl+Z)").click()
-        await page.get_by_role("button", name="Undo (Ctrl+Z)").click()
-        await verify(page)
-        report = page.get_by_role("region", name="Report")
-        await expect(report.get_by_role("heading", name="Violated")).to_be_visible()
-        assert await against(page) == []
-        await report.get_by_role("button", name="Show the run: 12 steps").first.click()
-        assert await against(page) == []
-
-
-async def against(page: Page) -> list[str]:
-    """What axe has against a page."""
-    found = await Axe().run(page)
-    return [
-        f"{each['id']}: {[node['html'][:200] for node in each['nodes']]}"
-        for each in found.response["violations"]
+    await page.get_by_role("button", name="Save").click()
+    await expect(page.get_by_role("toolbar", name="Editor")).to_contain_text("Saved")
+    kept = ElementTree.parse(desk.executive.missions / f"{MISSION}.bpmn")
+    assert [each.attrib for each in kept.iter(REQUIREMENT)] == [
+        {
+            "id": "formula",
+            "text": "nobody reverses unasked",
+            "ltl": "[](completed(Reverse) -> once(user.decision == 'continue'))",
+        }
     ]
+
+
+async def test_a_pattern_gets_its_arguments_from_pickers(desk: Desk) -> None:
+    page = await desk.edit(tab="Verify")
+    parts = page.get_by_role("region", name="Requirements of this mission")
+    await parts.get_by_label("Pattern").select_option("operator_in_the_loop")
+    await parts.get_by_role("button", name="Add", exact=True).click()
+    ask = parts.get_by_role("combobox", name="ask", exact=True)
+    await ask.click()
+    await expect(offered(page).get_by_role("option")).to_have_text(["UserSendRouteUSER SEND ROUTE"])
+    await offered(page).get_by_role("option").click()
+    await parts.get_by_role("combobox", name="decision").click()
+    await offered(page).get_by_role("option", name="continue").click()
+    before = parts.get_by_role("textbox", name="before")
+    await before.fill("active(DriveR")
+    await offered(page).get_by_role("option", name="DriveRoute").click()
+    await before.blur()
+    await verify(page)
+    report = page.get_by_role("region", name="Report")
+    await expect(report.get_by_role("heading", name="Everything holds")).to_be_visible()
+    await expect(parts).to_contain_text("an operator has answered 'USER SEND ROUTE'")
+
+
+async def test_requirements_typed_as_yaml_are_pointed_at_where_they_are_wrong(desk: Desk) -> None:
+    page = await desk.edit(tab="Verify")
+    await page.get_by_text("Options", exact=True).click()
+    spec = page.get_by_label("More requirements (YAML)")
+    await spec.fill("requirements:\n  - id: ends\n    ltl: '<> endd'\n")
+    await spec.blur()
+    await verify(page)
+    problem = page.get_by_role("alert").filter(has_text="could not be verified")
+    await expect(problem).to_contain_text("Line 3")
+    await expect(problem.locator(".m2v-caret")).to_have_text("<> endd\n   ^")
+    await spec.fill("requirements:\n  - {id: ends, ltl: '<> ended', fair: true}\n")
+    await spec.blur()
+    await verify(page)
+    report = page.get_by_role("region", name="Report")
+    await expect(report).to_contain_text("Your requirements")
+    await expect(report).to_contain_text("ends")

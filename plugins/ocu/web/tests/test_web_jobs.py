@@ -1,29 +1,31 @@
 """Verifications and rehearsals: ordered, come back for, ended."""
 
+import asyncio
 import json
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 from m2pem_plugin_web.jobs import AT_ONCE, KEPT, MOST_WAITING
-from rest_world import REPOSITORY, VIGNETTE, Rest, rest_world
+from rest_world import REPOSITORY, VIGNETTE, WITHIN_S, Rest, rest_world
 
 SCHEMA = json.loads((REPOSITORY / "docs" / "verification.schema.json").read_text(encoding="utf-8"))
 ANSWERS = (REPOSITORY / "missions/answers/vignette1_detection.yaml").read_text(encoding="utf-8")
-FORKS = 12
+LOOPS = 20
 LARGE = (
     '<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targetNamespace="t">'
     '<process id="P" isExecutable="true"><startEvent id="S"/><parallelGateway id="G"/>'
     '<sequenceFlow id="f" sourceRef="S" targetRef="G"/>'
     + "".join(
-        f'<sequenceFlow id="a{n}" sourceRef="G" targetRef="U{n}"/><userTask id="U{n}"/>'
-        f'<sequenceFlow id="b{n}" sourceRef="U{n}" targetRef="V{n}"/><userTask id="V{n}"/>'
-        f'<sequenceFlow id="c{n}" sourceRef="V{n}" targetRef="G"/>'
-        for n in range(FORKS)
+        f'<sequenceFlow id="a{n}" sourceRef="G" targetRef="X{n}"/><exclusiveGateway id="X{n}"/>'
+        f'<sequenceFlow id="b{n}" sourceRef="X{n}" targetRef="U{n}"/><userTask id="U{n}"/>'
+        f'<sequenceFlow id="c{n}" sourceRef="U{n}" targetRef="V{n}"/><userTask id="V{n}"/>'
+        f'<sequenceFlow id="d{n}" sourceRef="V{n}" targetRef="X{n}"/>'
+        for n in range(LOOPS)
     )
     + "</process></definitions>"
 )
-"""A search that does not end within a test."""
+"""Loops side by side, without an end: a search that does not end within a test."""
 
 
 async def ordered(rest: Rest, path: str, body: Any) -> str:
@@ -54,8 +56,10 @@ async def test_a_verification_that_cannot_be_made_says_why(tmp_path: Path) -> No
 async def test_a_verification_tells_how_far_it_is_and_can_be_ended(tmp_path: Path) -> None:
     async with rest_world(tmp_path) as rest:
         place = await ordered(rest, "/verifications", {"xml": LARGE})
-        while (job := await rest.get(place))["progress"]["states"] == 0:
-            assert job["state"] == "running", job
+        async with asyncio.timeout(WITHIN_S):
+            while (job := await rest.get(place))["progress"]["states"] == 0:
+                assert job["state"] == "running", job
+                await asyncio.sleep(0.02)
         await rest.delete(place)
         assert (await rest.get(place))["state"] == "cancelled"
         await rest.delete(place)

@@ -1,14 +1,11 @@
 """Every menu of the editor opens with its entries, on every kind of element."""
 
-import shutil
-from pathlib import Path
-
 from playwright.async_api import Page, expect
-from web_browsing import browser, page_at
+from web_desk import IN_ONE_LOOP, Desk
 from web_drawing import MENU, Drawing
-from web_served import REPOSITORY, served
 
-NAME = "vignette1"
+pytestmark = IN_ONE_LOOP
+
 # By element: how many entries the menus have at least, 0 where there is none; and the context pad.
 APPEND = 70
 REPLACE_TASK = 40
@@ -26,31 +23,24 @@ KINDS = {
     "RoutePromptReference": (0, 1),
     "PoolVignette1": (0, 1),
 }
-BLOCKS = {"Operator": 1, "Ground vehicles": 13, "Payloads": 7, "Teams": 7, "Services": 1}
+BLOCKS = {"Operator": 1, "Ground vehicles": 13, "Aircraft": 15}
+BLOCKS |= {"Payloads": 7, "Teams": 7, "Services": 1}
 PALETTE = 15
 TWO_FRAMES = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
-async def test_every_menu_has_its_entries_on_every_kind_of_element(tmp_path: Path) -> None:
-    with served(tmp_path) as executive:
-        shutil.copy(REPOSITORY / "missions" / f"{NAME}.bpmn", executive.missions)
-        async with browser() as chromium, page_at(chromium, executive.url) as it:
-            page = it.page
-            await page.get_by_role("link", name=NAME).click()
-            drawing = Drawing(page)
-            await expect(drawing.element("Reverse")).to_be_attached()
-            wrong = []
-            for element, (append, replace) in KINDS.items():
-                await drawing.select(element)
-                found = (await entries(page, "append"), await entries(page, "replace"))
-                if not (
-                    found[0] >= append and found[1] >= replace and bool(found[0]) == bool(append)
-                ):
-                    wrong.append(f"{element}: {found}, not {(append, replace)} or more")
-            assert not wrong, "\n".join(wrong)
-            await look_at_flow(drawing)
-            await look_at_palette_and_blocks(page)
-            it.assert_well()
+async def test_every_menu_has_its_entries_on_every_kind_of_element(desk: Desk) -> None:
+    page = await desk.edit()
+    drawing = Drawing(page)
+    wrong = []
+    for element, (append, replace) in KINDS.items():
+        await drawing.select(element)
+        found = (await entries(page, "append"), await entries(page, "replace"))
+        if not (found[0] >= append and found[1] >= replace and bool(found[0]) == bool(append)):
+            wrong.append(f"{element}: {found}, not {(append, replace)} or more")
+    assert not wrong, "\n".join(wrong)
+    await look_at_flow(drawing)
+    await look_at_palette_and_blocks(page)
 
 
 async def test_a_menu_opens_at_once_after_something_was_typed(tmp_path: Path) -> None:
@@ -84,8 +74,7 @@ async def entries(page: Page, menu: str) -> int:
     await opener.click()
     await expect(page.locator(f"{MENU} .entry").first).to_be_visible()
     found = await page.locator(f"{MENU} .entry").count()
-    await page.keyboard.press("Escape")
-    await expect(page.locator(MENU)).to_have_count(0)
+    await Drawing(page).close_menu()
     return found
 
 
@@ -97,15 +86,16 @@ async def look_at_flow(drawing: Drawing) -> None:
 async def look_at_palette_and_blocks(page: Page) -> None:
     await expect(page.locator(".djs-palette .entry")).to_have_count(PALETTE)
     await page.click(".djs-palette [data-action=create]")
-    await expect(page.locator(f"{MENU} .entry", has_text="Single vehicle routing")).to_have_count(1)
+    await expect(page.locator(f"{MENU} .entry", has_text="Bridge crossing")).to_have_count(1)
     assert await page.locator(f"{MENU} .entry").count() > 80
     await page.locator(f"{MENU}-search input").press_sequentially("orbit")
     await expect(page.locator(f"{MENU} .entry").first).to_have_text("Orbit")
-    await page.keyboard.press("Escape")
+    await Drawing(page).close_menu()
     blocks = page.get_by_role("region", name="Blocks")
     for group, count in BLOCKS.items():
         part = blocks.locator("details", has=page.get_by_text(group, exact=True))
         await expect(part.get_by_role("button")).to_have_count(count)
     await blocks.get_by_role("searchbox").fill("route")
-    await expect(blocks.get_by_role("button", name="Single vehicle routing")).to_be_visible()
+    found = blocks.get_by_role("button", name="Single vehicle routing")
+    await expect(found).to_have_count(2)  # of ground vehicles, and of aircraft
     await expect(blocks.get_by_role("button", name="Zoom")).to_have_count(0)

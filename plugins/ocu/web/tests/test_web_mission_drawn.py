@@ -7,8 +7,9 @@ import re
 from collections import Counter
 from pathlib import Path
 
-from playwright.async_api import Page, expect
-from web_browsing import browser, page_at
+from playwright.async_api import Browser, Page, expect
+from web_browsing import page_at
+from web_desk import IN_ONE_LOOP
 from web_drawing import Drawing, new_mission
 from web_pictures import picture
 from web_running import (
@@ -26,17 +27,19 @@ from web_vignette import Mission, draw_detection, draw_main
 
 from m2pem import load_mission
 
+pytestmark = IN_ONE_LOOP
+
 NAME = "vignette1"
 FASTER = ("--simulate", "--speed", "5", "--journal", "memory:")
 PROBLEMS = ".m2-problems-head p"
 
 
 async def test_vignette1_is_drawn_from_an_empty_page_and_lives_its_whole_life(
-    tmp_path: Path,
+    chromium: Browser, tmp_path: Path
 ) -> None:
     fleet = fleet_with_mine(tmp_path)
     with served(tmp_path, fleet=fleet, words=FASTER) as executive:
-        async with browser() as chromium, page_at(chromium, executive.url) as it:
+        async with page_at(chromium, executive.url) as it:
             page = it.page
             drawing = await begin(page)
             mission = await draw(drawing)

@@ -1,14 +1,70 @@
-"""The page in a real browser: it comes up, and complains about nothing."""
+"""The page of an executive of this process, in a real browser: how people come in, and what they
+are told of vehicles that are not heard."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from web_browsing import browser, page_at
-from web_served import served
+from playwright.async_api import Browser, expect
+from web_browsing import page_at
+from web_desk import IN_ONE_LOOP
+from web_world import VEHICLE, MakeWorld, executive, serving
+
+from m2pem.api.arbiter import Arbiter
+from m2pem.journal import MemoryJournal
+from m2pem.model.catalogue import ResourceId
+from m2pem.plugins import PluginManager
+from m2pem.sim.arbiters import SimArbiter
+
+pytestmark = IN_ONE_LOOP
 
 
-async def test_the_printed_address_signs_in(tmp_path: Path) -> None:
-    with served(tmp_path) as executive:
-        async with browser() as chromium, page_at(chromium, executive.url) as it:
-            await it.page.get_by_role("heading", name="Missions").wait_for()
-            assert "token" not in it.page.url
-            it.assert_well()
+async def test_the_printed_address_signs_in(chromium: Browser, world: MakeWorld) -> None:
+    async with world() as here, page_at(chromium, here.ocu.url) as it:
+        await it.page.get_by_role("heading", name="Missions").wait_for()
+        assert "token" not in it.page.url
+        it.assert_well()
+
+
+class Kept(PluginManager):
+    """Keeps the simulated arbiter that an executive makes: its links can be cut."""
+
+    made: SimArbiter
+
+    def arbiter(self, name: str) -> Callable[..., Arbiter]:
+        make = super().arbiter(name)
+
+        def keep(*given: Any) -> Arbiter:
+            arbiter = make(*given)
+            assert isinstance(arbiter, SimArbiter)
+            self.made = arbiter
+            return arbiter
+
+        return keep
+
+
+async def test_a_vehicle_whose_link_is_lost_is_gray_and_comes_back(
+    chromium: Browser, tmp_path: Path
+) -> None:
+    plugins = Kept()
+    async with (
+        executive(MemoryJournal(), plugins) as running,
+        serving(running.control, tmp_path, {}) as here,
+        page_at(chromium, here.ocu.url) as it,
+    ):
+        page = it.page
+        prompt = await here.asked()
+        await page.goto(f"{here.base}/runs/{prompt.run}")
+        card = page.locator(".card", has_text=VEHICLE)
+        marker = page.locator(".vehicle")
+        await expect(card).not_to_contain_class("card-stale")
+        await expect(marker).not_to_contain_class("vehicle-stale")
+        plugins.made.lose_link(ResourceId(VEHICLE))
+        await expect(card).to_contain_class("card-stale")
+        await expect(card).to_contain_text("silent for")
+        await expect(marker).to_contain_class("vehicle-stale")
+        plugins.made.restore_link(ResourceId(VEHICLE))
+        await expect(card).not_to_contain_class("card-stale")
+        await expect(card).not_to_contain_text("silent for")
+        await expect(marker).not_to_contain_class("vehicle-stale")
+        it.assert_well()

@@ -7,7 +7,9 @@ from playwright.async_api import Page
 
 # Rules of WCAG 2.2 A and AA, and what axe's makers advise besides.
 TAGS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+OPTIONS = {"runOnly": TAGS, "resultTypes": ["violations"]}
 SHOWN = 3
+AXE = Axe()
 
 
 @dataclass(slots=True)
@@ -18,14 +20,20 @@ class Accessibility:
     wrong: list[str] = field(default_factory=list)
     looked: list[str] = field(default_factory=list)
 
-    async def look(self, what: str) -> None:
-        """At all that is on the page now, once nothing moves any more."""
+    async def look(self, what: str, part: str = "") -> None:
+        """At all that is on the page now, once nothing moves any more.
+
+        `part`: a selector of what alone has changed, where the rest was looked at before.
+        """
         await self.page.evaluate(STILL)
-        results = await Axe().run(
-            self.page, options={"runOnly": TAGS, "resultTypes": ["violations"]}
+        if await self.page.evaluate("typeof axe === 'undefined'"):
+            await self.page.evaluate(AXE.axe_script)
+        violations = await self.page.evaluate(
+            "([part, options]) => axe.run(part || document, options).then((it) => it.violations)",
+            [part, OPTIONS],
         )
         self.looked.append(what)
-        for violation in results.response["violations"]:
+        for violation in violations:
             nodes = violation["nodes"]
             self.wrong.append(f"{what}: {violation['id']} ({len(nodes)}): {violation['help']}")
             for node in nodes[:SHOWN]:

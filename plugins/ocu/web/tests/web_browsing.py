@@ -10,6 +10,7 @@ from playwright.async_api import (
     BrowserContext,
     ConsoleMessage,
     Page,
+    StorageState,
     async_playwright,
     expect,
 )
@@ -56,6 +57,16 @@ class Watched:
     context: BrowserContext
     complaints: list[str] = field(default_factory=list)
 
+    def listen(self, page: Page) -> None:
+        """Keep what a page complains about."""
+
+        def on_console(message: ConsoleMessage) -> None:
+            if message.type == "error":
+                self.complaints.append(message.text)
+
+        page.on("console", on_console)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+
     def assert_well(self) -> None:
         """Nothing was complained about."""
         assert self.complaints == []
@@ -63,24 +74,29 @@ class Watched:
 
 @asynccontextmanager
 async def page_at(
-    started: Browser, url: str, *, width: int = 1440, height: int = 900, dark: bool = False
+    started: Browser,
+    url: str,
+    *,
+    width: int = 1440,
+    height: int = 900,
+    dark: bool = False,
+    state: StorageState | None = None,
 ) -> AsyncIterator[Watched]:
-    """A page of its own profile, so of its own operator, at an address."""
+    """A page of its own profile, so of its own operator, at an address.
+
+    `state`: the cookies of somebody who has signed in.
+    """
     context = await started.new_context(
         viewport={"width": width, "height": height},
         color_scheme="dark" if dark else "light",
         accept_downloads=True,
+        permissions=["clipboard-read", "clipboard-write"],
+        storage_state=state,
     )
     context.set_default_timeout(TIMEOUT_MS)
     page = await context.new_page()
     watched = Watched(page, context)
-
-    def on_console(message: ConsoleMessage) -> None:
-        if message.type == "error":
-            watched.complaints.append(message.text)
-
-    page.on("console", on_console)
-    page.on("pageerror", lambda error: watched.complaints.append(str(error)))
+    watched.listen(page)
     try:
         await page.goto(url)
         yield watched

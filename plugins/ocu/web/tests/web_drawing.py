@@ -134,6 +134,15 @@ class Drawing:
         await entry.click()
         await expect(self.page.locator(MENU)).to_have_count(0)
 
+    async def close_menu(self) -> None:
+        """Press Escape; a menu that has just been drawn does not listen yet."""
+        menu = self.page.locator(MENU)
+        async with asyncio.timeout(WITHIN_S):
+            while await menu.count():
+                await self.page.keyboard.press("Escape")
+                with suppress(AssertionError):
+                    await expect(menu).to_have_count(0, timeout=TRAP_MS)
+
     async def put_down(self, x: float, y: float) -> None:
         """Put down what hangs at the mouse."""
         await self.page.mouse.move(x - 8, y - 8, steps=3)

@@ -4,6 +4,7 @@ import asyncio
 import shutil
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import TypeAlias
 
 from playwright.async_api import Locator, Page, expect
 from web_served import FLEET
@@ -48,7 +49,10 @@ def fleet_with_mine(folder: Path) -> Path:
     return path
 
 
-async def wait_for_colour(page: Page, element: str, wanted: tuple[int, int, int]) -> None:
+Colour: TypeAlias = tuple[int, int, int]
+
+
+async def wait_for_colour(page: Page, element: str, wanted: Colour) -> None:
     """Until an element, known by its name or id, is drawn in a colour."""
     found: list[int] | None = None
     try:
@@ -59,7 +63,7 @@ async def wait_for_colour(page: Page, element: str, wanted: tuple[int, int, int]
         raise AssertionError(f"{element} is {found}, not {wanted}") from None
 
 
-def is_near(found: list[int] | None, wanted: tuple[int, int, int]) -> bool:
+def is_near(found: list[int] | None, wanted: Colour) -> bool:
     return found is not None and all(abs(a - b) <= NEAR for a, b in zip(found, wanted, strict=True))
 
 

@@ -235,12 +235,12 @@ class MakeWorld:
             yield world
 
 
-def executive(journal: Journal) -> Executive:
+def executive(journal: Journal, plugins: PluginManager | None = None) -> Executive:
     """One with a simulated vehicle, that can also rehearse."""
     return Executive(
         scenarios.fleet("sim", {VEHICLE: {}}),
         journal,
-        PluginManager(),
+        plugins or PluginManager(),
         SystemClock(SPEED),
         speed=SPEED,
         simulated=True,

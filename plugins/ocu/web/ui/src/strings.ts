@@ -12,7 +12,6 @@ export const strings = {
     stopAgain: "Again to STOP",
     stopHint:
       "Stop every run, and every vehicle that a run commands: click twice, or hold; Shift+Escape twice",
-    stopNotAllowed: "Viewers cannot stop",
     stopped: "All runs were told to stop.",
     stopReason: "STOP on the web page",
     home: "Missions",
@@ -825,7 +824,7 @@ export const strings = {
       withdrawn: "The question was withdrawn: {text}",
       sent: "Answer sent…",
       show: "Show in the diagram",
-      viewer: "Viewers cannot answer",
+      viewer: "Operators answer {decisions}.",
     },
     signals: {
       title: "Send a signal",

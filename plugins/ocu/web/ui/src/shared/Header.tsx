@@ -76,13 +76,12 @@ export function Header() {
             {text.signOut}
           </button>
         )}
-        {who && (
+        {may("operator") && (
           <StopButton
             class="stop-all"
             label={text.stop}
             again={text.stopAgain}
-            hint={may("operator") ? text.stopHint : text.stopNotAllowed}
-            disabled={!may("operator")}
+            hint={text.stopHint}
             hotkey
             onStop={() => void stopAll()}
           />

@@ -122,6 +122,14 @@ describe("live client", () => {
     expect(timers.at(-1)!.delay_ms).toBe(500);
   });
 
+  it("says that it is broken once, until it is open again", () => {
+    newest().onclose!({ code: 1006 });
+    timers.at(-1)!.callback();
+    expect(states.slice(2)).toEqual(["lost"]);
+    newest().onopen!();
+    expect(states.slice(2)).toEqual(["lost", "open"]);
+  });
+
   it("drops what a broken connection had sent and was not applied", () => {
     newest().tell(frame(7));
     newest().onclose!({ code: 1006 });

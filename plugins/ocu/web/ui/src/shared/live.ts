@@ -41,6 +41,8 @@ export class LiveClient {
   private cancelRetry: (() => void) | null = null;
   private watched: string | null = null;
   private isOpen = false;
+  /** From a break until it is open again, however often that is tried. */
+  private isBroken = false;
 
   constructor(
     private readonly around: Surroundings,
@@ -51,11 +53,12 @@ export class LiveClient {
     if (this.socket) return;
     this.cancelRetry?.();
     this.cancelRetry = null;
-    this.listener.connection("connecting");
+    if (!this.isBroken) this.listener.connection("connecting");
     const socket = this.around.connect();
     this.socket = socket;
     socket.onopen = () => {
       this.failures = 0;
+      this.isBroken = false;
       this.isOpen = true;
       this.say({ type: "watch", run: this.watched });
       this.listener.connection("open");
@@ -69,6 +72,7 @@ export class LiveClient {
     this.cancelRetry = null;
     const socket = this.socket;
     this.forget();
+    this.isBroken = false;
     socket?.close();
   }
 
@@ -115,7 +119,8 @@ export class LiveClient {
 
   private closed(code: number): void {
     this.forget();
-    if (REFUSED.has(code)) {
+    this.isBroken = !REFUSED.has(code);
+    if (!this.isBroken) {
       this.listener.connection("refused");
       return;
     }

@@ -17,16 +17,20 @@ export interface NameDialogProps {
 }
 
 export function NameDialog({ title, label, act, suggested, close, chosen }: NameDialogProps) {
-  const [taken, setTaken] = useState<string[]>([]);
+  // Until it is known, the name that is suggested may be another mission's.
+  const [taken, setTaken] = useState<string[] | null>(null);
   const [name, setName] = useState(suggested);
   useEffect(() => {
-    void get<MissionLine[]>("/missions").then((missions) => {
-      const names = missions.map((each) => each.name);
-      setTaken(names);
-      setName((before) => freeName(before, names));
-    });
+    void get<MissionLine[]>("/missions")
+      .catch((): MissionLine[] => [])
+      .then((missions) => {
+        const names = missions.map((each) => each.name);
+        setTaken(names);
+        setName((before) => freeName(before, names));
+      });
   }, []);
-  const wrong = nameProblem(name, taken);
+  const wrong = nameProblem(name, taken ?? []);
+  const usable = taken !== null && wrong === "";
   return (
     <Dialog
       title={title}
@@ -36,7 +40,7 @@ export function NameDialog({ title, label, act, suggested, close, chosen }: Name
           <button type="button" class="secondary" onClick={close}>
             {strings.home.cancel}
           </button>
-          <button type="submit" form="m2-name-form" class="primary" disabled={wrong !== ""}>
+          <button type="submit" form="m2-name-form" class="primary" disabled={!usable}>
             {act}
           </button>
         </>
@@ -46,7 +50,7 @@ export function NameDialog({ title, label, act, suggested, close, chosen }: Name
         id="m2-name-form"
         onSubmit={(event) => {
           event.preventDefault();
-          if (!wrong) chosen(name.trim());
+          if (usable) chosen(name.trim());
         }}
       >
         <NameInput label={label} name={name} wrong={wrong} write={setName} />

@@ -33,15 +33,17 @@ export function Toolbar(props: ToolbarProps) {
       <span class="m2-saved-state" role="status">
         {isDirty ? strings.editor.unsaved : strings.editor.saved}
       </span>
-      <button
-        type="button"
-        class={isDirty ? "primary" : "secondary"}
-        title={words.saveHint}
-        disabled={!isDirty || work.isSaving.value || !may("commander")}
-        onClick={() => void work.save()}
-      >
-        {words.save}
-      </button>
+      {may("commander") && (
+        <button
+          type="button"
+          class={isDirty ? "primary" : "secondary"}
+          title={words.saveHint}
+          disabled={!isDirty || work.isSaving.value}
+          onClick={() => void work.save()}
+        >
+          {words.save}
+        </button>
+      )}
       <span class="m2-gap" />
       <IconButton
         icon="undo"
@@ -111,7 +113,7 @@ function FileMenu({ work }: { work: MissionWork }) {
     work.question.value = { kind };
   };
   const items: MenuItem[] = [
-    { label: texts.saveAs, act: ask("saveAs"), disabled: !may("commander") },
+    ...(may("commander") ? [{ label: texts.saveAs, act: ask("saveAs") }] : []),
     { label: texts.versions, act: ask("versions") },
     { label: texts.upload, act: () => file.current?.click() },
     {

@@ -108,19 +108,23 @@ export function PromptPanel() {
       </div>
       <p id="prompt-text">{prompt.text || mission.label(prompt.process, prompt.element)}</p>
       <div class="prompt-decisions">
-        {prompt.decisions.map(({ value, label }, index) => (
-          <button
-            key={value}
-            type="button"
-            disabled={!usable}
-            title={mayAnswer ? text.keys : text.viewer}
-            aria-keyshortcuts={index < 9 ? String(index + 1) : undefined}
-            onClick={() => void answer(value)}
-          >
-            {index < 9 && <kbd aria-hidden="true">{index + 1}</kbd>}
-            {label || value}
-          </button>
-        ))}
+        {mayAnswer ? (
+          prompt.decisions.map(({ value, label }, index) => (
+            <button
+              key={value}
+              type="button"
+              disabled={!usable}
+              title={text.keys}
+              aria-keyshortcuts={index < 9 ? String(index + 1) : undefined}
+              onClick={() => void answer(value)}
+            >
+              {index < 9 && <kbd aria-hidden="true">{index + 1}</kbd>}
+              {label || value}
+            </button>
+          ))
+        ) : (
+          <span>{fill(text.viewer, { decisions: decisionsOf(prompt) })}</span>
+        )}
         {prompts.length > 1 && (
           <button
             type="button"
@@ -135,6 +139,9 @@ export function PromptPanel() {
     </section>
   );
 }
+
+const decisionsOf = ({ decisions }: Prompt): string =>
+  decisions.map(({ value, label }) => `“${label || value}”`).join(", ");
 
 const idOf = ({ run, prompt }: Prompt): string => `${run}/${prompt}`;
 

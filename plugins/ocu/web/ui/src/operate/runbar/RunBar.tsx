@@ -118,7 +118,6 @@ function Controls({ status }: { status: string }) {
   const ask = (what: string, body?: unknown) =>
     void attempt(() => post(`/runs/${encodeURIComponent(scene.run)}/${what}`, body));
   const goesOn = status === "running" || status === "paused";
-  const steerable = may("operator") && goesOn;
   if (!goesOn && status !== "interrupted") {
     return (
       <button type="button" class="primary" onClick={replay}>
@@ -126,10 +125,11 @@ function Controls({ status }: { status: string }) {
       </button>
     );
   }
+  if (!may("operator")) return null;
   return (
     <>
       {status === "paused" ? (
-        <button type="button" class="primary" disabled={!steerable} onClick={() => ask("resume")}>
+        <button type="button" class="primary" disabled={!goesOn} onClick={() => ask("resume")}>
           <Icon name="play" />
           {text.resume}
         </button>
@@ -138,7 +138,7 @@ function Controls({ status }: { status: string }) {
           type="button"
           class="secondary"
           title={text.pauseHint}
-          disabled={!steerable}
+          disabled={!goesOn}
           onClick={() => ask("pause")}
         >
           <Icon name="pause" />
@@ -148,7 +148,7 @@ function Controls({ status }: { status: string }) {
       <button
         type="button"
         class="secondary"
-        disabled={!steerable}
+        disabled={!goesOn}
         onClick={() => (sending.value = "signal")}
       >
         {text.signal}
@@ -156,7 +156,7 @@ function Controls({ status }: { status: string }) {
       <button
         type="button"
         class="secondary"
-        disabled={!steerable}
+        disabled={!goesOn}
         onClick={() => (sending.value = "message")}
       >
         {text.message}
@@ -166,7 +166,7 @@ function Controls({ status }: { status: string }) {
         label={text.stopRun}
         again={fill(text.stopRunAgain, { run: scene.run })}
         hint={text.stopRun}
-        disabled={!steerable}
+        disabled={!goesOn}
         onStop={() => ask("stop", { reason: strings.shell.stopReason })}
       />
       {sending.value && <SendDialog what={sending.value} onClose={() => (sending.value = null)} />}

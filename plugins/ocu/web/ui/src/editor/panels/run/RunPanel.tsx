@@ -54,14 +54,16 @@ function Rehearse({ editor }: { editor: EditorContext }) {
         <AnswersForm editor={editor} rehearsal={rehearsal} />
       </details>
       <div class="m2v-actions">
-        <button
-          type="button"
-          class="primary"
-          disabled={busy || !allowed || !ready}
-          onClick={() => void rehearsal.begin(editor)}
-        >
-          {words.rehearse}
-        </button>
+        {allowed && (
+          <button
+            type="button"
+            class="primary"
+            disabled={busy || !ready}
+            onClick={() => void rehearsal.begin(editor)}
+          >
+            {words.rehearse}
+          </button>
+        )}
         {busy && (
           <button type="button" class="secondary" onClick={() => void job.cancel()}>
             {strings.verify.cancel}
@@ -110,14 +112,16 @@ function Start({ editor }: { editor: EditorContext }) {
       <h2>{words.start}</h2>
       <p class="m2-field-hint">{simulated ? words.startSimulated : words.startReal}</p>
       <div class="m2v-actions">
-        <button
-          type="button"
-          class={simulated ? "primary" : "primary m2r-real"}
-          disabled={busy || !allowed || !ready}
-          onClick={() => (simulated ? void start() : setAsks(true))}
-        >
-          {busy ? words.starting : simulated ? words.start : words.startRealButton}
-        </button>
+        {allowed && (
+          <button
+            type="button"
+            class={simulated ? "primary" : "primary m2r-real"}
+            disabled={busy || !ready}
+            onClick={() => (simulated ? void start() : setAsks(true))}
+          >
+            {busy ? words.starting : simulated ? words.start : words.startRealButton}
+          </button>
+        )}
       </div>
       {!allowed && <p class="m2-note">{words.startNotAllowed}</p>}
       {refusal && <ProblemView editor={editor} title={words.startFailed} refusal={refusal} />}

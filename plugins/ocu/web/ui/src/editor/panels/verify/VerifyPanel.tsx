@@ -65,15 +65,17 @@ function Ask({ editor, verification }: PartProps) {
   return (
     <section class="m2v-ask" aria-label={words.ask}>
       <div class="m2v-actions">
-        <button
-          type="button"
-          class="primary"
-          disabled={busy || !allowed || !ready}
-          title={allowed ? words.beginHint : words.notAllowed}
-          onClick={() => void verification.begin(editor)}
-        >
-          {words.begin}
-        </button>
+        {allowed && (
+          <button
+            type="button"
+            class="primary"
+            disabled={busy || !ready}
+            title={words.beginHint}
+            onClick={() => void verification.begin(editor)}
+          >
+            {words.begin}
+          </button>
+        )}
         {busy && (
           <button type="button" class="secondary" onClick={() => void job.cancel()}>
             {words.cancel}

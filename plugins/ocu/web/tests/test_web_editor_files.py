@@ -3,8 +3,9 @@
 import os
 from pathlib import Path
 
-from browser_world import ROOT, Browsing
-from playwright.async_api import Dialog, FilePayload, Page, expect
+from playwright.async_api import FilePayload, Page, expect
+from web_desk import IN_ONE_LOOP, Desk
+from web_served import REPOSITORY
 
 from m2pem.editing.editable import editable
 from m2pem.errors import MissionError
@@ -12,12 +13,14 @@ from m2pem.model.bpmn import parse_mission
 from m2pem.model.bpmn.search_path import SearchPath
 from tests.editing.same_model import model_of, new_names
 
+pytestmark = IN_ONE_LOOP
+
 CORPORA = os.environ.get("M2PEM_CORPORA", "")
 FILES = sorted(
     [
-        *(ROOT / "missions").glob("*.bpmn"),
-        *(ROOT / "examples").glob("*/*.bpmn"),
-        *(ROOT / "docs" / "broken").glob("*.bpmn"),
+        *(REPOSITORY / "missions").glob("*.bpmn"),
+        *(REPOSITORY / "examples").glob("*/*.bpmn"),
+        *(REPOSITORY / "docs" / "broken").glob("*.bpmn"),
         *(Path(CORPORA).rglob("*.bpmn") if CORPORA else ()),
     ]
 )
@@ -44,8 +47,8 @@ async def downloaded(page: Page, item: str) -> bytes:
     return Path(await (await download.value).path()).read_bytes()  # noqa: ASYNC240  # small
 
 
-async def test_every_mission_goes_through_the_editor_without_loss(browsing: Browsing) -> None:
-    page = await browsing.edit("vignette1")
+async def test_every_mission_goes_through_the_editor_without_loss(desk: Desk) -> None:
+    page = await desk.edit()
     for number, file in enumerate(FILES):
         source = file.read_bytes()
         try:
@@ -61,10 +64,10 @@ async def test_every_mission_goes_through_the_editor_without_loss(browsing: Brow
             assert model_of(after) == model_of(before, new_names(before, after)), file
 
 
-async def test_every_element_has_its_form(browsing: Browsing) -> None:
-    page = await browsing.begin()
+async def test_every_element_has_its_form(desk: Desk) -> None:
+    page = desk.page
     for mission in ("mehds_vignette_1", "team_column"):
-        await browsing.edit(mission, page)
+        await desk.edit(mission, page)
         shapes = await page.locator("#m2-canvas .djs-container > svg .djs-shape").count()
         await page.locator("svg[data-element-id]").first.focus()
         seen = set()
@@ -76,11 +79,11 @@ async def test_every_element_has_its_form(browsing: Browsing) -> None:
         assert len(seen) > 20
 
 
-async def test_what_is_copied_keeps_its_behavior_in_another_mission(browsing: Browsing) -> None:
-    page = await browsing.edit("vignette1")
+async def test_what_is_copied_keeps_its_behavior_in_another_mission(desk: Desk) -> None:
+    page = await desk.edit()
     await page.click("[data-element-id=Reverse]")
     await page.keyboard.press("Control+c")
-    await browsing.edit("survey_pair", page)
+    await desk.edit("survey_pair", page)
     before = await page.locator(".djs-shape").count()
     await page.mouse.move(500, 700)
     await page.mouse.move(520, 700)
@@ -94,8 +97,8 @@ async def test_what_is_copied_keeps_its_behavior_in_another_mission(browsing: Br
     assert '<m2pem:property name="distance" value="10 m"' in saved
 
 
-async def test_pictures_are_drawn(browsing: Browsing) -> None:
-    page = await browsing.edit("vignette1")
+async def test_pictures_are_drawn(desk: Desk) -> None:
+    page = await desk.edit()
     svg = await downloaded(page, "picture (SVG)")
     assert b"DRIVE ROUTE" in svg
     assert b"evsg1" in svg
@@ -103,8 +106,8 @@ async def test_pictures_are_drawn(browsing: Browsing) -> None:
     assert png.startswith(b"\x89PNG")
 
 
-async def test_a_diagram_is_laid_out_and_put_back(browsing: Browsing) -> None:
-    page = await browsing.edit("vignette1")
+async def test_a_diagram_is_laid_out_and_put_back(desk: Desk) -> None:
+    page = await desk.edit()
     before = await page.locator("[data-element-id=Reverse]").first.get_attribute("transform")
     await page.get_by_role("button", name="Lay the diagram out anew").click()
     await page.get_by_role("button", name="Lay out", exact=True).click()
@@ -118,8 +121,8 @@ async def test_a_diagram_is_laid_out_and_put_back(browsing: Browsing) -> None:
     )
 
 
-async def test_a_called_process_of_another_diagram_is_shown(browsing: Browsing) -> None:
-    page = await browsing.edit("survey_pair")
+async def test_a_called_process_of_another_diagram_is_shown(desk: Desk) -> None:
+    page = await desk.edit("survey_pair")
     await page.get_by_role("button", name="Add a process").click()
     await page.get_by_label("Name of the process").fill("HELP")
     await page.keyboard.press("Enter")
@@ -135,25 +138,24 @@ async def test_a_called_process_of_another_diagram_is_shown(browsing: Browsing) 
     assert 'name="HELP"' in saved
 
 
-async def test_what_cannot_be_drawn_is_refused_with_the_reason(browsing: Browsing) -> None:
-    page = await browsing.edit("vignette1")
+async def test_what_cannot_be_drawn_is_refused_with_the_reason(desk: Desk) -> None:
+    page = await desk.edit()
     async with page.expect_file_chooser() as chooser:
         await from_menu(page, "Replace by a file")
     file = FilePayload(name="x.bpmn", mimeType="application/xml", buffer=b"<!DOCTYPE x><x/>")
     await (await chooser.value).set_files([file])
     await expect(page.get_by_role("alert")).to_contain_text("cannot be drawn")
     await expect(page.locator("[data-element-id=Reverse]")).to_have_count(1)
-    # Chromium logs the refusal itself.
-    browsing.faults[:] = [fault for fault in browsing.faults if "status of 4" not in fault]
+    desk.refusals.append(422)
 
 
 async def test_problems_lead_into_collapsed_subprocesses_and_other_diagrams(
-    browsing: Browsing,
+    desk: Desk,
 ) -> None:
-    page = await browsing.begin()
+    page = desk.page
     source = (Path(__file__).parent / "nested.bpmn").read_bytes()
-    (browsing.served.missions / "nested.bpmn").write_bytes(source)
-    await browsing.edit("nested", page)
+    (desk.executive.missions / "nested.bpmn").write_bytes(source)
+    await desk.edit("nested", page)
     problems = page.get_by_role("tab", name="Problems")
     for element, diagram in (("Unreached", "OUTER"), ("Bad", "OTHER")):
         await problems.click()
@@ -163,23 +165,3 @@ async def test_problems_lead_into_collapsed_subprocesses_and_other_diagrams(
         await expect(selected).to_have_attribute("data-element-id", element)
         tab = page.get_by_role("tab", name=diagram)
         await expect(tab).to_have_attribute("aria-selected", "true")
-
-
-async def test_changes_are_not_left_unasked(browsing: Browsing) -> None:
-    page = await browsing.begin()
-    asked: list[str] = []
-
-    async def stay(dialog: Dialog) -> None:
-        asked.append(dialog.message)
-        await dialog.dismiss()
-
-    await page.get_by_role("link", name="vignette1", exact=True).click()
-    await page.click("[data-element-id=Reverse]")
-    await page.get_by_label("Name", exact=True).fill("BACK OFF")
-    await expect(page.locator(".m2-saved-state")).to_have_text("Not saved yet")
-    page.on("dialog", stay)
-    await page.get_by_role("button", name="All missions").click()
-    await page.evaluate("history.back()")
-    await page.wait_for_url("**/missions/vignette1")
-    await expect(page.locator("[data-element-id=Reverse]").first).to_contain_text("BACK OFF")
-    assert len(asked) == 2
