@@ -130,9 +130,9 @@ async def test_a_called_process_of_another_diagram_is_shown(desk: Desk) -> None:
     ask = page.locator(".m2-block", has_text="Ask the operator")
     await ask.focus()
     await page.keyboard.press("Enter")
-    await expect(page.locator(".djs-shape")).to_have_count(1)
+    await expect(page.locator(".djs-shape:visible")).to_have_count(1)
     await page.get_by_role("tab", name="SURVEY").click()
-    await expect(page.locator("[data-element-id=GatewayWest], .djs-shape").first).to_be_visible()
+    await expect(page.locator("[data-element-id=WestSurveyed]").first).to_be_visible()
     saved = (await downloaded(page, "Download .bpmn")).decode()
     assert saved.count("<bpmndi:BPMNDiagram ") == 2
     assert 'name="HELP"' in saved

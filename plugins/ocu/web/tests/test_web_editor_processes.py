@@ -5,15 +5,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from playwright.async_api import Page, expect
-from web_browsing import browser, page_at
+from web_desk import IN_ONE_LOOP, Desk
 from web_drawing import Drawing
-from web_served import REPOSITORY, served
+from web_served import REPOSITORY
 
 from m2pem.model.bpmn import parse_mission
 from m2pem.model.bpmn.search_path import SearchPath
 from tests.editing.same_model import model_of
 
+pytestmark = IN_ONE_LOOP
+
 NAME = "survey_pair"
+NESTED = Path(__file__).parent / "nested.bpmn"
 SHOWN = ".djs-shape:visible:not([data-element-id$=_label])"
 
 
@@ -56,115 +59,112 @@ async def redo(page: Page) -> None:
 
 
 async def test_what_was_done_on_several_diagrams_is_undone_and_redone_in_one_row(
-    tmp_path: Path,
+    desk: Desk,
 ) -> None:
-    with served(tmp_path) as executive:
-        shutil.copy(REPOSITORY / "missions" / f"{NAME}.bpmn", executive.missions)
-        async with browser() as chromium, page_at(chromium, executive.url) as it:
-            page = it.page
-            await page.get_by_role("link", name=NAME).click()
-            drawing = Drawing(page)
-            await expect(drawing.element("WestSurveyed")).to_be_visible()
-            before = await page.locator(SHOWN).count()
-            await drawing.select("WestSurveyed")
-            await page.get_by_label("Name", exact=True).fill("Done?")
-            await expect(page.get_by_role("button", name="Undo")).to_be_enabled()
+    page = await desk.edit(NAME)
+    drawing = Drawing(page)
+    await expect(drawing.element("WestSurveyed")).to_be_visible()
+    before = await page.locator(SHOWN).count()
+    await drawing.select("WestSurveyed")
+    await page.get_by_label("Name", exact=True).fill("Done?")
+    await expect(page.get_by_role("button", name="Undo")).to_be_enabled()
 
-            await add_process(page, "HELP")
-            await tabs(page, ["SURVEY BY TWO COPTERS", "HELP"], "HELP")
-            await page.locator(".m2-block", has_text="Ask the operator").focus()
-            await page.keyboard.press("Enter")
-            await expect(page.locator(SHOWN)).to_have_count(1)
-            await page.get_by_role("tab", name="SURVEY BY TWO COPTERS").click()
-            await expect(page.locator(SHOWN)).to_have_count(before)
+    await add_process(page, "HELP")
+    await tabs(page, ["SURVEY BY TWO COPTERS", "HELP"], "HELP")
+    await page.locator(".m2-block", has_text="Ask the operator").focus()
+    await page.keyboard.press("Enter")
+    await expect(page.locator(SHOWN)).to_have_count(1)
+    await page.get_by_role("tab", name="SURVEY BY TWO COPTERS").click()
+    await expect(page.locator(SHOWN)).to_have_count(before)
 
-            await undo(page)  # what it takes back is shown
-            await tabs(page, ["SURVEY BY TWO COPTERS", "HELP"], "HELP")
-            await expect(page.locator(SHOWN)).to_have_count(0)
-            await undo(page)
-            await tabs(page, ["SURVEY BY TWO COPTERS"], "SURVEY BY TWO COPTERS")
-            await undo(page)
-            await expect(drawing.element("WestSurveyed")).not_to_contain_text("Done?")
-            await expect(page.locator(".m2-saved-state")).to_have_text("Saved")
-            for _ in range(3):
-                await redo(page)
-            await expect(page.locator(SHOWN)).to_have_count(1)
+    await undo(page)  # what it takes back is shown
+    await tabs(page, ["SURVEY BY TWO COPTERS", "HELP"], "HELP")
+    await expect(page.locator(SHOWN)).to_have_count(0)
+    await undo(page)
+    await tabs(page, ["SURVEY BY TWO COPTERS"], "SURVEY BY TWO COPTERS")
+    await undo(page)
+    await expect(drawing.element("WestSurveyed")).not_to_contain_text("Done?")
+    await expect(page.locator(".m2-saved-state")).to_have_text("Saved")
+    for _ in range(3):
+        await redo(page)
+    await expect(page.locator(SHOWN)).to_have_count(1)
 
-            await page.get_by_role("tab", name="SURVEY BY TWO COPTERS").click()
-            await page.get_by_role("button", name="Remove SURVEY BY TWO COPTERS").click()
-            await page.get_by_role("dialog").get_by_role("button", name="Remove").click()
-            await tabs(page, ["HELP"], "HELP")
-            await expect(page.get_by_role("button", name="Remove HELP")).to_have_count(0)
-            await undo(page)
-            await tabs(page, ["SURVEY BY TWO COPTERS", "HELP"], "SURVEY BY TWO COPTERS")
-            await expect(page.locator(SHOWN)).to_have_count(before)
-            await redo(page)
-            await tabs(page, ["HELP"], "HELP")
-            await undo(page, 2)
-            await tabs(page, ["SURVEY BY TWO COPTERS", "HELP"], "HELP")
-            await undo(page)
-            await tabs(page, ["SURVEY BY TWO COPTERS"], "SURVEY BY TWO COPTERS")
-            await undo(page)
+    await page.get_by_role("tab", name="SURVEY BY TWO COPTERS").click()
+    await page.get_by_role("button", name="Remove SURVEY BY TWO COPTERS").click()
+    await page.get_by_role("dialog").get_by_role("button", name="Remove").click()
+    await tabs(page, ["HELP"], "HELP")
+    await expect(page.get_by_role("button", name="Remove HELP")).to_have_count(0)
+    await undo(page)
+    await tabs(page, ["SURVEY BY TWO COPTERS", "HELP"], "SURVEY BY TWO COPTERS")
+    await expect(page.locator(SHOWN)).to_have_count(before)
+    await redo(page)
+    await tabs(page, ["HELP"], "HELP")
+    await undo(page, 2)
+    await tabs(page, ["SURVEY BY TWO COPTERS", "HELP"], "HELP")
+    await undo(page)
+    await tabs(page, ["SURVEY BY TWO COPTERS"], "SURVEY BY TWO COPTERS")
+    await undo(page)
 
-            await add_process(page, "LATER")
-            await undo(page)
-            await save_renamed(drawing, "WestSurveyed", "Done?")
-            it.assert_well()
-        source = (REPOSITORY / "missions" / f"{NAME}.bpmn").read_text()
-        again = (
-            (executive.missions / f"{NAME}.bpmn")
-            .read_text()
-            .replace('"Done?"', '"West half surveyed?"')
-        )
-        assert model(again) == model(source)
+    await add_process(page, "LATER")
+    await undo(page)
+    await save_renamed(drawing, "WestSurveyed", "Done?")
+    source = (REPOSITORY / "missions" / f"{NAME}.bpmn").read_text()
+    again = (
+        (desk.executive.missions / f"{NAME}.bpmn")
+        .read_text()
+        .replace('"Done?"', '"West half surveyed?"')
+    )
+    assert model(again) == model(source)
 
 
-async def test_pools_that_were_removed_come_back_as_they_were(tmp_path: Path) -> None:
-    with served(tmp_path) as executive:
-        source = REPOSITORY / "missions" / "vignette1.bpmn"
-        shutil.copy(source, executive.missions)
-        async with browser() as chromium, page_at(chromium, executive.url) as it:
-            page = it.page
-            await page.get_by_role("link", name="vignette1").click()
-            await expect(Drawing(page).element("PoolVignette1")).to_be_visible()
-            before = await page.locator(SHOWN).count()
-            pools = (await page.get_by_role("tab", selected=True).first.inner_text()).strip()
-            await add_process(page, "HELP")
-            await page.get_by_role("tab", name=pools).click()
-            await page.get_by_role("button", name=f"Remove {pools}").click()
-            await page.get_by_role("dialog").get_by_role("button", name="Remove").click()
-            await tabs(page, ["HELP"], "HELP")
-            await undo(page)
-            await expect(page.locator(SHOWN)).to_have_count(before)
-            await undo(page)
-            await tabs(page, [pools], pools)
-            await save_renamed(Drawing(page), "Reverse", "Turn back")
-            it.assert_well()
-        drawn = (executive.missions / "vignette1.bpmn").read_text()
-        name = model(
-            source.read_text().replace(
-                'id="Reverse" name="REVERSE"', 'id="Reverse" name="Turn back"'
-            )
-        )
-        assert model(drawn) == name
+async def test_pools_that_were_removed_come_back_as_they_were(desk: Desk) -> None:
+    page = await desk.edit("vignette1")
+    source = REPOSITORY / "missions" / "vignette1.bpmn"
+    await expect(Drawing(page).element("PoolVignette1")).to_be_visible()
+    before = await page.locator(SHOWN).count()
+    pools = (await page.get_by_role("tab", selected=True).first.inner_text()).strip()
+    await add_process(page, "HELP")
+    await page.get_by_role("tab", name=pools).click()
+    await page.get_by_role("button", name=f"Remove {pools}").click()
+    await page.get_by_role("dialog").get_by_role("button", name="Remove").click()
+    await tabs(page, ["HELP"], "HELP")
+    await undo(page)
+    await expect(page.locator(SHOWN)).to_have_count(before)
+    await undo(page)
+    await tabs(page, [pools], pools)
+    await save_renamed(Drawing(page), "Reverse", "Turn back")
+    drawn = (desk.executive.missions / "vignette1.bpmn").read_text()
+    name = model(
+        source.read_text().replace('id="Reverse" name="REVERSE"', 'id="Reverse" name="Turn back"')
+    )
+    assert model(drawn) == name
 
 
-async def test_all_and_what_is_in_a_frame_are_of_the_diagram_that_is_shown(tmp_path: Path) -> None:
-    with served(tmp_path) as executive:
-        shutil.copy(REPOSITORY / "missions" / f"{NAME}.bpmn", executive.missions)
-        async with browser() as chromium, page_at(chromium, executive.url) as it:
-            page = it.page
-            await page.get_by_role("link", name=NAME).click()
-            await expect(Drawing(page).element("WestSurveyed")).to_be_visible()
-            await add_process(page, "HELP")
-            await page.locator(".m2-block", has_text="Ask the operator").focus()
-            await page.keyboard.press("Enter")
-            await expect(page.locator(SHOWN)).to_have_count(1)
-            await page.locator("svg[data-element-id]").first.focus()
-            await page.keyboard.press("Control+a")
-            await expect(page.locator(".djs-element.selected")).to_have_count(1)
-            await page.keyboard.press("Delete")
-            await expect(page.locator(SHOWN)).to_have_count(0)
-            await page.get_by_role("tab", name="SURVEY BY TWO COPTERS").click()
-            await expect(Drawing(page).element("WestSurveyed")).to_be_visible()
-            it.assert_well()
+async def test_what_is_in_a_collapsed_subprocess_comes_back_with_its_process(desk: Desk) -> None:
+    shutil.copy(NESTED, desk.executive.missions)
+    page = await desk.edit(NESTED.stem)
+    await page.get_by_role("tab", name="OUTER").click()
+    before = await page.locator(SHOWN).count()
+    await page.get_by_role("button", name="Remove OUTER").click()
+    await page.get_by_role("dialog").get_by_role("button", name="Remove").click()
+    await tabs(page, ["OTHER"], "OTHER")
+    await undo(page)
+    await expect(page.locator(SHOWN)).to_have_count(before)
+    await page.locator(".bjs-drilldown:visible").click()
+    await expect(page.locator("[data-element-id=Unreached]")).to_be_visible()
+
+
+async def test_all_and_what_is_in_a_frame_are_of_the_diagram_that_is_shown(desk: Desk) -> None:
+    page = await desk.edit(NAME)
+    await expect(Drawing(page).element("WestSurveyed")).to_be_visible()
+    await add_process(page, "HELP")
+    await page.locator(".m2-block", has_text="Ask the operator").focus()
+    await page.keyboard.press("Enter")
+    await expect(page.locator(SHOWN)).to_have_count(1)
+    await page.locator("svg[data-element-id]").first.focus()
+    await page.keyboard.press("Control+a")
+    await expect(page.locator(".djs-element.selected")).to_have_count(1)
+    await page.keyboard.press("Delete")
+    await expect(page.locator(SHOWN)).to_have_count(0)
+    await page.get_by_role("tab", name="SURVEY BY TWO COPTERS").click()
+    await expect(Drawing(page).element("WestSurveyed")).to_be_visible()
