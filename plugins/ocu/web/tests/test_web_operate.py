@@ -126,14 +126,26 @@ async def test_a_vehicle_is_taken_and_given_back(desk: Desk) -> None:
     page = await desk.start()
     card = page.locator(".card", has_text="evsg2")
     log = page.get_by_role("region", name="Events")
-    await card.get_by_role("button", name="Take over").click()
+    await card.get_by_role("button", name="Take over", exact=True).click()
     await expect(card).to_contain_text("with anna")
     assert await holder(desk, "evsg2") == "anna"
     await expect(log.get_by_text("anna took evsg2")).to_be_visible()
-    await card.get_by_role("button", name="Give back").click()
-    await expect(card.get_by_role("button", name="Take over")).to_be_visible()
+    await card.get_by_role("button", name="Give back", exact=True).click()
+    await expect(card.get_by_role("button", name="Take over", exact=True)).to_be_visible()
     assert await holder(desk, "evsg2") == ""
     await expect(log.get_by_text("anna gave evsg2 back")).to_be_visible()
+
+
+async def test_a_payload_is_taken_without_its_vehicle(desk: Desk) -> None:
+    page = await desk.start()
+    card = page.locator(".card", has_text="evsg2")
+    await card.get_by_role("button", name="Take over ptz").click()
+    await expect(card).to_contain_text("with anna")
+    assert await holder(desk, "evsg2/ptz") == "anna"
+    assert await holder(desk, "evsg2") == ""
+    await card.get_by_role("button", name="Give back ptz").click()
+    await expect(card.get_by_role("button", name="Take over ptz")).to_be_visible()
+    assert await holder(desk, "evsg2/ptz") == ""
 
 
 async def holder(desk: Desk, vehicle: str) -> str:

@@ -109,12 +109,12 @@ async def test_all_see_who_has_taken_a_vehicle(chromium: Browser, staffed: Serve
         run = await start(anna.page, staffed)
         await otto.page.goto(run)
         taken = otto.page.locator(".card", has_text="evsg2")
-        await taken.get_by_role("button", name="Take over").click()
+        await taken.get_by_role("button", name="Take over", exact=True).click()
         seen = anna.page.locator(".card", has_text="evsg2")
         await expect(seen).to_contain_text("with otto")
-        await expect(seen.get_by_role("button", name="Give back")).to_be_disabled()
-        await taken.get_by_role("button", name="Give back").click()
-        await expect(seen.get_by_role("button", name="Take over")).to_be_enabled()
+        await expect(seen.get_by_role("button", name="Give back", exact=True)).to_be_disabled()
+        await taken.get_by_role("button", name="Give back", exact=True).click()
+        await expect(seen.get_by_role("button", name="Take over", exact=True)).to_be_enabled()
 
 
 async def test_a_viewer_sees_all_and_finds_nothing_to_steer_with(

@@ -185,9 +185,12 @@ function Doing({ resource, name, look }: DoingProps) {
         ))
       )}
       {look && look.footprint.length > 0 && <small> {directionOf(look)}</small>}
+      {isPayload(resource) && <HandOver resource={resource} name={name} />}
     </p>
   );
 }
+
+const isPayload = (resource: string) => resource.includes("/");
 
 /** Of a camera: from the bow, up or down, and how near. */
 function directionOf({ pan_rad, tilt_rad, zoom }: PayloadState): string {
@@ -201,7 +204,8 @@ function directionOf({ pan_rad, tilt_rad, zoom }: PayloadState): string {
     .join(" ");
 }
 
-function HandOver({ resource }: { resource: string }) {
+/** `name`: of a payload, which has its button in its line. */
+function HandOver({ resource, name }: { resource: string; name?: string }) {
   const { scene } = useOperating();
   if (scene.mode !== "live" || !may("operator")) return null;
   const holder = scene.holders.value[resource] ?? "";
@@ -211,12 +215,15 @@ function HandOver({ resource }: { resource: string }) {
       toast(fill(done, { resource }), "good");
     }
   };
+  const kind = name ? "card-hand-over" : "secondary";
+  const label = (act: string) => (name ? `${act} ${name}` : undefined);
   if (isOperator(holder)) {
     const own = holder === session.value?.user;
     return (
       <button
         type="button"
-        class="secondary"
+        class={kind}
+        aria-label={label(text.giveBack)}
         disabled={!own}
         onClick={() => void ask("give-back", text.given)}
       >
@@ -227,7 +234,8 @@ function HandOver({ resource }: { resource: string }) {
   return (
     <button
       type="button"
-      class="secondary"
+      class={kind}
+      aria-label={label(text.take)}
       title={text.takeHint}
       onClick={() => void ask("take", text.taken)}
     >
