@@ -154,3 +154,20 @@ def test_several_reset_at_one_moment() -> None:
     """).start({"x": False})
     assert play.answer(prompt="v").at == "u g2"
     assert play.answer(prompt="u").ended == "completed"
+
+
+def test_what_interrupts_its_scope_leaves_nothing_to_reset() -> None:
+    after = """
+        join -> after
+        join -> late if not waitingForStart
+        <subProcess id="handler" triggeredByEvent="true">
+          <startEvent id="called"><signalEventDefinition signalRef="s"/></startEvent>
+          <userTask id="handle"/>
+          called -> handle
+        </subProcess>
+    """
+    play = Play(three("activationCount &gt;= 1", after)).start()
+    assert play.answer(prompt="a").at == "b c after"
+    assert play.signal("s").at == "handle"
+    assert play.answer(prompt="handle").ended == "completed"
+    assert "late" not in play.entered()

@@ -68,7 +68,15 @@ def test_a_task_of_a_sketch_takes_time() -> None:
 
 
 def test_a_file_that_takes_too_much_memory_is_told(tmp_path: Path) -> None:
-    (tmp_path / "sketch.bpmn").write_bytes(SKETCH)
+    branches = "".join(
+        f'<task id="T{n}"/><endEvent id="E{n}"/>'
+        f'<sequenceFlow id="t{n}" sourceRef="S" targetRef="T{n}"/>'
+        f'<sequenceFlow id="e{n}" sourceRef="T{n}" targetRef="E{n}"/>'
+        for n in range(8)
+    )
+    wide = SKETCH.replace(b'<startEvent id="S"/>', b'<startEvent id="S"/>' + branches.encode())
+    (tmp_path / "wide.bpmn").write_bytes(wide)
+    assert checked(tmp_path).wrong == []
     counts = checked(tmp_path, Terms(memory_mb=1))
     assert len(counts.wrong) == 1
     assert " MB" in counts.wrong[0]

@@ -54,6 +54,7 @@ def _scope_closed(state: RunState, record: r.ScopeClosed) -> None:
 def _scope_interrupted(state: RunState, record: r.ScopeInterrupted) -> None:
     scope = state.scopes[record.scope]
     scope.interrupted = True
+    scope.activated.clear()  # no token comes any more for which a complex gateway would wait
     undoing.drop_compensations(scope)
     _disarm_event_subprocesses(state, scope)
 
@@ -74,6 +75,7 @@ def _transaction_cancelled(state: RunState, record: r.TransactionCancelled) -> N
     """The transaction is not active any more: nothing but its rollback can happen to it."""
     scope = state.scopes[record.scope]
     scope.cancelled = scope.interrupted = True
+    scope.activated.clear()
     undoing.drop_compensations(scope)
     for holder in (scope, scope.owner):
         if holder is not None and holder.waits is not None:

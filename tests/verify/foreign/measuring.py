@@ -1,5 +1,6 @@
 """Judges each file in a forked process, and measures what it took: a crash costs one file."""
 
+import gc
 import os
 import pickle
 import resource
@@ -17,11 +18,14 @@ _GRACE = 15.0
 """How many times its seconds a file may take before it counts as a hang."""
 _SPARE_MB = 1_000.0
 """Address space beyond the memory asked for: it is reserved, not used."""
+_PAGE = resource.getpagesize()
+_WORD = 8
+"""Bytes in which a process says first how much memory it began with."""
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """`judgement` None: `crash` says why. `peak_mb`: all of its memory."""
+    """`judgement` None: `crash` says why. `peak_mb`: of memory, beyond what it began with."""
 
     path: Path
     judgement: Judgement | None
@@ -45,7 +49,8 @@ def _measure(path: Path, terms: Terms) -> Measured:
     said = _read(reading, child, terms.seconds * _GRACE)
     os.close(reading)
     _, status, used = os.wait4(child, 0)
-    peak_mb = used.ru_maxrss / 1024
+    began, said = said[:_WORD], said[_WORD:]
+    peak_mb = used.ru_maxrss / 1024 - int.from_bytes(began, "little") / (1 << 20)
     if not said:
         code = os.waitstatus_to_exitcode(status)
         return Measured(path, None, f"the process ended with {code}", peak_mb)
@@ -56,7 +61,10 @@ def _measure(path: Path, terms: Terms) -> Measured:
 
 
 def _serve(path: Path, terms: Terms, writing: int) -> NoReturn:
-    address_space = int((terms.memory_mb + _SPARE_MB) * 1e6)
+    gc.freeze()  # a collection would copy all that the process was forked with
+    size, resident = _memory()
+    os.write(writing, resident.to_bytes(_WORD, "little"))
+    address_space = size + int((terms.memory_mb + _SPARE_MB) * 1e6)
     resource.setrlimit(resource.RLIMIT_AS, (address_space, address_space))
     found: Judgement | str
     try:
@@ -68,6 +76,12 @@ def _serve(path: Path, terms: Terms, writing: int) -> NoReturn:
     os._exit(0)
 
 
+def _memory() -> tuple[int, int]:
+    """Bytes of address space, and of it in memory, of this process now."""
+    size, resident = Path("/proc/self/statm").read_text(encoding="ascii").split()[:2]
+    return int(size) * _PAGE, int(resident) * _PAGE
+
+
 def _read(reading: int, child: int, hang_s: float) -> bytes:
     """What the process says; if it had to be stopped, that."""
     said = b""
@@ -75,7 +89,9 @@ def _read(reading: int, child: int, hang_s: float) -> bytes:
         ready, _, _ = select.select([reading], [], [], hang_s)
         if not ready:
             os.kill(child, signal.SIGKILL)
-            return pickle.dumps(f"it hangs: nothing is said for {hang_s:g} s")
+            return said[:_WORD].ljust(_WORD, b"\0") + pickle.dumps(
+                f"it hangs: nothing is said for {hang_s:g} s"
+            )
         part = os.read(reading, 1 << 16)
         if not part:
             return said
