@@ -241,7 +241,7 @@ PROGRAMS = (
         (
             Goal("ratio", "an engine with the page, times its speed without", "", 0.95, True),
             Goal("per_s", "the page, token events, all of them counted", "/s"),
-            Goal("frames_per_s", "the page, frames to a browser", "/s", 20, at_least=True),
+            Goal("frames_per_s", "the page, frames to a browser", "/s", 24, at_least=True),
             Goal("frame_p50_ms", "the page, from a frame's making to the browser, p50", "ms"),
             Goal("frame_p99_ms", "the page, from a frame's making to the browser, p99", "ms"),
             Goal("event_p50_ms", "the page, from an event to the browser, p50", "ms"),
@@ -256,7 +256,7 @@ PROGRAMS = (
         ("web_page", "2"),
         (
             Goal("fps", "the page, pictures drawn", "/s", 25, at_least=True),
-            Goal("told_per_s", "the page, frames told to it", "/s", 20, at_least=True),
+            Goal("told_per_s", "the page, frames told to it", "/s", 24, at_least=True),
             Goal("per_s", "the page, token events, all of them counted", "/s"),
             Goal("longest_ms", "the page, the longest time between two pictures", "ms"),
         ),
