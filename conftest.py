@@ -1,5 +1,7 @@
 """What all tests here go by: none fails because a computer is busy with something else."""
 
+import signal
+
 from hypothesis import HealthCheck, settings
 
 # Beside what is said here, what Hypothesis itself takes to be right where it is run.
@@ -7,3 +9,7 @@ settings.register_profile(
     "patient", settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("patient")
+
+# A shell that starts the tests in the background has them, and all that they start, ignore Ctrl-C.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
