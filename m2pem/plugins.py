@@ -126,6 +126,10 @@ class PluginManager:
         """The service of that name; errors as for `arbiter`."""
         return self._one("service", self.services(), name)
 
+    def service_writes(self) -> dict[str, tuple[str, ...]]:
+        """What each service writes to the data store, by its name; errors as for `arbiter`."""
+        return {name: tuple(self.service(name)().writes) for name in self.services()}
+
     def commands(self, cli: "click.Group") -> None:
         """Add the plugins' commands; a plugin that would replace a command adds none.
 

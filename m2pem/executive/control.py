@@ -315,8 +315,7 @@ class Control:
 
     def services(self) -> Mapping[str, Sequence[str]]:
         """The service-task classes that there are, with what each writes."""
-        plugins = self._executive.plugins
-        return {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
+        return self._executive.plugins.service_writes()
 
 
 def _named(name: str, signals: Mapping[str, Signal]) -> list[str]:

@@ -94,7 +94,7 @@ def findings_for(
 
     `data`: names given at start (`--data`). `arbiters` None: no fleet, so roles are not checked.
     """
-    writes = {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
+    writes = plugins.service_writes()
     findings = [*mission.warnings, *lint(mission, data, writes, _behavior_writes(arbiters))]
     beginning = [each.id for each in mission.processes if not each.global_task]
     if process is not None and process not in beginning:

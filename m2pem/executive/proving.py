@@ -69,7 +69,7 @@ def asked_of(
     """
     wrong = findings_for(mission, arbiters, plugins, tuple(data), process, simulated=simulated)
     refuse_errors(f"{mission.file} cannot be verified: `m2pem check` finds errors", wrong)
-    writes = {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
+    writes = plugins.service_writes()
     options = Options(data=data, service_writes=writes, timers_in_order=timers_in_order)
     fleet = arbiters.fleet if arbiters is not None else fleet_for(mission)
     requirements = gather(Names(mission, fleet, writes, data), spec)

@@ -30,7 +30,7 @@ def requirement_findings(
     from m2pem.verify.requirements import Names, gather  # noqa: PLC0415
     from m2pem.verify.requirements.requirement import RequirementsError  # noqa: PLC0415
 
-    writes = {name: tuple(plugins.service(name)().writes) for name in plugins.services()}
+    writes = plugins.service_writes()
     fleet = arbiters.fleet if arbiters is not None else fleet_for(mission)
     try:
         gather(Names(mission, fleet, writes, data))

@@ -1,5 +1,6 @@
 """Several processes in one file: each on a diagram of its own, and all undone in one row."""
 
+import re
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -168,3 +169,23 @@ async def test_all_and_what_is_in_a_frame_are_of_the_diagram_that_is_shown(desk:
     await expect(page.locator(SHOWN)).to_have_count(0)
     await page.get_by_role("tab", name="SURVEY BY TWO COPTERS").click()
     await expect(Drawing(page).element("WestSurveyed")).to_be_visible()
+
+
+async def test_a_second_diagram_of_the_same_process_is_drawn_when_it_is_opened(desk: Desk) -> None:
+    file = desk.executive.missions / f"{NAME}.bpmn"
+    text = file.read_text()
+    begin = text.index("<bpmndi:BPMNDiagram")
+    end = text.index("</bpmndi:BPMNDiagram>") + len("</bpmndi:BPMNDiagram>")
+    second = re.sub(r'(<bpmndi:\w+ id=")', r"\1Second_", text[begin:end])
+    file.write_text(text[:end] + second + text[end:])
+    page = await desk.edit(NAME)
+    views = page.get_by_role("tab", name="SURVEY BY TWO COPTERS")
+    await expect(views).to_have_count(2)
+    before = await page.locator(SHOWN).count()
+    await views.nth(1).click()
+    await expect(views.nth(1)).to_have_attribute("aria-selected", "true")
+    await expect(page.locator(SHOWN)).to_have_count(before)
+    await views.nth(0).click()
+    await expect(views.nth(0)).to_have_attribute("aria-selected", "true")
+    await save_renamed(Drawing(page), "WestSurveyed", "Done?")
+    assert file.read_text().count("<bpmndi:BPMNDiagram ") == 2
