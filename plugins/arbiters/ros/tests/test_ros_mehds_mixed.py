@@ -19,7 +19,8 @@ STORIES = [
         ("EndAborted",),
         (
             Trouble("RouteSweep", 30, ground=f"evsg1: {SILENT}"),
-            Trouble("RouteSweep", 60, visit=2, ground=f"evsg3: {STUCK}"),
+            # By then all have gone back to where the route begins, and waited for each other there.
+            Trouble("RouteSweep", 220, visit=2, ground=f"evsg3: {STUCK}"),
             Trouble("TraverseAlternate", 90, ground=f"evsg2: {STUCK}"),
         ),
     ),
