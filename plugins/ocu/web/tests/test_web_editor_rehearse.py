@@ -90,6 +90,31 @@ async def test_answers_that_do_not_fit_are_refused_with_the_reason(desk: Desk) -
     await expect(refused).to_contain_text("UserSendRoute")
 
 
+async def test_what_is_typed_as_yaml_is_read_back_into_the_form(desk: Desk) -> None:
+    page = await desk.edit(tab="Run")
+    part = page.get_by_role("region", name="Rehearse")
+    await part.get_by_text("What happens in the rehearsal").click()
+    await part.get_by_role("button", name="Write it as YAML").click()
+    yaml = part.get_by_label("Answers file (YAML)")
+    back = part.get_by_role("button", name="Back to the form")
+    typed = "answers: {UserSendRout: [continue, abort]}\nservices: {Detector: [{after: 2 min}]}\n"
+    await yaml.fill(typed)
+    await back.click()
+    told = part.get_by_text("answers.UserSendRout: the form has no such task")
+    await expect(told).to_be_visible()
+    await expect(yaml).to_have_value(typed)
+    await yaml.fill(typed.replace("Rout:", "Route:"))
+    await back.click()
+    visits = part.get_by_role("group", name="USER SEND ROUTE")
+    await expect(visits.get_by_label("visit 2")).to_have_value("abort")
+    await expect(part.get_by_label("After, in seconds")).to_have_value("120")
+    # A row as it is added can be rehearsed.
+    await part.get_by_role("button", name="Script a behavior").click()
+    await part.get_by_role("button", name="Rehearse").click()
+    outcome = part.get_by_role("region", name="What came of it")
+    await expect(outcome.get_by_role("heading", name="Terminated")).to_be_visible()
+
+
 async def test_a_simulated_run_starts_once_and_is_shown(desk: Desk) -> None:
     page = await desk.edit(tab="Run")
     panel = page.get_by_role("tabpanel", name="Run")

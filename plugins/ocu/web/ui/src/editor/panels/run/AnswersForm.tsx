@@ -21,6 +21,7 @@ export function AnswersForm({ editor, rehearsal }: AnswersFormProps) {
   // Tasks come and go while the mission is drawn.
   editor.changes.value;
   const raw = rehearsal.raw.value;
+  const unread = rehearsal.unread.value;
   const script = rehearsal.script.value;
   const write = (next: Partial<Script>) => {
     rehearsal.script.value = { ...script, ...next };
@@ -35,13 +36,16 @@ export function AnswersForm({ editor, rehearsal }: AnswersFormProps) {
           rows={10}
           mono
           value={raw}
-          write={(text) => {
-            rehearsal.raw.value = text;
-          }}
+          write={(text) => rehearsal.write(text)}
         />
-        <button type="button" class="m2-button" onClick={() => (rehearsal.raw.value = null)}>
+        <button type="button" class="m2-button" onClick={() => void rehearsal.readBack(editor)}>
           {words.toForm}
         </button>
+        {unread !== null && (
+          <p class="m2-field-error" role="alert">
+            {fill(words.unread.stays, { reason: unread })}
+          </p>
+        )}
       </>
     );
   }
@@ -55,7 +59,8 @@ export function AnswersForm({ editor, rehearsal }: AnswersFormProps) {
       <button
         type="button"
         class="m2-button"
-        onClick={() => (rehearsal.raw.value = yamlOf(script))}
+        disabled={!rehearsal.isReady.value}
+        onClick={() => rehearsal.write(yamlOf(script))}
       >
         {words.toYaml}
       </button>

@@ -4,7 +4,7 @@ import { SelectField } from "../../properties/fields/SelectField";
 import { TextField } from "../../properties/fields/TextField";
 import { Rows } from "../../properties/forms/Rows";
 import { commandingTasks, servingTasks, type Task } from "../drawn";
-import { ENDS, isGiven } from "./answers";
+import { carriesError, ENDS, isGiven } from "./answers";
 import type { PartProps } from "./AnswersForm";
 import { Seconds } from "./Seconds";
 
@@ -92,7 +92,7 @@ export function Behaviors({ editor, script, write }: PartProps) {
       <Rows
         rows={script.behaviors}
         write={(behaviors) => write({ behaviors })}
-        add={() => ({ element: tasks[0]?.id ?? "", after: "", end: "failed" as const, error: "" })}
+        add={() => ({ element: tasks[0]?.id ?? "", after: "5", end: "failed" as const, error: "" })}
         addLabel={words.addBehavior}
         empty={words.behaviorUsual}
         label={(row) => nameOf(tasks, row.element)}
@@ -120,9 +120,10 @@ export function Behaviors({ editor, script, write }: PartProps) {
                 id={`${id}-after`}
                 label={words.after}
                 value={row.after}
+                required
                 write={(after) => change({ after })}
               />
-              {(row.end === "failed" || row.end === "lost") && (
+              {carriesError(row.end) && (
                 <TextField
                   id={`${id}-error`}
                   label={words.error}

@@ -9,7 +9,7 @@ const script: Script = {
   ],
   behaviors: [
     { element: "DriveRoute", after: "30", end: "failed", error: "ROUTE_BLOCKED" },
-    { element: "DriveStop", after: "", end: "stalled", error: "ignored" },
+    { element: "DriveStop", after: "9", end: "stalled", error: "ignored" },
   ],
   sends: [
     { kind: "signal", id: "dc45ff2b-ef6b", at: "12.5", data: "reason = dust, depth = 2" },
@@ -29,11 +29,11 @@ behaviors:
   DriveRoute:
     - {after: 30 s, end: failed, error: ROUTE_BLOCKED}
   DriveStop:
-    - {end: stalled}
+    - {after: 9 s, end: stalled}
 signals:
   - {at: 12.5 s, id: dc45ff2b-ef6b, data: {reason: dust, depth: 2}}
 messages:
-  - {at: 0 s, id: "7c1e4a90-2f53", data: {}}
+  - {at: 0 s, id: "7c1e4a90-2f53"}
 `);
   });
 
@@ -46,9 +46,10 @@ messages:
     const [send] = script.sends;
     expect(isComplete({ ...script, sends: [{ ...send!, at: "" }] })).toBe(false);
     expect(isComplete({ ...script, sends: [{ ...send!, data: "dust" }] })).toBe(false);
-    expect(isComplete({ ...script, behaviors: [{ ...script.behaviors[0]!, after: "soon" }] })).toBe(
-      false,
-    );
+    for (const after of ["soon", ""]) {
+      const behaviors = [{ ...script.behaviors[0]!, after }];
+      expect(isComplete({ ...script, behaviors })).toBe(false);
+    }
   });
 });
 

@@ -5,7 +5,10 @@ export type End = "failed" | "stalled" | "lost" | "succeeded";
 
 export const ENDS: readonly End[] = ["failed", "stalled", "lost", "succeeded"];
 
-/** Of a behavior: after how many seconds it ends ("": in its own time), how, and with what error. */
+/** Whether a behavior that ends in this way does so with an error. */
+export const carriesError = (end: End): boolean => end === "failed" || end === "lost";
+
+/** Of a behavior: after how many seconds it ends, how, and with what error. */
 export interface ScriptedBehavior {
   element: string;
   after: string;
@@ -45,7 +48,7 @@ export const isSeconds = (text: string): boolean => /^\d+(\.\d+)?$/.test(text.tr
 export function isComplete(script: Script): boolean {
   const timed = (text: string) => text.trim() === "" || isSeconds(text);
   return (
-    script.behaviors.every(({ element, after }) => element && timed(after)) &&
+    script.behaviors.every(({ element, after }) => element && isSeconds(after)) &&
     script.services.every((row) => row.element && timed(row.after) && isGiven(row)) &&
     script.sends.every(({ id, at, data }) => id && isSeconds(at) && dataOf(data) !== undefined)
   );
@@ -99,11 +102,10 @@ function flow(pairs: readonly (readonly [name: string, text: string])[]): string
 }
 
 function behaviorEntry({ after, end, error }: ScriptedBehavior): string {
-  const carriesError = end === "failed" || end === "lost";
   return flow([
-    ...(after.trim() ? [["after", seconds(after)] as const] : []),
+    ["after", seconds(after)],
     ["end", end],
-    ...(carriesError && error.trim() ? [["error", written(error.trim())] as const] : []),
+    ...(carriesError(end) && error.trim() ? [["error", written(error.trim())] as const] : []),
   ]);
 }
 
@@ -117,11 +119,13 @@ function serviceEntry({ after, name, value, error }: ScriptedService): string {
 }
 
 function sendEntry({ id, at, data }: ScriptedSend): string {
-  const map = Object.entries(dataOf(data) ?? {});
+  const map = Object.entries(dataOf(data) ?? {}).map(
+    ([name, value]) => [key(name), writtenValue(value)] as const,
+  );
   return flow([
     ["at", seconds(at)],
     ["id", written(id)],
-    ["data", flow(map.map(([name, value]) => [key(name), writtenValue(value)]))],
+    ...(map.length ? [["data", flow(map)] as const] : []),
   ]);
 }
 

@@ -7,6 +7,7 @@ import { beginningOf } from "../begin/beginning";
 import { Job, type JobTold } from "../job";
 import { keptOf } from "../kept";
 import type { EditorContext } from "../panel";
+import { askingTasks, commandingTasks, servingTasks } from "../drawn";
 import { EMPTY, isComplete, yamlOf, type Script } from "./answers";
 
 export interface RehearsalTold extends JobTold {
@@ -26,12 +27,39 @@ export class Rehearsal {
   readonly script = signal<Script>(EMPTY);
   /** The text of an answers file in place of the form; null: what the form says. */
   readonly raw = signal<string | null>(null);
+  /** Why the form cannot show that text; null: nobody has asked, or it can. */
+  readonly unread = signal<string | null>(null);
   readonly job = new Job<RehearsalTold>("/rehearsals");
   readonly spans = signal<readonly Span[]>([]);
   readonly isReady = computed(() => this.raw.value !== null || isComplete(this.script.value));
 
   text(): string {
     return this.raw.value ?? yamlOf(this.script.value);
+  }
+
+  /** From now on the text counts. */
+  write(text: string): void {
+    this.raw.value = text;
+    this.unread.value = null;
+  }
+
+  /** Reads the text back into the form; it stays where the form cannot show all of it. */
+  async readBack(editor: EditorContext): Promise<void> {
+    const ids = (tasks: readonly { id: string }[]) => new Set(tasks.map(({ id }) => id));
+    // Few need it: it comes with the library that reads YAML.
+    const { scriptOf, Unread } = await import("./readAnswers");
+    try {
+      this.script.value = scriptOf(this.raw.value ?? "", {
+        asking: ids(askingTasks(editor)),
+        serving: ids(servingTasks(editor)),
+        commanding: ids(commandingTasks(editor)),
+      });
+      this.raw.value = null;
+      this.unread.value = null;
+    } catch (error) {
+      if (!(error instanceof Unread)) throw error;
+      this.unread.value = error.message;
+    }
   }
 
   async begin(editor: EditorContext): Promise<void> {
