@@ -18,7 +18,7 @@ export class Unread extends Error {}
 
 type Entry = Readonly<Record<string, Value>>;
 
-const SECONDS: Readonly<Record<string, number>> = { "": 1, s: 1, ms: 0.001, min: 60, h: 3600 };
+const SECONDS = { s: 1, ms: 0.001, min: 60, h: 3600 };
 const SECTIONS = ["answers", "services", "behaviors", "signals", "messages"];
 // As yaml_source.py: a few lines of nested aliases must not fill the memory.
 const MOST_ALIASES = 100;
@@ -120,9 +120,10 @@ function sendsOf(file: Entry, kind: ScriptedSend["kind"]): ScriptedSend[] {
 
 /** A duration as a number of seconds. */
 function secondsOf(value: Value, place: string): string {
-  const [, number, unit] = /^\s*(\d+(?:\.\d+)?)\s*([a-z]*)\s*$/.exec(String(value)) ?? [];
-  const factor = SECONDS[unit ?? "?"];
-  if (number === undefined || factor === undefined) throw unread(words.duration, place);
+  const [, number, unit = "s"] =
+    /^\s*(\d+(?:\.\d+)?)\s*(s|ms|min|h)?\s*$/.exec(String(value)) ?? [];
+  if (number === undefined) throw unread(words.duration, place);
+  const factor = SECONDS[unit as keyof typeof SECONDS];
   return String(Number((Number(number) * factor).toPrecision(12)));
 }
 
