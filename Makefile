@@ -46,9 +46,12 @@ $(INSTALLED): pyproject.toml constraints.txt $(PLUGINS:%=%/pyproject.toml)
 # The tests of what BPMN editors see need Node.js, those of the terminal unit tmux, those of the web page
 # Chromium, and those of verification Spin and a C compiler; nothing else does, so their absence stops nothing.
 npm-packages:
-	@{ command -v npm && command -v chromium && command -v tmux && command -v spin && command -v tcc; } >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && { \
-	  echo "Installing Debian packages: $(DEBIAN_PACKAGES)"; \
-	  apt-get update -qq && apt-get install -y -qq $(DEBIAN_PACKAGES) >/dev/null; }; } || true
+	@missing=; for package in $(DEBIAN_PACKAGES); do command -v $${package/nodejs/node} >/dev/null || missing="$$missing $$package"; done; \
+	if [ -n "$$missing" ] && [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	  echo "Installing Debian packages:$$missing"; \
+	  { apt-get update -qq && apt-get install -y -qq $$missing >/dev/null; } || { \
+	    echo "apt-get could not install$$missing (its own message is above). Install them by hand, then make setup again" >&2; exit 1; }; \
+	fi
 	@if command -v npm >/dev/null; then $(MAKE) --silent $(JS)/node_modules/.package-lock.json; \
 	else echo "Some tests need Debian packages that are not installed: $(DEBIAN_PACKAGES)" >&2; fi
 

@@ -5,16 +5,12 @@ import subprocess
 import tomllib
 from functools import cache
 from pathlib import Path
-from statistics import median
 
 import pytest
 
 import m2pem
 
 REPOSITORY = Path(__file__).parents[1]
-MAXIMUM_LINES = 400
-MEDIAN_LINES = 150
-
 REGISTRIES = re.compile(rb"\b(?:pypi|pythonhosted|npmjs|debian)\.(?:org|com|io)\b")
 HOME_PATHS = re.compile(rb"(?<![\w.])/(?:home|Users)/\w+|(?<![\w./])/root[/]")
 
@@ -33,37 +29,12 @@ def files() -> tuple[Path, ...]:
     return tuple(path for path in paths if path.is_file())
 
 
-def module_lengths() -> dict[str, int]:
-    """Lines of each module of the core and of the plugins."""
-    modules = [
-        path
-        for path in files()
-        if path.suffix == ".py"
-        and path.relative_to(REPOSITORY).parts[0] in ("m2pem", "plugins")
-        and "tests" not in path.parts
-    ]
-    return {
-        str(path.relative_to(REPOSITORY)): len(path.read_text(encoding="utf-8").splitlines())
-        for path in modules
-    }
-
-
 def found_in_files(pattern: re.Pattern[bytes]) -> list[str]:
     return [
         f"{path.relative_to(REPOSITORY)}: {found[0].decode()}"
         for path in files()
         if (found := pattern.search(path.read_bytes()))
     ]
-
-
-def test_no_module_is_too_long() -> None:
-    too_long = {name: lines for name, lines in module_lengths().items() if lines > MAXIMUM_LINES}
-    assert too_long == {}
-
-
-def test_most_modules_are_short() -> None:
-    lengths = [n for name, n in module_lengths().items() if not name.endswith("__init__.py")]
-    assert median(lengths) <= MEDIAN_LINES
 
 
 def test_no_file_names_a_package_registry() -> None:
