@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from m2pem.api.bus import FleetBus
     from m2pem.api.clock import Clock
     from m2pem.api.control import (
+        Alert,
         HandedOver,
         MissionControl,
         Notice,
@@ -97,7 +98,7 @@ _MODULES = {
     "m2pem.api.bus": "FleetBus",
     "m2pem.api.clock": "Clock",
     "m2pem.api.control": (
-        "HandedOver MissionControl Notice OpenPrompt PromptClosed RunId RunStatus RunSummary"
+        "Alert HandedOver MissionControl Notice OpenPrompt PromptClosed RunId RunStatus RunSummary"
         " SimulationResult StampedRecord TelemetrySample"
     ),
     "m2pem.api.goals": "GoalArbiter",
@@ -132,6 +133,7 @@ _LAZY = {name: module for module, names in _MODULES.items() for name in names.sp
 __all__ = [
     "SHARED",
     "AdjustingArbiter",
+    "Alert",
     "Arbiter",
     "ArbiterContext",
     "Area",

@@ -104,8 +104,19 @@ class PromptClosed:
     by: str = ""
 
 
-Notice: TypeAlias = Union[StampedRecord, OpenPrompt, PromptClosed]
-"""What a subscriber gets, in order, after it was committed."""
+@dataclass(frozen=True, slots=True)
+class Alert:
+    """A warning about the executive itself, which no record has: a vehicle that did not take STOP,
+    a journal that does not write, a plugin that blocks. `run` "": it concerns all of them."""
+
+    run: RunId
+    code: str
+    text: str
+
+
+Notice: TypeAlias = Union[StampedRecord, OpenPrompt, PromptClosed, Alert]
+"""What a subscriber gets: records and prompts in order, after they were committed, and alerts
+at once."""
 
 
 class MissionControl(Protocol):
@@ -131,11 +142,30 @@ class MissionControl(Protocol):
         ...
 
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
-        """End every token, cancel every behavior."""
+        """End every token, cancel every behavior.
+
+        The cancels go to the arbiters at once, before the run decides and whatever the journal
+        does. Until the run has decided it, it starts no behavior any more.
+
+        Raises:
+            OperatorError: the run has ended; or the cancels are sent, and the journal has not
+                written the stop within 2 s.
+        """
+        ...
+
+    async def stop_all(self, *, by: str = "", reason: str = "") -> Sequence[RunId]:
+        """Stop every run that has not ended, as `stop` does; returns them.
+
+        Raises:
+            OperatorError: as for `stop`; names each run concerned. The others are stopped.
+        """
         ...
 
     async def pause(self, run: RunId, *, by: str = "") -> None:
-        """Hold every commanded resource and freeze timers."""
+        """Hold every commanded resource and freeze timers.
+
+        The holds go to the arbiters at once, as the cancels of `stop` do; errors as there.
+        """
         ...
 
     async def resume(self, run: RunId, *, by: str = "") -> None:

@@ -11,11 +11,13 @@ import click
 
 from m2pem.api.control import RunId, RunStatus
 from m2pem.cli.entry import STOPPED, ignore_closed_stdout
+from m2pem.cli.group import log_from_a_thread
 from m2pem.cli.interruption import Interruption
 from m2pem.cli.ocus import PLAIN, Operators
 from m2pem.cli.output import Output
 from m2pem.control_socket.server import ControlSocket
 from m2pem.executive.executive import Executive
+from m2pem.executive.loop_monitor import LoopMonitor
 from m2pem.model.mission import Mission
 
 if TYPE_CHECKING:
@@ -48,6 +50,7 @@ async def driving(
         runner = executive.runners.get(run)
         return runner.run.state.mission if runner is not None else None
 
+    log_from_a_thread()
     output.tell_by(mission, one=one, asks=PLAIN not in operators.names)
     loop = asyncio.get_running_loop()
     with Interruption(executive) as interruption:
@@ -57,7 +60,11 @@ async def driving(
 
         output.writer.when_broken(nobody_reads)
         # First, as nothing may come between connecting and taking up a run: reports would be lost.
-        async with ControlSocket(executive.control, journal), executive:
+        async with (
+            ControlSocket(executive.control, journal),
+            executive,
+            LoopMonitor(executive.notices),
+        ):
             notices = executive.control.subscribe(size=BACKLOG)
             printing = asyncio.create_task(output.follow(notices))
             if operators.take_terminal:

@@ -2,6 +2,7 @@
 
 import difflib
 import logging
+import sys
 from copy import copy
 from functools import cached_property
 from importlib import import_module
@@ -131,6 +132,20 @@ def _log_to_stderr(level: int) -> None:
     logger.handlers[:] = [handler]
     logger.propagate = False
     logger.setLevel(level)
+
+
+def log_from_a_thread() -> None:
+    """Have a thread write the log: standard error that nobody reads must not hold up a mission."""
+    from m2pem.cli.writer import writer_for
+
+    class Lines(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            writer_for(sys.stderr).put(self.format(record))
+
+    logger = logging.getLogger("m2pem")
+    lines = Lines()
+    lines.setFormatter(logger.handlers[0].formatter if logger.handlers else None)
+    logger.handlers[:] = [lines]
 
 
 class _WithoutTracebacks(logging.Formatter):

@@ -3,16 +3,17 @@
 import asyncio
 import os
 import signal
+import sys
 from types import TracebackType
 from typing import Self
 
-import click
-
 from m2pem.cli.entry import STOPPED
+from m2pem.cli.writer import writer_for
 from m2pem.executive.executive import Executive
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 GIVE_UP = 3
+GIVE_UP_PRINTING_S = 1.0
 
 
 class Interruption:
@@ -58,6 +59,7 @@ class Interruption:
             self._say(f"{name}: still waiting for {held}; once more to give up")
         else:
             self._say(f"{name}: gave up; not released: {self._held() or 'nothing'}")
+            writer_for(sys.stderr).drain(GIVE_UP_PRINTING_S)
             os._exit(STOPPED)
 
     def _held(self) -> str:
@@ -71,4 +73,5 @@ class Interruption:
         return ", ".join(held)
 
     def _say(self, text: str) -> None:
-        click.echo(f"m2pem: {text}", err=True)
+        # From a thread: standard error that nobody reads must not hold up the stop.
+        writer_for(sys.stderr).put(f"m2pem: {text}")

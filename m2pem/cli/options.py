@@ -27,6 +27,8 @@ mission_argument = click.argument("mission")
 
 run_argument = click.argument("run_id", metavar="RUN")
 
+optional_run_argument = click.argument("run_id", metavar="[RUN]", required=False)
+
 format_option = click.option(
     "--format",
     "output",

@@ -7,8 +7,8 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from m2pem.api.control import Notice, RunId, StampedRecord
-from m2pem.cli.story import Story
+from m2pem.api.control import Alert, Notice, RunId, StampedRecord
+from m2pem.cli.story import Story, printable
 from m2pem.cli.writer import LineWriter, writer_for
 from m2pem.engine.records import RunEnded
 from m2pem.journal.codec import record_line
@@ -72,6 +72,9 @@ class Output:
                 self.show(notice)
                 if self.writer.full:
                     await self.drain()
+            elif isinstance(notice, Alert) and not self._covered:
+                where = f"{notice.run}: " if notice.run else ""
+                writer_for(sys.stderr).put(f"m2pem: {where}{printable(notice.text)}")
 
     async def drain(self) -> None:
         """Wait until all is printed."""

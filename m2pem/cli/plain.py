@@ -24,14 +24,15 @@ from m2pem.model.behavior import Decision
 
 NAME = "plain"
 BACKLOG = 1_000_000
-STOP_WAITS_S = 1.0
+STOP_WAITS_S = 0.2
 
 HELP = """\
   2, or abort        answer the open prompt, by number or by decision
   p3 2               answer prompt p3, when several are open (r2 p3 2: of run r2)
   signal NAME        send a signal, by its name or its id
   pause, resume      hold the vehicles and the clock; go on
-  stop               end the mission: every vehicle is told to stop
+  stop               end the mission: its vehicles are sent the command to stop
+  stop all           end every mission
   route NAME FILE    hand over a route, under the name that the mission uses
   area NAME FILE     hand over an area; point NAME FILE: a point
   start FILE         start another mission
@@ -207,7 +208,10 @@ class PlainOcu:
         return next(iter(self._active))
 
     async def _stop(self, words: list[str]) -> None:
-        await self._control.stop(self._which(words), by=NAME)
+        if words == ["all"]:
+            await self._control.stop_all(by=NAME)
+        else:
+            await self._control.stop(self._which(words), by=NAME)
 
     async def _pause(self, words: list[str]) -> None:
         await self._control.pause(self._which(words), by=NAME)

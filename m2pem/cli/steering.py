@@ -1,5 +1,6 @@
 """What the one-shot commands share: they ask an executive that runs on this host, and end."""
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -17,12 +18,30 @@ def steer(journal_url: str | None, run: str, method: str, by: str | None, **para
         UnusableError: the journal is in memory.
     """
     from m2pem.api.operator import operator_name
+    from m2pem.control_socket.client import ask_driver
+
+    ask_driver(_journal_file(journal_url), run, method, by=by or operator_name(), **params)
+
+
+def steer_all(journal_url: str | None, method: str, by: str | None, **params: Any) -> list[str]:
+    """Call a method of every executive on the journal, all at once; returns their answers together.
+
+    Raises:
+        OperatorError: an executive refused, or there is none.
+        UnusableError: the journal is in memory.
+    """
+    from m2pem.api.operator import operator_name
+    from m2pem.control_socket.client import ask_all
+
+    return ask_all(_journal_file(journal_url), method, by=by or operator_name(), **params)
+
+
+def _journal_file(journal_url: str | None) -> Path:
     from m2pem.cli.journals import url_of
     from m2pem.cli.options import UnusableError
-    from m2pem.control_socket.client import ask_driver
     from m2pem.journal import file_of
 
     path = file_of(url_of(journal_url))
     if path is None:
         raise UnusableError("a journal in memory has no place where its executive could be found")
-    ask_driver(path, run, method, by=by or operator_name(), **params)
+    return path

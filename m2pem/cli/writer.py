@@ -34,9 +34,12 @@ class LineWriter:
         """Call this, from another thread, when nobody reads the stream any more."""
         self._when_broken.append(call)
 
-    def drain(self) -> None:
-        """Wait until all is printed."""
-        self._waiting.join()
+    def drain(self, timeout_s: float | None = None) -> None:
+        """Wait until all is printed, at most `timeout_s`."""
+        with self._waiting.all_tasks_done:
+            self._waiting.all_tasks_done.wait_for(
+                lambda: not self._waiting.unfinished_tasks, timeout_s
+            )
 
     def _write(self) -> None:
         while True:

@@ -1,12 +1,13 @@
 """One question to a running executive, for commands that ask and end."""
 
 import socket
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from m2pem.control_socket.place import ControlSocketError, address, live_sockets
 from m2pem.control_socket.protocol import Request, line, result_of
-from m2pem.errors import NotDrivenError, OperatorError
+from m2pem.errors import M2pemError, NotDrivenError, OperatorError
 
 TIMEOUT_S = 10.0
 
@@ -46,6 +47,30 @@ def ask_driver(journal: Path, run: str, method: str, **params: Any) -> Any:
     if elsewhere:
         raise OperatorError("; ".join(elsewhere))
     raise _nobody(journal)
+
+
+def ask_all(journal: Path, method: str, **params: Any) -> list[Any]:
+    """Call a method that returns a list of every executive on the journal, at the same time.
+
+    Raises:
+        OperatorError: some refused or did not answer, each named; or there is none.
+    """
+    paths = list(live_sockets(journal))
+    if not paths:
+        raise _nobody(journal)
+    answers: list[Any] = []
+    problems: list[str] = []
+    with ThreadPoolExecutor(len(paths)) as pool:
+        asked = [pool.submit(ask, path, method, **params) for path in paths]
+        for answer in asked:
+            try:
+                answers += answer.result()
+            except M2pemError as error:
+                problems.append(str(error))
+    if problems:
+        done = f"; done: {', '.join(map(str, answers))}" if answers else ""
+        raise OperatorError(f"{'; '.join(problems)}{done}")
+    return answers
 
 
 def find_executive(journal: Path, run: str | None) -> Path:

@@ -32,6 +32,13 @@ class Stop(OfRun, frozen=True):
     reason: str = ""
 
 
+class StopAll(Params, frozen=True):
+    """As MissionControl.stop_all."""
+
+    by: str = ""
+    reason: str = ""
+
+
 class Answer(Params, frozen=True):
     """As MissionControl.answer."""
 
@@ -116,6 +123,7 @@ METHODS: dict[str, Method] = {
     "signal": (Signal, lambda c, p: c.signal(p.id, run=p.run, data=p.data, by=p.by)),
     "message": (Signal, lambda c, p: c.message(p.id, run=p.run, data=p.data, by=p.by)),
     "stop": (Stop, lambda c, p: c.stop(p.run, by=p.by, reason=p.reason)),
+    "stop_all": (StopAll, lambda c, p: c.stop_all(by=p.by, reason=p.reason)),
     "pause": (OfRun, lambda c, p: c.pause(p.run, by=p.by)),
     "resume": (OfRun, lambda c, p: c.resume(p.run, by=p.by)),
     "set_geometry": (Geometry, lambda c, p: c.set_geometry(p.name, p.geometry, run=p.run, by=p.by)),

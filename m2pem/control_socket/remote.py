@@ -11,6 +11,7 @@ import msgspec
 
 from m2pem.api.authoring import Draft, Editable, MissionSource, Outline
 from m2pem.api.control import (
+    Alert,
     HandedOver,
     Notice,
     OpenPrompt,
@@ -35,7 +36,15 @@ from m2pem.resources.snapshot import restore
 
 _KINDS: dict[str, type] = {
     kind.__name__: kind
-    for kind in (StampedRecord, OpenPrompt, PromptClosed, VehicleState, PayloadState, TeamState)
+    for kind in (
+        StampedRecord,
+        OpenPrompt,
+        PromptClosed,
+        Alert,
+        VehicleState,
+        PayloadState,
+        TeamState,
+    )
 }
 
 
@@ -89,6 +98,15 @@ class RemoteControl:
                 raise ControlSocketError(f"the executive is gone: {error}") from error
         return result_of(answer)
 
+    async def _ask_at_once(self, method: str, **params: Any) -> Any:
+        """On a connection of its own: STOP waits for no other call, and `wait` keeps none."""
+        reader, writer = await self._connect()
+        try:
+            writer.write(line(Request("2.0", method, params, next(self._numbers))))
+            return result_of(await reader.readline())
+        finally:
+            writer.close()
+
     async def _stream(self, method: str, **params: Any) -> AsyncIterator[Any]:
         reader, writer = await self._connect()
         try:
@@ -124,11 +142,16 @@ class RemoteControl:
 
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
         """End every token, cancel every behavior."""
-        await self._ask("stop", run=run, by=by, reason=reason)
+        await self._ask_at_once("stop", run=run, by=by, reason=reason)
+
+    async def stop_all(self, *, by: str = "", reason: str = "") -> Sequence[RunId]:
+        """Stop every run that has not ended."""
+        stopped = await self._ask_at_once("stop_all", by=by, reason=reason)
+        return msgspec.convert(stopped, list[RunId])
 
     async def pause(self, run: RunId, *, by: str = "") -> None:
         """Hold every commanded resource and freeze timers."""
-        await self._ask("pause", run=run, by=by)
+        await self._ask_at_once("pause", run=run, by=by)
 
     async def resume(self, run: RunId, *, by: str = "") -> None:
         """Go on after a pause."""
@@ -215,12 +238,7 @@ class RemoteControl:
 
     async def wait(self, run: RunId) -> RunSummary:
         """Wait until the run has ended and its vehicles are released."""
-        reader, writer = await self._connect()
-        try:
-            writer.write(line(Request("2.0", "wait", {"run": run}, next(self._numbers))))
-            return msgspec.convert(result_of(await reader.readline()), RunSummary)
-        finally:
-            writer.close()
+        return msgspec.convert(await self._ask_at_once("wait", run=run), RunSummary)
 
     # --- what there is --------------------------------------------------------------------------
 

@@ -71,11 +71,21 @@ class Control:
 
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
         """End every token, cancel every behavior."""
-        await self._ask(run, i.StopRun(by, reason))
+        immediate = self._executive.immediate
+        asked = immediate.stop(self._executive.runner(run), by, reason)
+        await immediate.written("stop", {run: asked})
+
+    async def stop_all(self, *, by: str = "", reason: str = "") -> Sequence[RunId]:
+        """Stop every run that has not ended."""
+        asked = self._executive.stop_at_once(by, reason)
+        await self._executive.immediate.written("stop", asked)
+        return list(asked)
 
     async def pause(self, run: RunId, *, by: str = "") -> None:
         """Hold every commanded resource and freeze timers."""
-        await self._ask(run, i.PauseRun(by))
+        immediate = self._executive.immediate
+        asked = immediate.pause(self._executive.runner(run), by)
+        await immediate.written("pause", {run: asked})
 
     async def resume(self, run: RunId, *, by: str = "") -> None:
         """Go on after a pause."""

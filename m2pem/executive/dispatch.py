@@ -8,6 +8,7 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
@@ -26,6 +27,10 @@ log = logging.getLogger("m2pem.dispatch")
 CALL_TIMEOUT_S = 10.0
 """An arbiter's `start`, `cancel`, `hold` or `resume` only hands over; one that hangs is a fault."""
 
+START_PATIENCE_S = 0.3
+"""How long STOP and pause wait for an arbiter's `start` that has not returned: a cancel that comes
+before its start would stop nothing."""
+
 Geometries = Callable[[str, str], Geometry | None]
 """(run, name) -> the route, area or point that the run knows under the name."""
 
@@ -38,6 +43,15 @@ class _Active:
     resources: tuple[ResourceId, ...]
     last_number: int = 0
     deadline: asyncio.Task[None] | None = None
+
+
+@dataclass(slots=True)
+class Order:
+    """A STOP or hold that was sent out of turn. `wrong`: "", or why it may not have arrived."""
+
+    resources: tuple[ResourceId, ...]
+    task: asyncio.Task[None] | None = None
+    wrong: str = ""
 
 
 class Dispatcher:
@@ -66,6 +80,7 @@ class Dispatcher:
         self._starts: dict[str, asyncio.Task[None]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._unscriptable: set[str] = set()
+        self._barred: set[str] = set()
 
     # --- commands -------------------------------------------------------------------------------
 
@@ -97,10 +112,67 @@ class Dispatcher:
 
     def hold_all(self, run: str) -> None:
         """Bring everything that a run commands to its safe state, whatever its state says."""
-        for behavior, active in self._active.items():
-            if behavior.partition(".")[0] == run:
-                for resource in active.resources:
-                    self.hold(resource)
+        for _, active in self._active_of(run):
+            for resource in active.resources:
+                self.hold(resource)
+
+    # --- STOP and pause, out of turn -------------------------------------------------------------
+
+    def stop_at_once(self, run: str, epoch: int) -> dict[str, Order]:
+        """Cancel all that a run commands, by behavior; it starts nothing any more.
+
+        These cancels wait for nothing that their resources were asked before, but for
+        `START_PATIENCE_S` for a start under way. A start that takes longer is abandoned, and the
+        resource is held as well, as the arbiter may have begun the behavior.
+        """
+        self._barred.add(run)
+        return {
+            behavior: self._order(active, partial(self._stop, behavior, active, epoch))
+            for behavior, active in self._active_of(run)
+        }
+
+    def hold_at_once(self, run: str) -> dict[str, Order]:
+        """Hold all that a run commands, by behavior; out of turn as `stop_at_once` is."""
+        return {
+            behavior: self._order(active, partial(self._hold_now, behavior, active))
+            for behavior, active in self._active_of(run)
+        }
+
+    def _active_of(self, run: str) -> list[tuple[str, _Active]]:
+        return [each for each in self._active.items() if each[0].partition(".")[0] == run]
+
+    def _order(self, active: _Active, send: Callable[[], Awaitable[str]]) -> Order:
+        order = Order(active.resources)
+
+        async def carry_out() -> None:
+            order.wrong = await send()
+
+        order.task = self._enqueue(active.resources, carry_out, set())
+        return order
+
+    async def _stop(self, behavior: str, active: _Active, epoch: int) -> str:
+        start = self._starts.get(behavior)
+        abandoned = not await _returns(start)
+        if abandoned and start is not None:
+            start.cancel()
+            await _returns(start)
+        if self._active.get(behavior) is not active:
+            return ""  # it was not sent: `_start` saw that its run is barred
+        wrong = await self._cancel_active(behavior, active, active.resources, epoch)
+        if abandoned:
+            held = [await self._turn("hold", resource) for resource in active.resources]
+            wrong = wrong or "its start had not returned and was abandoned; it is held as well"
+            wrong = "; ".join([wrong, *filter(None, held)])
+        return wrong
+
+    async def _hold_now(self, behavior: str, active: _Active) -> str:
+        start = self._starts.get(behavior)
+        if not await _returns(start):
+            # The vehicle may set off when its start returns at last: it is held then, too.
+            for resource in active.resources:
+                self.hold(resource)
+        held = [await self._turn("hold", resource) for resource in active.resources]
+        return "; ".join(filter(None, held))
 
     # --- what is known of behaviors -------------------------------------------------------------
 
@@ -200,6 +272,8 @@ class Dispatcher:
         kind = BehaviorType(command.type)
         serving = self._arbiters.serving(ids, command.name, kind)
         arbiter = serving or self._arbiters.of(ids[0])
+        if self._is_barred(command):
+            return  # the run's stop, which comes next, ends it
         self._active[command.behavior] = active = _Active(arbiter, ids)
         if serving is None:
             reason = f"{', '.join(ids)} are served by different arbiters"
@@ -224,6 +298,9 @@ class Dispatcher:
             if near:
                 self._refuse(command.behavior, "REJECTED", near)
                 return
+        if self._is_barred(command):
+            del self._active[command.behavior]
+            return
         self._apply_script(command, arbiter)
         wrong = await self._call(f"start {command.behavior}", arbiter.start(request))
         if wrong and self._active.get(command.behavior) is active:
@@ -254,13 +331,16 @@ class Dispatcher:
             self._arbiters.teams.parts_of(command.preempts, ids),
         )
 
-    async def _turn(self, what: str, resource: ResourceId) -> None:
+    def _is_barred(self, command: StartBehavior) -> bool:
+        return command.behavior.partition(".")[0] in self._barred
+
+    async def _turn(self, what: str, resource: ResourceId) -> str:
         """Hold or resume; asked in its turn, as a team may have taken the resource meanwhile."""
         arbiter = self._arbiters.holding(resource)
         if self._clearance is not None and what == "hold":
             self._clearance.airspace.delay(resource)
         call = arbiter.hold(resource) if what == "hold" else arbiter.resume(resource)
-        await self._call(f"{what} {resource}", call)
+        return await self._call(f"{what} {resource}", call)
 
     def spec(
         self, resources: tuple[ResourceId, ...], name: str, kind: BehaviorType
@@ -290,13 +370,19 @@ class Dispatcher:
         if active is None:
             self._post(BehaviorReport(command.behavior, 1, BehaviorState.CANCELLED))
             return
-        await self._call(
-            f"cancel {command.behavior}", active.arbiter.cancel(command.behavior, command.epoch)
-        )
-        if self._active.get(command.behavior) is active and active.deadline is None:
-            limits = [active.arbiter.limits(ResourceId(name)) for name in command.resources]
+        ids = _ids(command.resources)
+        await self._cancel_active(command.behavior, active, ids, command.epoch)
+
+    async def _cancel_active(
+        self, behavior: str, active: _Active, resources: tuple[ResourceId, ...], epoch: int
+    ) -> str:
+        """Ask its arbiter to end it, within the arbiter's limit. Returns "", or what went wrong."""
+        wrong = await self._call(f"cancel {behavior}", active.arbiter.cancel(behavior, epoch))
+        if self._active.get(behavior) is active and active.deadline is None:
+            limits = [active.arbiter.limits(resource) for resource in resources]
             timeout_s = max(limit.cancel_timeout_s for limit in limits)
-            active.deadline = asyncio.create_task(self._give_up(command.behavior, timeout_s))
+            active.deadline = asyncio.create_task(self._give_up(behavior, timeout_s))
+        return wrong
 
     async def _give_up(self, behavior: str, timeout_s: float) -> None:
         await self._clock.sleep(timeout_s)
@@ -312,6 +398,14 @@ class Dispatcher:
     def _refuse(self, behavior: str, code: str, reason: str) -> None:
         number = self._active[behavior].last_number + 1
         self._post(BehaviorReport(behavior, number, BehaviorState.REJECTED, code, reason))
+
+
+async def _returns(start: asyncio.Task[None] | None) -> bool:
+    """Wait a little for a start under way; whether none is under way any more."""
+    if start is None or start.done():
+        return True
+    await asyncio.wait({start}, timeout=START_PATIENCE_S)
+    return start.done()
 
 
 async def _nothing() -> None:

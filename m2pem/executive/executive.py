@@ -23,22 +23,26 @@ from m2pem.api.control import HandedOver, RunId, SimulationResult
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import LinkState, TeamState
 from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
-from m2pem.engine.records import Record
-from m2pem.engine.run import MissionRun
+from m2pem.engine.records import Record, RunEnded
+from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import RunStatus
 from m2pem.errors import JournalError, NotDrivenError, OperatorError, PluginError
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.clearance import clearance_for
+from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control
 from m2pem.executive.dispatch import Dispatcher
 from m2pem.executive.handover import Handover
+from m2pem.executive.immediate import ImmediateCommands
 from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
 from m2pem.executive.notices import Notices
+from m2pem.executive.observers import Observers
 from m2pem.executive.recovery import replay, take_over
 from m2pem.executive.reporting import reported
 from m2pem.executive.runner import Outside, Runner
 from m2pem.executive.script import Script
 from m2pem.executive.services import Services
+from m2pem.executive.stop_marks import StopMarks
 from m2pem.gateway.bus import Bus
 from m2pem.gateway.watch import Watch, watch
 from m2pem.journal.base import Journal, RunHeader
@@ -59,8 +63,8 @@ log = logging.getLogger("m2pem.executive")
 REMEMBERED_RUNS = 100
 """Runs that are over whose last state is kept in memory; the journal has them all."""
 
-STEPS_AT_ONCE = 10_000
-"""Engine steps after which a run that does not wait lets others run."""
+STEPS_AT_ONCE = 2_000
+"""Engine steps after which a run that does not wait lets others run: STOP waits no longer."""
 
 
 class Executive:
@@ -101,7 +105,8 @@ class Executive:
         self.control = Control(self)
         self.rehearse = rehearse
         self.search_path = tuple(search_path)
-        self._observed = observed
+        self._observers = Observers(plugins.records_committed, self.notices) if observed else None
+        self._marks = StopMarks(journal.file, journal.identity)
         self._script = script
         self.speed = speed
         self._watch_links = watch_links
@@ -126,6 +131,7 @@ class Executive:
         told = self._geometry, self._post_report
         self.dispatcher = Dispatcher(self.arbiters, self.availability, clock, *told, script, clear)
         self.handover = Handover(self.arbiters, self.availability)
+        self.immediate = ImmediateCommands(self.dispatcher, self.notices, self._marks)
         self.services = Services(
             plugins.service,
             ServiceContext(clock, self.bus, logging.getLogger("m2pem.service"), fleet.detectors),
@@ -141,6 +147,8 @@ class Executive:
             PluginError: an arbiter cannot connect.
         """
         await self._connect()
+        if self._observers is not None and isinstance(self.clock, SystemClock):
+            self._observers.start()
         self._group = await self._stack.enter_async_context(asyncio.TaskGroup())
         for name, arbiter in self.arbiters.all.items():
             self._listen(f"reports of {name}", partial(self._read_reports, arbiter))
@@ -182,15 +190,23 @@ class Executive:
                 listener.cancel()
             for arbiter in self.arbiters.all.values():
                 await arbiter.close()
+            if self._observers is not None:
+                await self._observers.close()
             self.bus.close()
             self.notices.end()
             await self._stack.aclose()
 
+    def stop_at_once(self, by: str, reason: str) -> dict[RunId, "asyncio.Future[Step]"]:
+        """Send the cancels of every run that has not ended; by run: when its stop is recorded."""
+        return {
+            runner.id: self.immediate.stop(runner, by, reason)
+            for runner in self.runners.values()
+            if not runner.done.is_set() and runner.run.state.status is not RunStatus.ENDED
+        }
+
     async def stop_all(self, reason: str) -> None:
         """Stop what still runs and wait for it."""
-        for runner in self.runners.values():
-            if runner.run.state.status is not RunStatus.ENDED:
-                runner.post(StopRun(reason=reason))
+        self.stop_at_once("", reason)
         await asyncio.gather(*self._tasks.values())
 
     def _listen(self, what: str, listening: Callable[[], Awaitable[None]]) -> None:
@@ -304,11 +320,15 @@ class Executive:
             raise OperatorError(f"{number} never began: start its mission again")
         epoch = await self.journal.claim(number)
         mission = mission_of(line.header)
-        run = MissionRun(mission, self.fleet, number)
+        run = MissionRun(mission, self.fleet, number, STEPS_AT_ONCE)
         last_us = await replay(self.journal, run, self._script)
         runner = self._runner(run, epoch)
         self.handover.take_up(run.state.taken)
         outage_s = max(0.0, (self.clock.now_us() - last_us) / 1_000_000)
+        mark = self._marks.get(number)
+        if mark is not None:
+            log.warning("%s was stopped before its executive ended; it stays stopped", number)
+            runner.tell_stop(StopRun(mark.by, mark.reason), frozenset())
         await take_over(runner, self.arbiters, self.dispatcher, outage_s)
         self._drive(runner)
 
@@ -316,7 +336,8 @@ class Executive:
         outside = Outside(
             self.journal, self.clock, self.dispatcher, self.services, self.notices, self._observe
         )
-        runner = Runner(run, epoch, outside, self._max_steps)
+        bound = self.fleet.steps_between_waits
+        runner = Runner(run, epoch, outside, self._max_steps, bound)
         self.runners[runner.id] = runner
         return runner
 
@@ -334,8 +355,10 @@ class Executive:
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
         if self._script is not None:
             self._script.seen(run, records)
-        if self._observed:
-            self.plugins.records_committed(run, records)
+        if self._observers is not None:
+            self._observers.put(run, records)
+        if any(isinstance(record, RunEnded) for record in records[-3:]):
+            self._marks.remove(run)
 
     # --- what happens outside -------------------------------------------------------------------
 

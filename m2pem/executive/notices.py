@@ -8,6 +8,9 @@ from collections.abc import AsyncIterator
 from m2pem.api.control import Notice, RunId
 from m2pem.errors import OperatorError
 
+TURN = 200
+"""Notices that a reader gets without letting others run."""
+
 
 class Subscription:
     """Notices for one reader. A reader that falls `size` behind is cut off with an error."""
@@ -19,10 +22,11 @@ class Subscription:
         self._wake = asyncio.Event()
         self._overrun = False
         self._ended = False
+        self._taken = 0
 
     def put(self, notice: Notice) -> None:
         """Hand a notice over, unless it is of another run."""
-        if self._overrun or (self._run is not None and notice.run != self._run):
+        if self._overrun or (self._run is not None and notice.run not in ("", self._run)):
             return
         if len(self._waiting) >= self._size:
             self._overrun = True
@@ -54,6 +58,10 @@ class Subscription:
                 raise StopAsyncIteration
             self._wake.clear()
             await self._wake.wait()
+        self._taken += 1
+        if self._taken % TURN == 0:
+            # What waits is given without waiting: a long backlog would hold up STOP.
+            await asyncio.sleep(0)
         return self._waiting.popleft()
 
 

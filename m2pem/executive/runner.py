@@ -1,6 +1,7 @@
 """Drives one run: decide -> commit -> dispatch, for every input, in the order they came.
 
-Only stop, hold and cancel may go out before the commit. Inputs that wait together are decided
+Only stop, hold and cancel may go out before the commit; those of an operator's STOP and pause go
+out before the run decides them (`m2pem.executive.immediate`). Inputs that wait together are decided
 together and share a commit.
 """
 
@@ -10,14 +11,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from m2pem.api.clock import Clock
-from m2pem.api.control import OpenPrompt, PromptClosed, RunId, StampedRecord
+from m2pem.api.control import Alert, OpenPrompt, PromptClosed, RunId, StampedRecord
 from m2pem.engine import commands as c
 from m2pem.engine import records as r
 from m2pem.engine.inputs import (
+    ClaimRun,
     Continue,
     GiveUp,
     Input,
     PauseRun,
+    ResumeRun,
+    StartRun,
     StopRun,
     Tick,
 )
@@ -33,6 +37,12 @@ log = logging.getLogger("m2pem.run")
 
 MAX_BATCH = 1000
 """Inputs decided before a commit, at most."""
+
+STEPS_A_COMMIT = 10_000
+"""Engine steps of a run that does not wait which may share a commit."""
+
+STALLED_AFTER_S = 2.0
+"""A commit that takes longer is worth an alert."""
 
 
 @dataclass(slots=True)
@@ -50,11 +60,17 @@ class Outside:
 class Runner:
     """One run and its task. `epoch` is the claim under which entries are written.
 
-    `max_steps`: engine steps after which a run is given up (rehearsals).
+    `max_steps`: engine steps after which a run is given up (rehearsals). `steps_between_waits`:
+    those after which a run that never waits is paused; None: there is no bound.
     """
 
     def __init__(
-        self, run: MissionRun, epoch: int, outside: Outside, max_steps: int | None = None
+        self,
+        run: MissionRun,
+        epoch: int,
+        outside: Outside,
+        max_steps: int | None = None,
+        steps_between_waits: int | None = None,
     ) -> None:
         self.run = run
         self.id: RunId = run.state.run
@@ -63,6 +79,12 @@ class Runner:
         self.prompts: dict[str, OpenPrompt] = {}
         self._outside = outside
         self._max_steps = max_steps
+        self._steps_between_waits = steps_between_waits
+        self._steps_at_wait = 0
+        self._stopping = False
+        self._pauses = 0
+        self._cancelled_at_once: frozenset[str] = frozenset()
+        self._held_at_once: frozenset[str] = frozenset()
         self._inbox: list[Input] = []
         self._wake = asyncio.Event()
         self._withheld: list[c.StartBehavior] = []
@@ -89,6 +111,37 @@ class Runner:
         self._told.append((item, told))
         self.post(item)
         return told
+
+    def tell_stop(self, item: StopRun, cancelled: frozenset[str]) -> "asyncio.Future[Step]":
+        """As `tell`, ahead of what waits; `cancelled`: the behaviors whose cancel is under way.
+
+        Until it is decided the run commands nothing new.
+        """
+        self._stopping = True
+        self._cancelled_at_once |= cancelled
+        told = self.tell(item)
+        self._inbox.pop()
+        # A run that has not begun, or is not claimed, cannot be stopped: these come first.
+        first = [isinstance(each, (StartRun, ClaimRun)) for each in self._inbox]
+        self._inbox.insert(len(first) - first[::-1].index(True) if any(first) else 0, item)
+        return told
+
+    @property
+    def can_pause(self) -> bool:
+        """Whether a pause has something to hold: not in a run that has ended, or stays paused."""
+        status = self.run.state.status
+        resumes = any(isinstance(item, ResumeRun) for item in self._inbox)
+        paused = status is RunStatus.PAUSED and not resumes
+        return not (self.done.is_set() or status is RunStatus.ENDED or paused)
+
+    def tell_pause(self, item: PauseRun, held: frozenset[str]) -> "asyncio.Future[Step]":
+        """As `tell`; `held`: the resources whose hold is under way.
+
+        Until it is decided nothing is started or let go.
+        """
+        self._pauses += 1
+        self._held_at_once |= held
+        return self.tell(item)
 
     # --- the loop -------------------------------------------------------------------------------
 
@@ -134,14 +187,15 @@ class Runner:
             if self.run.wants_continue:
                 await asyncio.sleep(0)
                 if not self._inbox:
-                    return [Continue()]
+                    return [self._pause_by_itself() if self._never_waits() else Continue()]
                 continue
-            self._wake.clear()
             due_us = self.run.next_due_us
+            if due_us is not None and due_us <= self._outside.clock.now_us():
+                return [self._pause_by_itself() if self._never_waits() else Tick()]
+            self._steps_at_wait = self.run.steps_done
+            self._wake.clear()
             if due_us is None:
                 await self._wake.wait()
-            elif due_us <= self._outside.clock.now_us():
-                return [Tick()]
             else:
                 await self._wait_until(due_us)
 
@@ -151,6 +205,22 @@ class Runner:
             and self.run.steps_done >= self._max_steps
             and self.run.state.status is RunStatus.RUNNING
         )
+
+    def _never_waits(self) -> bool:
+        allowed = self._steps_between_waits
+        return allowed is not None and self.run.steps_done - self._steps_at_wait >= allowed
+
+    def _pause_by_itself(self) -> PauseRun:
+        """A run that fills the journal and waits for nothing is held until an operator decides."""
+        steps = self.run.steps_done - self._steps_at_wait
+        self._steps_at_wait = self.run.steps_done
+        why = f"it took {steps:,} steps and did not wait once"
+        text = (
+            f"paused: {why}: a loop of the mission may have no end. Stop it, or resume it for as "
+            "many steps more; the fleet's steps_between_waits is the bound"
+        )
+        self._outside.notices.publish(Alert(self.id, "NEVER_WAITS", text))
+        return PauseRun(f"m2pem, as {why}")
 
     async def _wait_until(self, due_us: int) -> None:
         woken = asyncio.ensure_future(self._wake.wait())
@@ -162,31 +232,73 @@ class Runner:
             due.cancel()
 
     async def _cycle(self, batch: Sequence[Input]) -> None:
-        steps: list[Step] = []
-        for item in batch:
-            step = self.run.receive(item, self._outside.clock.now_us())
-            steps.append(step)
-            if isinstance(item, (StopRun, PauseRun, GiveUp)):
-                self._dispatch_early(step)
-        await self._outside.journal.append(
-            [
-                Entry(
-                    self.id,
-                    self.epoch,
-                    step.seq,
-                    step.at_us,
-                    step.t_us,
-                    step.input,
-                    tuple(step.records),
-                )
-                for step in steps
-            ]
-        )
+        steps = [self._decide(item) for item in batch]
+        # A mission that does not wait: what an operator wants is seen between any two steps.
+        begun = self.run.steps_done
+        while self.run.wants_continue and self.run.steps_done - begun < STEPS_A_COMMIT:
+            await asyncio.sleep(0)
+            if self._inbox or self._exhausted() or self._never_waits():
+                break
+            steps.append(self._decide(Continue()))
+        await self._commit(steps)
         for step in steps:
             self._publish(step)
             for command in step.commands:
                 self._dispatch(command, early_done=isinstance(step.input, _EARLY))
+            self._settle_pause(step)
             self._answer_asker(step)
+
+    def _decide(self, item: Input) -> Step:
+        step = self.run.receive(item, self._outside.clock.now_us())
+        if isinstance(item, _EARLY):
+            self._dispatch_early(step)
+        return step
+
+    async def _commit(self, steps: Sequence[Step]) -> None:
+        loop = asyncio.get_running_loop()
+        stalled = loop.call_later(STALLED_AFTER_S, self._alert_of_stall)
+        try:
+            await self._outside.journal.append(
+                [
+                    Entry(
+                        self.id,
+                        self.epoch,
+                        step.seq,
+                        step.at_us,
+                        step.t_us,
+                        step.input,
+                        tuple(step.records),
+                    )
+                    for step in steps
+                ]
+            )
+        finally:
+            stalled.cancel()
+
+    def _alert_of_stall(self) -> None:
+        text = (
+            f"the journal has not written for {STALLED_AFTER_S:g} s: the run commands nothing new "
+            "until it does. STOP and pause reach its vehicles all the same"
+        )
+        self._outside.notices.publish(Alert(self.id, "JOURNAL_STALLED", text))
+
+    def _settle_pause(self, step: Step) -> None:
+        """The pause that was sent ahead is decided: from here on the run's own state counts."""
+        if not isinstance(step.input, PauseRun) or not self._pauses:
+            return
+        self._pauses -= 1
+        if self._pauses:
+            return
+        held, self._held_at_once = self._held_at_once, frozenset()
+        if self._stopping:
+            return
+        state = self.run.state
+        # What the run commanded no more when the pause was decided, nothing else lets go.
+        kept = state.held if state.status is RunStatus.PAUSED else ()
+        for resource in sorted(held.difference(kept)):
+            self._outside.dispatcher.resume(resource)
+        if not self._is_held:
+            self._release_withheld()
 
     def _answer_asker(self, step: Step) -> None:
         for place, (item, told) in enumerate(self._told):
@@ -213,9 +325,13 @@ class Runner:
     def _dispatch_early(self, step: Step) -> None:
         for command in step.commands:
             if isinstance(command, c.CancelBehavior):
-                self._outside.dispatcher.cancel(command)
-            elif isinstance(command, c.HoldResource):
+                self._cancel(command)
+            elif isinstance(command, c.HoldResource) and command.resource not in self._held_at_once:
                 self._outside.dispatcher.hold(command.resource)
+
+    def _cancel(self, command: c.CancelBehavior) -> None:
+        if command.behavior not in self._cancelled_at_once:
+            self._outside.dispatcher.cancel(command)
 
     def _dispatch(self, command: c.Command, *, early_done: bool = False) -> None:
         outside = self._outside
@@ -224,13 +340,14 @@ class Runner:
                 self._start(command)
             case c.CancelBehavior():
                 if not early_done:
-                    outside.dispatcher.cancel(command)
+                    self._cancel(command)
             case c.HoldResource(resource=resource):
                 if not early_done:
                     outside.dispatcher.hold(resource)
             case c.ResumeResource(resource=resource):
-                outside.dispatcher.resume(resource)
-                self._release_withheld()
+                if not self._is_held:
+                    outside.dispatcher.resume(resource)
+                    self._release_withheld()
             case c.OpenPrompt():
                 prompt = OpenPrompt(
                     self.id,
@@ -254,14 +371,18 @@ class Runner:
 
     def _start(self, command: c.StartBehavior) -> None:
         """Start it, unless it is unwanted by now; while paused, nothing starts."""
-        state = self.run.state
-        behavior = state.behaviors.get(command.behavior)
-        if behavior is None or behavior.phase is not BehaviorPhase.ACTIVE:
+        behavior = self.run.state.behaviors.get(command.behavior)
+        if behavior is None or behavior.phase is not BehaviorPhase.ACTIVE or self._stopping:
             return
-        if state.status is RunStatus.PAUSED:
+        if self._is_held:
             self._withheld.append(command)
         else:
             self._outside.dispatcher.start(command)
+
+    @property
+    def _is_held(self) -> bool:
+        """Whether a pause or stop that was asked for later keeps vehicles from moving."""
+        return self._stopping or self._pauses > 0 or self.run.state.status is RunStatus.PAUSED
 
     def _release_withheld(self) -> None:
         withheld, self._withheld = self._withheld, []

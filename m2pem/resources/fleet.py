@@ -91,6 +91,7 @@ class Fleet:
     geometries: Mapping[str, Geometry] = field(default_factory=dict)
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     max_outage_s: float | None = None
+    steps_between_waits: int = 200_000
     fence: str = ""
     vertical_separation_m: float | None = None
     horizontal_separation_m: float = 20.0

@@ -158,6 +158,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         geometries=geometries,
         origin=_origin(model, geometries),
         max_outage_s=model.max_outage,
+        steps_between_waits=model.steps_between_waits,
         fence=model.fence or "",
         vertical_separation_m=apart.vertical if apart else None,
         horizontal_separation_m=(apart or DeconflictionModel()).horizontal,

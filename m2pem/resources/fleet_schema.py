@@ -162,6 +162,13 @@ class FleetModel(_Model):
         Duration | None,
         Field(description="A run that was down for longer holds and asks before it goes on."),
     ] = None
+    steps_between_waits: Annotated[
+        int,
+        Field(
+            ge=1000,
+            description="A run that executes more elements without waiting once is paused.",
+        ),
+    ] = 200_000
     vehicles: dict[Name, VehicleModel] = {}
     teams: dict[Name, TeamModel] = {}
     routes: Annotated[

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from m2pem.api import (
+    Alert,
     MissionControl,
     Notice,
     OpenPrompt,
@@ -177,6 +178,8 @@ class Feed:
                     listener.asked(asked)
             case PromptClosed():
                 self._close(notice, listener)
+            case Alert(run=run, text=text):
+                log.error("%s", f"{run}: {text}" if run else text)
 
     async def _meet(self, stamped: StampedRecord) -> Picture:
         """A run that is new here: from its start, or taken up by this executive."""

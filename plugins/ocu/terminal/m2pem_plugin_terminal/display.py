@@ -9,7 +9,7 @@ from textual.containers import Horizontal, VerticalScroll
 from textual.widgets import Static
 
 from m2pem.api import ResourceId
-from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId, RunStatus
+from m2pem.api.control import Alert, MissionControl, OpenPrompt, PromptClosed, RunId, RunStatus
 from m2pem.errors import M2pemError
 from m2pem_plugin_terminal.board import Board
 from m2pem_plugin_terminal.feed import Feed
@@ -178,6 +178,10 @@ class Display(App[None], inherit_bindings=False):
         """One more line."""
         if run == self.run_shown:
             self.log_pane.add(line)
+
+    def alerted(self, alert: Alert) -> None:
+        """Show it as an alarm."""
+        self.say(f"{alert.run}: {alert.text}" if alert.run else alert.text, alarm=True)
 
     def asked(self, prompt: OpenPrompt) -> None:
         """Show it at once."""

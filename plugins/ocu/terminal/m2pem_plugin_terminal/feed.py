@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from m2pem.api.control import (
+    Alert,
     MissionControl,
     Notice,
     OpenPrompt,
@@ -26,6 +27,10 @@ class Listener(Protocol):
 
     def logged(self, run: RunId, line: Line) -> None:
         """A line was added to the log of a run."""
+        ...
+
+    def alerted(self, alert: Alert) -> None:
+        """The executive warns of something that is in no run's records."""
         ...
 
     def asked(self, prompt: OpenPrompt) -> None:
@@ -109,6 +114,8 @@ class Feed:
                     self._listener.logged(run, line)
                 if board.status.ended and not was_over:
                     self._listener.ended(run)
+            case Alert():
+                self._listener.alerted(notice)
             case OpenPrompt(run=run, prompt=prompt):
                 self.prompts[run, prompt] = notice
                 self._listener.asked(notice)

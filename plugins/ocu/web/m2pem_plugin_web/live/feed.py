@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from m2pem.api import (
+    Alert,
     BehaviorState,
     MissionControl,
     Notice,
@@ -51,6 +52,10 @@ class Listener(Protocol):
 
     def closed(self, closed: PromptClosed) -> None:
         """It was answered or withdrawn."""
+        ...
+
+    def alerted(self, alert: Alert) -> None:
+        """The executive warns of something that is in no run's records."""
         ...
 
     def failed(self, run: RunId, text: str) -> None:
@@ -193,6 +198,8 @@ class Feed:
                     self._listener.asked(notice)
             case PromptClosed():
                 self._close(notice)
+            case Alert():
+                self._listener.alerted(notice)
 
     def _close(self, closed: PromptClosed) -> None:
         if self.prompts.pop((closed.run, closed.prompt), None) is not None:

@@ -13,6 +13,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api import (
+    Alert,
     MissionControl,
     OpenPrompt,
     PromptClosed,
@@ -76,6 +77,10 @@ class Hub:
     def closed(self, closed: PromptClosed) -> None:
         """It was answered or withdrawn."""
         self._tell_all(words.closed(closed))
+
+    def alerted(self, alert: Alert) -> None:
+        """The executive warns of something that is in no run's records."""
+        self._tell_all(words.fault(f"{alert.run}: {alert.text}" if alert.run else alert.text))
 
     def failed(self, run: RunId, text: str) -> None:
         """Something went wrong in a run."""

@@ -1,0 +1,116 @@
+"""STOP and pause: they reach the arbiters at once, and are decided and journaled afterwards.
+
+Nothing here awaits the engine, the journal, a plugin or a print before the cancels and holds are
+under way: a disk that hangs, or a mission that never waits, does not delay them.
+"""
+
+import asyncio
+from collections.abc import Mapping, Sequence
+
+from m2pem.api.control import Alert, RunId
+from m2pem.engine import inputs as i
+from m2pem.engine import records as r
+from m2pem.engine.run import Step
+from m2pem.errors import M2pemError, OperatorError
+from m2pem.executive.dispatch import Dispatcher, Order
+from m2pem.executive.notices import Notices
+from m2pem.executive.runner import Runner
+from m2pem.executive.stop_marks import StopMark, StopMarks
+
+ACKNOWLEDGED_WITHIN_S = 1.0
+"""An arbiter that has not taken a STOP or hold by then: operators are alerted."""
+
+WRITTEN_WITHIN_S = 2.0
+"""How long an operator's STOP or pause waits for the journal, before it says how things are."""
+
+
+class ImmediateCommands:
+    """Of one executive. `marks` keep a stop until the journal has it."""
+
+    def __init__(self, dispatcher: Dispatcher, notices: Notices, marks: StopMarks) -> None:
+        self._dispatcher = dispatcher
+        self._notices = notices
+        self._marks = marks
+        self._watches: set[asyncio.Task[None]] = set()
+
+    def stop(self, runner: Runner, by: str, reason: str) -> "asyncio.Future[Step]":
+        """Send the cancels of a run; the future is done when its stop is in the journal.
+
+        A run that the journal failed is stopped, too: its vehicles may still be held.
+
+        Raises:
+            OperatorError: the run has ended.
+            M2pemError: the run can decide nothing any more; its cancels are sent.
+        """
+        if not runner.done.is_set() or runner.failure is not None:
+            self._marks.put(runner.id, StopMark(by, reason))
+            orders = self._dispatcher.stop_at_once(runner.id, runner.epoch)
+            self._watch("STOP", runner.id, orders)
+            return runner.tell_stop(i.StopRun(by, reason), frozenset(orders))
+        return runner.tell(i.StopRun(by, reason))
+
+    def pause(self, runner: Runner, by: str) -> "asyncio.Future[Step]":
+        """Send the holds of a run; the future is done when its pause is in the journal.
+
+        Raises:
+            M2pemError: the run has ended, or can decide nothing any more.
+        """
+        if runner.can_pause:
+            orders = self._dispatcher.hold_at_once(runner.id)
+            self._watch("pause", runner.id, orders)
+            held = {resource for order in orders.values() for resource in order.resources}
+            return runner.tell_pause(i.PauseRun(by), frozenset(map(str, held)))
+        return runner.tell(i.PauseRun(by))
+
+    async def written(self, what: str, asked: "Mapping[RunId, asyncio.Future[Step]]") -> None:
+        """Wait until the journal has what was asked of runs, within `WRITTEN_WITHIN_S`.
+
+        Raises:
+            OperatorError: it has not, or a run ignored it; each run is named.
+        """
+        if asked:
+            await asyncio.wait(asked.values(), timeout=WRITTEN_WITHIN_S)
+        problems = [
+            f"{run}: {problem}" for run, each in asked.items() if (problem := _problem(what, each))
+        ]
+        if problems:
+            raise OperatorError("; ".join(problems))
+
+    def _watch(self, what: str, run: RunId, orders: Mapping[str, Order]) -> None:
+        if orders:
+            task = asyncio.create_task(self._alert_if_late(what, run, orders))
+            self._watches.add(task)
+            task.add_done_callback(self._watches.discard)
+
+    async def _alert_if_late(self, what: str, run: RunId, orders: Mapping[str, Order]) -> None:
+        """Say at once which vehicles may go on, and why."""
+        tasks = {order.task for order in orders.values() if order.task is not None}
+        await asyncio.wait(tasks, timeout=ACKNOWLEDGED_WITHIN_S)
+        waited = f"its arbiter has not taken it within {ACKNOWLEDGED_WITHIN_S:g} s"
+        late: Sequence[tuple[Order, str]] = [
+            (order, order.wrong or waited)
+            for order in orders.values()
+            if order.wrong or not (order.task is None or order.task.done())
+        ]
+        for order, why in late:
+            names = ", ".join(order.resources)
+            text = f"{names} may not have received the {what} of {run}: {why}. Use its own stop"
+            self._notices.publish(Alert(run, "NOT_RECEIVED", text))
+
+
+def _problem(what: str, asked: "asyncio.Future[Step]") -> str:
+    """Why it is not in the journal, or changed nothing; "" when all is well."""
+    if not asked.done():
+        return (
+            f"the {what} went to its vehicles at once, but the journal does not write: "
+            "it has not been recorded yet"
+        )
+    error = asked.exception()
+    if isinstance(error, M2pemError):
+        return f"the {what} went to its vehicles, but was not recorded: {error}"
+    if error is not None:
+        raise error
+    match asked.result().records:
+        case [r.InputIgnored(reason), *_]:
+            return reason
+    return ""

@@ -1,0 +1,94 @@
+"""Watches the event loop: a plugin that blocks it delays everything, STOP included.
+
+    async with LoopMonitor(executive.notices):
+        ...
+
+A thread sees that the loop does not turn, and reads off its stack which module keeps it.
+"""
+
+import asyncio
+import logging
+import sys
+import threading
+import time
+from importlib.metadata import entry_points
+from types import FrameType
+from typing import Self
+
+from m2pem.api.control import Alert
+from m2pem.executive.notices import Notices
+
+log = logging.getLogger("m2pem.executive")
+
+TICK_S = 0.1
+LATE_AFTER_S = 0.5
+"""A loop that has not turned for so long is blocked."""
+
+
+class LoopMonitor:
+    """Of the loop in which its block runs. While the loop is blocked, the log says so; operators
+    get an alert as soon as it turns again."""
+
+    def __init__(self, notices: Notices) -> None:
+        self._notices = notices
+        self._ticked_s = time.monotonic()
+        self._ended = threading.Event()
+        self._blocked_by = ""
+
+    async def __aenter__(self) -> Self:
+        self._loop = asyncio.get_running_loop()
+        self._thread = threading.get_ident()
+        self._tick()
+        threading.Thread(target=self._watch, name="loop monitor", daemon=True).start()
+        return self
+
+    async def __aexit__(self, *reason: object) -> None:
+        self._ended.set()
+        self._timer.cancel()
+
+    def _tick(self) -> None:
+        now_s = time.monotonic()
+        late_s = now_s - self._ticked_s - TICK_S
+        self._ticked_s = now_s
+        if self._blocked_by:
+            text = (
+                f"nothing was done for {late_s:.1f} s, and STOP would not have been either: "
+                f"{self._blocked_by} blocked the executive"
+            )
+            self._blocked_by = ""
+            self._notices.publish(Alert("", "BLOCKED", text))
+        self._timer = self._loop.call_later(TICK_S, self._tick)
+
+    def _watch(self) -> None:
+        while not self._ended.wait(TICK_S):
+            late_s = time.monotonic() - self._ticked_s - TICK_S
+            if late_s < LATE_AFTER_S or self._blocked_by:
+                continue
+            frame = sys._current_frames().get(self._thread)
+            self._blocked_by = blocking(frame)
+            log.error(
+                "%s blocks the executive: STOP reaches no vehicle until it returns. Use the "
+                "vehicles' own stop",
+                self._blocked_by,
+            )
+
+
+def blocking(frame: FrameType | None) -> str:
+    """Where a stack is: "m2pem_plugin_x.arbiter, cancel, line 3".
+
+    The innermost code of a plugin, if there is any; else of another library, else of m2pem.
+    """
+    plugins = {each.module.partition(".")[0] for each in entry_points(group="m2pem")}
+    found: dict[str, str] = {}
+    while frame is not None:
+        module = str(frame.f_globals.get("__name__", "?"))
+        package = module.partition(".")[0]
+        if package == "m2pem":
+            owner = "m2pem"
+        elif package in plugins:
+            owner = "plugin"
+        else:
+            owner = "" if package in sys.stdlib_module_names else "library"
+        found.setdefault(owner, f"{module}, {frame.f_code.co_name}, line {frame.f_lineno}")
+        frame = frame.f_back
+    return found.get("plugin") or found.get("library") or found.get("m2pem") or "an unknown module"
