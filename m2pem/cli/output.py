@@ -16,6 +16,9 @@ from m2pem.model.mission import Mission
 
 US_PER_S = 1_000_000
 
+TURN = 200
+"""Records printed before others may do something."""
+
 
 def wants_colour(stream: TextIO) -> bool:
     """Whether a stream is a terminal whose owner has not set NO_COLOR."""
@@ -67,7 +70,11 @@ class Output:
 
     async def follow(self, notices: AsyncIterator[Notice]) -> None:
         """Print every record that is told, until there will be no more."""
+        printed = 0
         async for notice in notices:
+            printed += 1
+            if printed % TURN == 0:
+                await asyncio.sleep(0)  # a backlog comes without waiting, and STOP must not wait
             if isinstance(notice, StampedRecord):
                 self.show(notice)
                 if self.writer.full:

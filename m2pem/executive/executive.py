@@ -63,7 +63,7 @@ log = logging.getLogger("m2pem.executive")
 REMEMBERED_RUNS = 100
 """Runs that are over whose last state is kept in memory; the journal has them all."""
 
-STEPS_AT_ONCE = 2_000
+STEPS_AT_ONCE = 1_000
 """Engine steps after which a run that does not wait lets others run: STOP waits no longer."""
 
 

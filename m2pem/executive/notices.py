@@ -8,9 +8,6 @@ from collections.abc import AsyncIterator
 from m2pem.api.control import Notice, RunId
 from m2pem.errors import OperatorError
 
-TURN = 200
-"""Notices that a reader gets without letting others run."""
-
 
 class Subscription:
     """Notices for one reader. A reader that falls `size` behind is cut off with an error."""
@@ -22,7 +19,6 @@ class Subscription:
         self._wake = asyncio.Event()
         self._overrun = False
         self._ended = False
-        self._taken = 0
 
     def put(self, notice: Notice) -> None:
         """Hand a notice over, unless it is of another run."""
@@ -58,10 +54,6 @@ class Subscription:
                 raise StopAsyncIteration
             self._wake.clear()
             await self._wake.wait()
-        self._taken += 1
-        if self._taken % TURN == 0:
-            # What waits is given without waiting: a long backlog would hold up STOP.
-            await asyncio.sleep(0)
         return self._waiting.popleft()
 
 

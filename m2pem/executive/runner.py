@@ -41,6 +41,9 @@ MAX_BATCH = 1000
 STEPS_A_COMMIT = 10_000
 """Engine steps of a run that does not wait which may share a commit."""
 
+MANY_RECORDS = 1_000
+"""Records of one input after whose publication others may do something."""
+
 STALLED_AFTER_S = 2.0
 """A commit that takes longer is worth an alert."""
 
@@ -85,6 +88,7 @@ class Runner:
         self._pauses = 0
         self._cancelled_at_once: frozenset[str] = frozenset()
         self._held_at_once: frozenset[str] = frozenset()
+        self._strays: frozenset[str] = frozenset()
         self._inbox: list[Input] = []
         self._wake = asyncio.Event()
         self._withheld: list[c.StartBehavior] = []
@@ -241,17 +245,22 @@ class Runner:
                 break
             steps.append(self._decide(Continue()))
         await self._commit(steps)
+        if any(isinstance(step.input, PauseRun) for step in steps):
+            self._let_strays_go()
         for step in steps:
             self._publish(step)
             for command in step.commands:
                 self._dispatch(command, early_done=isinstance(step.input, _EARLY))
-            self._settle_pause(step)
             self._answer_asker(step)
+            if len(step.records) > MANY_RECORDS:
+                await asyncio.sleep(0)  # subscribers keep up, and STOP does not wait
 
     def _decide(self, item: Input) -> Step:
         step = self.run.receive(item, self._outside.clock.now_us())
         if isinstance(item, _EARLY):
             self._dispatch_early(step)
+        if isinstance(item, PauseRun):
+            self._settle_pause()
         return step
 
     async def _commit(self, steps: Sequence[Step]) -> None:
@@ -282,20 +291,23 @@ class Runner:
         )
         self._outside.notices.publish(Alert(self.id, "JOURNAL_STALLED", text))
 
-    def _settle_pause(self, step: Step) -> None:
+    def _settle_pause(self) -> None:
         """The pause that was sent ahead is decided: from here on the run's own state counts."""
-        if not isinstance(step.input, PauseRun) or not self._pauses:
-            return
+        if not self._pauses:
+            return  # it was not sent ahead
         self._pauses -= 1
         if self._pauses:
             return
         held, self._held_at_once = self._held_at_once, frozenset()
-        if self._stopping:
-            return
         state = self.run.state
-        # What the run commanded no more when the pause was decided, nothing else lets go.
-        kept = state.held if state.status is RunStatus.PAUSED else ()
-        for resource in sorted(held.difference(kept)):
+        # What the run commanded no more when it paused, nothing else lets go.
+        self._strays |= held.difference(state.held if state.status is RunStatus.PAUSED else ())
+
+    def _let_strays_go(self) -> None:
+        if self._is_held and self.run.state.status is not RunStatus.PAUSED:
+            return
+        strays, self._strays = self._strays, frozenset()
+        for resource in sorted(strays):
             self._outside.dispatcher.resume(resource)
         if not self._is_held:
             self._release_withheld()

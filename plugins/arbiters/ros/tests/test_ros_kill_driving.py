@@ -26,18 +26,21 @@ import os, signal
 def die(*arguments, **options):
     os.kill(os.getpid(), signal.SIGKILL)
 
-@hookimpl
-def m2pem_records_committed(run_id, records):
-    if "DIE_AT_REQUEST" in os.environ:
-        if any(type(record).__name__ == "BehaviorRequested" for record in records):
-            die()
+def look(self, run_id, records):
+    if any(type(record).__name__ == "BehaviorRequested" for record in records):
+        die()
+
+if "DIE_AT_REQUEST" in os.environ:
+    from m2pem.executive.observers import Observers
+
+    Observers.put = look
 
 if "DIE_WHEN_TOLD" in os.environ:
     from m2pem_plugin_ros.vehicle import Vehicle
 
     setattr(Vehicle, os.environ["DIE_WHEN_TOLD"], die)
 """
-"""An observer is told of what was requested after the commit, before anything is dispatched; and
+"""Observers are handed what was requested after the commit, before anything is dispatched; and
 what a vehicle tells of is not in the journal yet when `Vehicle` hears of it."""
 
 
