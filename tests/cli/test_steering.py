@@ -47,6 +47,13 @@ def test_who_asks_is_named(
     assert asked == [by]
 
 
+@pytest.mark.parametrize("words", ["stop", "stop r1 --all"])
+def test_stop_takes_a_run_or_all_of_them(invoke: Invoke, words: str) -> None:
+    status, _, err = invoke(*words.split())
+    assert status == 2
+    assert "name a run to stop, or --all" in err
+
+
 def test_a_refusal_ends_with_1(invoke: Invoke, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise OperatorError("r1: somebody was first")

@@ -14,6 +14,7 @@ from m2pem_plugin_mocu.texts import NAME_CHARACTERS, REASON_CHARACTERS, asker, b
 from m2pem_plugin_mocu.values import decode_data
 
 RUN = "r1"
+ALL_RUNS = "all"
 
 
 async def control_run(control: MissionControl, request: Any, _: Any) -> None:
@@ -33,10 +34,13 @@ async def control_run(control: MissionControl, request: Any, _: Any) -> None:
 
 
 async def stop_run(control: MissionControl, request: Any, _: Any) -> None:
-    """Stop a run: a ControlRun request with this verb."""
+    """Stop a run, or all of them: a ControlRun request with this verb."""
     run, by = named(request.run, "run", RUN), asker(request.by)
     reason = bounded(request.reason, "reason", REASON_CHARACTERS)
-    await control.stop(run, by=by, reason=reason)
+    if run == ALL_RUNS:
+        await control.stop_all(by=by, reason=reason)
+    else:
+        await control.stop(run, by=by, reason=reason)
 
 
 async def send_signal(control: MissionControl, request: Any, _: Any) -> None:

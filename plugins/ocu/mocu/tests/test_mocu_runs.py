@@ -164,6 +164,12 @@ async def test_a_run_is_paused_resumed_and_stopped(world: World, client: Client)
     assert (await world.control.wait(run)).status is RunStatus.STOPPED
 
 
+async def test_stop_of_all_stops_every_run(world: World, client: Client) -> None:
+    run = await world.drives()
+    assert (await client.call("control_run", verb=STOP, run="all", by="anna"))["success"]
+    assert (await world.control.wait(run)).status is RunStatus.STOPPED
+
+
 async def test_what_cannot_be_done_to_a_run_is_refused(world: World, client: Client) -> None:
     run = await world.drives()
     for fields, says in (

@@ -15,6 +15,7 @@ from m2pem_plugin_terminal.board import Board
 from m2pem_plugin_terminal.dialogs import Choice, Choose, Read, help_text
 from m2pem_plugin_terminal.display import Display
 from m2pem_plugin_terminal.handover import TEXT, TITLE, choices, with_operator
+from m2pem_plugin_terminal.stop import STOP_ALL
 
 
 class TerminalApp(Display):
@@ -23,6 +24,7 @@ class TerminalApp(Display):
     BINDINGS: ClassVar[list[BindingType]] = [
         # Before any dialog or text field gets to see them:
         Binding("ctrl+x", "stop", priority=True),
+        Binding("ctrl+a", "stop_all", priority=True),
         Binding("ctrl+c", "interrupt", priority=True),
         Binding("escape", "disarm", priority=True),
         *(Binding(str(number), f"answer({number})") for number in range(1, 10)),
@@ -91,6 +93,15 @@ class TerminalApp(Display):
                 self.pop_screen()
             reason = f"by {self.by}"
             self._carry_out("Stop", self.control.stop(board.run, by=self.by, reason=reason))
+        self.show()
+
+    def action_stop_all(self) -> None:
+        """STOP of every run, at the second press."""
+        if self.trigger.press(STOP_ALL):
+            self.say("Stopping all runs ...", alarm=True)
+            while self._in_dialog:
+                self.pop_screen()
+            self._carry_out(STOP_ALL, self.control.stop_all(by=self.by, reason=f"by {self.by}"))
         self.show()
 
     def action_interrupt(self) -> None:

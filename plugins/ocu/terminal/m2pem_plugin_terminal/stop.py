@@ -7,6 +7,8 @@ from textual.widgets import Static
 
 ARMED_FOR_S = 4.0
 
+STOP_ALL = "STOP all runs"
+
 HINTS = (
     ("p", "Pause"),
     ("s", "Signals"),
@@ -52,7 +54,8 @@ class StopBar(Static):
         armed = trigger.armed
         self.set_class(armed, "armed")
         if armed:
-            key = "^X" if trigger.what.startswith("STOP") else "^C"
+            stop = "^A" if trigger.what == STOP_ALL else "^X"
+            key = stop if trigger.what.startswith("STOP") else "^C"
             self.update(Text(f" {trigger.what}?  Press {key} again.   Esc: no", "bold"))
             return
         text = Text()

@@ -22,6 +22,17 @@ async def test_the_second_press_stops_the_mission(world: World) -> None:
         assert (await world.control.runs())[0].detail == "by anna@gcs1"
 
 
+async def test_another_key_stops_every_mission(world: World) -> None:
+    async with world.terminal() as terminal:
+        run = await world.start()
+        await terminal.until_shown("RUNNING")
+        await terminal.press("ctrl+a")
+        await terminal.until_shown("STOP all runs?", "Press ^A again")
+        assert await status(world, run) is RunStatus.RUNNING
+        await terminal.press("ctrl+a")
+        await terminal.until_shown("STOPPED")
+
+
 @pytest.mark.parametrize("keys", [["s"], ["t"], ["r"], ["question_mark"], ["q"], ["slash", "x"]])
 async def test_stop_works_over_everything(world: World, keys: list[str]) -> None:
     async with world.terminal() as terminal:
