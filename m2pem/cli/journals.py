@@ -2,9 +2,13 @@
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING, cast
 
 from m2pem.cli.options import UnusableError
 from m2pem.journal import Journal, MemoryJournal, RunLine, default_url, file_of, open_journal
+
+if TYPE_CHECKING:
+    from m2pem.journal.sqlite import SqliteJournal
 
 
 def url_of(url: str | None) -> str:
@@ -51,7 +55,22 @@ async def find_run(journal: Journal, run: str) -> RunLine:
     if run not in lines:
         there = f"it has {', '.join(lines)}" if lines else "it has none yet"
         raise UnusableError(f"the journal has no run {run!r}; {there}")
-    return lines[run]
+    line = lines[run]
+    if line.loss is not None and not line.header.mission:
+        raise UnusableError(f"{run}: {line.loss}. {line.loss.remedy(run)}")
+    return line
+
+
+async def accept(journal: Journal, run: str) -> None:
+    """Note that a person knows what the journal has lost of a run that cannot be resumed.
+
+    Raises:
+        UnusableError: a journal in memory loses nothing.
+        JournalError: it has lost nothing, or can be resumed, which asks.
+    """
+    if isinstance(journal, MemoryJournal):
+        raise UnusableError(f"the journal has no run {run!r}")
+    await cast("SqliteJournal", journal).accept_loss(run)
 
 
 async def last_decided_us(journal: Journal, line: RunLine) -> int:

@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 @click.command(epilog=example("m2pem replay r1 --verify"))
 @click.argument("run_id", metavar="RUN", required=False)
 @journal_option
-@click.option("--verify", is_flag=True, help="Decide every input again, and compare.")
+@click.option(
+    "--verify",
+    is_flag=True,
+    help="Check that all entries are there, decide every input again, and compare.",
+)
 @click.option("--state", "state_only", is_flag=True, help="Print only how it stands.")
 @click.option(
     "--counterexample",
@@ -49,7 +53,8 @@ def replay(
     """Print what happened in a run, and how it stands.
 
     The state is rebuilt by applying the journaled records alone, as after a crash. With --verify
-    every input is decided again instead, and the first difference ends it with status 1.
+    every input is decided again instead, and the first difference ends it with status 1; so does
+    an entry that was changed, or one that was acknowledged and is gone.
 
     With --counterexample no journal is read: a run that violates a property is played step by
     step, and the engine's records are printed. It ends with 1 if the engine does not follow it.
@@ -121,4 +126,4 @@ async def _verify(journal: "Journal", line: "RunLine", output: str, done: "Progr
         print(as_json(verification.as_data()))
     else:
         print(verification.as_text())
-    return 1 if verification.difference else 0
+    return 1 if verification.difference or line.loss else 0

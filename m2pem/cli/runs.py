@@ -16,10 +16,15 @@ US_PER_S = 1_000_000
 
 @click.command(epilog=example("m2pem runs"))
 @journal_option
+@click.option(
+    "--accept-loss",
+    metavar="RUN",
+    help="You have looked at the vehicles of a run that the journal has lost: new runs may begin.",
+)
 @format_option
-def runs(journal: str | None, output: str) -> None:
+def runs(journal: str | None, accept_loss: str | None, output: str) -> None:
     """List the runs of a journal."""
-    found = asyncio.run(_runs(journal))
+    found = asyncio.run(_runs(journal, accept_loss))
     if output == "json":
         click.echo(as_json(found))
         return
@@ -44,11 +49,13 @@ def runs(journal: str | None, output: str) -> None:
     click.echo(table(header, rows))
 
 
-async def _runs(url: str | None) -> "list[RunSummary]":
-    from m2pem.cli.journals import existing_journal
+async def _runs(url: str | None, accept_loss: str | None) -> "list[RunSummary]":
+    from m2pem.cli.journals import accept, existing_journal
     from m2pem.executive.control import summary
 
     async with existing_journal(url) as journal:
+        if accept_loss is not None:
+            await accept(journal, accept_loss)
         return [summary(line) for line in await journal.runs()]
 
 

@@ -113,7 +113,8 @@ async def _interrupted(
     mine: list[RunLine] = []
     others: list[RunLine] = []
     for line in await journal.runs():
-        if line.outcome is None and not line.driven:
+        taken_up = line.loss is None or line.loss.resumable
+        if line.outcome is None and not line.driven and taken_up:
             header = line.header
             same = (header.fleet, header.simulated, header.speed) == here
             (mine if same else others).append(line)

@@ -13,6 +13,7 @@ class Verification:
     def __init__(self, line: RunLine) -> None:
         self.difference: dict[str, Any] = {}
         self._run_id = line.run
+        self._loss = line.loss
         self._run = run_of(line)
         self._inputs = 0
         self._records = 0
@@ -48,16 +49,18 @@ class Verification:
             "inputs": self._inputs,
             "records": self._records,
             "difference": self.difference or None,
+            "loss": str(self._loss) if self._loss is not None else None,
         }
 
     def as_text(self) -> str:
         """For people."""
         same = f"{self._run_id}: {self._inputs} inputs decided again, {self._records} records"
+        loss = f"\n{self._run_id}: {self._loss}" if self._loss is not None else ""
         if not self.difference:
-            return f"{same}, all the same"
+            return f"{same}, all the same{loss}"
         return (
             f"{same} the same; then {self.difference['input']} differs at record "
             f"{self.difference['seq']}\n"
             f"  journal: {self.difference['journal'] or 'no more records'}\n"
-            f"  decided: {self.difference['decided'] or 'no more records'}"
+            f"  decided: {self.difference['decided'] or 'no more records'}{loss}"
         )

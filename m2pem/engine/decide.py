@@ -81,7 +81,7 @@ def _start(x: Steps, item: i.StartRun) -> None:
 
 
 def _claim(x: Steps, item: i.ClaimRun) -> None:
-    x.emit(r.RunClaimed(item.epoch, item.by))
+    x.emit(r.RunClaimed(item.epoch, item.by, item.lost))
 
 
 def _stop(x: Steps, item: i.StopRun) -> None:

@@ -31,10 +31,15 @@ class StartRun(_Input, frozen=True):
 
 
 class ClaimRun(_Input, frozen=True):
-    """An executive has taken the run over after a restart, with a new epoch."""
+    """An executive has taken the run over after a restart, with a new epoch.
+
+    `lost`: how many records the journal has lost. So many ids of behaviors, prompts and services
+    are left out: the lost records may have used them.
+    """
 
     epoch: int
     by: str = ""
+    lost: int = 0
 
 
 class StopRun(_Input, frozen=True):

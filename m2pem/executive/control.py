@@ -32,6 +32,7 @@ from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import MissionError, OperatorError
 from m2pem.executive.loading import findings_for, library_of, load_source
+from m2pem.executive.loss import PROMPT as LOSS_PROMPT
 from m2pem.executive.prover import verify_apart
 from m2pem.executive.requiring import requirement_findings
 from m2pem.findings import Finding
@@ -137,6 +138,8 @@ class Control:
 
     async def answer(self, run: RunId, prompt: str, decision: str, *, by: str = "") -> None:
         """Answer a prompt; the first answer wins."""
+        if prompt == LOSS_PROMPT and await self._executive.losses.answer(run, decision, by):
+            return
         await self._ask(run, i.PromptAnswer(prompt, decision, by))
 
     async def set_geometry(
@@ -212,6 +215,8 @@ class Control:
             return runner.run.state.mission
         for line in await self._executive.journal.runs():
             if line.run == run:
+                if not line.header.mission and line.loss is not None:
+                    raise OperatorError(f"{run}: {line.loss}")
                 return await asyncio.to_thread(mission_of, line.header)
         raise OperatorError(f"the journal has no run {run}")
 
@@ -343,6 +348,9 @@ def summary(line: RunLine) -> RunSummary:
         status = RunStatus.INTERRUPTED
     else:
         status = RunStatus.PAUSED if line.paused else RunStatus.RUNNING
+    detail = line.detail
+    if line.loss is not None:
+        detail = f"{line.loss}; {detail}" if detail else str(line.loss)
     return RunSummary(
         line.run,
         line.header.mission_name,
@@ -351,6 +359,6 @@ def summary(line: RunLine) -> RunSummary:
         line.started_us,
         line.ended_us,
         line.last_seq,
-        line.detail,
+        detail,
         line.header.created_us,
     )

@@ -35,6 +35,7 @@ from m2pem.executive.dispatch import Dispatcher
 from m2pem.executive.handover import Handover
 from m2pem.executive.immediate import ImmediateCommands
 from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
+from m2pem.executive.loss import Losses
 from m2pem.executive.notices import Notices
 from m2pem.executive.observers import Observers
 from m2pem.executive.recovery import replay, take_over
@@ -132,6 +133,7 @@ class Executive:
         self.dispatcher = Dispatcher(self.arbiters, self.availability, clock, *told, script, clear)
         self.handover = Handover(self.arbiters, self.availability)
         self.immediate = ImmediateCommands(self.dispatcher, self.notices, self._marks)
+        self.losses = Losses(self)
         self.services = Services(
             plugins.service,
             ServiceContext(clock, self.bus, logging.getLogger("m2pem.service"), fleet.detectors),
@@ -314,6 +316,8 @@ class Executive:
         if line is None:
             known = ", ".join(lines) or "none"
             raise JournalError(f"there is no run {number}; the journal has: {known}")
+        if line.loss is not None and not line.loss.resumable:
+            raise OperatorError(f"{number}: {line.loss}. {line.loss.remedy(number)}")
         if line.outcome is not None:
             raise OperatorError(f"{number} has ended: {line.outcome.value}")
         if line.last_seq == 0:
@@ -329,7 +333,9 @@ class Executive:
         if mark is not None:
             log.warning("%s was stopped before its executive ended; it stays stopped", number)
             runner.tell_stop(StopRun(mark.by, mark.reason), frozenset())
-        await take_over(runner, self.arbiters, self.dispatcher, outage_s)
+        await take_over(runner, self.arbiters, self.dispatcher, outage_s, line.loss)
+        if line.loss is not None:
+            await self.losses.ask(runner, line.loss)
         self._drive(runner)
 
     def _runner(self, run: MissionRun, epoch: int) -> Runner:
@@ -353,6 +359,7 @@ class Executive:
             del self.runners[oldest.id]
 
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
+        self.losses.seen(run, records)
         if self._script is not None:
             self._script.seen(run, records)
         if self._observers is not None:

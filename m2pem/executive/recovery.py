@@ -10,15 +10,16 @@ from contextlib import suppress
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport
 from m2pem.engine import commands as c
-from m2pem.engine.inputs import BehaviorMissing, ClaimRun, Input, ResourceFault
+from m2pem.engine.inputs import BehaviorMissing, ClaimRun, Input, PauseRun, ResourceFault
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import Behavior, BehaviorPhase
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.dispatch import Dispatcher
+from m2pem.executive.loss import doubted, paused_by
 from m2pem.executive.reporting import reported, spec_of
 from m2pem.executive.runner import Runner
 from m2pem.executive.script import Script
-from m2pem.journal.base import Journal
+from m2pem.journal.base import Journal, Loss
 from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import BehaviorState, ResourceId, ResumePolicy
 from m2pem.resources.parameters import ParameterError
@@ -41,15 +42,22 @@ async def replay(journal: Journal, run: MissionRun, script: Script | None) -> in
 
 
 async def take_over(
-    runner: Runner, arbiters: FleetArbiters, dispatcher: Dispatcher, outage_s: float
+    runner: Runner,
+    arbiters: FleetArbiters,
+    dispatcher: Dispatcher,
+    outage_s: float,
+    loss: Loss | None = None,
 ) -> None:
     """Bring a replayed and claimed run back to life. Its task must not run yet.
 
     `outage_s`: for how long nobody drove it. Longer than the fleet's `max_outage`, every behavior
-    is held and an operator is asked.
+    is held and an operator is asked. `loss`: what the journal has lost of it: the run is paused,
+    and an operator is asked about every behavior when it goes on (see `Losses`).
     """
     state = runner.run.state
-    runner.post(ClaimRun(runner.epoch))
+    runner.post(ClaimRun(runner.epoch, lost=loss.records if loss is not None else 0))
+    if loss is not None:
+        runner.post(PauseRun(paused_by(loss)))
     max_outage_s = arbiters.fleet.max_outage_s
     too_long = max_outage_s is not None and outage_s > max_outage_s
     known = list(state.behaviors.values())
@@ -59,7 +67,7 @@ async def take_over(
     for behavior, report in zip(known, reports, strict=True):
         number = max(report.number if report is not None else 0, behavior.number)
         unseen = behavior.state is None and behavior.phase is BehaviorPhase.ACTIVE
-        if report is not None and report.state is BehaviorState.UNKNOWN and unseen:
+        if report is not None and report.state is BehaviorState.UNKNOWN and unseen and not loss:
             resend.add(behavior.id)
             continue
         arbiter = _arbiter(arbiters, behavior)
@@ -70,6 +78,8 @@ async def take_over(
         if item is None and too_long and behavior.phase is BehaviorPhase.ACTIVE:
             reason = f"nobody drove the mission for {outage_s:.0f} s"
             item = BehaviorMissing(behavior.id, ResumePolicy.HOLD, BehaviorState.RUNNING, reason)
+        if loss is not None:
+            item = doubted(behavior, report, item, loss)
         if item is not None:
             runner.post(item)
     runner.take_up(

@@ -53,10 +53,50 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
+class Loss:
+    """Entries that were durable and are not in the journal any more.
+
+    `acknowledged` is the last record that was reported as durable, `found` the last one that the
+    journal has now (0: none; None: the run itself is gone). `resumable`: the run can be taken up.
+    """
+
+    acknowledged: int
+    found: int | None
+    resumable: bool = True
+
+    @property
+    def records(self) -> int:
+        """How many records are missing at least; 0: their number is right, their content is not."""
+        return max(0, self.acknowledged - (self.found or 0))
+
+    def remedy(self, run: str) -> str:
+        """What a person should do about it."""
+        if self.resumable:
+            return f"`m2pem resume {run}` holds its vehicles and asks"
+        return f"Look at its vehicles, then `m2pem runs --accept-loss {run}` lets new runs begin"
+
+    def __str__(self) -> str:
+        if self.found is None:
+            return (
+                f"the journal has lost the run: it acknowledged {self.acknowledged} records of it"
+            )
+        if not self.records:
+            return (
+                f"the journal has lost what was acknowledged up to record {self.acknowledged}: "
+                "something else is in its place"
+            )
+        return (
+            f"the journal has lost records: it acknowledged record {self.acknowledged}, and its "
+            f"last one now is {self.found}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class RunLine:
     """What the journal knows of a run without reading its records.
 
-    `driven`: an executive that is alive holds it. `outcome` None: not ended.
+    `driven`: an executive that is alive holds it. `outcome` None: not ended. `loss`: what was
+    acknowledged and is gone; of a run that is gone whole, the header is empty and the epoch 0.
     """
 
     run: str
@@ -69,6 +109,7 @@ class RunLine:
     outcome: RunOutcome | None = None
     detail: str = ""
     ended_us: int | None = None
+    loss: Loss | None = None
 
 
 class Journal(Protocol):
@@ -85,7 +126,11 @@ class Journal(Protocol):
         ...
 
     async def create(self, header: RunHeader) -> str:
-        """Make a run, durable on return, claimed with epoch 1; the id is r1, r2, ..."""
+        """Make a run, durable on return, claimed with epoch 1; the id is r1, r2, ...
+
+        Raises:
+            JournalError: it cannot be written, space runs short, or a loss is not settled yet.
+        """
         ...
 
     async def claim(self, run: str) -> int:
@@ -105,12 +150,17 @@ class Journal(Protocol):
 
         Raises:
             StaleEpochError: the run was claimed by another since; nothing of the call is written.
-            JournalError: not written (disk full, ...); nothing of the call is written.
+            JournalError: not written (disk full, ...); nothing of the call is written. Or the
+                files were removed or replaced: the journal writes no more.
         """
         ...
 
     def read(self, run: str, after_seq: int = 0) -> AsyncIterator[Entry]:
-        """Entries whose first record comes after `after_seq`, in order, in constant memory."""
+        """Entries whose first record comes after `after_seq`, in order, in constant memory.
+
+        Raises:
+            JournalError: no such run; or an entry is damaged or missing, by run and record.
+        """
         ...
 
     async def runs(self) -> Sequence[RunLine]:

@@ -5,8 +5,10 @@ import sqlite3
 import time
 from pathlib import Path
 from urllib.parse import quote
+from uuid import UUID
 
 from m2pem.errors import JournalError
+from m2pem.journal.marks import of_another_journal
 from m2pem.journal.migrations import check, migrate
 
 _logger = logging.getLogger(__name__)
@@ -16,8 +18,10 @@ LOG_BYTES = 4_000_000
 """About where SQLite begins to write its log from the start again."""
 
 
-def open_for_writing(path: Path) -> sqlite3.Connection:
+def open_for_writing(path: Path, marked: UUID | None = None) -> sqlite3.Connection:
     """Open a journal's file, making it and its tables where they are missing.
+
+    `marked`: the identity in the mark file beside it; a journal that has another is left alone.
 
     The connection may be handed to one other thread. A new file is readable by its owner alone:
     missions and fleets tell where vehicles are.
@@ -36,7 +40,7 @@ def open_for_writing(path: Path) -> sqlite3.Connection:
             if new:
                 # Never by opening the file: closing it again would drop SQLite's own locks.
                 path.chmod(0o600)
-            _prepare(connection, path)
+            _prepare(connection, path, marked)
         except BaseException:
             connection.close()
             raise
@@ -47,19 +51,31 @@ def open_for_writing(path: Path) -> sqlite3.Connection:
     return connection
 
 
-def _prepare(connection: sqlite3.Connection, path: Path) -> None:
+def _prepare(connection: sqlite3.Connection, path: Path, marked: UUID | None) -> None:
     # Checked before anything is changed: turning WAL on would already mark a foreign database.
     connection.execute("BEGIN")
     try:
         check(connection, path)
+        if marked is not None and not _is(connection, marked):
+            raise of_another_journal(path.with_name(f"{path.name}-mark"))
     finally:
         connection.execute("ROLLBACK")
     if _turn_wal_on(connection) != "wal":
         raise JournalError(f"{path}: its file system can't carry a write-ahead log; use another")
     connection.execute("PRAGMA synchronous = FULL")
     migrate(connection, path)
+    # The tables and the identity leave the log at once: they must outlast damage to it.
+    connection.execute("PRAGMA wal_checkpoint(PASSIVE)")
     if path.with_name(f"{path.name}-wal").stat().st_size < LOG_BYTES:
         _lengthen_log(connection)
+
+
+def _is(connection: sqlite3.Connection, identity: UUID) -> bool:
+    has_one = "SELECT 1 FROM sqlite_master WHERE name = 'identity'"
+    if connection.execute(has_one).fetchone() is None:
+        # Of an earlier m2pem, or empty, which no journal with a mark can be.
+        return False
+    return bool(connection.execute("SELECT uuid FROM identity").fetchone() == (str(identity),))
 
 
 def _lengthen_log(connection: sqlite3.Connection) -> None:
@@ -72,7 +88,7 @@ def _lengthen_log(connection: sqlite3.Connection) -> None:
     try:
         connection.execute("BEGIN IMMEDIATE")
         connection.execute("CREATE TABLE filling (content BLOB)")
-        connection.execute("INSERT INTO filling VALUES (zeroblob(?))", (LOG_BYTES,))
+        connection.execute("INSERT INTO filling VALUES (zeroblob(?))", (LOG_BYTES + (1 << 16),))
     except sqlite3.Error:
         # It is a matter of speed alone: where the disk is too full for it, it may do for a mission.
         _logger.debug("the log of the journal stays short", exc_info=True)

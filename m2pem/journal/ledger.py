@@ -6,8 +6,9 @@ and the others of its group go on. An SQLite error ends the whole transaction.
 
 import os
 import sqlite3
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain
 from typing import Any
@@ -15,8 +16,12 @@ from typing import Any
 from m2pem.engine.records import RunOutcome
 from m2pem.errors import InternalError, JournalError
 from m2pem.journal.base import Entry, RunHeader
+from m2pem.journal.chain import beginning, link, seal
 from m2pem.journal.codec import encode_library, run_id, unknown_run
 from m2pem.journal.lease import RunLocks
+from m2pem.journal.losses import loss_of, losses
+from m2pem.journal.marks import NO_HASH, Mark, MarkFile, MarkState
+from m2pem.journal.presence import Presence
 from m2pem.journal.standing import Standing
 
 
@@ -26,30 +31,44 @@ class Row:
 
     number: int
     entry: Entry
-    body: str
+    body: bytes
 
-    @property
-    def columns(self) -> tuple[Any, ...]:
+    def hash_after(self, before: bytes) -> bytes:
+        """The hash of the entry, when `before` is that of the one before it."""
+        entry = self.entry
+        return link(before, entry.seq, entry.epoch, entry.at_us, entry.t_us, self.body)
+
+    def columns(self, hash_: bytes | None) -> tuple[Any, ...]:
         """As the table has them."""
         entry = self.entry
-        return self.number, entry.seq, entry.epoch, entry.at_us, entry.t_us, self.body
+        body = self.body.decode()
+        return self.number, entry.seq, entry.epoch, entry.at_us, entry.t_us, body, hash_
 
 
-_ROWS = 100
+_ROWS = 90
 """To a statement: SQLite before 3.32 takes 999 parameters."""
 
 
 class Ledger:
-    """`begin`, any number of calls, then `commit` or `rollback`; and again."""
+    """`begin`, any number of calls, then `commit` or `rollback`; and again.
 
-    def __init__(self, connection: sqlite3.Connection, locks: RunLocks) -> None:
+    `presence`: whether the journal's files are still where they were opened.
+    """
+
+    def __init__(
+        self, connection: sqlite3.Connection, locks: RunLocks, marks: MarkFile, presence: Presence
+    ) -> None:
         self._connection = connection
         self._locks = locks
+        self._marks = marks
+        self._presence = presence
         self._known: dict[int, Standing] = {}
         self._data_version = 0
         self._changed: dict[int, Standing] = {}
-        self._rows: list[Row] = []
+        self._rows: list[tuple[Any, ...]] = []
         self._locked: list[int] = []
+        self._appended: set[int] = set()
+        self._lossy: set[int] = set()
 
     def begin(self) -> None:
         """Start a transaction; what another process has written before is seen in it."""
@@ -61,61 +80,123 @@ class Ledger:
 
     def create(self, header: RunHeader) -> str:
         """Add a run, claimed with epoch 1."""
+        marks = self._marks.read()
+        self._refuse_while_lossy(marks)
         last = self._connection.execute("SELECT max(run) FROM runs").fetchone()[0]
-        number = 1 + (last or 0)
-        standing = Standing(epoch=1, pid=os.getpid(), started_us=header.created_us)
-        self._take(number, standing)
-        self._connection.execute(
-            "INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-            (
-                number,
-                header.mission_name,
-                header.mission,
-                header.process,
-                header.fleet,
-                header.simulated,
-                header.speed,
-                header.created_us,
-                encode_library(header.library),
-            ),
+        number = 1 + max(last or 0, *marks, 0)
+        row = (
+            number,
+            header.mission_name,
+            header.mission,
+            header.process,
+            header.fleet,
+            header.simulated,
+            float(header.speed),
+            header.created_us,
+            encode_library(header.library),
         )
+        standing = Standing(
+            epoch=1, pid=os.getpid(), started_us=header.created_us, hash=beginning(row)
+        )
+        self._take(number, standing)
+        self._connection.execute("INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
         self._changed[number] = standing
         return run_id(number)
+
+    def _refuse_while_lossy(self, marks: Mapping[int, Mark]) -> None:
+        for number, loss in losses(self._connection, marks).items():
+            run = run_id(number)
+            raise JournalError(
+                f"no run begins: {run}: {loss}, so its vehicles may do what no mission knows. "
+                f"{loss.remedy(run)}"
+            )
 
     def claim(self, number: int) -> int:
         """Take a run's lock and raise its epoch, which is returned."""
         standing = self._standing(number)
         self._take(number, standing)
-        self._changed[number] = standing.claimed(os.getpid())
-        return standing.epoch + 1
+        # Nobody else writes the mark now.
+        mark = self._marks.of(number)
+        if loss_of(self._connection, number, mark) is not None:
+            self._lossy.add(number)
+        self._changed[number] = replace(
+            standing.claimed(os.getpid()), epoch=1 + max(standing.epoch, mark.epoch if mark else 0)
+        )
+        return self._changed[number].epoch
+
+    def accept_loss(self, number: int) -> None:
+        """Let the mark say that what is missing of a run is known; the run must not be driven."""
+        mark = self._marks.of(number)
+        loss = loss_of(self._connection, number, mark)
+        if mark is None or loss is None:
+            raise JournalError(f"{run_id(number)} has lost nothing")
+        if loss.resumable:
+            run = run_id(number)
+            raise JournalError(f"{run} can be resumed: {loss.remedy(run)}")
+        self._marks.write({number: replace(mark, state=MarkState.ACCEPTED)})
 
     def append(self, rows: Sequence[Row]) -> None:
         """Add entries."""
         changed: dict[int, Standing] = {}
+        columns: list[tuple[Any, ...]] = []
         for row in rows:
             before = changed.get(row.number) or self._standing(row.number)
-            changed[row.number] = before.after(row.entry)
+            hash_ = row.hash_after(before.hash or self._beginning(row.number))
+            changed[row.number] = before.after(row.entry, hash_)
+            columns.append(row.columns(hash_))
         for number in changed:
             if not self._locks.mine(number):
                 raise InternalError(f"{run_id(number)}: written to without having been claimed")
         self._changed.update(changed)
-        self._rows.extend(rows)
+        self._appended.update(changed)
+        self._rows.extend(columns)
+
+    def _beginning(self, number: int) -> bytes:
+        """Of a run that has no hash yet: it is from before the chain."""
+        query = "SELECT * FROM runs WHERE run = ?"
+        return beginning(self._connection.execute(query, (number,)).fetchone())
 
     def forget(self, number: int) -> None:
         """Drop what is remembered of a run that is let go of."""
         self._known.pop(number, None)
+        self._lossy.discard(number)
+        self._marks.forget(number)
 
     def commit(self) -> bool:
-        """Make it durable; False when there was nothing to write."""
-        self._write("INSERT INTO entries", [row.columns for row in self._rows])
+        """Make it durable and mark it; False when there was nothing to write.
+
+        Raises:
+            JournalError: it is in the journal, but must not be acknowledged: the files are not
+                where they were, or the mark cannot be written.
+        """
+        self._write("INSERT INTO entries", self._rows)
         self._write(
             "REPLACE INTO standings", [_columns(*changed) for changed in self._changed.items()]
         )
         self._connection.execute("COMMIT")
         wrote = bool(self._changed)
+        if wrote:
+            self._presence.check()
+            self._mark()
         self._known.update(self._changed)
         self._reset()
         return wrote
+
+    def _mark(self) -> None:
+        marks: dict[int, Mark] = {}
+        for number, standing in self._changed.items():
+            if number in self._lossy:
+                # The mark remembers the loss until an operator has let the run go on, or ended it.
+                if standing.paused or number not in self._appended:
+                    continue
+                self._lossy.discard(number)
+            marks[number] = mark_of(standing)
+        try:
+            self._marks.write(marks)
+        except OSError as error:
+            raise JournalError(
+                f"{self._marks.path}: the mark cannot be written: {error.strerror}"
+            ) from error
 
     def _write(self, into: str, rows: Sequence[tuple[Any, ...]]) -> None:
         # Many rows to a statement: each execution gives the interpreter's lock away, and with a
@@ -147,6 +228,10 @@ class Ledger:
                 f"run {run} is driven by process {standing.pid}, which is alive: end that first"
             )
         self._locked.append(number)
+        try:
+            self._marks.reserve(number)
+        except OSError as error:
+            raise JournalError(f"{self._marks.path}: {error.strerror}") from error
 
     def _standing(self, number: int) -> Standing:
         standing = self._changed.get(number) or self._known.get(number)
@@ -156,12 +241,13 @@ class Ledger:
             ).fetchone()
             if row is None:
                 raise unknown_run(run_id(number))
-            standing = self._known[number] = standing_of(row[1:])
+            standing = self._known[number] = standing_of(row)
         return standing
 
     def _reset(self) -> None:
         self._changed.clear()
         self._rows.clear()
+        self._appended.clear()
         self._locked.clear()
 
 
@@ -170,23 +256,41 @@ def _placeholders(rows: int, columns: int) -> str:
     return ", ".join([f"({', '.join('?' * columns)})"] * rows)
 
 
+def mark_of(standing: Standing) -> Mark:
+    """What the mark file says of a run that is there."""
+    state = MarkState.OPEN if standing.outcome is None else MarkState.ENDED
+    return Mark(standing.epoch, standing.last_seq, standing.hash or NO_HASH, state)
+
+
 def _columns(number: int, s: Standing) -> tuple[Any, ...]:
-    return (
+    row = (
         number,
         s.epoch,
         s.pid,
         s.started_us,
         s.last_seq,
-        s.paused,
+        int(s.paused),
         s.outcome,
         s.detail,
         s.ended_us,
+        s.hash,
     )
+    return *row, seal(row)
 
 
-def standing_of(columns: Sequence[Any]) -> Standing:
-    """A standing from its columns of the table, after the run's number."""
-    epoch, pid, started_us, last_seq, paused, outcome, detail, ended_us = columns
+def standing_of(row: Sequence[Any]) -> Standing:
+    """A standing from its row of the table.
+
+    Raises:
+        JournalError: it is damaged.
+    """
+    number, epoch, pid, started_us, last_seq, paused, outcome, detail, ended_us, hash_, sealed = row
+    whole = sealed is None and hash_ is None  # from before the chain
+    if not whole:
+        with suppress(TypeError, ValueError, OverflowError):
+            whole = sealed == seal(row[:-1])
+    if not whole:
+        raise JournalError(f"run {number}: its row in the table `standings` is damaged")
     return Standing(
         epoch=epoch,
         pid=pid,
@@ -196,4 +300,5 @@ def standing_of(columns: Sequence[Any]) -> Standing:
         outcome=None if outcome is None else RunOutcome(outcome),
         detail=detail,
         ended_us=ended_us,
+        hash=hash_,
     )

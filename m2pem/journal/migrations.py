@@ -66,10 +66,22 @@ def identity_of_the_journal(connection: sqlite3.Connection) -> None:
     connection.execute("INSERT INTO identity VALUES (?)", (str(uuid4()),))
 
 
+def hash_chain(connection: sqlite3.Connection) -> None:
+    """0.4: each entry carries a hash over what was before it; entries from before have none.
+
+    `seal` covers the other columns of a standing. `marked`: there has been a mark file.
+    """
+    connection.execute("ALTER TABLE entries ADD COLUMN hash BLOB")
+    connection.execute("ALTER TABLE standings ADD COLUMN hash BLOB")
+    connection.execute("ALTER TABLE standings ADD COLUMN seal BLOB")
+    connection.execute("ALTER TABLE identity ADD COLUMN marked INTEGER NOT NULL DEFAULT 0")
+
+
 MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
     runs_standings_and_entries,
     other_files_of_missions,
     identity_of_the_journal,
+    hash_chain,
 )
 
 

@@ -1,7 +1,9 @@
 """The journal in an SQLite file: for one host, any number of executives."""
 
 import asyncio
+import logging
 import sqlite3
+import struct
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing, suppress
@@ -11,7 +13,8 @@ from typing import Any, TypeVar
 from uuid import UUID
 
 from m2pem.errors import JournalError
-from m2pem.journal.base import Entry, RunHeader, RunLine
+from m2pem.journal.base import Entry, Loss, RunHeader, RunLine
+from m2pem.journal.chain import beginning, link
 from m2pem.journal.codec import (
     decode_body,
     decode_library,
@@ -22,20 +25,28 @@ from m2pem.journal.codec import (
 )
 from m2pem.journal.database import in_plain_words, open_for_reading, open_for_writing
 from m2pem.journal.lease import RunLocks, run_locks
-from m2pem.journal.ledger import Ledger, Row, standing_of
+from m2pem.journal.ledger import Ledger, Row, mark_of, standing_of
+from m2pem.journal.losses import losses
+from m2pem.journal.marks import MarkFile, identity_in, of_another_journal
+from m2pem.journal.presence import Presence
 from m2pem.journal.writer import GroupWriter
 
 T = TypeVar("T")
 
+log = logging.getLogger("m2pem.journal")
+
 _BATCH_BYTES = 1 << 20
 _BATCH_ENTRIES = 500
+_STANDING_COLUMNS = 11
+NO_HEADER = RunHeader("", b"", "")
+"""Of a run that the journal has lost whole."""
 
 
 class SqliteJournal:
     """WAL and `synchronous=FULL`: an append that returned survives a power cut.
 
     One thread writes, another reads; the event loop never waits for the disk. `FILE-lock` beside
-    the file says which runs are driven.
+    the file says which runs are driven, `FILE-mark` what was acknowledged last.
     """
 
     def __init__(
@@ -44,13 +55,18 @@ class SqliteJournal:
         writing: sqlite3.Connection,
         reading: sqlite3.Connection,
         locks: RunLocks,
+        marks: MarkFile,
+        identity: UUID,
     ) -> None:
         self._path = path
-        self._identity = UUID(writing.execute("SELECT uuid FROM identity").fetchone()[0])
+        self._identity = identity
         self._locks = locks
+        self._marks = marks
         self._writing = writing
         self._reading = reading
-        self._writer = GroupWriter(Ledger(writing, locks), path, finish=self._finish)
+        presence = Presence([path, _beside(path, "wal"), _beside(path, "lock"), marks.path])
+        ledger = Ledger(writing, locks, marks, presence)
+        self._writer = GroupWriter(ledger, path, finish=self._finish)
         self._reader = ThreadPoolExecutor(1, thread_name_prefix=f"reading {path}")
         self._closed = False
         self._writer.start()
@@ -59,19 +75,34 @@ class SqliteJournal:
     def open(cls, path: Path) -> "SqliteJournal":
         """Open a journal, making its file where it is missing; `close` it in the end.
 
+        What was acknowledged and is gone is logged as an error, and each run's `RunLine.loss`.
+
         Raises:
-            JournalError: there is no such folder, it is not a journal, a newer one, ...
+            JournalError: there is no such folder, it is not a journal, a newer one, it is not the
+                one whose mark file is beside it, ...
         """
         path = path.resolve()
+        marked = identity_in(_beside(path, "mark"))
+        if marked is not None and not path.exists():
+            raise of_another_journal(_beside(path, "mark"))
         with ExitStack() as undo:
-            writing = undo.enter_context(closing(open_for_writing(path)))
+            writing = undo.enter_context(closing(open_for_writing(path, marked)))
             reading = undo.enter_context(closing(open_for_reading(path)))
+            identity = _identity_of(writing, path)
             try:
-                locks = run_locks(path.with_name(f"{path.name}-lock"))
+                locks = run_locks(_beside(path, "lock"))
+                marks = MarkFile(_beside(path, "mark"), identity)
             except OSError as error:
                 raise JournalError(f"{error.filename} can't be opened: {error.strerror}") from error
+            undo.callback(marks.close)
+            try:
+                _compare(writing, marks, path)
+            except sqlite3.Error as error:
+                raise in_plain_words(error, path) from error
+            except OSError as error:
+                raise JournalError(f"{marks.path}: {error.strerror}") from error
             undo.pop_all()
-        return cls(path, writing, reading, locks)
+        return cls(path, writing, reading, locks, marks, identity)
 
     @property
     def identity(self) -> UUID:
@@ -132,60 +163,117 @@ class SqliteJournal:
         """See `Journal.append`. A cancelled call may or may not be written, but never in part."""
         self._check_open()
         if entries:
-            rows = [Row(run_number(e.run), e, encode_body(e).decode()) for e in entries]
+            rows = [Row(run_number(e.run), e, encode_body(e)) for e in entries]
             await self._writer.submit(partial(Ledger.append, rows=rows))
 
     async def read(self, run: str, after_seq: int = 0) -> AsyncIterator[Entry]:
         """See `Journal.read`; entries that are appended meanwhile are included."""
         number = run_number(run)
+        before: bytes | None = None
+        first = True
         while True:
-            batch = await self._read(partial(self._batch, number, after_seq))
+            batch, before = await self._read(
+                partial(self._batch, number, after_seq, before, first=first)
+            )
             for entry in batch:
                 yield entry
             if not batch:
                 return
-            after_seq = batch[-1].seq
+            after_seq, first = batch[-1].seq, False
 
-    def _batch(self, number: int, after_seq: int) -> list[Entry]:
+    def _batch(
+        self, number: int, after_seq: int, before: bytes | None, *, first: bool
+    ) -> tuple[list[Entry], bytes | None]:
+        """`before`: the hash of the entry before; None: no entry before has one."""
+        self._reading.execute("BEGIN")
+        try:
+            if first:
+                before = self._hash_up_to(number, after_seq)
+            entries, before = self._next(number, after_seq, before)
+            if not entries:
+                self._check_end(number, before)
+        finally:
+            self._reading.execute("ROLLBACK")
+        return entries, before
+
+    def _next(
+        self, number: int, after_seq: int, before: bytes | None
+    ) -> tuple[list[Entry], bytes | None]:
         entries: list[Entry] = []
         size = 0
         rows = self._reading.execute(
-            "SELECT seq, epoch, at_us, t_us, body FROM entries WHERE run = ? AND seq > ?"
-            " ORDER BY seq LIMIT ?",
+            "SELECT seq, epoch, at_us, t_us, CAST(body AS BLOB), hash FROM entries"
+            " WHERE run = ? AND seq > ? ORDER BY seq LIMIT ?",
             (number, after_seq, _BATCH_ENTRIES),
         )
-        for seq, epoch, at_us, t_us, body in rows:
-            try:
-                content = decode_body(body)
-            except JournalError as error:
-                raise JournalError(
-                    f"{self._path}: {run_id(number)}, record {seq}: {error}"
-                ) from error
-            entries.append(Entry(run_id(number), epoch, seq, at_us, t_us, *content))
-            size += len(body)
-            if size > _BATCH_BYTES:
-                break
-        rows.close()
-        if not entries and not self._known(number):
-            raise unknown_run(run_id(number))
-        return entries
+        with closing(rows):
+            for seq, epoch, at_us, t_us, body, hash_ in rows:
+                if hash_ is not None:
+                    link_ = link(before or self._beginning(number), seq, epoch, at_us, t_us, body)
+                if hash_ != (None if before is None and hash_ is None else link_):
+                    raise self._damaged(
+                        number, seq, "it does not follow from what was before it (its hash differs)"
+                    )
+                before = hash_
+                try:
+                    content = decode_body(body)
+                except JournalError as error:
+                    raise self._damaged(number, seq, str(error)) from error
+                entries.append(Entry(run_id(number), epoch, seq, at_us, t_us, *content))
+                size += len(body)
+                if size > _BATCH_BYTES:
+                    break
+        return entries, before
 
-    def _known(self, number: int) -> bool:
-        query = "SELECT 1 FROM runs WHERE run = ?"
-        return self._reading.execute(query, (number,)).fetchone() is not None
+    def _hash_up_to(self, number: int, seq: int) -> bytes | None:
+        row = self._reading.execute(
+            "SELECT hash FROM entries WHERE run = ? AND seq <= ? ORDER BY seq DESC LIMIT 1",
+            (number, seq),
+        ).fetchone()
+        return None if row is None else row[0]
+
+    def _beginning(self, number: int) -> bytes:
+        row = self._reading.execute("SELECT * FROM runs WHERE run = ?", (number,)).fetchone()
+        return beginning(row)
+
+    def _check_end(self, number: int, before: bytes | None) -> None:
+        query = "SELECT * FROM standings JOIN runs USING (run) WHERE run = ?"
+        row = self._reading.execute(query, (number,)).fetchone()
+        if row is None:
+            raise unknown_run(run_id(number))
+        standing = standing_of(row[:_STANDING_COLUMNS])
+        if standing.hash is not None and standing.hash != (before or self._beginning(number)):
+            raise self._damaged(
+                number, standing.last_seq, "it, or what was before it, is missing or was changed"
+            )
+
+    def _damaged(self, number: int, seq: int, why: str) -> JournalError:
+        return JournalError(f"{self._path}: {run_id(number)}, record {seq}: {why}")
 
     async def runs(self) -> Sequence[RunLine]:
         """See `Journal.runs`."""
         return await self._read(self._lines)
 
     def _lines(self) -> list[RunLine]:
-        rows = self._reading.execute("SELECT * FROM runs JOIN standings USING (run) ORDER BY run")
-        return [self._line(*row) for row in rows]
+        marks = self._marks.read()
+        self._reading.execute("BEGIN")
+        try:
+            lost = losses(self._reading, marks)
+            rows = self._reading.execute(
+                "SELECT * FROM standings JOIN runs USING (run) ORDER BY run"
+            ).fetchall()
+        finally:
+            self._reading.execute("ROLLBACK")
+        lines = {row[0]: self._line(row, lost.pop(row[0], None)) for row in rows}
+        for number, loss in lost.items():
+            mark = marks[number]
+            lines[number] = RunLine(run_id(number), NO_HEADER, mark.epoch, 0, 0, loss=loss)
+        return [lines[number] for number in sorted(lines)]
 
-    def _line(self, number: int, *columns: Any) -> RunLine:
-        mission_name, mission, process, fleet, simulated, speed, created_us, library, *standing = (
-            columns
-        )
+    def _line(self, row: Sequence[Any], loss: Loss | None) -> RunLine:
+        mission_name, mission, process, fleet, simulated, speed, created_us, library = row[
+            _STANDING_COLUMNS:
+        ]
         header = RunHeader(
             mission_name=mission_name,
             mission=mission,
@@ -196,7 +284,18 @@ class SqliteJournal:
             created_us=created_us,
             library=decode_library(library),
         )
-        return standing_of(standing).line(run_id(number), header, self._locks.held(number))
+        number = row[0]
+        standing = standing_of(row[:_STANDING_COLUMNS])
+        return standing.line(run_id(number), header, self._locks.held(number), loss)
+
+    async def accept_loss(self, run: str) -> None:
+        """An operator knows what is missing of a run that cannot be resumed: new runs may begin.
+
+        Raises:
+            JournalError: it has lost nothing, or can be resumed, which asks.
+        """
+        self._check_open()
+        await self._writer.submit(partial(Ledger.accept_loss, number=run_number(run)))
 
     async def _read(self, work: Callable[[], T]) -> T:
         self._check_open()
@@ -204,6 +303,9 @@ class SqliteJournal:
             return await asyncio.get_running_loop().run_in_executor(self._reader, work)
         except sqlite3.Error as error:
             raise in_plain_words(error, self._path) from error
+        except (TypeError, ValueError, struct.error) as error:
+            # A flipped bit may make a text of a number.
+            raise JournalError(f"{self._path}: it is damaged: {error}") from error
 
     def _check_open(self) -> None:
         if self._closed:
@@ -225,4 +327,48 @@ class SqliteJournal:
         # What can't be moved from the log into the file now is moved when it is opened next.
         with suppress(sqlite3.Error):
             self._writing.close()
+        self._marks.close()
         self._locks.close()
+
+
+def _beside(path: Path, what: str) -> Path:
+    return path.with_name(f"{path.name}-{what}")
+
+
+def _identity_of(connection: sqlite3.Connection, path: Path) -> UUID:
+    try:
+        return UUID(connection.execute("SELECT uuid FROM identity").fetchone()[0])
+    except sqlite3.Error as error:
+        raise in_plain_words(error, path) from error
+    except (TypeError, ValueError, AttributeError) as error:
+        raise JournalError(f"{path}: it is damaged: its identity cannot be read") from error
+
+
+def _compare(connection: sqlite3.Connection, marks: MarkFile, path: Path) -> None:
+    """Say what is missing; begin the marks of a journal that has none."""
+    (marked,) = connection.execute("SELECT marked FROM identity").fetchone()
+    if marks.new:
+        if marked:
+            log.warning(
+                "%s is missing: whether %s has lost anything cannot be known any more; look at the "
+                "vehicles before you resume a run",
+                marks.path,
+                path.name,
+            )
+        _begin_marks(connection, marks)
+    for number, loss in losses(connection, marks.read()).items():
+        log.error("%s: %s: %s", path, run_id(number), loss)
+    if not marked:
+        connection.execute("UPDATE identity SET marked = 1")
+
+
+def _begin_marks(connection: sqlite3.Connection, marks: MarkFile) -> None:
+    # Nobody else may write meanwhile: a mark must not go back.
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        rows = connection.execute("SELECT * FROM standings").fetchall()
+        if rows:
+            marks.reserve(max(row[0] for row in rows))
+            marks.write({row[0]: mark_of(standing_of(row)) for row in rows})
+    finally:
+        connection.execute("ROLLBACK")

@@ -4,14 +4,17 @@ from dataclasses import dataclass, replace
 
 from m2pem.engine.records import RunEnded, RunOutcome, RunPaused, RunResumed, RunStarted
 from m2pem.errors import InternalError, StaleEpochError
-from m2pem.journal.base import Entry, RunHeader, RunLine
+from m2pem.journal.base import Entry, Loss, RunHeader, RunLine
 
 _NOTED = frozenset({RunStarted, RunPaused, RunResumed, RunEnded})
 
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """A run after its last entry. `pid`: the process that claimed it last."""
+    """A run after its last entry. `pid`: the process that claimed it last.
+
+    `hash`: of the last entry, or of the header before the first; None: from before the chain.
+    """
 
     epoch: int
     pid: int
@@ -21,9 +24,10 @@ class Standing:
     outcome: RunOutcome | None = None
     detail: str = ""
     ended_us: int | None = None
+    hash: bytes | None = None
 
-    def after(self, entry: Entry) -> "Standing":
-        """Where the run stands with one more entry.
+    def after(self, entry: Entry, hash_: bytes | None = None) -> "Standing":
+        """Where the run stands with one more entry, whose hash is `hash_`.
 
         Raises:
             StaleEpochError: the run was claimed since.
@@ -46,7 +50,7 @@ class Standing:
             )
         if not entry.records:
             raise InternalError(f"{entry.run}: an entry without a record")
-        standing = replace(self, last_seq=self.last_seq + len(entry.records))
+        standing = replace(self, last_seq=self.last_seq + len(entry.records), hash=hash_)
         for record in entry.records:
             if type(record) in _NOTED:
                 standing = standing._noting(entry, record)
@@ -70,7 +74,7 @@ class Standing:
         """Where the run stands when process `pid` has taken it over."""
         return replace(self, epoch=self.epoch + 1, pid=pid)
 
-    def line(self, run: str, header: RunHeader, driven: bool) -> RunLine:
+    def line(self, run: str, header: RunHeader, driven: bool, loss: Loss | None = None) -> RunLine:
         """What `Journal.runs` says of it."""
         return RunLine(
             run=run,
@@ -83,4 +87,5 @@ class Standing:
             outcome=self.outcome,
             detail=self.detail,
             ended_us=self.ended_us,
+            loss=loss,
         )

@@ -101,6 +101,8 @@ class GroupWriter:
                     call.error = error
             if self.ledger.commit():
                 self.commits += 1
+        except JournalError as error:
+            return self._withdraw(error, for_good=True)
         except sqlite3.Error as error:
             problem: M2pemError = in_plain_words(error, self.path)
             problem.__cause__ = error

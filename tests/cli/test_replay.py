@@ -1,4 +1,5 @@
 import json
+import re
 import sqlite3
 from pathlib import Path
 
@@ -97,8 +98,27 @@ def tamper(journal: Path, old: str, new: str) -> None:
     connection.close()
 
 
+def as_from_before_the_chain(journal: Path) -> None:
+    """As an earlier release would have written it, which decided otherwise."""
+    with sqlite3.connect(journal) as connection:
+        connection.execute("UPDATE entries SET hash = NULL")
+        connection.execute("UPDATE standings SET hash = NULL, seal = NULL")
+        connection.execute("UPDATE identity SET marked = 0")
+    connection.close()
+    journal.with_name(f"{journal.name}-mark").unlink()
+
+
+def test_an_entry_that_was_changed_is_named(invoke: Invoke, journal: Path, printed: str) -> None:
+    tamper(journal, '"key":"user.decision","value":"abort"', '"key":"user.decision","value":"go"')
+    for words in ((), ("--verify",)):
+        status, _, err = invoke("replay", "r1", "--journal", journal, *words)
+        assert status == 1
+        assert re.search(r"journal\.db: r1, record \d+: it does not follow from what was", err)
+
+
 def test_the_first_difference_is_printed(invoke: Invoke, journal: Path, printed: str) -> None:
     tamper(journal, '"key":"user.decision","value":"abort"', '"key":"user.decision","value":"go"')
+    as_from_before_the_chain(journal)
     words = ("replay", "r1", "--journal", journal, "--verify")
     status, out, _ = invoke(*words)
     assert status == 1
@@ -123,6 +143,7 @@ def test_a_record_too_few_is_a_difference(invoke: Invoke, journal: Path, printed
         shorter = json.dumps([given, records[:-1]])
         connection.execute("UPDATE entries SET body = ? WHERE seq = ?", (shorter, seq))
     connection.close()
+    as_from_before_the_chain(journal)
     status, out, _ = invoke("replay", "r1", "--journal", journal, "--verify")
     assert status == 1
     assert "journal: no more records" in out

@@ -119,5 +119,5 @@ def test_nothing_is_left_beside_the_journal_of_a_run_that_ended(
     answers = ("--answers", ANSWERS / "vignette1_detection.yaml", "--speed", "100")
     assert invoke("run", MISSION, "--fleet", FLEET, *NOBODY, *answers)[0] == 0
     names = {path.name for path in (tmp_path / "m2pem").iterdir()}
-    assert names == {"journal.db", "journal.db-lock", "journal.db-control"}
+    assert names == {"journal.db", "journal.db-lock", "journal.db-mark", "journal.db-control"}
     assert list((tmp_path / "m2pem" / "journal.db-control").iterdir()) == []

@@ -1,13 +1,12 @@
 import asyncio
 import os
-import sqlite3
 import tracemalloc
-from contextlib import closing
 
 import pytest
 
 from m2pem.engine.records import InputIgnored
 from m2pem.errors import JournalError
+from m2pem.journal.codec import encode_body
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.testing.contracts.journal import HEADER, JournalContract, entry, line, opened, written
 
@@ -184,14 +183,15 @@ async def test_symbolic_links_lead_to_the_same_locks(tmp_path):
                 await two.claim(run)
 
 
-async def test_a_damaged_entry_is_named(open_journal, tmp_path):
+async def test_an_entry_of_a_newer_release_is_named(open_journal, tmp_path, monkeypatch):
+    def of_a_newer_release(entry):
+        return encode_body(entry).replace(b"InputIgnored", b"NotYetKnown")
+
     async with opened(open_journal) as journal:
         run = await journal.create(HEADER)
-        await journal.append([entry(run, 1), entry(run, 2)])
-    with closing(sqlite3.connect(tmp_path / "journal.db")) as connection, connection:
-        connection.execute(
-            "UPDATE entries SET body = replace(body, 'InputIgnored', 'NotYetKnown') WHERE seq = 2"
-        )
+        await journal.append([entry(run, 1)])
+        monkeypatch.setattr("m2pem.journal.sqlite.encode_body", of_a_newer_release)
+        await journal.append([entry(run, 2)])
     async with opened(open_journal) as journal:
         reading = journal.read(run)
         with pytest.raises(JournalError, match=r"journal\.db: r1, record 2: .*newer m2pem"):

@@ -15,6 +15,9 @@ def _run_started(state: RunState, record: r.RunStarted) -> None:
 
 def _run_claimed(state: RunState, record: r.RunClaimed) -> None:
     state.epoch = record.epoch
+    state.last_behavior += record.lost
+    state.last_prompt += record.lost
+    state.last_service += record.lost
 
 
 def _run_paused(state: RunState, record: r.RunPaused) -> None:

@@ -14,10 +14,14 @@ class RunStarted(BaseRecord, frozen=True):
 
 
 class RunClaimed(BaseRecord, frozen=True):
-    """Another executive, or the same after a restart, drives the run from here."""
+    """Another executive, or the same after a restart, drives the run from here.
+
+    `lost`: how many records the journal had lost; so many ids are left out.
+    """
 
     epoch: int
     by: str = ""
+    lost: int = 0
 
 
 class RunPaused(BaseRecord, frozen=True):
