@@ -43,6 +43,7 @@ from m2pem.executive.reporting import reported
 from m2pem.executive.runner import Outside, Runner
 from m2pem.executive.script import Script
 from m2pem.executive.services import Services
+from m2pem.executive.space import watch_space
 from m2pem.executive.stop_marks import StopMarks
 from m2pem.gateway.bus import Bus
 from m2pem.gateway.watch import Watch, watch
@@ -155,6 +156,9 @@ class Executive:
         for name, arbiter in self.arbiters.all.items():
             self._listen(f"reports of {name}", partial(self._read_reports, arbiter))
             self._listen(f"telemetry of {name}", partial(self._read_telemetry, arbiter))
+        if self.journal.file is not None:
+            watching = partial(watch_space, self.journal.file, self.notices)
+            self._listen("watch of free space", watching)
         if self._watch_links:
             # On a fast clock our own hesitation would look like the silence of a vehicle.
             stretch = max(1.0, self.speed)

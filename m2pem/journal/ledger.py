@@ -22,6 +22,7 @@ from m2pem.journal.lease import RunLocks
 from m2pem.journal.losses import loss_of, losses
 from m2pem.journal.marks import NO_HASH, Mark, MarkFile, MarkState
 from m2pem.journal.presence import Presence
+from m2pem.journal.space import shortage
 from m2pem.journal.standing import Standing
 
 
@@ -80,6 +81,7 @@ class Ledger:
 
     def create(self, header: RunHeader) -> str:
         """Add a run, claimed with epoch 1."""
+        self._refuse_while_short()
         marks = self._marks.read()
         self._refuse_while_lossy(marks)
         last = self._connection.execute("SELECT max(run) FROM runs").fetchone()[0]
@@ -102,6 +104,16 @@ class Ledger:
         self._connection.execute("INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
         self._changed[number] = standing
         return run_id(number)
+
+    def _refuse_while_short(self) -> None:
+        try:
+            text = shortage(self._marks.path)
+        except OSError as error:
+            raise JournalError(
+                f"{self._marks.path}: its disk cannot be asked for free space: {error.strerror}"
+            ) from error
+        if text:
+            raise JournalError(text)
 
     def _refuse_while_lossy(self, marks: Mapping[int, Mark]) -> None:
         for number, loss in losses(self._connection, marks).items():

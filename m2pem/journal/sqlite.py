@@ -29,6 +29,7 @@ from m2pem.journal.ledger import Ledger, Row, mark_of, standing_of
 from m2pem.journal.losses import losses
 from m2pem.journal.marks import MarkFile, identity_in, of_another_journal
 from m2pem.journal.presence import Presence
+from m2pem.journal.space import bound_mb
 from m2pem.journal.writer import GroupWriter
 
 T = TypeVar("T")
@@ -82,6 +83,7 @@ class SqliteJournal:
                 one whose mark file is beside it, ...
         """
         path = path.resolve()
+        bound_mb()  # a wrong setting is reported now, not when a run is to begin
         marked = identity_in(_beside(path, "mark"))
         if marked is not None and not path.exists():
             raise of_another_journal(_beside(path, "mark"))

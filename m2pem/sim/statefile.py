@@ -4,8 +4,10 @@ SQLite, one transaction for each change, so that a killed process leaves a whole
 motion is a function of time, whoever opens the file later finds the vehicles moved on.
 """
 
+import os
 import sqlite3
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -95,18 +97,26 @@ class _Behavior(msgspec.Struct):
     shots: Shots | None = None
 
 
+def _make_private(path: str) -> None:
+    """Make a new file readable by its owner alone: it says where vehicles are. SQLite gives its
+    log the same mode."""
+    with suppress(FileExistsError):
+        os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600))
+
+
 class StateFile:
     """One file; several resources may share it, one arbiter at a time may write it."""
 
     def __init__(self, path: str) -> None:
         self.path = path
         try:
+            _make_private(path)
             self._connection = sqlite3.connect(path, isolation_level=None)
             self._connection.execute("PRAGMA journal_mode=WAL")
             self._connection.execute("PRAGMA synchronous=NORMAL")
             self._connection.executescript(_SCHEMA)
             found = self.meta("format", FORMAT)
-        except sqlite3.Error as error:
+        except (sqlite3.Error, OSError) as error:
             raise StateFileError(
                 f"{path}: cannot keep the state of a simulation here: {error}; name a file in a "
                 "folder that exists, or remove the file to begin anew"
