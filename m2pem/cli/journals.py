@@ -56,7 +56,7 @@ async def find_run(journal: Journal, run: str) -> RunLine:
         there = f"it has {', '.join(lines)}" if lines else "it has none yet"
         raise UnusableError(f"the journal has no run {run!r}; {there}")
     line = lines[run]
-    if line.loss is not None and not line.header.mission:
+    if line.gone and line.loss is not None:
         raise UnusableError(f"{run}: {line.loss}. {line.loss.remedy(run)}")
     return line
 

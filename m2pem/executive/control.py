@@ -197,8 +197,9 @@ class Control:
         return page
 
     async def runs(self) -> Sequence[RunSummary]:
-        """Every run of the journal."""
-        return [summary(line) for line in await self._executive.journal.runs()]
+        """Every run of the journal but those that it has lost whole."""
+        lines = await self._executive.journal.runs()
+        return [summary(line) for line in lines if not line.gone]
 
     def prompts(self) -> Sequence[OpenPrompt]:
         """The prompts that stand now."""
@@ -215,7 +216,7 @@ class Control:
             return runner.run.state.mission
         for line in await self._executive.journal.runs():
             if line.run == run:
-                if not line.header.mission and line.loss is not None:
+                if line.gone:
                     raise OperatorError(f"{run}: {line.loss}")
                 return await asyncio.to_thread(mission_of, line.header)
         raise OperatorError(f"the journal has no run {run}")

@@ -111,6 +111,11 @@ class RunLine:
     ended_us: int | None = None
     loss: Loss | None = None
 
+    @property
+    def gone(self) -> bool:
+        """Whether the journal has lost the run whole: the line is made of its mark alone."""
+        return self.loss is not None and self.loss.found is None
+
 
 class Journal(Protocol):
     """Opened by its constructor's `open` class method; one per executive."""

@@ -54,3 +54,18 @@ def test_a_lost_tail_is_told_everywhere_and_nothing_moves_before_the_operator_sa
     assert EffectKind.RESUME not in after
     assert EffectKind.CANCEL in after
     assert "it acknowledged" not in m2pem.run("runs")[1]
+
+
+def test_a_journal_that_is_removed_during_a_run_holds_the_vehicles_and_says_what_to_do(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    fleet, state = fleet_with_state(tmp_path)
+    program = driving(m2pem, fleet, speed="1")
+    (journal,) = tmp_path.rglob("journal.db")
+    journal.unlink()
+    program.type("takeover evsg2")
+    status, errors = program.rest()
+    assert status == 1
+    assert "journal.db was removed while it was in use" in errors
+    assert "look at the vehicles before you begin a new journal" in errors
+    assert of_the_vehicle(state)[-1] is EffectKind.HOLD

@@ -163,6 +163,9 @@ def test_a_run_of_which_nothing_is_left_is_not_taken_up(play):
             OperatorError, match=r"r1: the journal has lost the run.*accept-loss r1"
         ):
             await world.executive.resume("r1")
+        assert await world.executive.control.runs() == []
+        with pytest.raises(OperatorError, match="r1: the journal has lost the run"):
+            await world.executive.control.mission("r1")
 
     journal = with_loss(left_behind(GOTO), Loss(3, None, resumable=False))
     play(story, "ugv1", journal=journal)
