@@ -104,7 +104,8 @@ class BehaviorReport:
     of docs/missions.md ("ROUTE_BLOCKED", ...), "" unless it failed; `reason` is for people.
     `native_ref`: the arbiter's own name for it, handed back to `query` after a restart.
     `outputs`: of a terminal report: what the mission's data store gets, under names that the
-    behavior's `BehaviorSpec.writes` declares, such as `picture.files`.
+    behavior's `BehaviorSpec.writes` declares, such as `picture.files`. `held`: of an answer to
+    `query`: the behavior goes on, but one of its resources is held.
     """
 
     id: BehaviorId
@@ -114,6 +115,7 @@ class BehaviorReport:
     reason: str = ""
     native_ref: str | None = None
     outputs: Mapping[str, Value] = field(default_factory=dict)
+    held: bool = False
 
 
 class Arbiter(Protocol):
@@ -144,7 +146,11 @@ class Arbiter(Protocol):
         ...
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """What has become of a behavior, by looking at the vehicle. UNKNOWN if it is not known."""
+        """What has become of a behavior, by looking at the vehicle. UNKNOWN if it is not known.
+
+        A vehicle may have been held by an executive that is gone: then the answer says `held`, or
+        UNKNOWN where the vehicle cannot say so. `resume` lets it go on.
+        """
         ...
 
     async def hold(self, resource: ResourceId) -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import uuid
 from collections.abc import AsyncIterator, Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 from m2pem.api.arbiter import (
@@ -79,6 +80,11 @@ class GoalArbiter:
         """Let the resource go on to its goal."""
         raise NotImplementedError
 
+    def held(self, resource: ResourceId) -> bool:
+        """Whether the resource says that it is held. Override it where a hold outlives this process
+        on the vehicle; it is asked after a restart."""
+        return False
+
     # --- what a subclass calls ------------------------------------------------------------------
 
     def heard(
@@ -146,7 +152,8 @@ class GoalArbiter:
         if native_ref and holders and native_ref not in self._behaviors:
             self._behaviors[native_ref] = behavior
             self._ledger.adopt(behavior, holders, native_ref)
-        return self._ledger.last(behavior)
+        known = self._ledger.last(behavior)
+        return known if known.state.terminal else replace(known, held=any(map(self.held, holders)))
 
     def reports(self) -> AsyncIterator[BehaviorReport]:
         """Reports as they come, for one reader, until `close`."""

@@ -12,7 +12,7 @@ from m2pem.api.arbiter import Arbiter, BehaviorReport
 from m2pem.engine import commands as c
 from m2pem.engine.inputs import BehaviorMissing, ClaimRun, Input, PauseRun, ResourceFault
 from m2pem.engine.run import MissionRun
-from m2pem.engine.state import Behavior, BehaviorPhase
+from m2pem.engine.state import Behavior, BehaviorPhase, RunStatus
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.dispatch import Dispatcher
 from m2pem.executive.loss import doubted, paused_by
@@ -75,9 +75,11 @@ async def take_over(
         with suppress(ParameterError):
             dispatcher.occupy(_as_commanded(runner, behavior))
         item = _what_to_post(arbiters, behavior, report)
-        if item is None and too_long and behavior.phase is BehaviorPhase.ACTIVE:
-            reason = f"nobody drove the mission for {outage_s:.0f} s"
-            item = BehaviorMissing(behavior.id, ResumePolicy.HOLD, BehaviorState.RUNNING, reason)
+        if item is None and behavior.phase is BehaviorPhase.ACTIVE:
+            reason = _why_ask(state.status, report, outage_s if too_long else None)
+            if reason:
+                running = BehaviorState.RUNNING
+                item = BehaviorMissing(behavior.id, ResumePolicy.HOLD, running, reason)
         if loss is not None:
             item = doubted(behavior, report, item, loss)
         if item is not None:
@@ -151,6 +153,20 @@ def _what_to_post(
         reason = report.reason or "its arbiter no longer knows it"
         return BehaviorMissing(behavior.id, _policy(arbiters, behavior), report.state, reason)
     return reported(report, behavior, arbiters, behavior.number + 1)
+
+
+def _why_ask(status: RunStatus, report: BehaviorReport | None, outage_s: float | None) -> str:
+    """Why an operator must say whether a behavior that goes on may; "" if it may.
+
+    `outage_s`: how long the run had no executive, if that was too long. A hold that the journal
+    does not know of came from an executive whose journal failed, or from an operator whose pause
+    was not written any more: only an operator can say whether it is over.
+    """
+    if outage_s is not None:
+        return f"no executive drove the mission for {outage_s:.0f} s"
+    if report is not None and report.held and status is not RunStatus.PAUSED:
+        return "held, and the journal does not say why: its executive failed, or was told to pause"
+    return ""
 
 
 def _policy(arbiters: FleetArbiters, behavior: Behavior) -> ResumePolicy:

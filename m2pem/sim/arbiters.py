@@ -4,6 +4,7 @@ import asyncio
 import json
 import math
 from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from m2pem.api.arbiter import (
     ArbiterContext,
@@ -204,7 +205,7 @@ class SimArbiter:
         if execution is None or execution.last is None:
             reason = "the simulation knows no such behavior"
             return BehaviorReport(behavior, 0, BehaviorState.UNKNOWN, reason=reason)
-        return execution.last
+        return replace(execution.last, held=any(part.body.held for part in execution.parts))
 
     async def hold(self, resource: ResourceId) -> None:
         """Stop the resource, keeping its behavior. A vehicle brakes on its path."""

@@ -148,8 +148,9 @@ class Teams:
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """What became of a team behavior; after a restart, what became of its parts.
 
-        It goes on if all of them do or have ended well. Else it is UNKNOWN; what goes on of it is
-        kept in mind for a `start` under the same id, which takes it up, or a `cancel`.
+        It goes on if all of them are known; parts that have failed meanwhile count as if they did
+        so now. Else it is UNKNOWN; what goes on of it is kept in mind for a `start` under the same
+        id, which takes it up, or a `cancel`.
         """
         request = self._requests.pop(behavior, None)
         known = self._ledger.last(behavior)
@@ -167,9 +168,10 @@ class Teams:
             return replace(known, reason=found.gap)
         self._ledger.adopt(behavior, request.resources, native_ref, 1 + max(1, kept.version))
         adopted = self._make(request, scheme)
-        adopted.found(found.reports, kept)
+        held = found.held(marches=scheme.plan.march is not None)
+        adopted.found(found.reports, kept, halts=not held)
         adopted.start()
-        return self._ledger.last(behavior)
+        return replace(self._ledger.last(behavior), held=held)
 
     async def hold(self, resource: ResourceId) -> None:
         """A run holds a member: the team waits as one."""

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
@@ -71,6 +72,7 @@ class TeamBehavior:
         self._marshal = Marshal(plan.march, steady) if plan.march else None
         self._reference = Reference()
         self._told_running = False
+        self._ended_meanwhile: list[BehaviorReport] = []
         self._ending: tuple[BehaviorState, str, str] | None = None
         self._ending_due_us = 0
         self._stayed_s = 0.0
@@ -84,6 +86,8 @@ class TeamBehavior:
     def start(self) -> None:
         """Begin, or go on after a restart."""
         self._ticking = asyncio.get_running_loop().create_task(self._tick())
+        for report in self._ended_meanwhile:
+            self.heard(report)
         self._review()
 
     def cancel(self, epoch: int) -> None:
@@ -174,8 +178,13 @@ class TeamBehavior:
         if self.members[member].active:
             self._end_all(BehaviorState.FAILED, "FAILED", f"{member}: {reason}")
 
-    def found(self, reports: Mapping[str, BehaviorReport], kept: Reference) -> None:
-        """After a restart, before `start`: what the arbiters know of the parts."""
+    def found(
+        self, reports: Mapping[str, BehaviorReport], kept: Reference, *, halts: bool = False
+    ) -> None:
+        """After a restart, before `start`: what the arbiters know of the parts.
+
+        `halts`: the marshal has halted those that are held, and lets them go on.
+        """
         self._told_running = True
         self._reference = kept
         for name, why in kept.lost.items():
@@ -186,7 +195,12 @@ class TeamBehavior:
             done = report.state is BehaviorState.SUCCEEDED
             member = self.members.get(self._shares.place(part, done=done))
             if member is not None and not member.active:
-                member.adopt(f"{self.id}.{part}", report, kept.begun.get(part))
+                as_before = report
+                if report.state.terminal and not done:
+                    self._ended_meanwhile.append(report)
+                    as_before = replace(report, state=BehaviorState.RUNNING)
+                member.adopt(f"{self.id}.{part}", as_before, kept.begun.get(part))
+                member.halted = halts and report.held
 
     def take_up(self, reports: Mapping[str, BehaviorReport], kept: Reference) -> None:
         """As `found`, but some parts are missing: they are begun anew, and the others let go."""

@@ -126,6 +126,7 @@ class Member:
 
     def let_go(self) -> None:
         """After a restart: what was held until somebody said how to go on."""
+        self.halted = False
         if self.active:
             self._enqueue(self._go_on)
 

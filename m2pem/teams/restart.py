@@ -20,8 +20,8 @@ _log = logging.getLogger("m2pem.teams")
 
 @dataclass(frozen=True, slots=True)
 class FoundParts:
-    """`reports`: of the parts that had begun, by part. `gap`: why the team cannot go on; "" if it
-    can."""
+    """`reports`: of the parts that had begun, by part. `gap`: what is not known of a part; "" if
+    it is known of all what became of them."""
 
     reports: Mapping[str, BehaviorReport]
     gap: str = ""
@@ -30,6 +30,12 @@ class FoundParts:
     def good(self) -> Mapping[str, BehaviorReport]:
         """The parts that go on or have ended well."""
         return {part: each for part, each in self.reports.items() if each.state in _GOOD}
+
+    def held(self, *, marches: bool) -> bool:
+        """Whether a run or an operator holds the team. On a march, members are halted to keep
+        their places, but never all at once."""
+        going = [each.held for each in self.reports.values() if not each.state.terminal]
+        return bool(going) and (all(going) if marches else any(going))
 
     def trimmed(self, kept: Reference) -> Reference:
         """What was kept, without the parts that cannot go on: they are not asked for again."""
@@ -62,7 +68,7 @@ async def look_for_parts(
         if answer.state is BehaviorState.UNKNOWN and part not in kept.begun:
             continue
         reports[part] = answer
-        if answer.state not in _GOOD:
+        if answer.state is BehaviorState.UNKNOWN:
             why = answer.reason or answer.code or "no reason given"
             gaps.append(f"the part of {_doer(part)} is {answer.state.value}: {why}")
     if not reports and plan.legs:

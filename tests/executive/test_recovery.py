@@ -6,7 +6,14 @@ import pytest
 
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.api.control import RunStatus
-from m2pem.engine.inputs import BehaviorReported, ControlTaken, Input, PromptAnswer, StartRun
+from m2pem.engine.inputs import (
+    BehaviorReported,
+    ControlTaken,
+    Input,
+    PauseRun,
+    PromptAnswer,
+    StartRun,
+)
 from m2pem.engine.records import BehaviorRestarted, PromptOpened
 from m2pem.engine.run import MissionRun
 from m2pem.errors import JournalError, OperatorError
@@ -174,6 +181,41 @@ def test_an_outage_beyond_the_fleets_bound_holds_what_still_runs_and_asks(play, 
     known = {"r1.b1": BehaviorReport("r1.b1", 2, BehaviorState.RUNNING)}
     journal = left_behind(GOTO, ACCEPTED)
     assert resumed(play, journal, story, known=known) == (RunStatus.COMPLETED, 0)
+
+
+def test_a_vehicle_that_is_held_for_no_reason_in_the_journal_stands_until_an_operator_answers(play):
+    async def story(world: World):
+        control = world.executive.control
+        await world.fake.until_called("hold", "ugv1")
+        (prompt,) = control.prompts()
+        assert "held, and the journal does not say why" in prompt.text
+        assert world.fake.count("resume") == 0
+        await control.answer("r1", prompt.prompt, "resume", by="anna")
+        await world.fake.until_called("resume", "ugv1")
+        world.fake._numbers["r1.b1"] = 2
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        summary = await control.wait("r1")
+        return summary.status, world.fake.count("start")
+
+    known = {"r1.b1": BehaviorReport("r1.b1", 2, BehaviorState.RUNNING, held=True)}
+    journal = left_behind(GOTO, ACCEPTED, RUNNING)
+    assert resumed(play, journal, story, known=known) == (RunStatus.COMPLETED, 0)
+
+
+def test_a_vehicle_of_a_paused_run_is_held_as_the_journal_says_and_nothing_is_asked(play):
+    async def story(world: World):
+        control = world.executive.control
+        await world.fake.until_called("hold", "ugv1")
+        assert (control.prompts(), world.fake.count("resume")) == ([], 0)
+        await control.resume("r1", by="anna")
+        await world.fake.until_called("resume", "ugv1")
+        world.fake._numbers["r1.b1"] = 2
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        return (await control.wait("r1")).status
+
+    known = {"r1.b1": BehaviorReport("r1.b1", 2, BehaviorState.RUNNING, held=True)}
+    journal = left_behind(GOTO, ACCEPTED, RUNNING, PauseRun("anna"))
+    assert resumed(play, journal, story, known=known) is RunStatus.COMPLETED
 
 
 def test_open_prompts_are_asked_again(play):

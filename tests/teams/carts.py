@@ -176,6 +176,9 @@ class CartArbiter(GoalArbiter):
         self.yard.commands.append(("resume", resource))
         self.yard[resource].halted = False
 
+    def held(self, resource: ResourceId) -> bool:
+        return self.yard[resource].halted
+
     def fail(self, name: str, code: str) -> None:
         """Have a cart stop and give up what it does."""
         driven = self.yard.driven[name]

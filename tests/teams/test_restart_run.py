@@ -162,3 +162,82 @@ def test_a_member_that_was_lost_before_is_not_asked_for(play: Play) -> None:
     status, (ended,) = resume(play, left, to_the_end, policy=policy)
     assert (status, ended.state) == (RunStatus.COMPLETED, BehaviorState.SUCCEEDED)
     assert ended.reason.startswith("without b (FAILED")
+
+
+@KINDS
+def test_a_member_that_the_marshal_had_halted_goes_on_with_the_others(
+    play: Play, arbiter: str
+) -> None:
+    async def before(world: World) -> None:
+        await world.clock.sleep(40)
+        world.yard["c"].max_m_s = 0.1
+        await world.until(lambda: world.yard["a"].halted and world.yard["a"].stands)
+
+    left = crash(play, column(), MARCH, before, arbiter=arbiter)
+    assert left[1]["a"].halted
+    assert not left[1]["c"].halted
+    left[1]["c"].max_m_s = 15.0
+    status, (ended,) = resume(play, left, to_the_end, arbiter=arbiter)
+    assert (status, ended.state) == (RunStatus.COMPLETED, BehaviorState.SUCCEEDED)
+    assert left[1].count("single_vehicle_routing") == 0
+
+
+def test_a_team_that_was_held_as_a_whole_stands_until_an_operator_lets_it_go_on(play: Play) -> None:
+    async def before(world: World) -> None:
+        await world.clock.sleep(40)
+
+    async def then(world: World) -> Any:
+        async for notice in world.executive.control.subscribe("r1"):
+            if isinstance(notice, OpenPrompt):
+                break
+        await world.clock.sleep(30)
+        stand = [world.yard[name].stands for name in "abc"]
+        await world.executive.control.answer("r1", notice.prompt, "resume", by="anna")
+        return notice.text, stand, await to_the_end(world)
+
+    left = crash(play, column(), MARCH, before)
+    for name in "abc":
+        left[1][name].halted = True
+    text, stand, (status, (ended,)) = resume(play, left, then)
+    assert "held, and the journal does not say why" in text
+    assert stand == [True, True, True]
+    assert (status, ended.state) == (RunStatus.COMPLETED, BehaviorState.SUCCEEDED)
+    assert left[1].count("single_vehicle_routing") == 0
+
+
+def test_a_part_that_failed_while_no_executive_ran_fails_the_team_and_stops_the_others(
+    play: Play,
+) -> None:
+    async def before(world: World) -> None:
+        await world.clock.sleep(40)
+
+    left = crash(play, column(), MARCH, before)
+    fail(left[1], "b")
+    status, (ended,) = resume(play, left, to_the_end)
+    assert (status, ended.state, ended.code) == (
+        RunStatus.FAILED,
+        BehaviorState.FAILED,
+        "ROUTE_BLOCKED",
+    )
+    assert left[1].count("cancel") == 2
+    assert [left[1][name].stands for name in "ac"] == [True, True]
+
+
+def test_a_team_that_goes_on_without_lost_members_does_so_after_a_crash(play: Play) -> None:
+    policy = LostMemberPolicy.CONTINUE
+
+    async def before(world: World) -> None:
+        await world.clock.sleep(40)
+
+    left = crash(play, column(), MARCH, before, policy=policy)
+    fail(left[1], "b")
+    status, (ended,) = resume(play, left, to_the_end, policy=policy)
+    assert (status, ended.state) == (RunStatus.COMPLETED, BehaviorState.SUCCEEDED)
+    assert ended.reason.startswith("without b (ROUTE_BLOCKED")
+    assert left[1].count("single_vehicle_routing") == 0
+
+
+def fail(yard: Yard, name: str) -> None:
+    """A cart gives up while no executive runs."""
+    driven = yard.driven[name]
+    driven.became, driven.code, driven.cart.ahead = BehaviorState.FAILED, "ROUTE_BLOCKED", []

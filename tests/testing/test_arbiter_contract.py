@@ -129,6 +129,11 @@ class Forgetful(SimArbiter):
         return BehaviorReport(behavior, 0, BehaviorState.UNKNOWN)
 
 
+class HidesHolds(SimArbiter):
+    async def query(self, behavior: str, native_ref: str | None) -> BehaviorReport:
+        return dataclasses.replace(await super().query(behavior, native_ref), held=False)
+
+
 class NeverHolds(SimArbiter):
     async def hold(self, resource: ResourceId) -> None:
         pass
@@ -239,6 +244,7 @@ FINDS = [
     (AlwaysRunning, "query_tells_what_runs_and_what_has_ended"),
     (AlwaysRunning, "query_of_an_unknown_behavior_is_unknown"),
     (Forgetful, "another_arbiter_finds_the_behavior_again"),
+    (HidesHolds, "a_vehicle_that_another_arbiter_has_held_does_not_wait_unseen"),
     (Timeless, "a_start_of_a_past_epoch_is_refused"),
     (Timeless, "a_cancel_of_a_past_epoch_is_refused"),
     (NeverHolds, "hold_brings_the_vehicle_to_a_stand_within_the_declared_bound"),

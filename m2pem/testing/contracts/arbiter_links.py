@@ -80,6 +80,29 @@ class ArbiterLinks(ArbiterFixtures):
 
         run(main)
 
+    @needs("hold", "reconnect")
+    def test_a_vehicle_that_another_arbiter_has_held_does_not_wait_unseen(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """It goes on by itself, or `query` says `held` or UNKNOWN; `resume` lets it go on."""
+
+        async def main(clock: Clock) -> None:
+            async with ArbiterBench(make_arbiter(context(clock)), clock) as bench:
+                await start(bench, "r1.b1", case.short, case.vehicle)
+                await bench.running("r1.b1")
+                reference = bench.of("r1.b1")[-1].native_ref
+                await bench.arbiter.hold(case.vehicle)
+                await clock.sleep(bench.arbiter.limits(case.vehicle).hold_within_s)
+            async with ArbiterBench(make_arbiter(context(clock)), clock) as bench:
+                found = await bench.arbiter.query("r1.b1", reference)
+                if found.state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING):
+                    if found.held:
+                        await bench.arbiter.resume(case.vehicle)
+                    end = await bench.ended("r1.b1", 2 * case.short_s)
+                    assert end.state is BehaviorState.SUCCEEDED, end
+
+        run(main)
+
     @needs("second vehicle")
     def test_a_start_of_a_past_epoch_is_refused(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]

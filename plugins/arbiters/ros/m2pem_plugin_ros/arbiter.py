@@ -303,7 +303,7 @@ class RosArbiter:
         if outcome.state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING):
             self._ledger.adopt(behavior, kept.resources, reference)
             vehicle.adopt(order)
-            return self._ledger.last(behavior)
+            return replace(self._ledger.last(behavior), held=outcome.held)
         if outcome.state is BehaviorState.UNKNOWN:
             vehicle.leave(order)
         return BehaviorReport(

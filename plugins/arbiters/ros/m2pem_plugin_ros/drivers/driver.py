@@ -38,12 +38,13 @@ class Order:
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """How a goal stands on the vehicle. UNKNOWN: the vehicle knows nothing of it. `outputs`: of one
-    that has ended; what the mission's data store gets."""
+    that has ended; what the mission's data store gets. `held`: the vehicle says that it is held."""
 
     state: BehaviorState
     code: str = ""
     reason: str = ""
     outputs: Mapping[str, Value] = field(default_factory=dict)
+    held: bool = False
 
     @property
     def is_end(self) -> bool:

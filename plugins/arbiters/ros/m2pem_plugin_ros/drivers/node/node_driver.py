@@ -1,6 +1,7 @@
 """Reaches a vehicle through the m2pem node that runs on it."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 from uuid import UUID
 
@@ -113,8 +114,9 @@ class NodeDriver:
         self._insist(Command.RESUME, held=False)
 
     async def look(self, order: Order) -> Outcome:
-        """What the node says of the goal."""
-        return await self._opened.look(order)
+        """What the node says of the goal, and whether the vehicle is held."""
+        outcome = await self._opened.look(order)
+        return replace(outcome, held=self._said is not None and self._said.held)
 
     def forget(self) -> None:
         """Nothing is sent any more."""
