@@ -69,6 +69,14 @@ async def to_the_end(world: World) -> tuple[RunStatus, list[BehaviorEnded]]:
     return (await world.executive.control.wait("r1")).status, world.ended()
 
 
+async def asked(world: World) -> OpenPrompt:
+    """Wait until the operator is asked."""
+    async for notice in world.executive.control.subscribe("r1"):
+        if isinstance(notice, OpenPrompt):
+            return notice
+    raise AssertionError("nothing was asked")
+
+
 @KINDS
 def test_members_that_go_on_are_marshalled_on_and_nothing_is_started_again(
     play: Play, arbiter: str
@@ -126,9 +134,7 @@ def test_a_team_of_which_one_is_not_known_stands_and_the_operator_is_asked(
         await world.clock.sleep(40)
 
     async def then(world: World) -> Any:
-        async for notice in world.executive.control.subscribe("r1"):
-            if isinstance(notice, OpenPrompt):
-                break
+        notice = await asked(world)
         await world.clock.sleep(10)
         stand = [world.yard[name].stands for name in "abc"]
         await world.executive.control.answer("r1", notice.prompt, decision, by="anna")
@@ -187,9 +193,7 @@ def test_a_team_that_was_held_as_a_whole_stands_until_an_operator_lets_it_go_on(
         await world.clock.sleep(40)
 
     async def then(world: World) -> Any:
-        async for notice in world.executive.control.subscribe("r1"):
-            if isinstance(notice, OpenPrompt):
-                break
+        notice = await asked(world)
         await world.clock.sleep(30)
         stand = [world.yard[name].stands for name in "abc"]
         await world.executive.control.answer("r1", notice.prompt, "resume", by="anna")

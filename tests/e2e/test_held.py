@@ -1,0 +1,67 @@
+"""An executive ends while its vehicles are held: the next one asks before they go on."""
+
+import sqlite3
+from pathlib import Path
+
+from m2pem.sim.effects import EffectKind
+from m2pem.sim.statefile import recorded_effects
+from tests.command_line import CommandLine, Program, fleet_with_state, install_plugin
+from tests.executive.conftest import behavior, flow, mission
+
+TARGET = '<m2pem:property name="target" value="[38.1085, -77.3192, 60]"/>'
+DRIVE = mission(
+    '<process id="P" isExecutable="true"><startEvent id="S"/><intermediateCatchEvent id="Soon">'
+    "<timerEventDefinition><timeDuration>PT1S</timeDuration></timerEventDefinition>"
+    f"</intermediateCatchEvent>{behavior('Drive', 'goto', 'evsg1', parameters=TARGET)}"
+    f'<endEvent id="E"/>{flow("S", "Soon")}{flow("S", "Drive")}{flow("Soon", "E")}'
+    f"{flow('Drive', 'E')}</process>"
+)
+"""A drive of some 110 m, in which a timer has something written to the journal."""
+
+LOCKING = """
+import os, sqlite3
+
+held = []
+
+@hookimpl
+def m2pem_records_committed(run_id, records):
+    if any(type(record).__name__ == "BehaviorProgressed" for record in records) and not held:
+        held.append(sqlite3.connect(os.environ["LOCKS"], isolation_level=None))
+        held[0].execute("BEGIN IMMEDIATE")
+"""
+"""Another process writes to the journal and does not end: commits fail after a while."""
+
+
+def held_by_a_dying_executive(m2pem: CommandLine, tmp_path: Path) -> Path:
+    """A run whose journal failed while a vehicle drove; returns the state file of the vehicles."""
+    (tmp_path / "drive.bpmn").write_bytes(DRIVE)
+    fleet, state = fleet_with_state(tmp_path)
+    journal = tmp_path / "journal.db"
+    installed = install_plugin(tmp_path, "locking", LOCKING)
+    status, _, errors = m2pem.run(
+        "run", "drive.bpmn", "--fleet", fleet, "--ocu", "none", "--journal", journal,
+        LOCKS=str(journal), **installed,
+    )  # fmt: skip
+    assert (status, "locked" in errors) == (1, True), errors
+    assert [effect.kind for effect in recorded_effects(state)][-1] is EffectKind.HOLD
+    return state
+
+
+def resume(m2pem: CommandLine, *words: str) -> Program:
+    return m2pem.start("resume", "r1", "--journal", "journal.db", *words)
+
+
+def test_vehicles_that_a_dying_executive_has_held_are_asked_about(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    state = held_by_a_dying_executive(m2pem, tmp_path)
+    program = resume(m2pem, "--ocu", "plain")
+    program.until_text("held, and the journal does not say why")
+    kinds = [effect.kind for effect in recorded_effects(state)]
+    assert EffectKind.RESUME not in kinds
+    program.type("resume")
+    program.until_text("r1 completed")
+    assert program.rest()[0] == 0
+    kinds = [effect.kind for effect in recorded_effects(state)]
+    assert kinds.count(EffectKind.START) == 1
+    assert EffectKind.RESUME in kinds
