@@ -1,6 +1,8 @@
 """What all tests here go by: none fails because a computer is busy with something else."""
 
+import os
 import signal
+import tempfile
 
 from hypothesis import HealthCheck, settings
 
@@ -13,3 +15,6 @@ settings.load_profile("patient")
 # A shell that starts the tests in the background has them, and all that they start, ignore Ctrl-C.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Executives that tests start are no concern of those that this user runs, nor of another worker's.
+os.environ["M2PEM_RUNTIME_DIR"] = tempfile.mkdtemp(prefix="m2pem-tests-")

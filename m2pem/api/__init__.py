@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from m2pem.api.arbiter import (
+        AddressedArbiter,
         AdjustingArbiter,
         Arbiter,
         ArbiterContext,
@@ -88,8 +89,8 @@ if TYPE_CHECKING:
 # Loaded when asked for: an arbiter's module need not pay for what an OCU imports.
 _MODULES = {
     "m2pem.api.arbiter": (
-        "AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport BehaviorRequest"
-        " Connection Limits ResolvedValue SightedArbiter"
+        "AddressedArbiter AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport"
+        " BehaviorRequest Connection Limits ResolvedValue SightedArbiter"
     ),
     "m2pem.api.authoring": (
         "DataName Draft Editable MissionSource Outline OutlineElement"
@@ -132,6 +133,7 @@ _LAZY = {name: module for module, names in _MODULES.items() for name in names.sp
 
 __all__ = [
     "SHARED",
+    "AddressedArbiter",
     "AdjustingArbiter",
     "Alert",
     "Arbiter",

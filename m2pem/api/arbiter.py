@@ -197,3 +197,14 @@ class SightedArbiter(Protocol):
         """The state of a vehicle now; None: it cannot be known now, and what its telemetry said
         last holds."""
         ...
+
+
+@runtime_checkable
+class AddressedArbiter(Protocol):
+    """An arbiter that says what it connects to. On one host, one executive commands an address; of
+    an arbiter without this, all settings of a connection together count as the address."""
+
+    def addresses(self, resource: ResourceId) -> Sequence[str]:
+        """The same texts for the same vehicle in every process; none: there is nothing to share,
+        because it exists in this process alone, or another resource's address covers it."""
+        ...

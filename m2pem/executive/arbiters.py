@@ -1,10 +1,11 @@
 """The arbiters of a fleet: which one serves which resource, and what it offers."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
-from m2pem.api.arbiter import Arbiter, ArbiterContext, Connection
+from m2pem.api.arbiter import AddressedArbiter, Arbiter, ArbiterContext, Connection
 from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
 from m2pem.model.geometry import Area
@@ -93,6 +94,7 @@ class FleetArbiters:
             for resource in group
         }
         self._context = context
+        self._connections = connections
         self._offers = Offers(fleet, self.of)
         self.graph = ResourceGraph(fleet, self.offered)
 
@@ -138,6 +140,14 @@ class FleetArbiters:
         """The arbiter that serves a resource."""
         return self._of[resource]
 
+    def addresses(self) -> Mapping[ResourceId, tuple[str, Sequence[str]]]:
+        """The name of each resource's arbiter, and what that connects to."""
+        return {
+            resource: (name, _addresses(self.by_name[name], connection))
+            for name, group in self._connections.items()
+            for resource, connection in group.items()
+        }
+
     def offered(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """What can be had of a resource, before the fleet's `behaviors` list: what its arbiter
         offers, and what teams can make of that."""
@@ -157,6 +167,13 @@ class FleetArbiters:
 
 def _has(specs: Sequence[BehaviorSpec], team_behavior: str) -> bool:
     return any(spec.name == team_behavior and spec.type is BehaviorType.TEAM for spec in specs)
+
+
+def _addresses(arbiter: Arbiter, connection: Connection) -> Sequence[str]:
+    if isinstance(arbiter, AddressedArbiter):
+        return arbiter.addresses(connection.resource)
+    settings = connection.settings
+    return [json.dumps(dict(settings), sort_keys=True, default=str)] if settings else []
 
 
 def _takes_one_vehicle(arbiter: Arbiter) -> bool:

@@ -45,6 +45,7 @@ from m2pem.executive.script import Script
 from m2pem.executive.services import Services
 from m2pem.executive.space import watch_space
 from m2pem.executive.stop_marks import StopMarks
+from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.gateway.bus import Bus
 from m2pem.gateway.watch import Watch, watch
 from m2pem.journal.base import Journal, RunHeader
@@ -129,6 +130,7 @@ class Executive:
         self.arbiters = FleetArbiters(
             fleet, plugins, context, simulated=simulated, settings=settings
         )
+        self._locks = VehicleLocks(addresses_of(self.arbiters, journal.file))
         self._clearance = clear = clearance_for(fleet, clock)
         told = self._geometry, self._post_report
         self.dispatcher = Dispatcher(self.arbiters, self.availability, clock, *told, script, clear)
@@ -147,9 +149,15 @@ class Executive:
         """Connect the arbiters and listen to them.
 
         Raises:
+            VehicleInUseError: another executive commands a vehicle of the fleet.
             PluginError: an arbiter cannot connect.
         """
-        await self._connect()
+        self._locks.acquire()
+        try:
+            await self._connect()
+        except BaseException:
+            self._locks.release()
+            raise
         if self._observers is not None and isinstance(self.clock, SystemClock):
             self._observers.start()
         self._group = await self._stack.enter_async_context(asyncio.TaskGroup())
@@ -196,6 +204,7 @@ class Executive:
                 listener.cancel()
             for arbiter in self.arbiters.all.values():
                 await arbiter.close()
+            self._locks.release()
             if self._observers is not None:
                 await self._observers.close()
             self.bus.close()

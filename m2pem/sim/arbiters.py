@@ -5,6 +5,7 @@ import json
 import math
 from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from m2pem.api.arbiter import (
     ArbiterContext,
@@ -124,6 +125,11 @@ class SimArbiter:
             hold_within_s=stopping_s + 1.0,
             cancel_timeout_s=stopping_s + 5.0,
         )
+
+    def addresses(self, resource: ResourceId) -> Sequence[str]:
+        """A vehicle is what its state file says; without one it exists only here."""
+        state = self._settings[resource].state
+        return [f"{Path(state).resolve()}: {resource}"] if state else []
 
     async def connect(self) -> None:
         """Begin to simulate. What a state file knows goes on as if it had never been left.

@@ -1,6 +1,5 @@
 """An executive ends while its vehicles are held: the next one asks before they go on."""
 
-import sqlite3
 from pathlib import Path
 
 from m2pem.sim.effects import EffectKind

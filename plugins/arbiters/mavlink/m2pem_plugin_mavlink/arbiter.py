@@ -140,6 +140,12 @@ class MavlinkArbiter:
         own = self._connections[resource].lost_after_s if resource in self._connections else None
         return Limits(LOST_AFTER_S if own is None else own, HOLD_WITHIN_S, CANCEL_TIMEOUT_S)
 
+    def addresses(self, resource: ResourceId) -> Sequence[str]:
+        """The system on each of its links; payloads are carried."""
+        settings = self._settings.get(resource)
+        urls = settings.urls if settings is not None else ()
+        return [f"system {self._settings[resource].system_id} on {url}" for url in urls]
+
     # --- life -----------------------------------------------------------------------------------
 
     async def connect(self) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import os
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -118,6 +119,16 @@ class RosArbiter:
             hold_within_s = max(hold_within_s, BRAKING_BEGINS_WITHIN_S + braking_s)
         cancel_timeout_s = max(CANCEL_TIMEOUT_S, 1.5 * hold_within_s)
         return Limits(LOST_AFTER_S if own is None else own, hold_within_s, cancel_timeout_s)
+
+    def addresses(self, resource: ResourceId) -> Sequence[str]:
+        """The namespace in its ROS domain."""
+        settings = self._settings.get(resource)
+        if settings is None:
+            return []
+        domain = settings.domain_id
+        if domain is None:
+            domain = os.environ.get("ROS_DOMAIN_ID") or 0
+        return [f"domain {domain}, namespace {settings.namespace or '/'}"]
 
     # --- life -----------------------------------------------------------------------------------
 
