@@ -1,10 +1,11 @@
 """`m2pem fleet`: who is there and can do what."""
 
+import asyncio
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from m2pem.cli.options import MADE_UP, as_json, example, format_option
+from m2pem.cli.options import MADE_UP, as_json, example, format_option, journal_option
 
 if TYPE_CHECKING:
     from m2pem.executive.arbiters import FleetArbiters
@@ -13,9 +14,13 @@ if TYPE_CHECKING:
 @click.command(epilog=example("m2pem fleet fleet_configs/vignette1.yaml"))
 @click.argument("fleet_file", metavar="FLEET", required=False)
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of fleet files instead.")
+@journal_option
 @format_option
-def fleet(fleet_file: str | None, schema: bool, output: str) -> None:
-    """Show a fleet: who is there and can do what."""
+def fleet(fleet_file: str | None, schema: bool, journal: str | None, output: str) -> None:
+    """Show a fleet: who is there and can do what.
+
+    Also the interrupted runs of the journal that have vehicles of the fleet.
+    """
     if schema:
         from m2pem.resources.fleet_schema import fleet_schema
 
@@ -26,14 +31,20 @@ def fleet(fleet_file: str | None, schema: bool, output: str) -> None:
     if fleet_file == MADE_UP:
         raise click.UsageError(f"{MADE_UP!r} is made up from a mission; name a fleet file")
     from m2pem.cli.fleets import arbiters_of
+    from m2pem.cli.interrupted import interrupted_runs
     from m2pem.plugins import PluginManager
     from m2pem.resources.fleet_file import load_fleet
 
     arbiters = arbiters_of(load_fleet(fleet_file), PluginManager())
+    left = [
+        run
+        for run in asyncio.run(interrupted_runs(journal))
+        if any(resource in arbiters.resources for resource in run.behaviors)
+    ]
     if output == "json":
-        click.echo(as_json(_as_data(arbiters)))
+        click.echo(as_json({**_as_data(arbiters), "interrupted": left}))
     else:
-        click.echo(_as_text(arbiters))
+        click.echo("\n\n".join([_as_text(arbiters), *(run.as_text() for run in left)]))
 
 
 def _as_data(arbiters: "FleetArbiters") -> dict[str, Any]:

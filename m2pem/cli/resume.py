@@ -22,12 +22,14 @@ from m2pem.cli.options import (
 @journal_option
 @ocu_option
 @answers_option
+@click.option("--stop", is_flag=True, help="Stop it at once: its vehicles are told to stop.")
 @format_option
 def resume(
     run_id: str,
     journal: str | None,
     ocu_names: str | None,
     answers: Path | None,
+    stop: bool,
     output: str,
 ) -> int:
     """Take up a run that was interrupted.
@@ -35,7 +37,7 @@ def resume(
     The mission, the fleet, whether it is simulated, and its speed, are in the journal. Ends as
     `m2pem run` does.
     """
-    return asyncio.run(_resume(run_id, journal, ocu_names, answers, output))
+    return asyncio.run(_resume(run_id, journal, ocu_names, answers, output, stop=stop))
 
 
 async def _resume(
@@ -44,7 +46,10 @@ async def _resume(
     ocu_names: str | None,
     answers_file: Path | None,
     output: str,
+    *,
+    stop: bool,
 ) -> int:
+    from m2pem.api.operator import operator_name
     from m2pem.cli.driving import drive_run
     from m2pem.cli.given import get_answers
     from m2pem.cli.journals import existing_journal, find_run, last_decided_us, url_of
@@ -84,6 +89,9 @@ async def _resume(
 
             async def take_up() -> str:
                 await executive.resume(run_id)
+                if stop:
+                    reason = "stopped after an interruption"
+                    await executive.control.stop(run_id, by=operator_name(), reason=reason)
                 state = executive.runner(run_id).run.state
                 if out.story is not None:
                     out.story.know(state)

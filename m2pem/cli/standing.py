@@ -37,6 +37,15 @@ class Standing:
         if isinstance(record, DataWritten) and state.root and record.store == state.root.id:
             self._data[record.key] = record.value
 
+    def commanded(self) -> dict[str, str]:
+        """What it commands: the behavior of each vehicle and payload."""
+        state = self._run.state
+        return {
+            resource: state.behaviors[holders[-1]].name
+            for resource, holders in state.held.items()
+            if holders
+        }
+
     def as_data(self) -> dict[str, Any]:
         """For programs."""
         state = self._run.state

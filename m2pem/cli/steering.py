@@ -1,5 +1,6 @@
 """What the one-shot commands share: they ask an executive that runs on this host, and end."""
 
+import asyncio
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,18 @@ def steer(journal_url: str | None, run: str, method: str, by: str | None, **para
     """Call a method of the executive that drives the run.
 
     Raises:
-        OperatorError: it refused, or none drives the run.
+        OperatorError: it refused, or none drives the run; then, what the run has left behind.
         UnusableError: the journal is in memory.
     """
     from m2pem.api.operator import operator_name
     from m2pem.control_socket.client import ask_driver
+    from m2pem.errors import OperatorError
 
-    ask_driver(_journal_file(journal_url), run, method, by=by or operator_name(), **params)
+    path = _journal_file(journal_url)
+    try:
+        ask_driver(path, run, method, by=by or operator_name(), **params)
+    except OperatorError as error:
+        raise OperatorError(f"{error}{_left_behind(journal_url, path, run)}") from error
 
 
 def steer_all(journal_url: str | None, method: str, by: str | None, **params: Any) -> list[str]:
@@ -32,8 +38,21 @@ def steer_all(journal_url: str | None, method: str, by: str | None, **params: An
     """
     from m2pem.api.operator import operator_name
     from m2pem.control_socket.client import ask_all
+    from m2pem.errors import OperatorError
 
-    return ask_all(_journal_file(journal_url), method, by=by or operator_name(), **params)
+    path = _journal_file(journal_url)
+    try:
+        return ask_all(path, method, by=by or operator_name(), **params)
+    except OperatorError as error:
+        raise OperatorError(f"{error}{_left_behind(journal_url, path)}") from error
+
+
+def _left_behind(journal_url: str | None, path: Path, run: str | None = None) -> str:
+    """Lines on what interrupted runs have left behind: that of `run`, or (None) all."""
+    from m2pem.cli.interrupted import interrupted_runs
+
+    left = asyncio.run(interrupted_runs(journal_url)) if path.exists() else []
+    return "".join(f"\n{each.as_text()}" for each in left if run in (None, each.run))
 
 
 def _journal_file(journal_url: str | None) -> Path:

@@ -64,3 +64,21 @@ def test_vehicles_that_a_dying_executive_has_held_are_asked_about(
     kinds = [effect.kind for effect in recorded_effects(state)]
     assert kinds.count(EffectKind.START) == 1
     assert EffectKind.RESUME in kinds
+
+
+def test_what_an_interrupted_run_has_left_behind_is_said_and_can_be_stopped(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    state = held_by_a_dying_executive(m2pem, tmp_path)
+    fleet = tmp_path / "fleets" / "vignette1.yaml"
+    status, _, refused = m2pem.run("stop", "r1", "--journal", "journal.db")
+    _, shown, _ = m2pem.run("fleet", fleet, "--journal", "journal.db")
+    for text in (refused, shown):
+        assert "r1 (drive.bpmn) was interrupted, and no executive drives it" in text
+        assert "it has evsg1 (goto), which may go on or stand held" in text
+        assert "`m2pem resume r1 --stop` stops it" in text
+    assert status == 1
+    assert m2pem.run("resume", "r1", "--stop", "--journal", "journal.db")[0] == 130
+    kinds = [effect.kind for effect in recorded_effects(state)]
+    assert (EffectKind.CANCEL in kinds, EffectKind.RESUME in kinds) == (True, False)
+    assert "interrupted" not in m2pem.run("fleet", fleet, "--journal", "journal.db")[1]
