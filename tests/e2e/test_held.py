@@ -81,4 +81,4 @@ def test_what_an_interrupted_run_has_left_behind_is_said_and_can_be_stopped(
     assert m2pem.run("resume", "r1", "--stop", "--journal", "journal.db")[0] == 130
     kinds = [effect.kind for effect in recorded_effects(state)]
     assert (EffectKind.CANCEL in kinds, EffectKind.RESUME in kinds) == (True, False)
-    assert "interrupted" not in m2pem.run("fleet", fleet, "--journal", "journal.db")[1]
+    assert "was interrupted" not in m2pem.run("fleet", fleet, "--journal", "journal.db")[1]

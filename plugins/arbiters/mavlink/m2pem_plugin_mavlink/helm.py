@@ -26,6 +26,7 @@ STOP_SHARE = 0.8
 """Of the time in which a cancelled vehicle must be free: a stop that takes longer has failed."""
 
 _HELD = frozenset({FlightMode.HOLD})
+_FAIL_SAFE = frozenset({FlightMode.RETURN, FlightMode.LAND})
 
 
 @dataclass(slots=True)
@@ -113,6 +114,11 @@ class Helm:
         flight = self._flight
         if flight is not None and flight.cancelled:
             return  # it is being stopped already
+        if flight is None and self._fails_safe:
+            self._logger.warning(
+                "%s: not held: it returns or lands by itself", self.vehicle.resource
+            )
+            return
         if flight is not None and not self._held:
             flight.behavior.paused()
         self._held = True
@@ -271,6 +277,14 @@ class Helm:
             for task in (stop, late):
                 task.cancel()
             await asyncio.gather(stop, late, return_exceptions=True)
+
+    @property
+    def _fails_safe(self) -> bool:
+        """Whether it returns or lands, and was not asked for that here: a failsafe, or a person.
+        After a restart it is held when its behavior is not recognised."""
+        heard = self.vehicle.heard
+        own = heard.custom_mode == self.vehicle.ours.custom_mode
+        return bool(heard.armed) and heard.mode in _FAIL_SAFE and not own
 
     async def _stop(self) -> None:
         if await self.vehicle.identified(0.0):

@@ -135,6 +135,20 @@ def test_a_failsafe_fails_the_behavior_with_its_text(text, code) -> None:
     play(Body().fly(), main)
 
 
+def test_a_return_that_a_failsafe_began_before_a_restart_is_not_held() -> None:
+    def low_battery(body) -> None:
+        body.mode = FlightMode.RETURN
+
+    async def main(bench, reference) -> None:
+        assert (await bench.arbiter.query("r1.b1", reference)).state is BehaviorState.UNKNOWN
+        await bench.arbiter.hold(V)
+        await bench.clock.sleep(5)
+        assert bench.body.mode is FlightMode.RETURN
+        assert "stop" not in bench.told
+
+    after_a_restart(Body().fly(), "goto", main, meanwhile=low_battery, target=FAR)
+
+
 def test_a_mission_that_somebody_else_disarms_fails() -> None:
     async def main(bench) -> None:
         await flying(bench, "goto", target=Point((*at(300, 0), None)))
