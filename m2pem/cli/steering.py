@@ -1,6 +1,7 @@
 """What the one-shot commands share: they ask an executive that runs on this host, and end."""
 
 import asyncio
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -50,8 +51,12 @@ def steer_all(journal_url: str | None, method: str, by: str | None, **params: An
 def _left_behind(journal_url: str | None, path: Path, run: str | None = None) -> str:
     """Lines on what interrupted runs have left behind: that of `run`, or (None) all."""
     from m2pem.cli.interrupted import interrupted_runs
+    from m2pem.errors import M2pemError
 
-    left = asyncio.run(interrupted_runs(journal_url)) if path.exists() else []
+    left = []
+    if path.exists():
+        with suppress(M2pemError):  # what the executive refused matters more
+            left = asyncio.run(interrupted_runs(journal_url))
     return "".join(f"\n{each.as_text()}" for each in left if run in (None, each.run))
 
 
