@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         BehaviorRequest,
         Connection,
         Limits,
+        ReclaimingArbiter,
         ResolvedValue,
         SightedArbiter,
     )
@@ -90,7 +91,7 @@ if TYPE_CHECKING:
 _MODULES = {
     "m2pem.api.arbiter": (
         "AddressedArbiter AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport"
-        " BehaviorRequest Connection Limits ResolvedValue SightedArbiter"
+        " BehaviorRequest Connection Limits ReclaimingArbiter ResolvedValue SightedArbiter"
     ),
     "m2pem.api.authoring": (
         "DataName Draft Editable MissionSource Outline OutlineElement"
@@ -181,6 +182,7 @@ __all__ = [
     "Point",
     "PromptClosed",
     "Record",
+    "ReclaimingArbiter",
     "ResolvedValue",
     "ResourceId",
     "ResumePolicy",

@@ -4,7 +4,7 @@ One object per registered name serves all its resources of a fleet. `m2pem.testi
 checks every promise made here.
 """
 
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 from uuid import UUID, uuid4
@@ -59,6 +59,8 @@ class ArbiterContext:
     `origin`: of the local ENU frame, (latitude in degrees, longitude in degrees, altitude in
     metres). `teams`: members of each team, the lead first. `journal`: names the journal that the
     ids of behaviors belong to; with it, they are unique for ever. It is the same after a restart.
+    `epoch_of`: the epoch with which this executive drives the run of a behavior; 0: it does not.
+    Commands that are not asked for with an epoch, such as the question for a behavior, carry it.
     """
 
     clock: "Clock"
@@ -67,6 +69,7 @@ class ArbiterContext:
     origin: tuple[float, float, float]
     teams: Mapping[str, tuple[ResourceId, ...]] = field(default_factory=dict)
     journal: UUID = field(default_factory=uuid4)
+    epoch_of: Callable[[BehaviorId], int] = field(default=lambda _: 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,4 +210,19 @@ class AddressedArbiter(Protocol):
     def addresses(self, resource: ResourceId) -> Sequence[str]:
         """The same texts for the same vehicle in every process; none: there is nothing to share,
         because it exists in this process alone, or another resource's address covers it."""
+        ...
+
+
+@runtime_checkable
+class ReclaimingArbiter(Protocol):
+    """An arbiter that ends what a vehicle goes on with after its link was lost. Without this, a
+    vehicle that is heard again is told to `hold`, and its lost behavior to `cancel`."""
+
+    async def reclaim(self, resource: ResourceId) -> str:
+        """A resource that was lost is heard again: end what it does under behaviors that were LOST.
+
+        Returns when the resource has acknowledged, and "" then; only then may it be given another
+        behavior. Otherwise why it may not yet, for operators, such as its own failsafe that must
+        not be interrupted: it is asked for again soon. What nobody here had it do is left alone.
+        """
         ...

@@ -21,7 +21,7 @@ from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import Clock
 from m2pem.api.control import HandedOver, RunId, SimulationResult
 from m2pem.api.service import ServiceContext
-from m2pem.api.telemetry import LinkState, TeamState
+from m2pem.api.telemetry import TeamState
 from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
 from m2pem.engine.records import Record, RunEnded
 from m2pem.engine.run import MissionRun, Step
@@ -40,6 +40,7 @@ from m2pem.executive.notices import Notices
 from m2pem.executive.observers import Observers
 from m2pem.executive.recovery import replay, take_over
 from m2pem.executive.reporting import reported
+from m2pem.executive.returning import Returning
 from m2pem.executive.runner import Outside, Runner
 from m2pem.executive.script import Script
 from m2pem.executive.services import Services
@@ -117,7 +118,6 @@ class Executive:
         self.handed_over: dict[str, HandedOver] = {}
         self._tasks: dict[RunId, asyncio.Task[None]] = {}
         self._listeners: list[asyncio.Task[None]] = []
-        self._lost: set[ResourceId] = set()
         self._stack = AsyncExitStack()
         context = ArbiterContext(
             clock,
@@ -126,6 +126,7 @@ class Executive:
             fleet.origin,
             {team.name: spelled_out(team) for team in fleet.teams.values()},
             journal.identity,
+            self._epoch_of,
         )
         self.arbiters = FleetArbiters(
             fleet, plugins, context, simulated=simulated, settings=settings
@@ -137,6 +138,14 @@ class Executive:
         self.handover = Handover(self.arbiters, self.availability)
         self.immediate = ImmediateCommands(self.dispatcher, self.notices, self._marks)
         self.losses = Losses(self)
+        self._returning = Returning(
+            self.arbiters,
+            self.availability,
+            self.handover,
+            clock,
+            self._epoch_of,
+            self.bus.publish,
+        )
         self.services = Services(
             plugins.service,
             ServiceContext(clock, self.bus, logging.getLogger("m2pem.service"), fleet.detectors),
@@ -197,6 +206,7 @@ class Executive:
         """Stop every run, let its vehicles be released, close the arbiters."""
         try:
             await self.stop_all("the executive is shutting down")
+            await self._returning.close()
             await self.services.close()
             await self.dispatcher.close()
         finally:
@@ -239,14 +249,12 @@ class Executive:
 
     async def _read_telemetry(self, arbiter: Arbiter) -> None:
         async for state in arbiter.telemetry():
+            if not isinstance(state, TeamState):
+                self._returning.heard(state)
+                state = self._returning.shown(state)  # noqa: PLW2901
             self.bus.publish(state)
             if self._clearance is not None:
                 self._clearance.heard(state)
-            if isinstance(state, TeamState):
-                continue
-            if state.resource in self._lost and state.link is not LinkState.LOST:
-                self._lost.discard(state.resource)
-                self.handover.restore(state.resource)
 
     # --- runs -----------------------------------------------------------------------------------
 
@@ -394,9 +402,8 @@ class Executive:
     def _fault(self, fault: ResourceFault) -> None:
         log.warning("%s: %s: %s", fault.resource, fault.code, fault.reason)
         resource = ResourceId(fault.resource)
-        if not fault.reachable and not self.availability.reason(resource):
-            self._lost.add(resource)
-            self.availability.withdraw(resource, f"lost: {fault.reason}")
+        if not fault.reachable:
+            self._returning.lost(resource, fault.reason)
             if self._clearance:
                 self._clearance.airspace.lost(resource)
         with_team = self.arbiters.teams.fault(resource, fault.code, fault.reason)
@@ -434,6 +441,10 @@ class Executive:
             known = ", ".join(self.runners) or "none"
             raise NotDrivenError(f"{run} is not driven by this executive; it drives: {known}")
         return runner
+
+    def _epoch_of(self, behavior: str) -> int:
+        runner = self.runners.get(behavior.partition(".")[0])
+        return runner.epoch if runner is not None else 0
 
     def _geometry(self, run: str, name: str) -> Geometry | None:
         runner = self.runners.get(run)

@@ -3,7 +3,7 @@
 While an operator has a resource, no mission gets it; every run's journal says so.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from m2pem.engine.inputs import ControlReturned, ControlTaken
@@ -20,12 +20,16 @@ SOMEBODY = "an operator"
 
 
 class Handover:
-    """Operators take resources from the missions, and give them back."""
+    """Operators take resources from the missions, and give them back.
+
+    `why_not_free`: why a resource that is given back is not free yet (it is lost), or "".
+    """
 
     def __init__(self, arbiters: "FleetArbiters", availability: Availability) -> None:
         self._known = arbiters.resources
         self._availability = availability
         self.taken: dict[ResourceId, str] = {}
+        self.why_not_free: Callable[[ResourceId], str] = lambda _: ""
 
     async def take(self, name: str, by: str, runners: Iterable[Runner]) -> None:
         """Give a resource to an operator: no behavior gets it, and what it did is given up.
@@ -54,6 +58,8 @@ class Handover:
             raise OperatorError(f"{resource} is not with an operator")
         del self.taken[resource]
         self._availability.restore(resource)
+        if why := self.why_not_free(resource):
+            self._availability.withdraw(resource, why)
         for runner in list(runners):
             if not runner.done.is_set():
                 await runner.tell(ControlReturned(resource, by or SOMEBODY))

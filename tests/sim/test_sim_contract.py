@@ -51,6 +51,14 @@ class TestSimArbiter(ArbiterContract):
         return cut
 
     @pytest.fixture
+    def mend_link(self) -> CutLink:
+        def mend(arbiter: Arbiter, vehicle: ResourceId) -> None:
+            assert isinstance(arbiter, SimArbiter)
+            arbiter.restore_link(vehicle)
+
+        return mend
+
+    @pytest.fixture
     def effects(self) -> Effects:
         def count(arbiter: Arbiter, vehicle: ResourceId) -> int:
             assert isinstance(arbiter, SimArbiter)

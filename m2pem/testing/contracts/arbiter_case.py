@@ -10,7 +10,7 @@ import pytest
 
 from m2pem.api.arbiter import Arbiter, ArbiterContext, ResolvedValue
 from m2pem.api.clock import Clock
-from m2pem.api.telemetry import VehicleState
+from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.executive.clock import SystemClock, run_virtual
 from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.testing.contracts.bench import ArbiterBench, context
@@ -53,6 +53,7 @@ class ArbiterFixtures(Contract):
         "effects": "the fixture `effects` counts what a vehicle physically began",
         "hold": "`hold` brings a vehicle to a stand and `resume` lets it go on",
         "link": "the fixture `cut_link` makes a vehicle unheard, and its behavior is LOST",
+        "return": "the fixture `mend_link` lets a vehicle be heard again that was lost",
         "preempt": "a behavior takes a vehicle over from one that is being cancelled",
         "reconnect": "a behavior outlives the arbiter, and another one finds it again",
         "second vehicle": "there are two vehicles",
@@ -76,6 +77,12 @@ class ArbiterFixtures(Contract):
     @pytest.fixture
     def cut_link(self) -> CutLink | None:
         """A function that makes a vehicle unheard; None: not supported."""
+        return None
+
+    @pytest.fixture
+    def mend_link(self) -> CutLink | None:
+        """A function that lets a vehicle be heard again that `cut_link` made unheard, and that went
+        on meanwhile; None: not supported."""
         return None
 
     @pytest.fixture
@@ -125,6 +132,12 @@ async def start(
 def terminal(bench: ArbiterBench, id_: str) -> list[BehaviorState]:
     """The terminal states that were reported of a behavior."""
     return [state for state in bench.states_of(id_) if state.terminal]
+
+
+def heard(bench: ArbiterBench, vehicle: ResourceId) -> bool:
+    """Whether the last that a vehicle said is that its link is up."""
+    state = bench.latest(vehicle)
+    return state is not None and state.link is not LinkState.LOST
 
 
 def speed(bench: ArbiterBench, vehicle: ResourceId) -> float:

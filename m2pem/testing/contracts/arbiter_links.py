@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
+from m2pem.api.arbiter import ReclaimingArbiter
 from m2pem.api.clock import Clock
 from m2pem.model.catalogue import BehaviorState
 from m2pem.testing.contracts.arbiter_case import (
@@ -15,6 +16,7 @@ from m2pem.testing.contracts.arbiter_case import (
     CutLink,
     Main,
     MakeArbiter,
+    heard,
     on_bench,
     speed,
     start,
@@ -210,6 +212,50 @@ class ArbiterLinks(ArbiterFixtures):
             end = await bench.ended("r1.b1", bound_s + 1 + bench.late_s)
             assert end.state is BehaviorState.LOST, end
             assert not terminal(bench, "r1.b2"), "the other vehicle's link is up"
+
+        on_bench(make_arbiter, run, main)
+
+    @needs("link", "return", "telemetry")
+    def test_a_lost_vehicle_that_is_heard_again_stops_before_it_is_free(
+        self,
+        make_arbiter: MakeArbiter,
+        case: ArbiterCase,
+        cut_link: CutLink | None,
+        mend_link: CutLink | None,
+        run: Callable[[Main], None],
+    ) -> None:
+        """The executive asks it to `reclaim`, or to `hold`; after that it stands, and then it does
+        what it is given."""
+        if cut_link is None or mend_link is None:
+            skip_unsupported("return", "the fixture `mend_link` is not overridden")
+
+        async def main(bench: ArbiterBench) -> None:
+            await start(bench, "r1.b1", case.long, case.vehicle)
+            moving = await bench.until(lambda: speed(bench, case.vehicle) > 2 * STANDING_M_S, 30)
+            assert moving, "the long behavior must move the vehicle"
+            cut_link(bench.arbiter, case.vehicle)
+            limits = bench.arbiter.limits(case.vehicle)
+            end = await bench.ended("r1.b1", limits.lost_after_s + 1 + bench.late_s)
+            assert end.state is BehaviorState.LOST, end
+            mend_link(bench.arbiter, case.vehicle)
+            assert await bench.until(lambda: heard(bench, case.vehicle), 30), "it is heard again"
+            arbiter = bench.arbiter
+            if isinstance(arbiter, ReclaimingArbiter):
+                limit = bench.clock.now_us() + round(1e6 * limits.cancel_timeout_s)
+                while why := await arbiter.reclaim(case.vehicle):
+                    assert bench.clock.now_us() < limit, why
+                    await bench.clock.sleep(1)
+            else:
+                await arbiter.hold(case.vehicle)
+            stands = await bench.until(
+                lambda: speed(bench, case.vehicle) < STANDING_M_S, limits.hold_within_s
+            )
+            assert stands, f"still at {speed(bench, case.vehicle):.1f} m/s, though it is free"
+            await bench.clock.sleep(case.watch_s)
+            assert speed(bench, case.vehicle) < STANDING_M_S, "it does not move by itself"
+            await start(bench, "r1.b2", case.long, case.vehicle)
+            moving = await bench.until(lambda: speed(bench, case.vehicle) > 2 * STANDING_M_S, 30)
+            assert moving, f"it must do what it is given: {bench.of('r1.b2')}"
 
         on_bench(make_arbiter, run, main)
 

@@ -234,6 +234,10 @@ class MavlinkArbiter:
         if resource in self._helms:
             self._helms[resource].resume()
 
+    async def reclaim(self, resource: ResourceId) -> str:
+        """A vehicle that was lost is heard again: have it stop, unless it flies a failsafe."""
+        return await self._helms[resource].reclaim() if resource in self._helms else ""
+
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """What is known; after a restart, what the vehicle itself shows. Nothing is sent to it but
         questions."""
@@ -315,6 +319,7 @@ class MavlinkArbiter:
         if kept.behavior not in BEHAVIORS:
             return replace(unknown, reason=f"there is no behavior '{kept.behavior}' any more")
         if not await helm.knows(HEARD_WITHIN_S):
+            helm.leave()
             return replace(unknown, reason=f"where {kept.resource} is was not heard")
         try:
             behavior = self._make(kept)

@@ -6,13 +6,14 @@ for it before, an exchange in flight too, is given up, and only then something e
 
 import asyncio
 import logging
+import math
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from m2pem.api import BehaviorId, BehaviorState, Ledger, Limits
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError
 from m2pem_plugin_mavlink.behaviors.flight import SetSpeed
-from m2pem_plugin_mavlink.behaviors.looking import modes_of, on_the_ground
+from m2pem_plugin_mavlink.behaviors.looking import STANDS_BELOW_M_S, modes_of, on_the_ground
 from m2pem_plugin_mavlink.foreign import Cause, TakeoverWatch
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
@@ -25,6 +26,8 @@ KNOWN_WITHIN_S = 5.0
 STOP_SHARE = 0.8
 """Of the time in which a cancelled vehicle must be free: a stop that takes longer has failed."""
 
+_FAILSAFES = frozenset({FlightMode.RETURN, FlightMode.LAND})
+"""What autopilots do by themselves when a link is lost, beside standing (BRAKE, HOLD, LOITER)."""
 _HELD = frozenset({FlightMode.HOLD})
 _FAIL_SAFE = frozenset({FlightMode.RETURN, FlightMode.LAND})
 
@@ -62,6 +65,7 @@ class Helm:
         self._logger = logger
         self._flight: _Flight | None = None
         self._held = False
+        self._given = False
         self._work: set[asyncio.Task[None]] = set()
 
     @property
@@ -87,6 +91,7 @@ class Helm:
         before = self._flight
         self._flight = flight = _Flight(id_, behavior)
         self._held = False
+        self._given = True
         self._watch.begin()
         self._replace(lambda: self._fly(flight, before.behavior if before else None, look_first))
 
@@ -94,6 +99,7 @@ class Helm:
         """The vehicle was found doing it, and is to go on."""
         self._flight = flight = _Flight(id_, behavior, begun=True, looked=True)
         self._held = False
+        self._given = True
         self._replace(lambda: self._fly(flight))
 
     def cancel(self, id_: BehaviorId) -> None:
@@ -137,6 +143,41 @@ class Helm:
         self._held = False
         for task in self._work:
             task.cancel()
+
+    async def reclaim(self) -> str:
+        """It is heard again: have it stop what it was given before. Returns "" when it has
+        acknowledged, else why it is not free: RTL or LAND is not interrupted, as a lost link makes
+        autopilots do that by themselves."""
+        self.drop()
+        if not await self.knows(KNOWN_WITHIN_S):
+            return "it is heard again, and does not say yet what it does"
+        heard, driver = self.vehicle.heard, self.vehicle.driver
+        mode = "" if heard.custom_mode is None else driver.mode_name(heard.custom_mode)
+        if heard.armed and heard.mode in _FAILSAFES and not self._stands():
+            return f"it is heard again in {mode}, which is not interrupted: free when it stands"
+        # PX4 goes to a place in the mode in which it also stands.
+        stands = (
+            heard.mode is FlightMode.HOLD and heard.custom_mode != self.vehicle.ours.custom_mode
+        )
+        steered = stands or heard.mode in _FAILSAFES or heard.mode is FlightMode.MANUAL
+        if self._given and heard.armed and not steered:
+            try:
+                await self._stop()
+            except ExchangeError as error:
+                return f"it is heard again in {mode}, and does not stop: {error}"
+        self._given = False
+        return ""
+
+    def leave(self) -> None:
+        """It may be doing what it was given before a restart, and could not be asked."""
+        self._given = True
+
+    def _stands(self) -> bool:
+        """One that flies does not stand, though it may hover for a while."""
+        if self.vehicle.domain == "air":
+            return on_the_ground(self.vehicle)
+        velocity = self.vehicle.heard.velocity_enu_m_s
+        return velocity is not None and math.hypot(*velocity) < STANDS_BELOW_M_S
 
     async def close(self) -> None:
         """Leave the vehicle as it is."""

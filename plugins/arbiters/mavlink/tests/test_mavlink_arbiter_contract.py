@@ -32,6 +32,13 @@ class _Doubles(ArbiterContract):
         return cut
 
     @pytest.fixture
+    def mend_link(self, bodies):
+        def mend(_arbiter, vehicle) -> None:
+            bodies[vehicle].heard_by_us = True
+
+        return mend
+
+    @pytest.fixture
     def effects(self, bodies):
         return lambda _arbiter, vehicle: bodies[vehicle].begun
 

@@ -194,6 +194,42 @@ def test_a_lost_vehicle_that_comes_back_can_be_commanded() -> None:
     play(Body().fly(), main)
 
 
+@pytest.mark.parametrize("mode", [FlightMode.RETURN, FlightMode.LAND])
+def test_a_lost_vehicle_that_comes_back_in_a_failsafe_is_not_interrupted(mode) -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        bench.body.heard_by_us = False
+        await bench.ended("r1.b1", 5)
+        bench.body.mode, bench.body.heard_by_us = mode, True
+        await bench.clock.sleep(1)
+        told = list(bench.told)
+        why = await bench.arbiter.reclaim(V)
+        assert "which is not interrupted: free when it stands" in why
+        assert mode.name in why.upper()
+        while await bench.arbiter.reclaim(V):
+            await bench.clock.sleep(1)
+        assert bench.body.landed
+        assert not bench.body.armed
+        assert bench.told == told
+
+    play(Body().fly(), main)
+
+
+@pytest.mark.parametrize("mode", [FlightMode.MANUAL, FlightMode.HOLD])
+def test_a_lost_vehicle_that_somebody_else_has_stopped_is_left_alone(mode) -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        bench.body.heard_by_us = False
+        await bench.ended("r1.b1", 5)
+        bench.body.mode, bench.body.heard_by_us = mode, True
+        await bench.clock.sleep(1)
+        told = list(bench.told)
+        assert await bench.arbiter.reclaim(V) == ""
+        assert bench.told == told
+
+    play(Body().fly(), main)
+
+
 def test_states_say_what_the_vehicle_does() -> None:
     async def main(bench) -> None:
         await flying(bench)

@@ -60,7 +60,8 @@ def _station(installation: Installation) -> Station:
 
 
 class RosArbiter:
-    """Implements `m2pem.api.AdjustingArbiter`. What a fleet may say of it: docs/ros.md.
+    """Implements `m2pem.api.AdjustingArbiter` and `ReclaimingArbiter`. What a fleet may say of it:
+    docs/ros.md.
 
     `make_driver` and `make_station` are for tests without ROS.
 
@@ -208,6 +209,10 @@ class RosArbiter:
         """Have a vehicle go on."""
         if resource in self._vehicles:
             self._vehicles[resource].resume()
+
+    async def reclaim(self, resource: ResourceId) -> str:
+        """A vehicle that was lost is heard again: have it end what it goes on with."""
+        return await self._vehicles[resource].reclaim() if resource in self._vehicles else ""
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """What is known; after a restart, what the vehicle itself says. Nothing is begun."""

@@ -4,6 +4,7 @@ and when it was heard."""
 import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from uuid import UUID
 
 from m2pem.api import (
@@ -35,6 +36,9 @@ LOOK_WITHIN_S = 3.0
 
 CANCEL_SHARE = 0.8
 """Of the time in which a cancelled vehicle must be free: one that takes longer has failed to."""
+
+RECLAIM_WITHIN_S = 5.0
+"""In real time: a vehicle that has not acknowledged a CANCEL by then is also told to HOLD."""
 
 CLOSE_WITHIN_S = 5.0
 REMEMBERED = 1_000
@@ -74,7 +78,8 @@ class Vehicle:
         self._order: Order | None = None
         self._cancelled: BehaviorId = ""
         self._broken = ""
-        self._left: dict[UUID, None] = {}
+        self._left: dict[UUID, BehaviorId] = {}
+        self._left_less = asyncio.Event()
         self._heard_us = post.context.clock.now_us()
         self._heard = 0
         self._told: tuple[object, ...] = ()
@@ -147,6 +152,27 @@ class Vehicle:
         """Go on."""
         self._ask("resume", self.driver.resume)
 
+    async def reclaim(self) -> str:
+        """It is heard again: have it end what it was left with. Returns when it has acknowledged
+        all of that, and ""; else, after a while, what it may still do."""
+        if (holder := self.doing) is not None:
+            self._lose(holder, (self._context.clock.now_us() - self._heard_us) / 1e6)
+        for goal in list(self._left):
+            self._ask("end", partial(self.driver.end, goal))
+        try:
+            async with asyncio.timeout(RECLAIM_WITHIN_S):
+                while self._left:
+                    self._left_less.clear()
+                    await self._left_less.wait()
+        except TimeoutError:
+            self.hold()
+            left = ", ".join(self._left.values())
+            return (
+                f"it is heard again, was told to end {left} and then to hold, and has not"
+                " acknowledged: it may still do that"
+            )
+        return ""
+
     def refusal(self, request: BehaviorRequest) -> str:
         """Why it cannot be done now; "" if it can."""
         if self._broken:
@@ -186,7 +212,7 @@ class Vehicle:
 
     def leave(self, order: Order) -> None:
         """It may still do this, and is to stop doing it when it is given something else."""
-        self._left[order.goal] = None
+        self._left[order.goal] = order.request.id
 
     async def open(self) -> None:
         """Have the driver listen. One that breaks refuses every request, and stops nobody else.
@@ -229,8 +255,9 @@ class Vehicle:
 
     def ended(self, goal: UUID, outcome: Outcome) -> None:
         """It has ended, for good."""
-        self._left.pop(goal, None)
-        behavior = self._behavior(goal)
+        was_left = self._left.pop(goal, None) is not None
+        self._left_less.set()
+        behavior = self._behaviors.get(goal) if was_left else self._behavior(goal)
         if behavior is None:
             return
         if not outcome.is_end:
@@ -285,7 +312,7 @@ class Vehicle:
         self._ledger.lose(self.resource, f"not heard for {silent_s:.1f} s")
 
     def _leave(self, behavior: BehaviorId) -> None:
-        self._left[goal_id(self._context.journal, behavior)] = None
+        self._left[goal_id(self._context.journal, behavior)] = behavior
         self._order = None
 
     async def _give_up(self, behavior: BehaviorId) -> None:

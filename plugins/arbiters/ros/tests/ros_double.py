@@ -133,8 +133,11 @@ class DoubleDriver:
 
     def end(self, goal: UUID) -> None:
         self.body.told("end", goal)
+        self.known.add(goal)
         if self.body.goal == goal and self.body.stops:
             self.body.finish(Outcome(BehaviorState.CANCELLED))
+        elif self.body.goal != goal:
+            self.body.outcomes.setdefault(goal, Outcome(BehaviorState.CANCELLED))
 
     def adjust(self, goal: UUID, parameters: Mapping[str, ResolvedValue]) -> None:
         self.body.told("adjust", goal, dict(parameters))

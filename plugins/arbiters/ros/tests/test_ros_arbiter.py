@@ -144,6 +144,42 @@ def test_a_vehicle_that_is_heard_again_is_usable_and_gives_its_old_goal_up() -> 
     play(main)
 
 
+def test_a_vehicle_that_returns_is_not_free_until_it_has_acknowledged() -> None:
+    async def main(world) -> None:
+        async with world.connected() as bench:
+            body = world.bodies[A]
+            await bench.start("r1.b1", "goto", A, target=FAR)
+            await bench.running("r1.b1")
+            body.linked, body.stops = False, False
+            assert (await bench.ended("r1.b1", 3.0)).state is LOST
+            body.linked = True
+            await bench.until(lambda: bench.latest(A).link is LinkState.CONNECTED, 2)
+            why = await bench.arbiter.reclaim(A)
+            assert "was told to end r1.b1 and then to hold, and has not acknowledged" in why
+            assert body.called("end") == [("end", goal_id(JOURNAL, "r1.b1"))]
+            assert body.held
+            body.stops = True
+            assert await bench.arbiter.reclaim(A) == ""
+            assert body.goal is None
+
+    play(main)
+
+
+def test_a_vehicle_that_returns_with_nothing_of_ours_is_left_alone() -> None:
+    async def main(world) -> None:
+        async with world.connected() as bench:
+            await bench.clock.sleep(1)
+            world.bodies[A].linked = False
+            await bench.until(lambda: bench.latest(A).link is LinkState.LOST, 5)
+            world.bodies[A].linked = True
+            await bench.until(lambda: bench.latest(A).link is LinkState.CONNECTED, 2)
+            assert await bench.arbiter.reclaim(A) == ""
+            assert not world.bodies[A].called("end")
+            assert not world.bodies[A].called("hold")
+
+    play(main)
+
+
 def test_a_lost_vehicle_is_told_of_once() -> None:
     async def main(world) -> None:
         async with world.connected() as bench:

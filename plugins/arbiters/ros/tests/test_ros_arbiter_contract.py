@@ -30,6 +30,13 @@ class TestRosVehicles(ArbiterContract):
         return cut
 
     @pytest.fixture
+    def mend_link(self, bodies):
+        def mend(_arbiter, vehicle) -> None:
+            bodies[vehicle].linked = True
+
+        return mend
+
+    @pytest.fixture
     def effects(self, bodies):
         return lambda _arbiter, vehicle: bodies[vehicle].begun
 

@@ -105,6 +105,12 @@ class Pilot:
         if goal == self._goal and self._ending is None:
             self._end_with(Ending(BehaviorState.CANCELLED))
 
+    def stop_for(self, goal: UUID) -> None:
+        """Stop the base, which may still move for a goal that was dropped; the ending comes when it
+        stands."""
+        self._goal, self._motion, self._held = goal, None, False
+        self._end_with(Ending(BehaviorState.CANCELLED))
+
     def fail(self, reason: str) -> None:
         """Stop, and let what it does fail."""
         if self._goal is not None and self._ending is None:

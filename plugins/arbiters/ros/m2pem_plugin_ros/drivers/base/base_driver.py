@@ -114,11 +114,17 @@ class BaseDriver:
         self._pilot.begin(order.goal, motion)
 
     def end(self, goal: UUID) -> None:
-        """Stop, and tell when it stands; at once if the base is not driven for that goal."""
+        """Stop, and tell when it stands; at once if the base is driven for another goal.
+
+        A base that nobody drives may still move: its link was lost, or its program has ended.
+        """
         if goal == self._pilot.goal:
             self._pilot.end(goal)
             return
         ended = self._ended.outcome(goal)
+        if ended is None and self._pilot.goal is None:
+            self._pilot.stop_for(goal)
+            return
         if ended is None:
             reason = "the base was not driven for it any more"
             ended = Outcome(BehaviorState.CANCELLED, "", reason)

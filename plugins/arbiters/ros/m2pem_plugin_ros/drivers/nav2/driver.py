@@ -59,6 +59,8 @@ class Nav2Driver:
         self._ended: OrderedDict[UUID, Outcome] = OrderedDict()
         self._work: set[asyncio.Task[None]] = set()
         self._looking: list[asyncio.Task[None]] = []
+        self._given_up: dict[UUID, asyncio.Task[None]] = {}
+        self._was_lost = False
 
     async def open(self) -> None:
         """Listen to Nav2, and to whether it is active.
@@ -106,7 +108,7 @@ class Nav2Driver:
             self._told.ended(order.goal, Outcome(BehaviorState.REJECTED, "REJECTED", str(error)))
             return
         self._drive = drive = _Drive(order, errand)
-        self._held = False
+        self._held = self._was_lost = False
         self._replace(lambda: self._run(drive))
 
     def end(self, goal: UUID) -> None:
@@ -118,12 +120,17 @@ class Nav2Driver:
                 self._replace(lambda: self._stop_for(drive))
             return
         outcome = self._ended.get(goal, Outcome(BehaviorState.CANCELLED))
-        if nav2 is None or not any(number_of(goal, active) is not None for active in nav2.ours()):
+        active = nav2 is not None and any(number_of(goal, each) is not None for each in nav2.ours())
+        if nav2 is None or not (active or (self._was_lost and goal not in self._ended)):
             self._told.ended(goal, outcome)
             return
+        if goal in self._given_up:
+            return
         task = asyncio.get_running_loop().create_task(self._cancel_old(nav2, goal, outcome))
+        self._given_up[goal] = task
         self._work.add(task)
         task.add_done_callback(self._work.discard)
+        task.add_done_callback(lambda _: self._given_up.pop(goal, None))
 
     def adjust(self, goal: UUID, parameters: Mapping[str, ResolvedValue]) -> None:
         """Go on with these."""
@@ -166,13 +173,12 @@ class Nav2Driver:
         return outcome
 
     def forget(self) -> None:
-        """It cannot be reached."""
+        """It cannot be reached. What it was given stays ours, to be ended when it is again."""
         self._drive = None
         self._held = False
+        self._was_lost = True
         for task in self._work:
             task.cancel()
-        if self._nav2 is not None:
-            self._nav2.disown()
 
     async def close(self) -> None:
         """Leave the vehicle as it is."""
@@ -264,10 +270,20 @@ class Nav2Driver:
         self._over(drive, outcome)
 
     async def _cancel_old(self, nav2: Nav2, goal: UUID, outcome: Outcome) -> None:
-        try:
-            await nav2.stop_ours(lambda active: number_of(goal, active) is not None)
-        except RosError as error:
-            self._logger.error("%s: %s does not end: %s", self._name, goal, error)
+        """Until Nav2 has said that it does it no more."""
+        while True:
+            try:
+                if self._was_lost and not nav2.rival():
+                    # What it does may have been told while it was not heard: all is cancelled.
+                    await nav2.stop()
+                else:
+                    await nav2.stop_ours(lambda active: number_of(goal, active) is not None)
+            except RosError as error:
+                self._logger.error("%s: %s does not end: %s", self._name, goal, error)
+                await self._seat.context.clock.sleep(AGAIN_S)
+            else:
+                break
+        self._was_lost = False
         self._told.ended(goal, outcome)
 
     def _over(self, drive: _Drive, outcome: Outcome) -> None:
@@ -316,7 +332,7 @@ class Nav2Driver:
     async def _look_after(self, nav2: Nav2) -> None:
         """What it does for nobody any more is ended; what it can do no more has failed."""
         drive = self._drive
-        if drive is None and not self._work and nav2.ours():
+        if drive is None and not self._work and not self._was_lost and nav2.ours():
             await nav2.stop_ours()
         elif (
             drive is not None

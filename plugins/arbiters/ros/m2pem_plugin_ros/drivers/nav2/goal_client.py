@@ -98,10 +98,6 @@ class GoalClient:
             renewed.set()
         self._writers |= writers
 
-    def forget(self) -> None:
-        """What was sent is nobody's any more; what the server tells of goes on."""
-        self._open.clear()
-
     # --- what is asked --------------------------------------------------------------------------
 
     async def send(self, goal_id: UUID, goal: Any) -> bool:

@@ -190,12 +190,6 @@ class Nav2:
             for goal in filter(which, client.active & self._ours):
                 await client.cancel(goal)
 
-    def disown(self) -> None:
-        """What it was given is nobody's any more."""
-        self._ours.clear()
-        for client in self._clients():
-            client.forget()
-
     def limit_speed(self, speed_m_s: float | None) -> None:
         """Set the highest speed; None takes back what was set before."""
         if speed_m_s is None and self._limit_m_s is None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -53,6 +54,7 @@ class ByTopics:
         self._ended: dict[str, Outcome] = {}
         self._looks: dict[str, asyncio.Future[Status]] = {}
         self._node_heard_us: int | None = None
+        self._orders: OrderedDict[UUID, Order] = OrderedDict()
 
     @property
     def order(self) -> Order | None:
@@ -64,6 +66,7 @@ class ByTopics:
     def begin(self, order: Order) -> None:
         """START, until the node has said something of it."""
         self._let_go()
+        self._know(order)
         pursued = _Pursued(order.goal, order)
         self._current = self._pursued[str(order.goal)] = pursued
         self._ended.pop(str(order.goal), None)
@@ -75,7 +78,7 @@ class ByTopics:
                 return False
             if self._waited_s(began_us) > ANSWER_WITHIN_S:
                 reason = f"the vehicle's node answered no START for {ANSWER_WITHIN_S:g} s"
-                self._send(messages.about(Command.CANCEL, order, self._now_us()))
+                self._send(self._about(Command.CANCEL, pursued))
                 self._over(pursued, Outcome(BehaviorState.FAILED, "TIMEOUT", reason))
                 return False
             self._send(messages.start(order, self._now_us()))
@@ -113,8 +116,9 @@ class ByTopics:
     async def look(self, order: Order) -> Outcome:
         """QUERY, until it is answered. What goes on is ours from then on."""
         id_ = str(order.goal)
+        self._know(order)
         answer = self._looks.setdefault(id_, asyncio.get_running_loop().create_future())
-        query = messages.about(Command.QUERY, order, self._now_us())
+        query = self._about(Command.QUERY, _Pursued(order.goal, order))
 
         def say() -> bool:
             self._send(query)
@@ -226,9 +230,18 @@ class ByTopics:
         return (self._now_us() - max(began_us, self._node_heard_us)) / 1e6
 
     def _about(self, verb: int, pursued: _Pursued) -> Any:
-        if pursued.order is not None:
-            return messages.about(verb, pursued.order, self._now_us())
-        return messages.of_goal(verb, pursued.goal, self._now_us())
+        order = pursued.order or self._orders.get(pursued.goal)
+        if order is None:
+            return messages.of_goal(verb, pursued.goal, self._now_us())
+        epoch = self._seat.context.epoch_of(order.request.id)
+        return messages.about(verb, order, self._now_us(), epoch)
+
+    def _know(self, order: Order) -> None:
+        """What is told of a goal names its run, also after it was given up."""
+        self._orders[order.goal] = order
+        self._orders.move_to_end(order.goal)
+        if len(self._orders) > REMEMBERED:
+            self._orders.popitem(last=False)
 
     def _insist(self, pursued: _Pursued, say: Callable[[], bool]) -> None:
         self._insisting.start(f"cancel {pursued.goal}", say)

@@ -42,14 +42,15 @@ def adjust(order: Order, parameters: Mapping[str, ResolvedValue], now_us: int) -
     return message
 
 
-def about(verb: int, order: Order, now_us: int) -> Any:
-    """CANCEL or QUERY."""
+def about(verb: int, order: Order, now_us: int, epoch: int = 0) -> Any:
+    """CANCEL or QUERY. `epoch`: that of the executive that sends it, if it is known; an order that
+    was given before a restart has the one of its START."""
     return Command(
         stamp=stamp(now_us),
         verb=verb,
         id=str(order.goal),
         run=str(order.run),
-        epoch=order.request.epoch,
+        epoch=max(epoch, order.request.epoch),
     )
 
 

@@ -1,0 +1,123 @@
+"""A lost vehicle that is heard again stops before it is free."""
+
+from m2pem.api.telemetry import LinkState, VehicleState
+from m2pem.model.catalogue import ResourceId
+from m2pem.testing.fakes import Call
+
+from .conftest import World, behavior, mission, sequence
+
+DRIVE = mission(sequence(("B", behavior("B", "drive_stop", "ugv1"))))
+UGV1 = ResourceId("ugv1")
+
+
+def says(world: World, link: LinkState = LinkState.CONNECTED) -> None:
+    world.fake.say(VehicleState(UGV1, world.clock.now_us(), ready=True, link=link))
+
+
+async def lose(world: World) -> None:
+    control = world.executive.control
+    run = await control.start(DRIVE)
+    await world.fake.until_called("start", f"{run}.b1")
+    says(world, LinkState.LOST)
+    assert "LINK_LOST" in (await control.wait(run)).detail
+
+
+async def refusal(world: World) -> str:
+    control = world.executive.control
+    return (await control.wait(await control.start(DRIVE))).detail
+
+
+def latest(world: World) -> VehicleState:
+    state = world.executive.bus.latest(UGV1)
+    assert isinstance(state, VehicleState)
+    return state
+
+
+def test_it_is_told_to_stop_before_it_is_free(play):
+    async def story(world: World):
+        await lose(world)
+        calls = len(world.fake.calls)
+        world.fake.hangs.add("hold")
+        says(world)
+        await world.fake.until_called("hold", "ugv1")
+        assert Call("cancel", "r1.b1") in world.fake.calls[calls:]
+        refused = await refusal(world)
+        says(world)
+        await world.clock.sleep(0.1)
+        assert latest(world).ready is False
+        assert "it is heard again, and must first end r1.b1" in latest(world).not_ready_reasons
+        world.fake.hangs.clear()
+        await world.fake.until_called("hold", "ugv1", 2)
+        await world.clock.sleep(0.1)
+        assert latest(world).ready is True
+        again = await world.executive.control.start(DRIVE)
+        await world.fake.until_called("start", f"{again}.b1")
+        return refused
+
+    assert "ugv1 is unavailable: it is heard again, and must first end r1.b1" in play(
+        story, "ugv1", watch_links=True
+    )
+
+
+def test_one_that_cannot_be_told_is_told_again_and_not_free(play, caplog):
+    async def story(world: World):
+        await lose(world)
+        world.fake.raises["hold"] = RuntimeError("the radio is broken")
+        says(world)
+        await world.fake.until_called("hold", "ugv1", 3)
+        says(world)
+        refused = await refusal(world)
+        del world.fake.raises["hold"]
+        await world.fake.until_called("hold", "ugv1", 4)
+        return refused
+
+    refused = play(story, "ugv1", watch_links=True)
+    assert "it cannot be told to stop: RuntimeError: the radio is broken" in refused
+    assert "ugv1 is heard again, has ended what it did before, and is free" in caplog.text
+
+
+def test_one_that_is_lost_again_meanwhile_is_told_when_it_returns(play):
+    async def story(world: World):
+        await lose(world)
+        world.fake.hangs.add("hold")
+        says(world)
+        await world.fake.until_called("hold", "ugv1")
+        for _ in range(8):  # heard for long enough to be lost once more
+            await world.clock.sleep(0.5)
+            says(world)
+        says(world, LinkState.LOST)
+        await world.clock.sleep(0.1)
+        world.fake.hangs.clear()
+        held = world.fake.count("hold", "ugv1")
+        refused = await refusal(world)
+        assert world.fake.count("hold", "ugv1") == held, "nothing is sent to who is not heard"
+        says(world)
+        await world.fake.until_called("hold", "ugv1", held + 1)
+        return refused
+
+    assert "ugv1 is unavailable: lost: its arbiter lost the link" in play(
+        story, "ugv1", watch_links=True
+    )
+
+
+def test_an_operator_who_took_it_meanwhile_is_not_held_up(play):
+    async def story(world: World):
+        await lose(world)
+        await world.executive.control.take("ugv1", by="anna")
+        says(world)
+        await world.fake.until_called("cancel", "r1.b1")
+        await world.clock.sleep(0.1)
+        assert world.fake.count("hold", "ugv1") == 0
+        return await refusal(world)
+
+    assert "ugv1 is with anna" in play(story, "ugv1", watch_links=True)
+
+
+def test_one_that_is_given_back_while_it_is_lost_is_not_free(play):
+    async def story(world: World):
+        await lose(world)
+        await world.executive.control.take("ugv1", by="anna")
+        await world.executive.control.give_back("ugv1", by="anna")
+        return await refusal(world)
+
+    assert "ugv1 is unavailable: lost: " in play(story, "ugv1", watch_links=True)
