@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         BehaviorReport,
         BehaviorRequest,
         Connection,
+        DetectingArbiter,
         Limits,
         ReclaimingArbiter,
         ResolvedValue,
@@ -91,7 +92,8 @@ if TYPE_CHECKING:
 _MODULES = {
     "m2pem.api.arbiter": (
         "AddressedArbiter AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport"
-        " BehaviorRequest Connection Limits ReclaimingArbiter ResolvedValue SightedArbiter"
+        " BehaviorRequest Connection DetectingArbiter Limits ReclaimingArbiter ResolvedValue"
+        " SightedArbiter"
     ),
     "m2pem.api.authoring": (
         "DataName Draft Editable MissionSource Outline OutlineElement"
@@ -150,6 +152,7 @@ __all__ = [
     "Connection",
     "DataName",
     "Decision",
+    "DetectingArbiter",
     "Detection",
     "Dimension",
     "Draft",

@@ -4,7 +4,7 @@ One object per registered name serves all its resources of a fleet. `m2pem.testi
 checks every promise made here.
 """
 
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 from uuid import UUID, uuid4
@@ -225,4 +225,15 @@ class ReclaimingArbiter(Protocol):
         behavior. Otherwise why it may not yet, for operators, such as its own failsafe that must
         not be interrupted: it is asked for again soon. What nobody here had it do is left alone.
         """
+        ...
+
+
+@runtime_checkable
+class DetectingArbiter(Protocol):
+    """An arbiter that knows by their connections which payloads detect, beside those that the fleet
+    marks with `detector: true`."""
+
+    @property
+    def detectors(self) -> Collection[ResourceId]:
+        """Payloads whose detections complete the service `Detector`."""
         ...

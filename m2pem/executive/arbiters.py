@@ -5,7 +5,13 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
-from m2pem.api.arbiter import AddressedArbiter, Arbiter, ArbiterContext, Connection
+from m2pem.api.arbiter import (
+    AddressedArbiter,
+    Arbiter,
+    ArbiterContext,
+    Connection,
+    DetectingArbiter,
+)
 from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
 from m2pem.model.geometry import Area
@@ -154,6 +160,16 @@ class FleetArbiters:
         own = tuple(self._of[resource].catalogue(resource))
         made = self._offers.together(resource)
         return (*own, *(spec for spec in made if not _has(own, spec.name)))
+
+    @property
+    def detectors(self) -> tuple[ResourceId, ...]:
+        """The payloads that detect: the fleet marks them, or their arbiter knows it by their
+        connection."""
+        known = set(self.fleet.detectors)
+        for arbiter in self.by_name.values():
+            if isinstance(arbiter, DetectingArbiter):
+                known.update(arbiter.detectors)
+        return tuple(payload for payload in self.fleet.payloads if payload in known)
 
     def catalogue(self) -> Mapping[ResourceId, Sequence[BehaviorSpec]]:
         """What every resource can do in this fleet."""

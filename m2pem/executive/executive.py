@@ -148,7 +148,9 @@ class Executive:
         )
         self.services = Services(
             plugins.service,
-            ServiceContext(clock, self.bus, logging.getLogger("m2pem.service"), fleet.detectors),
+            ServiceContext(
+                clock, self.bus, logging.getLogger("m2pem.service"), self.arbiters.detectors
+            ),
             script,
         )
 

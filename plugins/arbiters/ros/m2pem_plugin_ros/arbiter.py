@@ -3,7 +3,7 @@
 import asyncio
 import math
 import os
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 from m2pem.api import (
@@ -60,8 +60,8 @@ def _station(installation: Installation) -> Station:
 
 
 class RosArbiter:
-    """Implements `m2pem.api.AdjustingArbiter` and `ReclaimingArbiter`. What a fleet may say of it:
-    docs/ros.md.
+    """Implements `m2pem.api.AdjustingArbiter`, `ReclaimingArbiter` and `DetectingArbiter`. What a
+    fleet may say of it: docs/ros.md.
 
     `make_driver` and `make_station` are for tests without ROS.
 
@@ -90,6 +90,7 @@ class RosArbiter:
         self._states: Mailbox[VehicleState | PayloadState] = Mailbox(STATES_WAITING, _may_be_missed)
         self._vehicles: dict[ResourceId, Vehicle] = {}
         self._asked: set[BehaviorId] = set()
+        self._unknown: dict[BehaviorId, tuple[Kept, str | None]] = {}
         self._attending: asyncio.Task[None] | None = None
 
     # --- what is offered ------------------------------------------------------------------------
@@ -101,6 +102,11 @@ class RosArbiter:
         own, usual = self._settings[resource].own_behaviors, PAYLOAD if "/" in resource else LEVEL
         known = {spec.name for spec in usual}
         return (*usual, *(spec for spec in own if spec.name not in known))
+
+    @property
+    def detectors(self) -> Collection[ResourceId]:
+        """Payloads that are listened to: they have a `topic`, or are marked `detector: true`."""
+        return self._detectors.keys()
 
     def _taken(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """A payload may be held by what its vehicle does; what it does itself comes first."""
@@ -186,7 +192,8 @@ class RosArbiter:
             await vehicle.take(request, look_first=asked)
 
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
-        """Stop the vehicle that does it."""
+        """Stop the vehicle that does it, or that may do it although it said that it does not."""
+        self._take_up(behavior)
         if self._ledger.may_cancel(behavior, epoch):
             for vehicle in self._doing(behavior):
                 vehicle.cancel(behavior)
@@ -253,7 +260,8 @@ class RosArbiter:
             await asyncio.gather(*waits, return_exceptions=True)
         for resource, vehicle in self._vehicles.items():
             if not vehicle.heard_once.is_set():
-                self._context.logger.warning("%s: it was not heard yet", resource)
+                where = vehicle.absence
+                self._context.logger.warning("%s: it was not heard yet: %s", resource, where)
 
     async def _disconnect(self) -> None:
         attending, self._attending = self._attending, None
@@ -307,6 +315,18 @@ class RosArbiter:
                 return found
         return unknown
 
+    def _take_up(self, behavior: BehaviorId) -> None:
+        """To be ended, what a vehicle did not know after a restart is its behavior once more."""
+        kept, reference = self._unknown.pop(behavior, (None, None))
+        if kept is None or self._ledger.last(behavior).state is not BehaviorState.UNKNOWN:
+            return
+        resource = next(iter([*self._doers(kept.resources), *kept.resources]))
+        vehicle = self._vehicles.get(resource)
+        if vehicle is not None and self._ledger.holder(resource) is None:
+            order = vehicle.order_for(behavior, kept.epoch, kept.behavior, kept.parameters)
+            self._ledger.adopt(behavior, kept.resources, reference)
+            vehicle.adopt(order)
+
     async def _look(
         self, vehicle: Vehicle, behavior: BehaviorId, kept: Kept, reference: str | None
     ) -> BehaviorReport:
@@ -322,6 +342,8 @@ class RosArbiter:
             return replace(self._ledger.last(behavior), held=outcome.held)
         if outcome.state is BehaviorState.UNKNOWN:
             vehicle.leave(order)
+            if kept.behavior:
+                self._unknown[behavior] = (kept, reference)
         return BehaviorReport(
             behavior,
             3 if outcome.is_end else 0,

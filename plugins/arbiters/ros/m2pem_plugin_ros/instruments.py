@@ -33,6 +33,17 @@ class Senses(Protocol):
         ...
 
     @property
+    def refusal(self) -> str:
+        """Why nothing may be commanded, for people: it is not one vehicle, or where it is cannot be
+        known; "" if it may."""
+        ...
+
+    @property
+    def absence(self) -> str:
+        """Where what says that it is there is awaited, and who is there, for people."""
+        ...
+
+    @property
     def troubles(self) -> tuple[str, ...]:
         """What is missing to know well how it is, for people."""
         ...

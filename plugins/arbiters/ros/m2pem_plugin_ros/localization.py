@@ -69,6 +69,9 @@ class TopicLocalization:
         self._clock = context.clock
         self._frame = settings.odom_frame
         self._where = Whereabouts(settings.odom_frame, context.origin)
+        self._resource = resource
+        self._odom = settings.topic(settings.topics.odom)
+        self.wrong_frame = ""
         self._stamp = (0, 0)
         self._posed_us: int | None = None
         self._fixed_us: int | None = None
@@ -102,8 +105,8 @@ class TopicLocalization:
     def troubles(self) -> tuple[str, ...]:
         """What is missing to know well where it is, for people."""
         troubles = []
-        if self._posed_us is None:
-            troubles.append("no odometry was heard yet")
+        if self._posed_us is None and not self.wrong_frame:
+            troubles.append(f"no odometry was heard yet on {self._odom}")
         if self._frame is OdomFrame.ODOM:
             if self._fixed_us is None:
                 troubles.append("no satellite fix was heard yet")
@@ -116,6 +119,12 @@ class TopicLocalization:
         if stamp == self._stamp and stamp != (0, 0):
             detail = f"stamp {stamp[0]}.{stamp[1]:09}"
             self.complaints.add("odometry that was there already", detail)
+            return
+        frame = message.header.frame_id
+        self.wrong_frame = self._strange(frame)
+        if self.wrong_frame:
+            self.complaints.add("odometry in another frame than the declared one", f"'{frame}'")
+            self.changes += 1
             return
         place, turn = message.pose.pose.position, message.pose.pose.orientation
         linear, angular = message.twist.twist.linear, message.twist.twist.angular
@@ -138,6 +147,25 @@ class TopicLocalization:
         self.changes += 1
         self._where.odometry(
             Pose(place.x, place.y, yaw_rad, place.z), Twist(linear.x, angular.z, linear.y)
+        )
+
+    def _strange(self, frame: str) -> str:
+        """Why odometry in a frame cannot be used; "" if it can. Of several robots each may have an
+        `odom` of its own (`ugv1/odom`, REP-105); `map` is that of the fleet."""
+        name = frame.removeprefix("/")
+        declared = self._frame.value
+        if name == declared:
+            return ""
+        if self._frame is OdomFrame.ODOM and name.rpartition("/")[2] == declared:
+            return ""
+        right = f"publish odometry in '{declared}', the fleet's local frame"
+        if name.rpartition("/")[2] == OdomFrame.ODOM:
+            right += ", or say 'odom_frame: odom' in its connection, with satellite fixes"
+        elif self._frame is OdomFrame.ODOM and name == OdomFrame.MAP:
+            right = "say 'odom_frame: map' in its connection"
+        return (
+            f"odometry on {self._odom} is in the frame '{frame}', declared is '{declared}', and tf"
+            f" is not read: {right}"
         )
 
     def _hear_fix(self, message: Any) -> None:

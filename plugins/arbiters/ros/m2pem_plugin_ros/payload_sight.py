@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from m2pem.api import GeoPosition, LinkState, PayloadState, ResourceId
 from m2pem_plugin_ros.complaints import Complaints
+from m2pem_plugin_ros.endpoints import Endpoints
 from m2pem_plugin_ros.localization import Localization
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.settings import Settings
@@ -97,8 +98,19 @@ class PayloadSenses:
     position: GeoPosition | None = None
     age_s = math.inf
 
-    def __init__(self, sight: PayloadSight) -> None:
+    def __init__(self, sight: PayloadSight, endpoints: Endpoints) -> None:
         self._sight = sight
+        self._endpoints = endpoints
+
+    @property
+    def refusal(self) -> str:
+        """Why nothing may be commanded, for people; "" if it may."""
+        return self._endpoints.trouble
+
+    @property
+    def absence(self) -> str:
+        """Where its node is awaited, and who is there, for people."""
+        return self._endpoints.absence
 
     @property
     def localization(self) -> Localization:

@@ -11,6 +11,7 @@ from m2pem_plugin_ros.battery import Battery
 from m2pem_plugin_ros.complaints import Complaints
 from m2pem_plugin_ros.detectors import DetectorTopic
 from m2pem_plugin_ros.diagnostics import Diagnostics
+from m2pem_plugin_ros.endpoints import Endpoints
 from m2pem_plugin_ros.instruments import Installation, Instruments
 from m2pem_plugin_ros.localization import TopicLocalization
 from m2pem_plugin_ros.payload_sight import PayloadSenses, PayloadSight
@@ -30,8 +31,10 @@ class TopicSenses:
         battery: Battery,
         diagnostics: Diagnostics,
         hardware_id: str,
+        endpoints: Endpoints,
     ) -> None:
         self.localization = localization
+        self._endpoints = endpoints
         self._battery = battery
         self._diagnostics = diagnostics
         self._hardware_id = hardware_id
@@ -46,6 +49,16 @@ class TopicSenses:
     def errors(self) -> tuple[str, ...]:
         """What is wrong with its parts, for people."""
         return self._diagnostics.errors(self._hardware_id)
+
+    @property
+    def refusal(self) -> str:
+        """Why nothing may be commanded, for people; "" if it may."""
+        return self._endpoints.trouble or self.localization.wrong_frame
+
+    @property
+    def absence(self) -> str:
+        """Where the vehicle is awaited, and who is there, for people."""
+        return self._endpoints.absence
 
     @property
     def troubles(self) -> tuple[str, ...]:
@@ -109,23 +122,26 @@ class DdsStation:
         ros = self._runtime(settings.domain_id)
         if "/" in resource:
             sight = PayloadSight(ros, resource, settings, Complaints(context.logger, resource))
-            return Instruments(ros, PayloadSenses(sight), TargetTopic(ros, settings).show, sight)
+            domain = _domain(settings.domain_id)
+            senses = PayloadSenses(sight, Endpoints(ros, settings, domain, is_payload=True))
+            return Instruments(ros, senses, TargetTopic(ros, settings).show, sight)
         localization = TopicLocalization(ros, resource, settings, context)
         self._localizations[resource] = localization
         topic = settings.topic(settings.topics.diagnostics)
         board = (_domain(settings.domain_id), topic)
         if board not in self._diagnostics:
             self._diagnostics[board] = Diagnostics(ros, topic, context.clock)
-        senses = TopicSenses(
+        topics = TopicSenses(
             localization,
             Battery(ros, resource, settings, context),
             self._diagnostics[board],
             settings.hardware_id,
+            Endpoints(ros, settings, _domain(settings.domain_id)),
         )
         # Other drivers ask the fleet's bus themselves where a target is.
         is_node = settings.driver is DriverName.NODE
         show_target = TargetTopic(ros, settings).show if is_node else _show_nothing
-        return Instruments(ros, senses, show_target)
+        return Instruments(ros, topics, show_target)
 
     def _runtime(self, domain_id: int | None) -> "RosRuntime":
         from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415  # it needs rclpy

@@ -42,6 +42,8 @@ RECLAIM_WITHIN_S = 5.0
 
 CLOSE_WITHIN_S = 5.0
 REMEMBERED = 1_000
+LOOK_EVERY = 5
+"""Times that it is attended to for each time that it is looked who else is there."""
 
 _GOES_ON = (BehaviorState.ACCEPTED, BehaviorState.RUNNING)
 
@@ -78,6 +80,8 @@ class Vehicle:
         self._order: Order | None = None
         self._cancelled: BehaviorId = ""
         self._broken = ""
+        self._attended = 0
+        self._wrong = ""
         self._left: dict[UUID, BehaviorId] = {}
         self._left_less = asyncio.Event()
         self._heard_us = post.context.clock.now_us()
@@ -173,11 +177,18 @@ class Vehicle:
             )
         return ""
 
+    @property
+    def absence(self) -> str:
+        """Where it is awaited, and who is there, for people."""
+        return self._instruments.senses.absence
+
     def refusal(self, request: BehaviorRequest) -> str:
         """Why it cannot be done now; "" if it can."""
         if self._broken:
             return self._broken
         try:
+            if wrong := self._instruments.senses.refusal:
+                return wrong
             return self.driver.refusal(request) or self._breach(request)
         except Exception as error:
             self._context.logger.exception("%s: refusal", self.resource)
@@ -293,7 +304,8 @@ class Vehicle:
             self._lose(holder, silent_s)
             holder = None
         self._show_targets()
-        news = (self._heard, self._instruments.senses.changes, self.link, holder)
+        self._look_for_others()
+        news = (self._heard, self._instruments.senses.changes, self.link, holder, self._wrong)
         still_lost = self.link is LinkState.LOST and self._told[2:3] == (self.link,)
         if still_lost or news == self._told:
             return None
@@ -302,14 +314,33 @@ class Vehicle:
         if self._instruments.sight is not None:
             return self._instruments.sight.state(now_us, self.link, behavior)
         health, senses = self._health(), self._instruments.senses
-        return vehicle_state(self.resource, now_us, senses, health, self.link, behavior)
+        state = vehicle_state(self.resource, now_us, senses, health, self.link, behavior)
+        if not self._wrong:
+            return state
+        reasons = (self._wrong, *state.not_ready_reasons)
+        return replace(state, ready=False, not_ready_reasons=reasons)
 
     # --- inside ---------------------------------------------------------------------------------
+
+    def _look_for_others(self) -> None:
+        """Once in a while, so that operators know before something is commanded."""
+        self._attended += 1
+        if self._attended % LOOK_EVERY:
+            return
+        wrong = self._instruments.senses.refusal
+        if wrong and wrong != self._wrong:
+            self._context.logger.error("%s: nothing more is commanded: %s", self.resource, wrong)
+        elif self._wrong and not wrong:
+            self._context.logger.warning("%s: can be commanded again", self.resource)
+        self._wrong = wrong
 
     def _lose(self, holder: BehaviorId, silent_s: float) -> None:
         self._leave(holder)
         self._ask("forget", self.driver.forget)
-        self._ledger.lose(self.resource, f"not heard for {silent_s:.1f} s")
+        reason = f"not heard for {silent_s:.1f} s"
+        if not self._heard:
+            reason = f"never heard: {self.absence}"
+        self._ledger.lose(self.resource, reason)
 
     def _leave(self, behavior: BehaviorId) -> None:
         self._left[goal_id(self._context.journal, behavior)] = behavior

@@ -192,6 +192,7 @@ class DoubleSenses:
         self.localization = self
         self.age_s = 0.0
         self.troubles = ()
+        self.refusal = self.absence = ""
 
     @property
     def pose(self) -> Pose:

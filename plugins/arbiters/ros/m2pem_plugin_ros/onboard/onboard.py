@@ -163,6 +163,7 @@ class Onboard:
         if asked.verb is Verb.START:
             self.start(message)
         elif asked.verb is Verb.QUERY:
+            self._book.is_past(asked.run, asked.epoch)  # who asks after a takeover shuts others out
             self._book.again(asked.id)
         elif asked.verb is Verb.HOLD:
             self._hold()

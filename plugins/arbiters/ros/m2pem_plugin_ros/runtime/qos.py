@@ -25,5 +25,6 @@ EVENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 TELEMETRY = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Of sensors. A reliable reader would never match a writer of best effort; this reads from both."""
 
-SERVICES = QoSProfile(depth=200, reliability=ReliabilityPolicy.RELIABLE)
-"""For both ends of a service: of more calls at once than that, the oldest are lost silently."""
+SERVICES = QoSProfile(depth=2000, reliability=ReliabilityPolicy.RELIABLE)
+"""For both ends of a service: of more calls at once than that, DDS loses the oldest silently. Those
+that wait are refused in turn, so that it takes a client's own flood to come so far."""

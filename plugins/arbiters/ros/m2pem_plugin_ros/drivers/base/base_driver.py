@@ -85,7 +85,9 @@ class BaseDriver:
         """What a plain base cannot do, or not from where it is."""
         pose = self._seat.localization.pose
         if pose is None:
-            return "its position is not known yet: no odometry was heard"
+            settings = self._seat.settings
+            topic = settings.topic(settings.topics.odom)
+            return f"its position is not known yet: no odometry was heard on {topic}"
         try:
             motion = self._motion(request)
         except RefusedError as error:

@@ -15,7 +15,7 @@ from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
 from m2pem_plugin_ros.drivers.node import messages
 from m2pem_plugin_ros.drivers.node.action_client import ACTIVE, GoalClient, Listeners
 from m2pem_plugin_ros.drivers.node.insisting import Insisting
-from m2pem_plugin_ros.drivers.node.link import LOOK_WITHIN_S, REMEMBERED, RESTARTED
+from m2pem_plugin_ros.drivers.node.link import LOOK_WITHIN_S, REMEMBERED, RESTARTED, STILL_S
 from m2pem_plugin_ros.runtime import RosTimeoutError
 from m2pem_plugin_ros.statuses import ENDS, read_status
 from m2pem_plugin_ros.wire import WireError
@@ -47,6 +47,7 @@ class _Pursued:
     cancelled: bool = False
     over: bool = False
     number: int = 0
+    shown_us: int | None = None
     news: asyncio.Event = field(default_factory=asyncio.Event)
 
 
@@ -149,6 +150,9 @@ class ByAction:
     def vehicle_does(self, behavior: str) -> None:
         """If it is not what it should do, ask: a node may have been restarted."""
         self._node_is_heard = True
+        for each in self._pursued.values():
+            if behavior == str(each.goal):
+                each.shown_us = self._seat.context.clock.now_us()
         pursued = self._current
         if pursued is None:
             return
@@ -237,10 +241,21 @@ class ByAction:
                 continue
             if number != action.GoalStatus.STATUS_UNKNOWN:
                 self._over(pursued, self._outcome(pursued.goal, number, status))
+            elif self._goes_on(pursued):
+                cause = "another node in its namespace knows nothing of what it does"
+                self._complaints.add(cause, str(pursued.goal))
+                await self._pauses.pause()
+                pursued.news.set()
             elif pursued.cancelled:
                 self._over(pursued, Outcome(BehaviorState.CANCELLED, reason=RESTARTED))
             else:
                 self._over(pursued, Outcome(BehaviorState.LOST, "LINK_LOST", RESTARTED))
+
+    def _goes_on(self, pursued: _Pursued) -> bool:
+        """Whether vehicle_status said so just now: then it is another node that does not know."""
+        if pursued.shown_us is None:
+            return False
+        return self._seat.context.clock.now_us() - pursued.shown_us < STILL_S * 1e6
 
     async def _cancel(self, pursued: _Pursued) -> None:
         while not pursued.over:

@@ -20,6 +20,7 @@ from m2pem_plugin_ros.drivers.node.link import (
     LOOK_WITHIN_S,
     REMEMBERED,
     RESTARTED,
+    STILL_S,
     Send,
 )
 from m2pem_plugin_ros.statuses import Status
@@ -32,13 +33,15 @@ _GOES_ON = frozenset({BehaviorState.ACCEPTED, BehaviorState.RUNNING})
 @dataclass(slots=True)
 class _Pursued:
     """A goal that was not heard to have ended. `heard`: the node has said something of it.
-    `number`: that of its last status. `cancelled`: it is to end."""
+    `number`: that of its last status. `cancelled`: it is to end. `shown_us`: when vehicle_status
+    said last that it goes on."""
 
     goal: UUID
     order: Order | None
     number: int = 0
     heard: bool = False
     cancelled: bool = False
+    shown_us: int | None = None
 
 
 class ByTopics:
@@ -183,7 +186,10 @@ class ByTopics:
                 self._seat.told.progress(pursued.goal)
 
     def _unknown(self, pursued: _Pursued) -> None:
-        if pursued.cancelled:
+        if pursued.shown_us is not None and self._waited_since_s(pursued.shown_us) < STILL_S:
+            cause = "another node in its namespace knows nothing of what it does"
+            self._complaints.add(cause, str(pursued.goal))
+        elif pursued.cancelled:
             reason = "the vehicle's node knows nothing of it"
             self._over(pursued, Outcome(BehaviorState.CANCELLED, reason=reason))
         elif pursued.heard:
@@ -193,6 +199,8 @@ class ByTopics:
         """If it is not what it should do, ask: statuses may be lost, and nodes restarted."""
         if self._node_heard_us is None:
             self._node_heard_us = self._now_us()
+        if (shown := self._pursued.get(behavior)) is not None:
+            shown.shown_us = self._now_us()
         pursued = self._current
         if pursued is None or pursued.cancelled:
             return
@@ -222,6 +230,9 @@ class ByTopics:
 
     def _now_us(self) -> int:
         return self._seat.context.clock.now_us()
+
+    def _waited_since_s(self, then_us: int) -> float:
+        return (self._now_us() - then_us) / 1e6
 
     def _waited_s(self, began_us: int) -> float:
         """For how long a node that is there has not answered."""

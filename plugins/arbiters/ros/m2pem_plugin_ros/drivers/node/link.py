@@ -18,6 +18,10 @@ LOOK_WITHIN_S = 3.0
 REMEMBERED = 100
 """Goals that have ended of which it is known how."""
 
+STILL_S = 2.5
+"""A node says at least once a second what it does. If what was said to be unknown was said to go on
+within this, two nodes are there, and the one that does it was not restarted."""
+
 RESTARTED = "the vehicle's node was restarted and knows nothing of it"
 
 

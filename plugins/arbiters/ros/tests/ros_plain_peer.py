@@ -1,0 +1,121 @@
+"""A vehicle in plain rclpy, with nothing of m2pem but its interfaces.
+
+    ros_plain_peer.py NAMESPACE node|base FRAME [TYPE]
+
+`node` keeps to docs/ros.md, "Write your own node"; `base` takes `cmd_vel`, and goes on with
+the last command that it got. FRAME: of its odometry; TYPE: of `cmd_vel`, Twist or TwistStamped, or
+`pose`, which publishes odometry as a PoseStamped. On /link, NAMESPACE makes it deaf and dumb, and
+"" lets it speak again: it drives on meanwhile. On /truth it says what it does, whatever its link: name,
+speed, behaviors begun, and the epochs of the CANCELs that it has heard.
+"""
+
+import contextlib
+import sys
+from typing import Any
+
+import rclpy
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
+from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus, VehicleStatus
+from nav_msgs.msg import Odometry
+from rclpy.executors import ExternalShutdownException
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
+
+PERIOD_S = 0.05
+SPEED_M_S = 1.0
+
+
+class Plain:
+    """One vehicle."""
+
+    def __init__(self, namespace: str, kind: str, frame: str, type_: str) -> None:
+        self.node = node = rclpy.create_node("vehicle", namespace=namespace)
+        self.namespace, self.kind, self.frame, self.type = namespace, kind, frame, type_
+        self.east, self.speed, self.steps = 0.0, 0.0, 0
+        self.doing, self.begun, self.cancels = "", 0, []
+        self.known: dict[str, tuple[int, int]] = {}
+        self.epochs: dict[str, int] = {}
+        self.linked = True
+        odometry = PoseStamped if type_ == "pose" else Odometry
+        self.odom = node.create_publisher(odometry, "odom", 5)
+        self.truth = node.create_publisher(String, "/truth", 10)
+        node.create_subscription(String, "/link", self.hear_link, 10)
+        if kind == "base":
+            stamped = type_ == "TwistStamped"
+            node.create_subscription(
+                TwistStamped if stamped else Twist,
+                "cmd_vel",
+                lambda message: self.hear_velocity(message.twist if stamped else message),
+                10,
+            )
+        else:
+            latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+            self.says = node.create_publisher(BehaviorStatus, "behavior_status", latched)
+            latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+            self.status = node.create_publisher(VehicleStatus, "vehicle_status", latched)
+            node.create_subscription(BehaviorCommand, "command", self.hear_command, 10)
+        node.create_timer(PERIOD_S, self.step)
+
+    def hear_link(self, message: Any) -> None:
+        self.linked = message.data != self.namespace
+
+    def hear_velocity(self, twist: Any) -> None:
+        if self.linked:
+            self.begun += self.speed == 0.0 and twist.linear.x != 0.0
+            self.speed = twist.linear.x
+
+    def hear_command(self, command: Any) -> None:
+        if not self.linked:
+            return
+        highest = self.epochs[command.run] = max(self.epochs.get(command.run, 0), command.epoch)
+        is_past = command.epoch < highest
+        if command.verb == BehaviorCommand.START and command.id not in self.known and not is_past:
+            self.doing, self.speed, self.begun = command.id, SPEED_M_S, self.begun + 1
+            self.say(command.id, 1, BehaviorStatus.ACCEPTED)
+            self.say(command.id, 2, BehaviorStatus.RUNNING)
+        elif command.verb == BehaviorCommand.CANCEL:
+            self.cancels.append(f"{command.epoch}{'refused' if is_past else ''}")
+            if command.id == self.doing and not is_past:
+                self.doing, self.speed = "", 0.0
+                self.say(command.id, 3, BehaviorStatus.CANCELLED)
+        elif command.verb == BehaviorCommand.QUERY:
+            self.say(command.id, *self.known.get(command.id, (0, BehaviorStatus.UNKNOWN)))
+
+    def say(self, id_: str, number: int, state: int) -> None:
+        if number:
+            self.known[id_] = (number, state)
+        self.says.publish(BehaviorStatus(id=id_, number=number, state=state))
+
+    def step(self) -> None:
+        self.steps += 1
+        self.east += self.speed * PERIOD_S
+        words = [self.namespace, f"{self.speed:.2f}", str(self.begun), ",".join(self.cancels)]
+        self.truth.publish(String(data=" ".join(words)))
+        if not self.linked:
+            return
+        if self.type == "pose":
+            self.odom.publish(PoseStamped())
+        else:
+            message = Odometry()
+            message.header.frame_id = self.frame
+            message.header.stamp = self.node.get_clock().now().to_msg()
+            message.pose.pose.position.x = self.east
+            message.pose.pose.orientation.w = 1.0
+            message.twist.twist.linear.x = self.speed
+            self.odom.publish(message)
+        if self.kind == "node" and self.steps % 4 == 0:
+            name = self.namespace.removeprefix("/")
+            self.status.publish(VehicleStatus(vehicle=name, behavior=self.doing))
+
+
+def main() -> None:
+    rclpy.init()
+    namespace, kind, frame, *type_ = sys.argv[1:]
+    plain = Plain(namespace, kind, frame, type_[0] if type_ else "Twist")
+    print("ready", flush=True)
+    with contextlib.suppress(ExternalShutdownException, KeyboardInterrupt):
+        rclpy.spin(plain.node)
+
+
+if __name__ == "__main__":
+    main()

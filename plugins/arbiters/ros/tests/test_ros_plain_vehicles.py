@@ -1,0 +1,336 @@
+"""Vehicles of plain rclpy nodes: one that returns, two in one namespace, and wrong frames."""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+from uuid import UUID
+
+import pytest
+from m2pem_plugin_ros.arbiter import RosArbiter
+from m2pem_plugin_ros.frames import to_geodetic
+from m2pem_plugin_ros.runtime import RosRuntime, qos
+from m2pem_plugin_ros.testing import Peer
+from std_msgs.msg import String
+
+from m2pem.api import (
+    ArbiterContext,
+    BehaviorState,
+    Connection,
+    Point,
+    ResourceId,
+    RunStatus,
+    VehicleState,
+)
+from m2pem.executive.clock import SystemClock
+from m2pem.executive.executive import Executive
+from m2pem.gateway.bus import Bus
+from m2pem.journal import MemoryJournal
+from m2pem.plugins import PluginManager
+from m2pem.resources.fleet_file import load_fleet
+from m2pem.testing.contracts.bench import ArbiterBench
+
+PEER = Path(__file__).with_name("ros_plain_peer.py")
+ORIGIN = (38.1075, -77.3192, 60.0)
+JOURNAL = UUID("0f5d1c7e-35b1-4b67-9f0d-6b3a2f7b1c55")
+UGV1 = ResourceId("ugv1")
+AMPLE_S = 40.0
+
+
+class Truth:
+    """What vehicles do, by their own word, whatever their links carry."""
+
+    def __init__(self, ros: RosRuntime) -> None:
+        self._ros = ros
+        self._said = {"/ugv1": ["/ugv1", "0", "0"]}
+        self._links = ros.node.create_publisher(String, "/link", 10)
+        ros.subscribe(String, "/truth", self._hear, qos.EVENTS)
+
+    def speed(self, vehicle: str = "/ugv1") -> float:
+        return float(self._said[vehicle][1])
+
+    def begun(self, vehicle: str = "/ugv1") -> int:
+        return int(self._said[vehicle][2])
+
+    def cancels(self, vehicle: str = "/ugv1") -> list[str]:
+        return self._said[vehicle][3].split(",") if len(self._said[vehicle]) > 3 else []
+
+    def cut(self, vehicle: str) -> None:
+        """Make a vehicle deaf and dumb; "" mends it."""
+        self._links.publish(String(data=vehicle))
+
+    def _hear(self, message: Any) -> None:
+        words = message.data.split(" ")
+        self._said[words[0]] = words
+
+
+def arbiter_for(domain: int, bus: Bus, epoch: int = 1, **settings: Any) -> RosArbiter:
+    connection = Connection(
+        UGV1,
+        "ground",
+        {"namespace": "/ugv1", "domain_id": domain, **settings},
+        lost_after_s=3.0,
+        sitl=True,
+    )
+    context = ArbiterContext(
+        SystemClock(), bus, logging.getLogger("m2pem.test"), ORIGIN, {}, JOURNAL, lambda _: epoch
+    )
+    return RosArbiter({UGV1: connection}, context)
+
+
+@asynccontextmanager
+async def connected(
+    domain: int, epoch: int = 1, **settings: Any
+) -> AsyncIterator[tuple[ArbiterBench, Truth]]:
+    async with RosRuntime("watcher", domain_id=domain) as ros:
+        truth = Truth(ros)
+        arbiter = arbiter_for(domain, Bus(), epoch, **settings)
+        async with ArbiterBench(arbiter, SystemClock()) as bench:
+            yield bench, truth
+
+
+async def until(true: Callable[[], object]) -> None:
+    async with asyncio.timeout(AMPLE_S):
+        while not true():  # noqa: ASYNC110  # what is waited for has no event
+            await asyncio.sleep(0.02)
+
+
+def ahead() -> Point:
+    place = to_geodetic(500.0, 0.0, 0.0, ORIGIN)
+    return Point((place.latitude_deg, place.longitude_deg, None))
+
+
+async def drives(bench: ArbiterBench, truth: Truth, id_: str = "r1.b1") -> None:
+    await bench.start(id_, "goto", UGV1, epoch=bench.arbiter._context.epoch_of(id_), target=ahead())
+    await bench.running(id_)
+    await until(lambda: truth.speed() > 0.3)
+
+
+def state(bench: ArbiterBench) -> VehicleState | None:
+    latest = bench.latest(UGV1)
+    return latest if isinstance(latest, VehicleState) else None
+
+
+def reasons(bench: ArbiterBench) -> str:
+    latest = state(bench)
+    return "" if latest is None else "; ".join(latest.not_ready_reasons)
+
+
+# --- one that returns -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings"),
+    [("node", {}), ("base", {"driver": "base"})],
+)
+async def test_a_vehicle_that_returns_is_told_to_stop_and_is_free_when_it_has(
+    ros_domain: int, kind: str, settings: Mapping[str, Any]
+) -> None:
+    with Peer(PEER, ros_domain, ["/ugv1", kind, "map"]):
+        async with connected(ros_domain, 7, **settings) as (bench, truth):
+            await drives(bench, truth)
+            truth.cut("/ugv1")
+            assert (await bench.ended("r1.b1", AMPLE_S)).state is BehaviorState.LOST
+            assert truth.speed() > 0.3, "it drives on, as nobody can tell it otherwise"
+            truth.cut("")
+            await until(lambda: (seen := state(bench)) is not None and seen.link == "connected")
+            async with asyncio.timeout(AMPLE_S):
+                while await bench.arbiter.reclaim(UGV1):  # type: ignore[attr-defined]
+                    pass
+            await until(lambda: truth.speed() == 0.0)
+            assert kind == "base" or truth.cancels()[0] == "7"
+            await drives(bench, truth, "r1.b2")
+
+
+# --- two in one namespace -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings", "topic"),
+    [("node", {}, "/ugv1/vehicle_status"), ("base", {"driver": "base"}, "/ugv1/odom")],
+)
+async def test_two_vehicles_in_one_namespace_are_both_named_and_not_commanded(
+    ros_domain: int, kind: str, settings: Mapping[str, Any], topic: str
+) -> None:
+    arguments = ["/ugv1", kind, "map"]
+    with Peer(PEER, ros_domain, arguments), Peer(PEER, ros_domain, arguments):
+        async with connected(ros_domain, **settings) as (bench, truth):
+            await until(lambda: "has 2 publishers" in reasons(bench))
+            assert state(bench).ready is False  # type: ignore[union-attr]
+            await bench.start("r1.b1", "goto", UGV1, target=ahead())
+            end = await bench.ended("r1.b1", AMPLE_S)
+            assert end.state is BehaviorState.REJECTED
+            assert f"{topic} in ROS domain {ros_domain} has 2 publishers" in end.reason
+            assert end.reason.count("/ugv1/vehicle (gid ") == 2
+            gids = {part.split(")")[0] for part in end.reason.split("(gid ")[1:]}
+            assert len(gids) == 2, "two endpoints have two gids"
+            assert truth.begun() == 0
+
+
+async def test_one_that_appears_later_is_told_of_and_was_not_restarted(ros_domain: int) -> None:
+    arguments = ["/ugv1", "node", "map"]
+    with Peer(PEER, ros_domain, arguments):
+        async with connected(ros_domain) as (bench, truth):
+            await drives(bench, truth)
+            with Peer(PEER, ros_domain, arguments):
+                await until(lambda: "has 2 publishers" in reasons(bench))
+                # The second one answers that it knows nothing of what the first one does.
+                await bench.clock.sleep(6.0)
+                assert [each.state.value for each in bench.of("r1.b1")] == ["ACCEPTED", "RUNNING"]
+            await until(lambda: "has 2 publishers" not in reasons(bench))
+            await bench.arbiter.cancel("r1.b1", 1)
+            assert (await bench.ended("r1.b1", AMPLE_S)).state is BehaviorState.CANCELLED
+            await until(lambda: truth.speed() == 0.0)
+
+
+# --- frames and types -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("settings", "frame", "says"),
+    [
+        ({}, "rover1/odom", "is in the frame 'rover1/odom', declared is 'map'"),
+        ({"driver": "base"}, "rover1/odom", "is in the frame 'rover1/odom', declared is 'map'"),
+        ({"driver": "base"}, "", "is in the frame '', declared is 'map'"),
+        ({"driver": "base"}, "ugv1/map", "is in the frame 'ugv1/map', declared is 'map'"),
+        (
+            {"driver": "base", "odom_frame": "odom"},
+            "map",
+            "declared is 'odom', and tf is not read: say 'odom_frame: map'",
+        ),
+    ],
+)
+async def test_odometry_in_a_frame_that_is_not_the_declared_one_is_refused_by_name(
+    ros_domain: int, settings: Mapping[str, Any], frame: str, says: str
+) -> None:
+    kind = "base" if settings else "node"
+    with Peer(PEER, ros_domain, ["/ugv1", kind, frame]):
+        async with connected(ros_domain, **settings) as (bench, truth):
+            await until(lambda: says in reasons(bench) or settings)
+            await bench.start("r1.b1", "goto", UGV1, target=ahead())
+            end = await bench.ended("r1.b1", AMPLE_S)
+            assert end.state is BehaviorState.REJECTED
+            assert says in end.reason
+            assert truth.begun() == 0
+
+
+@pytest.mark.parametrize(
+    ("settings", "type_", "says"),
+    [
+        ({}, "TwistStamped", "is subscribed to as geometry_msgs/msg/TwistStamped (/ugv1/vehicle"),
+        ({"stamped": True}, "Twist", "say 'stamped: false' in its connection"),
+        ({}, "pose", "/ugv1/odom is of type geometry_msgs/msg/PoseStamped (/ugv1/vehicle"),
+    ],
+)
+async def test_a_type_that_does_not_match_is_named_before_anything_moves(
+    ros_domain: int, settings: Mapping[str, Any], type_: str, says: str
+) -> None:
+    with Peer(PEER, ros_domain, ["/ugv1", "base", "map", type_]):
+        async with connected(ros_domain, driver="base", **settings) as (bench, truth):
+            await bench.start("r1.b1", "goto", UGV1, target=ahead())
+            end = await bench.ended("r1.b1", AMPLE_S)
+            assert end.state is BehaviorState.REJECTED
+            assert says in end.reason
+            assert truth.begun() == 0
+
+
+async def test_what_is_awaited_where_is_said_of_a_vehicle_in_another_domain(
+    ros_domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with connected(ros_domain):
+        pass
+    expected = (
+        "/ugv1/vehicle_status (m2pem_interfaces/msg/VehicleStatus) has no publisher in ROS domain"
+        f" {ros_domain}, namespace /ugv1"
+    )
+    assert expected in caplog.text
+
+
+# --- epochs ---------------------------------------------------------------------------------------
+
+
+async def test_a_cancel_of_an_executive_that_was_replaced_is_refused(ros_domain: int) -> None:
+    with Peer(PEER, ros_domain, ["/ugv1", "node", "map"]):
+        async with connected(ros_domain, 1) as (old, truth):
+            await drives(old, truth)
+            reference = old.of("r1.b1")[-1].native_ref
+            async with ArbiterBench(arbiter_for(ros_domain, Bus(), 2), SystemClock()) as new:
+                report = await new.arbiter.query("r1.b1", reference)
+                assert report.state is BehaviorState.RUNNING
+                await old.arbiter.cancel("r1.b1", 1)
+                await until(lambda: "1refused" in truth.cancels())
+                assert truth.speed() > 0.3
+                await new.arbiter.cancel("r1.b1", 2)
+                assert (await new.ended("r1.b1", AMPLE_S)).state is BehaviorState.CANCELLED
+                await until(lambda: "2" in truth.cancels() and truth.speed() == 0.0)
+
+
+# --- after a restart ------------------------------------------------------------------------------
+
+
+async def test_what_a_base_does_not_know_after_a_restart_is_cancelled_at_once(
+    ros_domain: int,
+) -> None:
+    with Peer(PEER, ros_domain, ["/ugv1", "base", "map"]):
+        async with connected(ros_domain, driver="base") as (old, truth):
+            await drives(old, truth)
+            reference = old.of("r1.b1")[-1].native_ref
+        async with connected(ros_domain, 2, driver="base") as (new, truth):
+            assert (await new.arbiter.query("r1.b1", reference)).state is BehaviorState.UNKNOWN
+            await new.arbiter.cancel("r1.b1", 2)
+            bound_s = new.arbiter.limits(UGV1).cancel_timeout_s
+            assert (await new.ended("r1.b1", bound_s)).state is BehaviorState.CANCELLED
+            assert truth.speed() == 0.0
+
+
+# --- detectors ------------------------------------------------------------------------------------
+
+FLEET = """
+version: 1
+name: test
+origin: {{lat: 38.1075, lon: -77.3192, alt: 60.0}}
+vehicles:
+  ugv1:
+    domain: ground
+    arbiter: ros
+    sitl: true
+    connection: {{namespace: /ugv1, domain_id: {domain}}}
+    payloads:
+      gpr: {{connection: {{topic: gpr/alarm, message: string}}}}
+"""
+MISSION = b"""<?xml version="1.0" encoding="UTF-8"?>
+<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
+             xmlns:m2pem="https://m2pem.org/schema/1" targetNamespace="test">
+  <process id="P" isExecutable="true">
+    <startEvent id="S"/>
+    <serviceTask id="D"><extensionElements><m2pem:service class="Detector"/></extensionElements>
+    </serviceTask>
+    <endEvent id="E"/>
+    <sequenceFlow id="F1" sourceRef="S" targetRef="D"/>
+    <sequenceFlow id="F2" sourceRef="D" targetRef="E"/>
+  </process>
+</definitions>
+"""
+
+
+async def test_a_payload_with_a_topic_is_a_detector_without_being_marked_as_one(
+    ros_domain: int, tmp_path: Path
+) -> None:
+    file = tmp_path / "fleet.yaml"
+    file.write_text(FLEET.format(domain=ros_domain))
+    fleet, journal = load_fleet(file), MemoryJournal()
+    with Peer(PEER, ros_domain, ["/ugv1", "node", "map"]):
+        async with (
+            RosRuntime("gpr", domain_id=ros_domain) as ros,
+            Executive(fleet, journal, PluginManager(), SystemClock()) as executive,
+        ):
+            alarm = ros.node.create_publisher(String, "/ugv1/gpr/alarm", 10)
+            await until(alarm.get_subscription_count)
+            run = await executive.control.start(MISSION)
+            over = asyncio.create_task(executive.control.wait(run))
+            while not over.done():
+                alarm.publish(String(data="mine"))
+                await asyncio.wait([over], timeout=0.5)
+            assert over.result().status is RunStatus.COMPLETED
