@@ -224,6 +224,28 @@ class ClosesOnce(SimArbiter):
         await super().close()
 
 
+class DrivesOn(SimArbiter):
+    """Its vehicles are on their way when they are heard again, and nobody stops them."""
+
+    task: asyncio.Task[None]
+
+    def restore_link(self, resource: ResourceId) -> None:
+        super().restore_link(resource)
+        request = BehaviorRequest("r9.b1", 1, *CASE.long, (resource,))
+        self.task = asyncio.create_task(self.start(request))
+
+    async def hold(self, resource: ResourceId) -> None:
+        pass
+
+
+class StaysHeld(SimArbiter):
+    """What was held when it returned is never let go."""
+
+    async def start(self, request: BehaviorRequest) -> None:
+        if not self.effects:
+            await super().start(request)
+
+
 FINDS = [
     (TwiceReported, "accepted_comes_before_running_and_one_terminal_report_last"),
     (NeverAccepted, "accepted_comes_before_running_and_one_terminal_report_last"),
@@ -253,6 +275,8 @@ FINDS = [
     (NeverResumes, "resume_goes_on_with_the_behavior"),
     (HearsNoLoss, "a_cut_link_is_lost_within_the_declared_bound"),
     (LosesAll, "a_cut_link_is_lost_within_the_declared_bound"),
+    (DrivesOn, "a_lost_vehicle_that_is_heard_again_stops_before_it_is_free"),
+    (StaysHeld, "a_lost_vehicle_that_is_heard_again_stops_before_it_is_free"),
     (CancelsAll, "two_vehicles_do_not_mix"),
     (Anonymous, "telemetry_names_the_resource_and_rises_in_time"),
     (OwnTime, "states_are_stamped_by_the_clock_that_was_lent"),
@@ -279,6 +303,9 @@ def test_the_contract_finds_what_is_wrong(
     def cut(arbiter: SimArbiter, vehicle: ResourceId) -> None:
         arbiter.lose_link(vehicle)
 
+    def mend(arbiter: SimArbiter, vehicle: ResourceId) -> None:
+        arbiter.restore_link(vehicle)
+
     def count_starts(arbiter: SimArbiter, vehicle: ResourceId) -> int:
         return sum(e.kind == "start" and e.resource == vehicle for e in arbiter.effects)
 
@@ -290,6 +317,7 @@ def test_the_contract_finds_what_is_wrong(
         "case": CASE,
         "run": run,
         "cut_link": cut,
+        "mend_link": mend,
         "effects": count_starts,
     }
     check = getattr(ArbiterContract, f"test_{test}")
