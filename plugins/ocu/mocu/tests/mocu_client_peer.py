@@ -21,7 +21,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-SERVICES = QoSProfile(depth=200)
+SERVICES = QoSProfile(depth=2000)
 
 TOPICS = {
     "prompts": (msg.OpenPrompts, LATCHED),

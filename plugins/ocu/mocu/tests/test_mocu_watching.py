@@ -189,6 +189,13 @@ async def test_a_flood_of_calls_starves_no_prompt(
     assert (await client.call("answer_prompt", **answer))["success"]
 
 
+async def test_each_of_many_calls_at_once_is_answered(world: World, client: Client) -> None:
+    answers = await client.responses(client.send("list_runs", times=1500), 1500)
+    refused = [each["message"] for each in answers if not each["success"]]
+    assert len(answers) == 1500
+    assert all("at once" in message for message in refused)
+
+
 async def test_what_happens_last_is_still_told(world: World, client: Client) -> None:
     await world.has_listeners(client)
     run, prompt = await world.asks()
