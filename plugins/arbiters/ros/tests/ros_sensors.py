@@ -40,9 +40,16 @@ async def until(true: Callable[[], object], what: str = "") -> None:
         raise AssertionError(f"not within {AMPLE_S:g} s: {what}") from None
 
 
-def odometry(east: float, north: float, yaw: float = 0.0, forward: float = 0.0, stamp: int = 0):
+def odometry(
+    east: float,
+    north: float,
+    yaw: float = 0.0,
+    forward: float = 0.0,
+    stamp: int = 0,
+    frame: str = "map",
+):
     fields = {
-        "header": {"stamp": {"sec": stamp}, "frame_id": "map"},
+        "header": {"stamp": {"sec": stamp}, "frame_id": frame},
         "pose": {
             "pose": {
                 "position": {"x": east, "y": north},

@@ -46,7 +46,7 @@ def localization(ros: RosRuntime, frame: OdomFrame = OdomFrame.MAP) -> TopicLoca
 async def test_odometry_in_the_map_is_the_pose(ros: RosRuntime, teller: Sensors) -> None:
     where = localization(ros)
     assert (where.pose, where.twist, where.position, where.age_s) == (None, None, None, INF)
-    assert where.troubles == ("no odometry was heard yet",)
+    assert where.troubles == ("no odometry was heard yet on /evsg1/odom",)
     await teller.say(odometry(30.0, 40.0, yaw=1.0, forward=1.5))
     await until(lambda: where.pose, "odometry is heard")
     assert where.pose == Pose(30.0, 40.0, pytest.approx(1.0))
@@ -112,7 +112,7 @@ async def test_odometry_that_begins_anywhere_needs_a_fix(ros: RosRuntime, teller
     await teller.say(
         fix(80.0, 170.0, status=-1),  # no fix, whatever it says
         fix(0.0, 0.0, status=-2),  # of a receiver that has not begun
-        odometry(500.0, 500.0),
+        odometry(500.0, 500.0, frame="odom"),
     )
     await until(lambda: where.twist, "odometry is heard")
     await until(lambda: where.complaints.counts["a fix that cannot be"] == 1)
@@ -120,7 +120,7 @@ async def test_odometry_that_begins_anywhere_needs_a_fix(ros: RosRuntime, teller
     assert where.troubles == ("no satellite fix was heard yet",)
     await teller.say(fix(*ORIGIN[:2], altitude=NAN, status=-2))
     await until(lambda: where.pose, "the fix is heard")
-    await teller.say(odometry(502.0, 501.0))
+    await teller.say(odometry(502.0, 501.0, frame="evsg1/odom"))
     await until(lambda: where.pose.east_m > 1.0, "how it went on is heard")
     assert where.pose.east_m == pytest.approx(2.0, abs=1e-3)
     assert where.pose.north_m == pytest.approx(1.0, abs=1e-3)
