@@ -5,8 +5,8 @@
 `node` keeps to docs/ros.md, "Write your own node"; `base` takes `cmd_vel`, and goes on with
 the last command that it got. FRAME: of its odometry; TYPE: of `cmd_vel`, Twist or TwistStamped, or
 `pose`, which publishes odometry as a PoseStamped. On /link, NAMESPACE makes it deaf and dumb, and
-"" lets it speak again: it drives on meanwhile. On /truth it says what it does, whatever its link: name,
-speed, behaviors begun, and the epochs of the CANCELs that it has heard.
+"" lets it speak again: it drives on meanwhile. On /truth it says what it does, whatever its link:
+name, speed, behaviors begun, and the epochs of the CANCELs that it has heard.
 """
 
 import contextlib
