@@ -42,8 +42,8 @@ RECLAIM_WITHIN_S = 5.0
 
 CLOSE_WITHIN_S = 5.0
 REMEMBERED = 1_000
-LOOK_EVERY = 5
-"""Times that it is attended to for each time that it is looked who else is there."""
+OTHERS_EVERY_S = 1.0
+"""In real time, however fast the clock is: so often it is looked who else is there."""
 
 _GOES_ON = (BehaviorState.ACCEPTED, BehaviorState.RUNNING)
 
@@ -80,7 +80,7 @@ class Vehicle:
         self._order: Order | None = None
         self._cancelled: BehaviorId = ""
         self._broken = ""
-        self._attended = 0
+        self._looked_s = 0.0
         self._wrong = ""
         self._left: dict[UUID, BehaviorId] = {}
         self._left_less = asyncio.Event()
@@ -324,9 +324,10 @@ class Vehicle:
 
     def _look_for_others(self) -> None:
         """Once in a while, so that operators know before something is commanded."""
-        self._attended += 1
-        if self._attended % LOOK_EVERY:
+        now_s = asyncio.get_running_loop().time()
+        if now_s - self._looked_s < OTHERS_EVERY_S:
             return
+        self._looked_s = now_s
         wrong = self._instruments.senses.refusal
         if wrong and wrong != self._wrong:
             self._context.logger.error("%s: nothing more is commanded: %s", self.resource, wrong)
