@@ -15,7 +15,7 @@ divided by zero) is a record in the journal and never one of these.
 
 from collections.abc import Sequence
 
-from m2pem.findings import Finding
+from m2pem.findings import Finding, lines
 
 
 class M2pemError(Exception):
@@ -32,7 +32,7 @@ class FindingsError(M2pemError):
     def __init__(self, what: str, findings: Sequence[Finding]) -> None:
         self.what = what
         self.findings = tuple(findings)
-        super().__init__("\n".join([what, *(str(finding) for finding in self.findings)]))
+        super().__init__("\n".join([what, *lines(self.findings)]))
 
 
 class MissionError(FindingsError):

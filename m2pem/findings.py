@@ -1,11 +1,18 @@
 """A finding: one thing that is wrong, or doubtful, in a file that a person wrote."""
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
 MAX_SHOWN = 400
 """Characters of a message, or of a remedy, as it is printed."""
+
+MAX_OF_A_KIND = 20
+"""Findings of one rule that are printed; what is beyond is counted."""
+
+_JOINERS = "\u200c\u200d"
+"""Format characters that words of some scripts need."""
 
 
 class Severity(StrEnum):
@@ -35,7 +42,8 @@ class Finding:
     number: str = ""
 
     def __str__(self) -> str:
-        where = f"{self.file}:{self.line}" if self.line else self.file
+        file = escaped(self.file)
+        where = f"{file}:{self.line}" if self.line else file
         element = f" {_line(self.element)}:" if self.element else ""
         remedy = f"; {_line(self.remedy)}" if self.remedy else ""
         rule = f"[{self.rule} {self.number}]" if self.number else f"[{self.rule}]"
@@ -44,10 +52,39 @@ class Finding:
 
 def _line(text: str) -> str:
     """The text on one line that can be read: it may quote whatever stands in a file."""
-    line = " ".join(text.splitlines())
+    line = escaped(" ".join(text.splitlines()))
     if len(line) <= MAX_SHOWN:
         return line
     return f"{line[: MAX_SHOWN // 2]} ... {line[-MAX_SHOWN // 2 :]}"
+
+
+def escaped(text: str, keep: str = "") -> str:
+    """The text with control characters, and those that turn its direction, as `\\u202e`.
+
+    What is printed quotes names from files of any origin; none may steer a terminal, or show
+    another name than it is. `keep`: characters that are left as they are.
+    """
+    if text.isprintable():
+        return text
+    kept = _JOINERS + keep
+    return "".join(
+        each if each.isprintable() or each in kept else ascii(each)[1:-1] for each in text
+    )
+
+
+def lines(findings: Iterable[Finding]) -> list[str]:
+    """The findings as they are printed: the first of each rule, and how many more there are."""
+    count: Counter[tuple[Severity, str]] = Counter()
+    shown = []
+    for finding in findings:
+        kind = (finding.severity, finding.rule)
+        count[kind] += 1
+        if count[kind] <= MAX_OF_A_KIND:
+            shown.append(str(finding))
+    for (severity, rule), number in count.items():
+        if number > MAX_OF_A_KIND:
+            shown.append(f"... and {number - MAX_OF_A_KIND:,} more: {severity.value} [{rule}]")
+    return shown
 
 
 def has_errors(findings: Iterable[Finding]) -> bool:

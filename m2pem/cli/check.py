@@ -16,7 +16,7 @@ from m2pem.cli.options import (
     process_option,
 )
 from m2pem.errors import FleetError, MissionError
-from m2pem.findings import Finding, Severity, has_errors
+from m2pem.findings import Finding, Severity, escaped, has_errors, lines
 
 if TYPE_CHECKING:
     from m2pem.model.mission import Mission
@@ -55,8 +55,8 @@ def check(
     if output == "json":
         click.echo(as_json(findings))
     else:
-        for finding in findings:
-            click.echo(str(finding))
+        for line in lines(findings):
+            click.echo(line)
         click.echo(_summary(mission, findings))
     if unusable:
         return UNUSABLE
@@ -126,10 +126,10 @@ def _summary(mission: str, findings: list[Finding]) -> str:
     errors = sum(finding.severity is Severity.ERROR for finding in findings)
     warnings = len(findings) - errors
     if not findings:
-        return f"{mission}: nothing found"
+        return f"{escaped(mission)}: nothing found"
     counts = [
         f"{count} {word}{'' if count == 1 else 's'}"
         for count, word in ((errors, "error"), (warnings, "warning"))
         if count
     ]
-    return f"{mission}: {', '.join(counts)}"
+    return f"{escaped(mission)}: {', '.join(counts)}"

@@ -9,6 +9,7 @@ import click
 
 from m2pem.cli.group import cli
 from m2pem.errors import M2pemError
+from m2pem.findings import escaped
 
 STOPPED = 130
 """Exit status when an operator stopped it (a shell's 128 + SIGINT)."""
@@ -34,7 +35,7 @@ def run_command_line(arguments: Sequence[str] | None = None) -> int:
     except M2pemError as error:
         if _debugging():
             logging.getLogger("m2pem").exception("it ended with this error")
-        click.echo(f"m2pem: {error}", err=True)
+        click.echo(f"m2pem: {escaped(str(error), keep=chr(10))}", err=True)
         return error.exit_status
     except Exception as error:
         if _debugging():
