@@ -53,7 +53,7 @@ def place(fleet: Fleet, resource: str) -> str:
 def check_roles(roles: Sequence[Role], fleet: Fleet, findings: TaskFindings) -> tuple[Role, ...]:
     """The roles that the fleet fills. What is wrong with the others goes to `findings`.
 
-    An optional role that the fleet lacks is left out without a word.
+    An optional role that the fleet lacks is left out; a warning says so if it looks mistyped.
     """
     names: set[str] = set()
     owners: dict[ResourceId, str] = {}
@@ -96,7 +96,38 @@ def _check_role(role: Role, fleet: Fleet, findings: TaskFindings) -> bool:
     elif not role.optional:
         message, remedy = _unknown(role, fleet)
         findings.add(f"unknown-{role.kind}", message, remedy, line=role.line, role=role.name)
+    elif meant := _meant(role, fleet):
+        findings.add(
+            "optional-role",
+            f"{fleet.file} has no {role.kind.value} '{role.resource}', and the role is optional: "
+            "the task is done without it",
+            meant,
+            line=role.line,
+            role=role.name,
+            severity=Severity.WARNING,
+        )
     return False
+
+
+def _meant(role: Role, fleet: Fleet) -> str:
+    """What a mistyped optional role may have meant, as a remedy; "" when the fleet lacks it indeed.
+
+    Names that differ only in their digits are not taken for typing errors: a fleet may have a
+    `uav1` and no `uav2`.
+    """
+    vehicle, _, name = role.resource.rpartition("/")
+    holder = fleet.vehicles.get(ResourceId(vehicle))
+    known: list[str] = []
+    if role.kind is RoleKind.TEAM:
+        known, name = list(fleet.teams), role.resource
+    elif role.kind is RoleKind.VEHICLE or holder is None:
+        known = [str(each) for each in fleet.vehicles]
+        name = role.resource if role.kind is RoleKind.VEHICLE else vehicle
+    else:
+        known = [each.rpartition("/")[2] for each in holder.payloads]
+    digits = str.maketrans("", "", "0123456789")
+    plain = name.translate(digits)
+    return did_you_mean(name, [each for each in known if each.translate(digits) != plain])
 
 
 def _unknown(role: Role, fleet: Fleet) -> tuple[str, str]:

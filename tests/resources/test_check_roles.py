@@ -142,3 +142,28 @@ def test_the_same_finding_is_kept_once(fleet: Fleet) -> None:
     for _ in range(2):
         findings.add("rule", "message", line=3)
     assert len(findings.found) == 1
+
+
+@pytest.mark.parametrize(
+    ("role", "meant"),
+    [
+        (payload("evsg3/ptt", optional=True), "ptz"),
+        (payload("esvg3/ptz", optional=True), "evsg3"),
+        (vehicle("esvg1", optional=True), "evsg1"),
+        (team("sektion", optional=True), "section"),
+    ],
+)
+def test_an_optional_role_that_looks_mistyped_is_warned_of(
+    fleet: Fleet, role: Role, meant: str
+) -> None:
+    _, findings = check(fleet, role)
+    (found,) = findings.found
+    assert (found.severity, found.rule) == (Severity.WARNING, "optional-role")
+    assert f"'{meant}'" in found.remedy
+
+
+@pytest.mark.parametrize("resource", ["evsg7", "mule"])
+def test_an_optional_role_of_another_vehicle_is_not_taken_for_mistyped(
+    fleet: Fleet, resource: str
+) -> None:
+    assert check(fleet, vehicle(resource, optional=True))[1].found == []
