@@ -100,7 +100,7 @@ async def _run(
     from m2pem.cli.setting import make_executive, refuse_speed
     from m2pem.cli.state_files import tidy_up, with_own_state
     from m2pem.executive.clock import SystemClock
-    from m2pem.executive.loading import load_source
+    from m2pem.executive.loading import load_source, without_effect
     from m2pem.journal import file_of
     from m2pem.plugins import PluginManager
 
@@ -123,6 +123,8 @@ async def _run(
             search_path=search_path,
         )
         process_id = executive.admit(mission, process, data)
+        for line in without_effect(mission):
+            click.echo(line, err=True)
         with output_of(output) as out:
             status = await drive_run(
                 executive,

@@ -9,21 +9,22 @@ from urllib.parse import unquote, urlsplit
 from m2pem.api.authoring import Draft, MissionSource
 from m2pem.errors import MissionError
 from m2pem.executive.arbiters import FleetArbiters
-from m2pem.findings import Finding, Severity, has_errors
+from m2pem.findings import Finding, Severity, has_errors, lines
 from m2pem.model.bpmn import parse_mission
+from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.bpmn.search_path import SearchPath
+from m2pem.model.bpmn.size import max_bytes, too_large
 from m2pem.model.elements import ServiceTask
 from m2pem.model.lint import by_file, lint
 from m2pem.model.mission import Mission
 from m2pem.model.near import did_you_mean
 from m2pem.resources.behaviors import SHARED
-from m2pem.resources.check import check_mission
+from m2pem.resources.check import check_mission, check_named
 
 if TYPE_CHECKING:
     from m2pem.plugins import PluginManager
 
 FETCH_TIMEOUT_S = 10.0
-MAX_BYTES = 20_000_000
 
 
 def load_source(mission: MissionSource, search_path: Iterable[Path] = ()) -> Mission:
@@ -46,8 +47,8 @@ def load_source(mission: MissionSource, search_path: Iterable[Path] = ()) -> Mis
             return parse_mission(_fetch(mission), name, SearchPath(None, search_path))
         mission = Path(unquote(parts.path)) if parts.scheme == "file" else Path(mission)
     try:
-        if mission.stat().st_size > MAX_BYTES:
-            raise _unreadable(str(mission), f"it is bigger than {MAX_BYTES // 1_000_000} MB")
+        if (size := mission.stat().st_size) > max_bytes():
+            raise _too_large(str(mission), size)
         source = mission.read_bytes()
     except OSError as error:
         raise _unreadable(str(mission), error.strerror or str(error)) from error
@@ -66,12 +67,19 @@ def _fetch(url: str) -> bytes:
 
     try:
         with urlopen(url, timeout=FETCH_TIMEOUT_S) as response:
-            content: bytes = response.read(MAX_BYTES + 1)
+            content: bytes = response.read(max_bytes() + 1)
     except (URLError, OSError, ValueError) as error:
         raise _unreadable(url, str(error)) from error
-    if len(content) > MAX_BYTES:
-        raise _unreadable(url, f"it is bigger than {MAX_BYTES // 1_000_000} MB")
+    if len(content) > max_bytes():
+        raise _too_large(url, None)
     return content
+
+
+def _too_large(name: str, size: int | None) -> MissionError:
+    message, remedy = too_large(size)
+    rule = "too-large"
+    finding = Finding(Severity.ERROR, name, 0, "", rule, message, remedy, code(rule))
+    return MissionError(f"{name} cannot be read", [finding])
 
 
 def _unreadable(name: str, why: str) -> MissionError:
@@ -92,7 +100,8 @@ def findings_for(
 ) -> list[Finding]:
     """All findings of `m2pem check` for a mission that was read: its own, the fleet's, plugins'.
 
-    `data`: names given at start (`--data`). `arbiters` None: no fleet, so roles are not checked.
+    `data`: names given at start (`--data`). `arbiters` None: no fleet, so roles are only
+    checked to be there.
     """
     writes = plugins.service_writes()
     findings = [*mission.warnings, *lint(mission, data, writes, _behavior_writes(arbiters))]
@@ -112,6 +121,8 @@ def findings_for(
     fleet = arbiters.fleet if arbiters is not None else None
     if arbiters is not None:
         findings += check_mission(mission, arbiters.fleet, arbiters.offered, simulated=simulated)
+    else:
+        findings += check_named(mission)
     findings += _unprovided(mission, writes)
     findings += plugins.check_mission(mission, fleet)
     order = by_file(mission)
@@ -145,6 +156,14 @@ def _unprovided(mission: Mission, services: Collection[str]) -> list[Finding]:
         for task in mission.activities()
         if isinstance(task, ServiceTask) and task.call and task.call.service not in services
     ]
+
+
+_WITHOUT_EFFECT = frozenset({"misspelled-attribute", "misplaced-extension", "foreign-extension"})
+
+
+def without_effect(mission: Mission) -> list[str]:
+    """What the author wrote and the run ignores, as printed when a run begins."""
+    return lines(each for each in mission.warnings if each.rule in _WITHOUT_EFFECT)
 
 
 def refuse_errors(what: str, findings: Sequence[Finding]) -> None:

@@ -66,6 +66,31 @@ def _member_lacks(name: str, offered: Sequence[BehaviorSpec], allowed: Sequence[
     return ""
 
 
+def check_named(mission: Mission) -> list[Finding]:
+    """Behaviors that name nothing to perform them: wrong whatever the fleet."""
+    found: list[Finding] = []
+    for task in mission.activities():
+        if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior:
+            findings = TaskFindings(mission.file_of(task), task)
+            _check_named(task.behavior, findings)
+            found += findings.found
+    return found
+
+
+def _check_named(behavior: Behavior, findings: TaskFindings) -> bool:
+    """Whether a role names what the behavior's type wants; all vehicles hold without one."""
+    wanted = behavior.type.value
+    if any(role.kind.value == wanted for role in behavior.roles):
+        return True
+    if not behavior.roles and behavior.name == "hold" and wanted == BehaviorType.VEHICLE.value:
+        return True
+    message = f"the {wanted} behavior {behavior.name} has no role"
+    if behavior.roles:
+        message += f" with a {wanted}"
+    findings.add("no-role", message, f"name a {wanted} for it", line=behavior.line)
+    return False
+
+
 @dataclass(frozen=True, slots=True)
 class _Taker:
     """How a behavior takes its parameters, and on whose account: the first that takes them so."""
@@ -123,14 +148,7 @@ class _Check:
     ) -> None:
         wanted = behavior.type.value
         what = f"the {wanted} behavior {behavior.name}"
-        if not behavior.roles:
-            if behavior.name != "hold" or behavior.type is not BehaviorType.VEHICLE:
-                message = f"{what} has no role"
-                findings.add("no-role", message, f"name a {wanted} for it", line=behavior.line)
-            return
-        if not any(role.kind.value == wanted for role in behavior.roles):
-            message = f"{what} has no role with a {wanted}"
-            findings.add("no-role", message, f"name a {wanted} for it", line=behavior.line)
+        if not _check_named(behavior, findings) or not behavior.roles:
             return
         if not any(role.kind.value == wanted for role in filled) and all(
             role.optional for role in behavior.roles if role.kind.value == wanted

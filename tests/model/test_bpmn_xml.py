@@ -3,10 +3,11 @@
 from pathlib import Path
 
 import pytest
-from bpmn_text import around, load, process, summary
+from bpmn_text import around, findings, load, process, summary
 
-from m2pem.errors import MissionError
-from m2pem.model.bpmn import MAX_BYTES, NO_BPMN_RULES
+from m2pem.errors import M2pemError, MissionError
+from m2pem.model.bpmn import NO_BPMN_RULES
+from m2pem.model.bpmn.size import max_bytes
 from m2pem.model.bpmn.xml import XmlError, parse_xml
 
 GOOD = around('<task id="T" name="Überfahrt"/>')
@@ -121,10 +122,25 @@ def test_what_is_no_bpmn(data: bytes) -> None:
     assert refused(data) == ("not-bpmn", 1)
 
 
-def test_files_over_the_limit_are_refused(tmp_path: Path) -> None:
-    data = b"<a>" + b" " * (25 * 1024 * 1024) + b"</a>"
-    assert len(data) > MAX_BYTES
+def test_files_over_the_limit_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = around("<!--" + " " * (1024 * 1024) + '--><task id="T"/>')
+    monkeypatch.setenv("M2PEM_MAX_MISSION_MIB", "1")
     assert refused(data) == ("too-large", 1)
+    (found,) = findings(data)
+    assert "1,048,576" in found.message
+    assert "M2PEM_MAX_MISSION_MIB" in found.remedy
+    monkeypatch.setenv("M2PEM_MAX_MISSION_MIB", "2")
+    assert findings(data) == ()
+
+
+def test_a_mission_of_23_mb_is_within_the_limit() -> None:
+    assert max_bytes() > 24_000_000
+
+
+def test_a_limit_that_is_no_number_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("M2PEM_MAX_MISSION_MIB", "much")
+    with pytest.raises(M2pemError, match="M2PEM_MAX_MISSION_MIB='much'"):
+        max_bytes()
 
 
 def test_deeply_nested_extensions_are_refused() -> None:

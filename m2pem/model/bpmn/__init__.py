@@ -27,13 +27,12 @@ from m2pem.model.bpmn.reading import Reading
 from m2pem.model.bpmn.rules import check_rules
 from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.bpmn.search_path import SearchPath
+from m2pem.model.bpmn.size import max_bytes
 from m2pem.model.bpmn.targets import find_called
-from m2pem.model.bpmn.xml import MAX_BYTES
 from m2pem.model.library import Library
 from m2pem.model.mission import Mission
 
 __all__ = [
-    "MAX_BYTES",
     "MAX_DEPTH",
     "NO_BPMN_RULES",
     "parse_mission",
@@ -58,7 +57,7 @@ def read_mission(path: str | Path, search_path: Iterable[Path | str] = ()) -> Mi
     file = str(path)
     try:
         with Path(path).open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
+            data = stream.read(max_bytes() + 1)
     except OSError as error:
         finding = Finding(
             Severity.ERROR,

@@ -12,7 +12,8 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from m2pem.model.bpmn.names import BPMN, local
-from m2pem.model.bpmn.xml import MAX_BYTES, XmlError, parse_xml
+from m2pem.model.bpmn.size import max_bytes
+from m2pem.model.bpmn.xml import XmlError, parse_xml
 from m2pem.model.library import LibraryError, Source
 
 VARIABLE = "M2PEM_PATH"
@@ -103,7 +104,7 @@ class SearchPath:
 
 def _read(path: Path) -> bytes:
     with path.open("rb") as stream:
-        return stream.read(MAX_BYTES + 1)
+        return stream.read(max_bytes() + 1)
 
 
 def _callable(path: Path) -> Iterator[tuple[str, str]]:

@@ -14,8 +14,7 @@ from operator import attrgetter
 
 from lxml import etree
 
-MAX_BYTES = 20 * 1024 * 1024
-"""Size limit of a mission file."""
+from m2pem.model.bpmn.size import max_bytes, too_large
 
 MAX_ELEMENT_DEPTH = 2048
 """How deep elements may nest: libxml2's limit for `huge_tree`."""
@@ -68,13 +67,8 @@ def parse_xml(data: bytes, *, declared: bool = True) -> Document:
     Raises:
         XmlError: too large, wrongly encoded, with a DOCTYPE, too deep or not well-formed.
     """
-    if len(data) > MAX_BYTES:
-        raise XmlError(
-            "too-large",
-            1,
-            f"the file has {len(data):,} bytes, more than the {MAX_BYTES:,} that m2pem reads",
-            "split the mission into several files",
-        )
+    if len(data) > max_bytes():
+        raise XmlError("too-large", 1, *too_large(len(data)))
     text = _decode(data) if declared else data.decode()
     _refuse_doctype(text)
     utf8 = text.encode()
