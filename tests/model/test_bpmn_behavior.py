@@ -144,11 +144,11 @@ WRONG = {
     ),
     "unknown child": (
         '<behavior type="vehicle" name="goto">\n<resource/></behavior>',
-        [("unknown-element", 5)],
+        [("unknown-extension", 5)],
     ),
     "unknown attribute": (
         '<behavior type="vehicle" name="goto" kind="x"/>',
-        [("unknown-attribute", 4)],
+        [("unknown-extension", 4)],
     ),
 }
 ROLES = {
@@ -159,7 +159,7 @@ ROLES = {
     "expression": ('<role name="d" vehicle="${v}"/>', "role-not-literal"),
     "dynamic": ('<role name="d" requires="domain:air"/>', "requires-reserved"),
     "optional that is no truth": ('<role name="d" vehicle="v" optional="y"/>', "bad-value"),
-    "unknown attribute": ('<role name="d" vehicle="v" robot="r"/>', "unknown-attribute"),
+    "unknown attribute": ('<role name="d" vehicle="v" robot="r"/>', "unknown-extension"),
     "twice": (
         '<role name="d" vehicle="v"/><role name="d" vehicle="w"/>',
         "duplicate-role",

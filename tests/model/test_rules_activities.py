@@ -9,7 +9,7 @@ CASES = read_cases("""
 *T
 ~ none => 2
 
-# start-quantity | T | it counts as 1
+# start-quantity | T | no number of tokens
 ! <task id="T" startQuantity="0"/>
 *T
 ~ "0" => "1"

@@ -4,6 +4,20 @@ import pytest
 from rule_cases import Case, assert_breaks_its_rule_alone, names, read_cases
 
 CASES = read_cases("""
+# intermediate-without-incoming | I | when its process begins
+<task id="T"/>
+! <intermediateThrowEvent id="I"/>[I>E]
+*T
+~ sourceRef="T" targetRef="E" => sourceRef="T" targetRef="I"
+
+# compensation-not-interrupting | Z | cannot be non-interrupting
+<subProcess id="T"><startEvent id="s"/><endEvent id="e"/>[s>e]
+<subProcess id="H" triggeredByEvent="true">
+! <startEvent id="Z" isInterrupting="false"><compensateEventDefinition/></startEvent>
+<endEvent id="z"/>[Z>z]</subProcess></subProcess>
+*T
+~ "false" => "true"
+
 # start-trigger | S | an error event
 ! <startEvent id="S"><errorEventDefinition/></startEvent><endEvent id="E"/>[S>E]
 ~ <errorEventDefinition/> => <documentation/>

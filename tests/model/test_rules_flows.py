@@ -86,6 +86,18 @@ CASES = read_cases("""
 [G>E]<sequenceFlow id="f" sourceRef="G" targetRef="E"/>
 ~ "Split" => "Diverging"
 
+# listed-flow-elsewhere | A | sourceRef of 'S-A' is 'S'
+<task id="A">
+! <outgoing>S-A</outgoing>
+</task>
+*A
+~ <outgoing>S-A => <outgoing>A-E
+
+# idle-gateway | G | neither
+! <exclusiveGateway id="G"/>
+*
+~ <exclusiveGateway id="G"/> => <task id="G"/>
+
 # idle-gateway | T | neither
 ! <inclusiveGateway id="T"/>
 *T

@@ -38,6 +38,11 @@ CASES = read_cases("""
 *T
 ~ <documentation/> =>
 
+# misspelled-attribute | T | 'nmae' for a task; it is ignored
+! <task id="T" nmae="red"/>
+*T
+~ nmae => name
+
 # unknown-attribute | T | 'colour'
 ! <task id="T" colour="red"/>
 *T

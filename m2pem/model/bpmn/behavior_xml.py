@@ -6,9 +6,8 @@ from typing import TypeVar
 from lxml import etree
 
 from m2pem.model.behavior import Behavior, BehaviorType, Parameter, Role, RoleKind, ServiceCall
-from m2pem.model.bpmn.names import BPMN, M2PEM, attribute_names, local
+from m2pem.model.bpmn.names import BPMN, M2PEM, local
 from m2pem.model.bpmn.reading import Reading
-from m2pem.model.near import did_you_mean
 
 _ROLE_ATTRIBUTES = frozenset({"name", "optional", "requires", *RoleKind})
 
@@ -33,7 +32,6 @@ class BehaviorReader:
                 head[name] = text
         parameters: list[Parameter] = []
         roles: list[Role] = []
-        self._check_attributes(element, frozenset({"type", "name"}))
         for child in self._children(element):
             what = local(child.tag)
             if what == "property":
@@ -44,8 +42,6 @@ class BehaviorReader:
                 roles += self._resources(child)
             elif what == "role":
                 self._misplaced(child, "role", "resources")
-            else:
-                self._unknown_child(child, "behavior", ("property", "properties", "resources"))
         self.refuse_repeated(parameters, "parameter")
         self.refuse_repeated(roles, "role")
         return self._finish(element, head, parameters, roles)
@@ -82,7 +78,6 @@ class BehaviorReader:
 
     def _head_property(self, element: etree._Element, head: dict[str, str]) -> None:
         name = _attribute(element, "name") or ""
-        self._check_attributes(element, frozenset({"name", "value"}))
         if name not in ("type", "name"):
             self._misplaced(element, f"property '{name}'", "properties")
             return
@@ -100,7 +95,6 @@ class BehaviorReader:
         """An `<m2pem:service class="...">`; None when it has no class."""
         parameters: list[Parameter] = []
         roles: list[Role] = []
-        self._check_attributes(element, frozenset({"class"}))
         for child in self._children(element):
             what = local(child.tag)
             if what == "property":
@@ -111,8 +105,6 @@ class BehaviorReader:
                 parameters += self._parameters(child)
             elif what == "resources":
                 roles += self._resources(child)
-            else:
-                self._unknown_child(child, "service", ("property", "role"))
         self.refuse_repeated(parameters, "property")
         self.refuse_repeated(roles, "role")
         name = (_attribute(element, "class") or "").strip()
@@ -134,15 +126,12 @@ class BehaviorReader:
         for child in self._children(element):
             if local(child.tag) == "property":
                 result += self.one_parameter(child)
-            else:
-                self._unknown_child(child, "properties", ("property",))
         return result
 
     def one_parameter(self, element: etree._Element) -> list[Parameter]:
         """A `<property>`; nothing when a finding says why."""
         name = _attribute(element, "name")
         text = _value_text(element)
-        self._check_attributes(element, frozenset({"name", "value", "id"}))
         line = self._line(element)
         if not name:
             self._error(
@@ -158,11 +147,7 @@ class BehaviorReader:
         return [] if value is None else [Parameter(name, value, line)]
 
     def _resources(self, element: etree._Element) -> list[Role]:
-        children = list(self._children(element))
-        for child in children:
-            if local(child.tag) != "role":
-                self._unknown_child(child, "resources", ("role",))
-        return self.roles([child for child in children if local(child.tag) == "role"])
+        return self.roles([each for each in self._children(element) if local(each.tag) == "role"])
 
     def roles(self, elements: list[etree._Element]) -> list[Role]:
         """The roles that some `<role>` elements say, without those that findings refuse."""
@@ -170,7 +155,6 @@ class BehaviorReader:
 
     def _role(self, element: etree._Element) -> list[Role]:
         line = self._line(element)
-        self._check_attributes(element, _ROLE_ATTRIBUTES)
         name = (_attribute(element, "name") or "").strip()
         if not name:
             self._error(line, "role-name", "a role has no name", 'write <role name="driver" .../>')
@@ -224,18 +208,6 @@ class BehaviorReader:
             if _is_ours(child.tag):
                 yield child
 
-    def _check_attributes(self, element: etree._Element, known: frozenset[str]) -> None:
-        for key in attribute_names(element):
-            name = key.removeprefix(M2PEM)
-            if name not in known and not name.startswith("{"):
-                self._report.warning(
-                    self._line(element),
-                    self._task,
-                    "unknown-attribute",
-                    f"'{local(element.tag)}' has no attribute '{name}'; it is ignored",
-                    did_you_mean(name, known, "delete it"),
-                )
-
     def refuse_repeated(self, items: list[Named], what: str) -> None:
         """Say which names stand there more than once."""
         seen: set[str] = set()
@@ -255,16 +227,6 @@ class BehaviorReader:
             "misplaced",
             f"{what} stands outside <{wrapper}>",
             f"move it into <{wrapper}>",
-        )
-
-    def _unknown_child(self, child: etree._Element, parent: str, known: tuple[str, ...]) -> None:
-        name = local(child.tag)
-        self._report.warning(
-            self._line(child),
-            self._task,
-            "unknown-element",
-            f"'{parent}' has no '{name}'; it is ignored",
-            did_you_mean(name, known, "delete it"),
         )
 
     def _error(self, line: int, rule: str, message: str, remedy: str) -> None:

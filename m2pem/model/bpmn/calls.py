@@ -15,7 +15,7 @@ from m2pem.model.bpmn.reading import (
     association,
     reference,
 )
-from m2pem.model.bpmn.scan import Scan, own_extensions
+from m2pem.model.bpmn.scan import Scan
 from m2pem.model.elements import CallActivity
 from m2pem.model.expression import Expression, parse
 
@@ -26,7 +26,6 @@ _ALL = 'list each value: <m2pem:in source="a.b" target="x"/>'
 
 def read_call_activity(reading: Reading, found: Scan) -> CallActivity:
     """A call activity; `resolve_calls` adds what data associations pass."""
-    own_extensions(reading, found, _USED)
     inputs: list[Mapping] = []
     outputs: list[Mapping] = []
     called = found.element.get("calledElement", "")

@@ -4,7 +4,7 @@ from lxml import etree
 
 from m2pem.model.bpmn.names import BPMN
 from m2pem.model.bpmn.reading import Reading, reference, text_of
-from m2pem.model.bpmn.scan import Scan, own_extensions, scan
+from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.elements import (
     ComplexGateway,
     EventBasedGateway,
@@ -29,7 +29,6 @@ def read_gateway(reading: Reading, element: etree._Element) -> Gateway:
     """A gateway of any kind."""
     identifier = reading.claim(element)
     found = scan(reading, element, identifier)
-    own_extensions(reading, found, frozenset())
     name, line = element.get("name", ""), reading.report.line(element)
     gateway: Gateway
     if element.tag == _COMPLEX:

@@ -8,7 +8,7 @@ from lxml import etree
 from m2pem.model.bpmn.events import definition_elements, read_thrown, referred_definition
 from m2pem.model.bpmn.names import ACTIVITI, BPMN, CAMUNDA, FLOWABLE, M2PEM, ZEEBE
 from m2pem.model.bpmn.reading import KEY, DataEnd, PendingLoop, Reading, reference, text_of
-from m2pem.model.bpmn.scan import Scan, own_extensions, scan
+from m2pem.model.bpmn.scan import Scan, scan
 from m2pem.model.elements import Activity, SubProcess
 from m2pem.model.events import EventDefinition, Signal, SignalEventDefinition
 from m2pem.model.expression import Expression
@@ -84,7 +84,6 @@ def _expression(reading: Reading, found: Scan, name: str, node: Activity) -> Exp
 
 def _standard_loop(reading: Reading, element: etree._Element, node: Activity) -> StandardLoop:
     found = scan(reading, element, node.id)
-    own_extensions(reading, found, frozenset())
     maximum: int | None = None
     text = element.get("loopMaximum")
     if text is not None and _NUMBER.fullmatch(text.strip()):
@@ -106,7 +105,6 @@ def _multi_instance(
     reading: Reading, activity: Scan, element: etree._Element, node: Activity
 ) -> MultiInstance:
     found = scan(reading, element, node.id)
-    own_extensions(reading, found, frozenset())
     zeebe = _zeebe(found)
     pending = PendingLoop(node, element, *(_reference(found, name) for name in _DATA_REFS))
     written = zeebe.get("inputCollection", "") or _editors(element, "collection")

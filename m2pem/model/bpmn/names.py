@@ -12,41 +12,6 @@ ACTIVITI = "{http://activiti.org/bpmn}"
 FLOWABLE = "{http://flowable.org/bpmn}"
 ZEEBE = "{http://camunda.org/schema/zeebe/1.0}"
 
-M2PEM_ELEMENTS = frozenset(
-    {
-        "arg",
-        "behavior",
-        "decision",
-        "in",
-        "out",
-        "prompt",
-        "properties",
-        "property",
-        "requirement",
-        "resources",
-        "role",
-        "service",
-        "userTask",
-    }
-)
-"""Local names of the elements of `M2PEM` that some version of m2pem gives a meaning."""
-
-M2PEM_ATTRIBUTES = frozenset(
-    {
-        "activeElements",
-        "class",
-        "collection",
-        "elementVariable",
-        "from",
-        "role",
-        "service",
-        "store",
-        "timeout",
-    }
-)
-"""Local names of the attributes of `M2PEM` that may stand on BPMN elements."""
-
-
 attribute_names = cast("Callable[[etree._Element], list[str]]", etree._Element.keys)
 """The names of an element's attributes, with their namespaces."""
 

@@ -161,14 +161,11 @@ def _quantity(reading: Reading, element: etree._Element, name: str, text: str, r
     """How many tokens begin, or leave, an activity (table 10.3)."""
     if text.isascii() and text.isdecimal() and 1 <= int(text) <= MAX_QUANTITY:
         return int(text)
-    # Some editors write 0 for what was not set.
-    say = reading.report.warning if text == "0" else reading.report.error
-    say(
+    reading.report.error(
         element,
         element.get("id", ""),
         rule,
-        f"{name}='{text}' is no number of tokens from 1 to {MAX_QUANTITY}"
-        + ("; it counts as 1" if text == "0" else ""),
+        f"{name}='{text}' is no number of tokens from 1 to {MAX_QUANTITY}",
         f'write for example {name}="2", or delete it',
     )
     return 1

@@ -12,7 +12,6 @@ from m2pem.model.bpmn.scan import Scan, own_extensions
 from m2pem.model.duration import duration_us
 from m2pem.model.elements import UserTask
 from m2pem.model.expression import Expression
-from m2pem.model.near import did_you_mean
 
 _USED = frozenset({"userTask", "prompt", "decision"})
 _SETTINGS = ("store", "role", "timeout")
@@ -28,7 +27,7 @@ def read_user_task(reading: Reading, found: Scan) -> UserTask:
         PendingPrompt(
             task,
             element,
-            own_extensions(reading, found, _USED),
+            own_extensions(found, _USED),
             found.documentation(),
             [association(each) for each in found.of("dataInputAssociation")],
         )
@@ -83,14 +82,6 @@ class _Asked:
         for child in element:
             if child.tag in (M2PEM + "prompt", M2PEM + "decision"):
                 self.read(child)
-            else:
-                self.reading.report.warning(
-                    child,
-                    self.task,
-                    "unknown-extension",
-                    f"m2pem:userTask has no '{local(child.tag)}'; it is ignored",
-                    did_you_mean(local(child.tag), ("prompt", "decision"), "delete it"),
-                )
 
     def data_object(self, identifier: str, *, own_decisions: bool) -> None:
         """What the data object that the task reads carries."""

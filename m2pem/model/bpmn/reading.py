@@ -6,10 +6,12 @@ from dataclasses import dataclass, field
 from lxml import etree
 
 from m2pem.errors import ExpressionSyntaxError
-from m2pem.model.bpmn.names import M2PEM, M2PEM_ATTRIBUTES, a, attribute_names, kind, local
+from m2pem.model.bpmn.names import M2PEM, a, attribute_names, kind, local
 from m2pem.model.bpmn.report import Report, Where
 from m2pem.model.bpmn.rewriting import expression_remedy, value_remedy
 from m2pem.model.bpmn.schema import Shape
+from m2pem.model.bpmn.unknown import unknown_attribute
+from m2pem.model.bpmn.vocabulary import looks_like_own, stranger_attribute
 from m2pem.model.elements import (
     Activity,
     BoundaryEvent,
@@ -27,7 +29,6 @@ from m2pem.model.elements import (
 from m2pem.model.events import Error, Escalation, Message, MessageEventDefinition, Signal
 from m2pem.model.expression import Expression, parse, template
 from m2pem.model.mission import Lane, MessageFlow, Participant
-from m2pem.model.near import did_you_mean
 
 KEY = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
 """A dotted name of the data store."""
@@ -234,21 +235,28 @@ class Reading:
             if key in shape.attributes:
                 continue
             if key[0] != "{":
-                self.report.warning(
+                rule, message, remedy = unknown_attribute(element, key, shape.attributes)
+                self.report.warning(element, identifier, rule, message, remedy)
+            elif key.startswith(M2PEM):
+                self._own_attribute(element, identifier, local(key))
+            elif looks_like_own("", namespace := key[1:].partition("}")[0]):
+                self.report.error(
                     element,
                     identifier,
-                    "unknown-attribute",
-                    f"BPMN has no attribute '{key}' for {a(kind(element.tag))}; it is ignored",
-                    did_you_mean(key, shape.attributes, "delete it, or give it its namespace"),
+                    "wrong-namespace",
+                    f"'{local(key)}' is of the namespace '{namespace}', which is not m2pem's",
+                    f"did you mean '{M2PEM[1:-1]}'?",
                 )
-            elif key.startswith(M2PEM) and key[len(M2PEM) :] not in M2PEM_ATTRIBUTES:
-                self.report.warning(
-                    element,
-                    identifier,
-                    "unknown-extension",
-                    f"m2pem has no attribute 'm2pem:{local(key)}'; it is ignored",
-                    did_you_mean(local(key), M2PEM_ATTRIBUTES, "delete it"),
-                )
+
+    def _own_attribute(self, element: etree._Element, identifier: str, name: str) -> None:
+        wrong = stranger_attribute(element.tag, name)
+        if wrong is None:
+            return
+        known, message, remedy = wrong
+        if known:
+            self.report.warning(element, identifier, "misplaced-extension", message, remedy)
+        else:
+            self.report.error(element, identifier, "unknown-extension", message, remedy)
 
     def note_outputs(self, elements: list[etree._Element]) -> list[Association]:
         """Keep data output associations: they say what the element writes."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
-from m2pem.model.bpmn.names import BPMN, M2PEM, M2PEM_ELEMENTS, a, kind, local
+from m2pem.model.bpmn.names import BPMN, M2PEM, a, kind, local
 from m2pem.model.bpmn.reading import Reading, text_of
 from m2pem.model.bpmn.schema import SHAPES, Shape
 from m2pem.model.near import did_you_mean
@@ -98,41 +98,13 @@ class Order:
             )
 
 
-def own_extensions(
-    reading: Reading, found: Scan, used: frozenset[str]
-) -> dict[str, list[etree._Element]]:
-    """The m2pem extension elements by local name; warns of those that have no effect here."""
+def own_extensions(found: Scan, used: frozenset[str]) -> dict[str, list[etree._Element]]:
+    """Those m2pem extension elements that the reader uses, by local name.
+
+    What the others are, rules say (`rules/extensions.py`).
+    """
     result: dict[str, list[etree._Element]] = {}
-    if EXTENSIONS not in found.children:
-        return result
     for child in found.extensions():
-        if not isinstance(child.tag, str) or not child.tag.startswith(M2PEM):
-            continue
-        name = child.tag[len(M2PEM) :]
-        if name in used:
+        if child.tag.startswith(M2PEM) and (name := local(child.tag)) in used:
             result.setdefault(name, []).append(child)
-        elif name in M2PEM_ELEMENTS:
-            reading.report.warning(
-                child,
-                found.id,
-                "misplaced-extension",
-                f"m2pem:{name} has no effect on {a(kind(found.element.tag))}",
-                "move it to a task that uses it, or delete it",
-            )
-        else:
-            unknown_extension(reading, child, found.id, M2PEM_ELEMENTS)
     return result
-
-
-def unknown_extension(
-    reading: Reading, element: etree._Element, identifier: str, known: frozenset[str]
-) -> None:
-    """Warn of an m2pem element that m2pem does not know."""
-    name = local(element.tag)
-    reading.report.warning(
-        element,
-        identifier,
-        "unknown-extension",
-        f"m2pem has no element '{name}' here; it is ignored",
-        did_you_mean(name, known, "delete it"),
-    )

@@ -1,5 +1,7 @@
 """Script tasks: a behavior as XML, or statements (docs/missions.md)."""
 
+from collections.abc import Callable
+
 from lxml import etree
 
 from m2pem.model.behavior import Behavior, Script
@@ -8,6 +10,7 @@ from m2pem.model.bpmn.names import BPMN, local
 from m2pem.model.bpmn.reading import Reading
 from m2pem.model.bpmn.rewriting import script_remedy, statement_remedy
 from m2pem.model.bpmn.scan import Scan, own_extensions
+from m2pem.model.bpmn.vocabulary import strangers
 from m2pem.model.bpmn.xml import XmlError, parse_xml
 from m2pem.model.elements import ScriptTask
 from m2pem.model.script import parse_script
@@ -20,7 +23,7 @@ BEHAVIOR = frozenset({"behavior"})
 
 def read_script_task(reading: Reading, found: Scan) -> ScriptTask:
     """A script task: a behavior of its extension elements or script, or statements."""
-    extensions = own_extensions(reading, found, BEHAVIOR)
+    extensions = own_extensions(found, BEHAVIOR)
     carried = extensions.get("behavior", [])
     scripts = found.of("script")
     script = scripts[0] if scripts else None
@@ -120,7 +123,7 @@ def _child_behavior(reading: Reading, found: Scan, script: etree._Element) -> Be
     if len(script) > 1 or not is_behavior(child):
         _no_behavior(reading, found, reading.report.line(child), local(child.tag))
         return None
-    return BehaviorReader(reading, found.id, reading.report.line).behavior(child)
+    return _behavior(reading, found, child, reading.report.line)
 
 
 def _text_behavior(
@@ -146,7 +149,18 @@ def _text_behavior(
     def line(element: etree._Element) -> int:
         return first + document.line(element) - 1
 
-    return BehaviorReader(reading, found.id, line).behavior(document.root)
+    return _behavior(reading, found, document.root, line)
+
+
+def _behavior(
+    reading: Reading,
+    found: Scan,
+    element: etree._Element,
+    line: Callable[[etree._Element], int],
+) -> Behavior | None:
+    for where, message, remedy in strangers(element):
+        reading.report.error(line(where), found.id, "unknown-extension", message, remedy)
+    return BehaviorReader(reading, found.id, line).behavior(element)
 
 
 def _no_behavior(reading: Reading, found: Scan, line: int, name: str) -> None:

@@ -31,7 +31,6 @@ from m2pem.model.elements import (
 from m2pem.model.events import Message
 from m2pem.model.expression.literals import shorten
 
-_NONE: frozenset[str] = frozenset()
 _SERVICE = frozenset({"behavior", "service", "property", "role"})
 _ENGINES = (CAMUNDA, FLOWABLE, ACTIVITI)
 _CLASSES = tuple(engine + name for engine in _ENGINES for name in ("class", "topic"))
@@ -42,13 +41,11 @@ _JOB = ZEEBE + "taskDefinition"
 
 def read_plain_task(reading: Reading, found: Scan) -> Task:
     """A task without a type."""
-    own_extensions(reading, found, _NONE)
     return Task(found.id, found.element.get("name", ""), reading.report.line(found.element))
 
 
 def read_manual_task(reading: Reading, found: Scan) -> ManualTask:
     """A manual task."""
-    own_extensions(reading, found, _NONE)
     return ManualTask(found.id, found.element.get("name", ""), reading.report.line(found.element))
 
 
@@ -66,7 +63,7 @@ Serving = TypeVar("Serving", bound=ServiceTask)
 
 
 def _service_task(reading: Reading, found: Scan, task: type[Serving]) -> Serving:
-    extensions = own_extensions(reading, found, _SERVICE)
+    extensions = own_extensions(found, _SERVICE)
     carried = extensions.get("behavior", [])
     behavior: Behavior | None = read_carried(reading, found, carried) if carried else None
     call = _service_call(reading, found, extensions)
@@ -144,7 +141,7 @@ def _loose_properties(
 
 def read_send_task(reading: Reading, found: Scan) -> SendTask:
     """A send task: a message, or a behavior."""
-    carried = own_extensions(reading, found, BEHAVIOR).get("behavior", [])
+    carried = own_extensions(found, BEHAVIOR).get("behavior", [])
     behavior = read_carried(reading, found, carried) if carried else None
     message = _message(reading, found)
     if carried and message is not None:
@@ -165,7 +162,6 @@ def read_send_task(reading: Reading, found: Scan) -> SendTask:
 
 def read_receive_task(reading: Reading, found: Scan) -> ReceiveTask:
     """A receive task."""
-    own_extensions(reading, found, _NONE)
     message = _message(reading, found)
     name = found.element.get("name", "")
     line = reading.report.line(found.element)

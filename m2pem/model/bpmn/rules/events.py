@@ -125,6 +125,23 @@ BOUNDARY_FLOW = Rule(
     "draw one to what follows when it is triggered",
 )
 
+INTERMEDIATE_SOURCE = Rule(
+    10520,
+    "intermediate-without-incoming",
+    "10.5.4",
+    W,
+    "no sequence flow leads into the intermediate event; it happens when its process begins",
+    "draw one from what comes before",
+)
+COMPENSATION_START = Rule(
+    10521,
+    "compensation-not-interrupting",
+    "10.5.2",
+    W,
+    "the start event of a compensation event subprocess cannot be non-interrupting",
+    'delete isInterrupting="false"; what it compensates has ended',
+)
+
 
 def _kinds(text: str) -> frozenset[str]:
     return frozenset(text.split())
@@ -140,6 +157,7 @@ _ALLOWED: dict[Rule, frozenset[str]] = {
 }
 
 
+_AD_HOC = BPMN + "adHocSubProcess"
 _RULES = {
     BPMN + "startEvent": START,
     BPMN + "endEvent": END,
@@ -175,6 +193,8 @@ def _start(tree: Tree, event: etree._Element) -> None:
     outer = parent(event)
     if is_true(outer, "triggeredByEvent"):
         _allow(tree, event)
+        if is_false(event, "isInterrupting") and has_trigger(tree, event, "compensate"):
+            tree.say(COMPENSATION_START, event)
     else:
         if outer.tag not in SUBPROCESSES:
             _allow(tree, event)
@@ -190,12 +210,20 @@ def _end(tree: Tree, event: etree._Element) -> None:
 
 def _catch(tree: Tree, event: etree._Element) -> None:
     _allow(tree, event)
+    if not has_trigger(tree, event, "link"):
+        _has_source(tree, event)
     if not tree.out(event):
         tree.say(INTERMEDIATE_FLOW, event)
 
 
+def _has_source(tree: Tree, event: etree._Element) -> None:
+    if not tree.into(event) and parent(event).tag != _AD_HOC:
+        tree.say(INTERMEDIATE_SOURCE, event)
+
+
 def _throw(tree: Tree, event: etree._Element) -> None:
     _allow(tree, event)
+    _has_source(tree, event)
     if not tree.out(event) and not has_trigger(tree, event, "link"):
         tree.say(INTERMEDIATE_FLOW, event)
 

@@ -31,6 +31,15 @@ LISTED = Rule(
     "delete the incoming or outgoing element; the flows themselves count",
 )
 
+LISTED_ELSEWHERE = Rule(
+    8479,
+    "listed-flow-elsewhere",
+    "8.4.13",
+    W,
+    "it lists an incoming or outgoing sequence flow that is another element's",
+    "correct the incoming or outgoing element, or the flow; the flows count",
+)
+
 
 def _condition(tree: Tree, element: etree._Element) -> None:
     flow = parent(element)
@@ -50,18 +59,21 @@ def _immediate(tree: Tree) -> None:
 
 
 def _listed(tree: Tree) -> None:
-    """Compares all names at once; only a file that has a wrong one is looked at in detail."""
     lists = (BPMN + "incoming", BPMN + "outgoing")
-    listed = {element.text for element in tree.root.iter(*lists)}
-    if not listed:
-        return
-    known = {flow.get("id") for flow in tree.flows}
-    if listed <= known:
-        return
+    known = {flow.get("id"): flow for flow in tree.flows}
     for element in tree.root.iter(*lists):
         name = (element.text or "").strip()
-        if name and name not in known and name.rpartition(":")[2] not in known:
-            tree.say(LISTED, element, f"'{name}'")
+        flow = known.get(name)
+        if flow is None:
+            flow = known.get(name.rpartition(":")[2])
+        if flow is None:
+            if name:
+                tree.say(LISTED, element, f"'{name}'")
+            continue
+        end = "targetRef" if element.tag == lists[0] else "sourceRef"
+        owner = parent(element).get("id")
+        if owner and flow.get(end, "").rpartition(":")[2] != owner:
+            tree.say(LISTED_ELSEWHERE, element, f"{end} of '{name}' is '{flow.get(end, '')}'")
 
 
 TOPIC = Topic(declared(globals()), {"conditionExpression": _condition}, (_immediate, _listed))

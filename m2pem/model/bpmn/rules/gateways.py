@@ -3,7 +3,7 @@
 from lxml import etree
 
 from m2pem.model.bpmn.rules.rule import Rule, Topic, W, declared
-from m2pem.model.bpmn.rules.tree import Tree, name_of
+from m2pem.model.bpmn.rules.tree import Tree, name_of, parent
 
 DIRECTION = Rule(
     8491,
@@ -53,10 +53,9 @@ def _gateway(tree: Tree, element: etree._Element) -> None:
     if direction not in ("Unspecified", "Converging", "Diverging", "Mixed"):
         tree.say(DIRECTION, element, f"'{direction}'")
     detail = f"this one has {incoming} incoming and {outgoing} outgoing"
-    if incoming + outgoing == 0:
-        return  # nothing is drawn to it, which is said elsewhere
     if incoming < 2 and outgoing < 2:
-        if name_of(element) != "eventBasedGateway":
+        alone = incoming + outgoing == 0 and name_of(parent(element)) == "adHocSubProcess"
+        if name_of(element) != "eventBasedGateway" and not alone:
             tree.say(IDLE, element)
     elif direction == "Converging" and (incoming < 2 or outgoing > 1):
         tree.say(CONVERGING, element, detail)

@@ -10,7 +10,7 @@ START_QUANTITY = Rule(
     "start-quantity",
     "10.3",
     E,
-    "startQuantity is no whole number from 1 (a warning for 0, which counts as 1)",
+    "startQuantity is no whole number from 1",
     "write how many tokens begin the activity, or delete it",
 )
 COMPLETION_QUANTITY = Rule(
@@ -18,7 +18,7 @@ COMPLETION_QUANTITY = Rule(
     "completion-quantity",
     "10.3",
     E,
-    "completionQuantity is no whole number from 1 (a warning for 0, which counts as 1)",
+    "completionQuantity is no whole number from 1",
     "write how many tokens leave the activity, or delete it",
 )
 NO_CALLED = Rule(

@@ -166,6 +166,14 @@ UNKNOWN_ATTRIBUTE = Rule(
     "BPMN has no such attribute there",
     "delete it, or give it its namespace",
 )
+MISSPELLED_ATTRIBUTE = Rule(
+    15309,
+    "misspelled-attribute",
+    "15.3",
+    W,
+    "BPMN has no such attribute there, but one with a name like it",
+    "correct the name; until then the attribute has no effect",
+)
 UNKNOWN_ELEMENT = Rule(
     15304,
     "unknown-element",

@@ -12,6 +12,7 @@ from m2pem.model.bpmn.rules import (
     definitions,
     event_gateways,
     events,
+    extensions,
     flows,
     gateways,
     lanes,
@@ -54,6 +55,7 @@ TOPICS: tuple[Topic, ...] = (
     reader_rules.TOPIC,
     reader_process_rules.TOPIC,
     own_rules.TOPIC,
+    extensions.TOPIC,
 )
 
 RULES: tuple[Rule, ...] = tuple(

@@ -6,10 +6,16 @@ The table is that of the readers (`schema.py`) for the rest of BPMN.
 from lxml import etree
 
 from m2pem.model.bpmn.names import BPMN, a, attribute_names, kind, local
-from m2pem.model.bpmn.rules.reader_rules import ELEMENT_ORDER, UNKNOWN_ATTRIBUTE, UNKNOWN_ELEMENT
+from m2pem.model.bpmn.rules.reader_rules import (
+    ELEMENT_ORDER,
+    MISSPELLED_ATTRIBUTE,
+    UNKNOWN_ATTRIBUTE,
+    UNKNOWN_ELEMENT,
+)
 from m2pem.model.bpmn.rules.rule import Check, Topic
 from m2pem.model.bpmn.rules.tree import Tree
 from m2pem.model.bpmn.schema import Shape, shape
+from m2pem.model.bpmn.unknown import unknown_attribute
 from m2pem.model.near import did_you_mean
 
 _BASE = "documentation extensionElements"
@@ -114,12 +120,9 @@ def _check(expected: Shape) -> Check:
     def check(tree: Tree, element: etree._Element) -> None:
         for key in attribute_names(element):
             if key[0] != "{" and key not in expected.attributes:
-                tree.say(
-                    UNKNOWN_ATTRIBUTE,
-                    element,
-                    f"'{key}' of {a(kind(element.tag))}; it is ignored",
-                    did_you_mean(key, expected.attributes, UNKNOWN_ATTRIBUTE.right),
-                )
+                slug, _, right = unknown_attribute(element, key, expected.attributes)
+                rule = UNKNOWN_ATTRIBUTE if slug == UNKNOWN_ATTRIBUTE.slug else MISSPELLED_ATTRIBUTE
+                tree.say(rule, element, f"'{key}' of {a(kind(element.tag))}; it is ignored", right)
         _children(tree, element, expected)
 
     return check

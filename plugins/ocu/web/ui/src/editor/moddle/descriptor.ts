@@ -1,5 +1,5 @@
 // What m2pem adds to BPMN, as bpmn-moddle reads and writes it (docs/missions.md). Whatever is not
-// said here is kept as it stands in the file.
+// said here is kept as it stands in the file. vocabulary.test.ts holds the names to m2pem's own.
 const attribute = (name: string) => ({ name, type: "String", isAttr: true });
 const children = (name: string, type: string) => ({ name, type, isMany: true });
 const text = { name: "body", type: "String", isBody: true };
@@ -77,10 +77,10 @@ export const m2pemDescriptor = {
       ],
     },
     { name: "Arg", superClass: ["Element"], properties: ["name", "value"].map(attribute) },
-    { name: "AskingTask", extends: ["bpmn:UserTask"], properties: task },
+    { name: "AskingTask", extends: ["bpmn:UserTask", "bpmn:GlobalUserTask"], properties: task },
     {
       name: "ServingTask",
-      extends: ["bpmn:ServiceTask", "bpmn:BusinessRuleTask"],
+      extends: ["bpmn:ServiceTask", "bpmn:BusinessRuleTask", "bpmn:GlobalBusinessRuleTask"],
       properties: ["class", "service"].map(attribute),
     },
     {
