@@ -10,6 +10,12 @@ CASES = read_cases("""
 *T
 ~ sourceRef="T" targetRef="E" => sourceRef="T" targetRef="I"
 
+# subprocess-starts | T | this one has 2
+! <subProcess id="T"><startEvent id="a"/><startEvent id="b"/><endEvent id="z"/>[a>z][b>z]
+</subProcess>
+*T
+~ <startEvent id="b"/> => <task id="b"/>
+
 # compensation-not-interrupting | Z | cannot be non-interrupting
 <subProcess id="T"><startEvent id="s"/><endEvent id="e"/>[s>e]
 <subProcess id="H" triggeredByEvent="true">

@@ -93,6 +93,11 @@ CASES = read_cases("""
 *A
 ~ <outgoing>S-A => <outgoing>A-E
 
+# unlisted-flow | T | 'T-E'
+! <task id="T"><outgoing>g</outgoing></task><sequenceFlow id="g" sourceRef="T" targetRef="E"/>
+*T
+~ <outgoing>g => <outgoing>T-E</outgoing><outgoing>g
+
 # idle-gateway | G | neither
 ! <exclusiveGateway id="G"/>
 *

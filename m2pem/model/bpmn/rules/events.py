@@ -7,6 +7,7 @@ from m2pem.model.bpmn.rules.rule import E, Rule, Topic, W, declared
 from m2pem.model.bpmn.rules.tree import (
     SUBPROCESSES,
     Tree,
+    children,
     has,
     has_trigger,
     is_false,
@@ -142,6 +143,15 @@ COMPENSATION_START = Rule(
     'delete isInterrupting="false"; what it compensates has ended',
 )
 
+SUBPROCESS_STARTS = Rule(
+    13301,
+    "subprocess-starts",
+    "13.3.4",
+    W,
+    "an embedded subprocess must not have several start events; each gets a token",
+    "keep one, with a parallel gateway after it if both paths are meant",
+)
+
 
 def _kinds(text: str) -> frozenset[str]:
     return frozenset(text.split())
@@ -235,6 +245,10 @@ def _boundary(tree: Tree, event: etree._Element) -> None:
 
 
 def _container(tree: Tree, element: etree._Element) -> None:
+    if element.tag != BPMN + "process" and not is_true(element, "triggeredByEvent"):
+        number = sum(1 for _ in children(element, "startEvent"))
+        if number > 1:
+            tree.say(SUBPROCESS_STARTS, element, f"this one has {number}")
     starts, ends = has(element, "startEvent"), has(element, "endEvent")
     if starts and not ends:
         tree.say(NO_END, element)

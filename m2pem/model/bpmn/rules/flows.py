@@ -4,7 +4,7 @@ from lxml import etree
 
 from m2pem.model.bpmn.names import BPMN
 from m2pem.model.bpmn.rules.rule import Rule, Topic, W, declared
-from m2pem.model.bpmn.rules.tree import ACTIVITIES, Tree, is_false, is_true, parent
+from m2pem.model.bpmn.rules.tree import ACTIVITIES, Tree, is_false, is_true, parent, what
 
 LONE_CONDITION = Rule(
     8476,
@@ -40,6 +40,15 @@ LISTED_ELSEWHERE = Rule(
     "correct the incoming or outgoing element, or the flow; the flows count",
 )
 
+UNLISTED = Rule(
+    8480,
+    "unlisted-flow",
+    "8.4.13",
+    W,
+    "it lists some of its incoming or outgoing sequence flows, and not this one",
+    "add it to the incoming or outgoing elements; the flows count",
+)
+
 
 def _condition(tree: Tree, element: etree._Element) -> None:
     flow = parent(element)
@@ -61,6 +70,7 @@ def _immediate(tree: Tree) -> None:
 def _listed(tree: Tree) -> None:
     lists = (BPMN + "incoming", BPMN + "outgoing")
     known = {flow.get("id"): flow for flow in tree.flows}
+    named: dict[tuple[etree._Element, str], set[str]] = {}
     for element in tree.root.iter(*lists):
         name = (element.text or "").strip()
         flow = known.get(name)
@@ -74,6 +84,14 @@ def _listed(tree: Tree) -> None:
         owner = parent(element).get("id")
         if owner and flow.get(end, "").rpartition(":")[2] != owner:
             tree.say(LISTED_ELSEWHERE, element, f"{end} of '{name}' is '{flow.get(end, '')}'")
+
+        else:
+            named.setdefault((parent(element), element.tag), set()).add(flow.get("id", ""))
+    for (element, tag), listed in named.items():
+        own = tree.into(element) if tag == lists[0] else tree.out(element)
+        missing = [each for each in own if each.get("id", "") not in listed]
+        if missing:
+            tree.say(UNLISTED, element, ", ".join(what(each) for each in missing))
 
 
 TOPIC = Topic(declared(globals()), {"conditionExpression": _condition}, (_immediate, _listed))
