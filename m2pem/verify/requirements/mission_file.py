@@ -7,12 +7,9 @@ from lxml import etree
 from m2pem.findings import Finding, Severity
 from m2pem.model.bpmn.names import BPMN, M2PEM
 from m2pem.model.bpmn.xml import Document, parse_xml
-from m2pem.model.near import did_you_mean
 from m2pem.verify.requirements.names import Names
 from m2pem.verify.requirements.reading import UnusableError, Written, made
 from m2pem.verify.requirements.requirement import Requirement, RequirementsError, misread
-
-_ATTRIBUTES = ("id", "ltl", "pattern", "text", "fair")
 
 
 def read_mission_requirements(names: Names) -> list[Requirement]:
@@ -46,11 +43,6 @@ def read_mission_requirements(names: Names) -> list[Requirement]:
             error("two requirements have this id", "give each its own")
             continue
         seen.add(name)
-        for attribute in element.attrib:
-            written = str(attribute)
-            if written not in _ATTRIBUTES:
-                hint = did_you_mean(written, _ATTRIBUTES, "delete it")
-                error(f"m2pem:requirement has no attribute '{written}'", hint)
         if element.get("fair", "true") not in ("true", "false"):
             error(f"fair='{element.get('fair')}' is neither true nor false")
             continue
