@@ -7,6 +7,7 @@ hashed by identity. Links are set once, by `m2pem.model.bpmn`, before anybody se
 Names are those of BPMN 2.0.2, chapter 10.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -19,6 +20,8 @@ from m2pem.model.events import (
 )
 from m2pem.model.expression import Expression
 from m2pem.model.loops import MultiInstance, StandardLoop
+
+_CAPITAL = re.compile(r"(?<!^)(?=[A-Z])")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,8 +44,13 @@ class Element:
 
     @property
     def label(self) -> str:
-        """What to call the element in front of a person: its name, else its id."""
-        return self.name or self.id
+        """What to call the element in front of a person: its name, else its id.
+
+        A name of nothing but white space says nothing: then it is called by its kind and id.
+        """
+        if not self.name or self.name.strip():
+            return self.name or self.id
+        return f"{_CAPITAL.sub(' ', type(self).__name__).lower()} {self.id}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

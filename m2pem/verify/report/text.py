@@ -43,7 +43,7 @@ def _rough(findings: Findings) -> Iterator[str]:
     approximations = findings.system.approximations
     for each in approximations[:_MOST_ROUGH]:
         element = findings.mission.elements.get(each.element)
-        name = f" ({element.name})" if element is not None and element.name else ""
+        name = f" ({element.name})" if element is not None and element.name.strip() else ""
         yield f"{each.element}{name}: {each.what}; {_MEANING[each.exactness]}"
     if len(approximations) > _MOST_ROUGH:
         yield f"and {len(approximations) - _MOST_ROUGH} more like these"

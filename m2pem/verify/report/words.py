@@ -20,7 +20,7 @@ class Words:
         if known is None:
             return element
         if known.name:
-            return _one_line(known.name)
+            return _one_line(known.label)
         if isinstance(known, e.SequenceFlow):
             return f"{self.name(known.source.id)} \u2192 {self.name(known.target.id)}"
         return known.id
