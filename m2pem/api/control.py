@@ -105,6 +105,27 @@ class PromptClosed:
 
 
 @dataclass(frozen=True, slots=True)
+class TakeEffect:
+    """What taking a resource would end now: a behavior of a task ends with error TAKEN_OVER.
+
+    `task` is the task's label. `caught_by`: the label of the event that catches the error, where
+    the mission goes on; "": no event catches it, and the run fails.
+    """
+
+    run: RunId
+    behavior: str
+    element: str
+    task: str
+    caught_by: str = ""
+
+    def __str__(self) -> str:
+        ends = f"{self.run}: {self.task} ends with error TAKEN_OVER"
+        if self.caught_by:
+            return f"{ends}; the mission goes on at {self.caught_by}"
+        return f"{ends}. TAKEN_OVER is not handled: the mission will fail"
+
+
+@dataclass(frozen=True, slots=True)
 class Alert:
     """A warning about the executive itself, which no record has: a vehicle that did not take STOP,
     a journal that does not write, a plugin that blocks. `run` "": it concerns all of them."""
@@ -203,6 +224,13 @@ class MissionControl(Protocol):
         """Take a vehicle or payload from the missions, to steer it by hand.
 
         What it was doing ends with error TAKEN_OVER; until it is given back no behavior gets it.
+        """
+        ...
+
+    async def preview_take(self, resource: str) -> Sequence[TakeEffect]:
+        """What `take` of a resource would end now, and whether the missions handle it.
+
+        Empty: no run commands it. Operators see this before they take anything.
         """
         ...
 

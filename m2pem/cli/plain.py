@@ -258,6 +258,8 @@ class PlainOcu:
     async def _take(self, words: list[str]) -> None:
         if len(words) != 1:
             raise OperatorError("say which: takeover RESOURCE")
+        for effect in await self._control.preview_take(words[0]):
+            self._say(str(effect))
         await self._control.take(words[0], by=NAME)
         self._say(f"{words[0]} is yours; handback {words[0]} gives it back")
 

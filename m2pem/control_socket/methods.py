@@ -73,6 +73,12 @@ class Resource(Params, frozen=True):
     by: str = ""
 
 
+class Preview(Params, frozen=True):
+    """As MissionControl.preview_take."""
+
+    resource: str
+
+
 class Page(Params, frozen=True):
     """As MissionControl.records."""
 
@@ -128,6 +134,7 @@ METHODS: dict[str, Method] = {
     "resume": (OfRun, lambda c, p: c.resume(p.run, by=p.by)),
     "set_geometry": (Geometry, lambda c, p: c.set_geometry(p.name, p.geometry, run=p.run, by=p.by)),
     "take": (Resource, lambda c, p: c.take(p.resource, by=p.by)),
+    "preview_take": (Preview, lambda c, p: c.preview_take(p.resource)),
     "give_back": (Resource, lambda c, p: c.give_back(p.resource, by=p.by)),
     "holders": (Nothing, lambda c, _: c.holders()),
     "runs": (Nothing, _runs),

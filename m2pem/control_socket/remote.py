@@ -20,6 +20,7 @@ from m2pem.api.control import (
     RunSummary,
     SimulationResult,
     StampedRecord,
+    TakeEffect,
 )
 from m2pem.api.telemetry import PayloadState, TeamState, Telemetry, VehicleState
 from m2pem.control_socket.place import ControlSocketError, address
@@ -187,6 +188,11 @@ class RemoteControl:
     async def take(self, resource: str, *, by: str = "") -> None:
         """Take a vehicle or payload from the missions."""
         await self._ask("take", resource=resource, by=by)
+
+    async def preview_take(self, resource: str) -> Sequence[TakeEffect]:
+        """What `take` of a resource would end now."""
+        effects = await self._ask("preview_take", resource=resource)
+        return msgspec.convert(effects, list[TakeEffect])
 
     async def give_back(self, resource: str, *, by: str = "") -> None:
         """Give it back to the missions."""

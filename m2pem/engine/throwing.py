@@ -164,6 +164,12 @@ def _catcher(
     return None
 
 
+def catcher_of_error(thrower: Token, code: str) -> Event | None:
+    """The event that would catch an error thrown now where a token is; None: the run would fail."""
+    caught = _catcher(thrower, code, _error_code)
+    return caught.event if caught is not None else None
+
+
 Catching = TypeVar("Catching", bound=Event)
 
 

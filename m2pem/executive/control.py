@@ -23,6 +23,7 @@ from m2pem.api.control import (
     RunSummary,
     SimulationResult,
     StampedRecord,
+    TakeEffect,
 )
 from m2pem.api.telemetry import Telemetry
 from m2pem.editing.editable import editable
@@ -151,6 +152,10 @@ class Control:
     async def take(self, resource: str, *, by: str = "") -> None:
         """Take a vehicle or payload from the missions."""
         await self._executive.handover.take(resource, by, self._executive.runners.values())
+
+    async def preview_take(self, resource: str) -> Sequence[TakeEffect]:
+        """What `take` of a resource would end now."""
+        return self._executive.handover.preview(resource, self._executive.runners.values())
 
     async def give_back(self, resource: str, *, by: str = "") -> None:
         """Give it back to the missions."""

@@ -6,6 +6,8 @@ While an operator has a resource, no mission gets it; every run's journal says s
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
+from m2pem.api.control import TakeEffect
+from m2pem.engine.control import preview_taken
 from m2pem.engine.inputs import ControlReturned, ControlTaken
 from m2pem.errors import OperatorError
 from m2pem.executive.runner import Runner
@@ -46,6 +48,26 @@ class Handover:
         for runner in list(runners):
             if not runner.done.is_set():
                 await runner.tell(ControlTaken(resource, by or SOMEBODY))
+
+    def preview(self, name: str, runners: Iterable[Runner]) -> list[TakeEffect]:
+        """What `take` of a resource would end now in each run.
+
+        Raises:
+            OperatorError: the fleet has no such resource.
+        """
+        resource = self._resource(name)
+        return [
+            TakeEffect(
+                runner.id,
+                behavior.id,
+                behavior.element,
+                state.mission.elements[behavior.element].label,
+                catcher.label if catcher is not None else "",
+            )
+            for runner in runners
+            if not runner.done.is_set() and (state := runner.run.state)
+            for behavior, catcher in preview_taken(state, resource)
+        ]
 
     async def give_back(self, name: str, by: str, runners: Iterable[Runner]) -> None:
         """Give a resource back to the missions.

@@ -1,6 +1,10 @@
 """Hand-over: what a mission sees of an operator who takes a vehicle and gives it back."""
 
+import pytest
+
+from m2pem.engine.control import preview_taken
 from m2pem.engine.inputs import ControlReturned, ControlTaken
+from m2pem.engine.records import ErrorThrown
 from m2pem.model.bpmn import parse_mission
 from tests.engine.kit import CANCELLED, SUCCEEDED, Play
 from tests.engine.notation import xml
@@ -65,3 +69,61 @@ def test_taking_twice_and_giving_back_what_nobody_has_changes_nothing() -> None:
     assert play.ignored() == "evsg1 is not with an operator"
     play.give(ControlTaken("evsg1", "anna")).give(ControlTaken("evsg1", "ben"))
     assert play.ignored() == "evsg1 is with anna already"
+
+
+FREE = """
+    <startEvent id="start"/> <scriptTask id="drive">do drive_stop evsg1</scriptTask>
+    start -> drive
+"""
+OTHER = """
+    <startEvent id="start"/> <scriptTask id="drive">do drive_stop evsg1</scriptTask>
+    <boundaryEvent id="lost" attachedToRef="drive">error LINK_LOST</boundaryEvent>
+    <endEvent id="end"/>
+    start -> drive
+    lost -> end
+"""
+ANY = OTHER.replace("error LINK_LOST", "error")
+AROUND = """
+    <startEvent id="start"/>
+    <subProcess id="leg">
+        <startEvent id="s"/> <scriptTask id="drive">do drive_stop evsg1</scriptTask>
+        s -> drive
+    </subProcess>
+    <boundaryEvent id="lost" attachedToRef="leg">error TAKEN_OVER</boundaryEvent>
+    <endEvent id="end"/>
+    start -> leg
+    lost -> end
+"""
+INSIDE = """
+    <startEvent id="start"/> <scriptTask id="drive">do drive_stop evsg1</scriptTask>
+    start -> drive
+    <subProcess id="rescue" triggeredByEvent="true">
+        <startEvent id="lost">error TAKEN_OVER</startEvent> <endEvent id="e"/>
+        lost -> e
+    </subProcess>
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "catcher"),
+    [
+        (FREE, ""),
+        (OTHER, ""),
+        (WAITS, "taken"),
+        (ANY, "lost"),
+        (AROUND, "lost"),
+        (INSIDE, "lost"),
+    ],
+)
+def test_the_preview_of_taking_a_vehicle_says_what_taking_it_then_does(
+    text: str, catcher: str
+) -> None:
+    play = Play(text).start()
+    [(behavior, caught_by)] = preview_taken(play.run.state, "evsg1")
+    assert (behavior.id, caught_by.id if caught_by else "") == ("r1.b1", catcher)
+    play.give(ControlTaken("evsg1", "anna"))
+    thrown = [each for each in play.steps[-1].records if isinstance(each, ErrorThrown)]
+    assert [(each.code, each.caught_by) for each in thrown] == [("TAKEN_OVER", catcher)]
+    assert play.ended == ("" if text is WAITS else "completed" if catcher else "failed")
+    assert preview_taken(play.run.state, "evsg1") == []
+    assert preview_taken(play.run.state, "evsg2") == []

@@ -393,8 +393,25 @@ def test_an_operator_takes_a_vehicle_and_gives_it_back(play):
     assert again.status is RunStatus.COMPLETED
 
 
+def test_operators_see_what_taking_a_vehicle_does_before_they_take_it(play):
+    async def story(world: World):
+        control = world.executive.control
+        await control.start(DRIVE)
+        await world.fake.until_called("start", "r1.b1")
+        before = await control.preview_take("ugv1")
+        await control.take("ugv1", by="anna")
+        return before, await control.preview_take("ugv1")
+
+    before, after = play(story, "ugv1")
+    assert [(each.run, each.behavior, each.caught_by) for each in before] == [("r1", "r1.b1", "")]
+    assert str(before[0]).endswith("TAKEN_OVER is not handled: the mission will fail")
+    assert after == []
+
+
 def test_a_name_that_is_in_no_fleet_cannot_be_taken(play):
     async def story(world: World):
+        with pytest.raises(OperatorError, match="did you mean 'ugv1'"):
+            await world.executive.control.preview_take("ugv")
         with pytest.raises(OperatorError, match="did you mean 'ugv1'"):
             await world.executive.control.take("ugv", by="anna")
         with pytest.raises(OperatorError, match="not with an operator"):

@@ -4,6 +4,7 @@ import time
 from collections.abc import Awaitable, Callable
 from typing import Any, ClassVar
 
+from rich.text import Text
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 
@@ -12,9 +13,16 @@ from m2pem.api.control import MissionControl, RunId, RunStatus
 from m2pem.api.operator import operator_name
 from m2pem.errors import M2pemError, OperatorError
 from m2pem_plugin_terminal.board import Board
-from m2pem_plugin_terminal.dialogs import Choice, Choose, Read, help_text
+from m2pem_plugin_terminal.dialogs import Choice, Choose, Confirm, Read, help_text
 from m2pem_plugin_terminal.display import Display
-from m2pem_plugin_terminal.handover import TEXT, TITLE, choices, with_operator
+from m2pem_plugin_terminal.handover import (
+    RETURNED,
+    TEXT,
+    TITLE,
+    choices,
+    effects_text,
+    with_operator,
+)
 from m2pem_plugin_terminal.stop import STOP_ALL
 
 
@@ -189,15 +197,46 @@ class TerminalApp(Display):
                 return
             holder = holders[ResourceId(resource)]
             if holder == self.by:
-                self._carry_out("Give back", self._give_back(resource))
+                self._carry_out("Give back", self._ask_to_give_back(resource))
             elif with_operator(holder):
                 self.say(f"{resource} is with {holder}", alarm=True)
             else:
-                self._carry_out("Take", self.control.take(resource, by=self.by))
+                self._carry_out("Take", self._ask_to_take(resource))
 
         listed = choices(self.control.fleet(), holders, self.by, self._task_label)
         await self.push_screen(Choose(TITLE, listed, TEXT), chosen)
         self.show()
+
+    async def _ask_to_take(self, resource: str) -> None:
+        """Show what taking it does; `y` does it, unless that has changed since: then ask again."""
+        effects = await self.control.preview_take(resource)
+
+        async def take() -> None:
+            if await self.control.preview_take(resource) != effects:
+                self.say(f"Not taken: what {resource} does has changed. Read it again", alarm=True)
+                await self._ask_to_take(resource)
+            else:
+                await self.control.take(resource, by=self.by)
+
+        await self._confirm("Take", f"Take {resource}?", effects_text(resource, effects), take)
+
+    async def _confirm(
+        self, what: str, title: str, text: Text, call: Callable[[], Awaitable[None]]
+    ) -> None:
+        """Have the operator confirm what was read with a key that is used for nothing else."""
+
+        def confirmed(yes: bool | None) -> None:
+            if yes:
+                self._carry_out(what, call())
+
+        await self.push_screen(Confirm(title, text), confirmed)
+        self.show()
+
+    async def _ask_to_give_back(self, resource: str) -> None:
+        async def give_back() -> None:
+            await self._give_back(resource)
+
+        await self._confirm("Give back", f"Give back {resource}?", Text(RETURNED), give_back)
 
     async def _give_back(self, resource: str) -> None:
         """Not what has become another's since the list was shown: anybody may give back."""

@@ -68,6 +68,28 @@ class Choose(ModalScreen[str | None]):
         self.dismiss(self._choices[event.option_index].value)
 
 
+class Confirm(ModalScreen[bool]):
+    """What will happen, confirmed by `y`: no digit or Enter, which answer and choose."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("y", "dismiss(True)", "Yes"),
+        ("escape", "dismiss(False)", "No"),
+    ]
+
+    def __init__(self, title: str, text: Text) -> None:
+        super().__init__()
+        self._title = title
+        self._text = text
+
+    def compose(self) -> ComposeResult:
+        """The text, and the key that confirms it."""
+        with Vertical(classes="dialog") as box:
+            box.border_title = self._title
+            box.border_subtitle = "y: yes   Esc: no"
+            yield Static(self._text, classes="dialog-text")
+        yield StopBar()
+
+
 class Read(ModalScreen[None]):
     """A text to be read; any of Escape, Enter and ? closes it."""
 

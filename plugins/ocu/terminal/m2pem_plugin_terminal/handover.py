@@ -1,18 +1,22 @@
 """Who has which vehicle and payload, and the list from which to take them or give them back."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
+
+from rich.text import Text
 
 from m2pem_plugin_terminal.dialogs import Choice
 from m2pem_plugin_terminal.words import shortened
 
 if TYPE_CHECKING:
     from m2pem.api import ResourceId
+    from m2pem.api.control import TakeEffect
     from m2pem.resources.fleet import Fleet
 
 TITLE = "Take, or give back"
-TEXT = "Takes what is free or with a mission; gives back yours."
+TEXT = "Takes what is free or with a mission; gives back yours. Asks before it does."
+RETURNED = "Missions may command it again from then on: it may move."
 REMARK_CELLS = 34
 BEHAVIOR = re.compile(r"r\d+\.b\d+")
 """An id of a behavior, as MissionControl.holders has it in place of an operator's name."""
@@ -41,6 +45,17 @@ def choices(
         for resource in (vehicle.id, *vehicle.payloads)
         if resource in holders
     ]
+
+
+def effects_text(resource: str, effects: Sequence["TakeEffect"]) -> Text:
+    """What taking a resource does to the missions, as the operator must know it before."""
+    text = Text()
+    for each in effects:
+        text.append(f"{each}.\n", "" if each.caught_by else "bold #e07a6a")
+    if not effects:
+        text.append(f"No mission is commanding {resource}.\n")
+    text.append("Until it is given back, tasks that need it fail: RESOURCE_UNAVAILABLE.")
+    return text
 
 
 def _who(holder: str, by: str, task: Callable[[str], str]) -> str:

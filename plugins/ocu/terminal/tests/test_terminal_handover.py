@@ -19,6 +19,9 @@ async def test_taking_a_vehicle_ends_what_it_did_and_says_who_has_it(world: Worl
         await terminal.press("t")
         await terminal.until_shown("1 scout  DRIVE", "2 uav  free", "3 uav/eye  free")
         await terminal.press("enter")
+        await terminal.until_shown("Take scout?", "r1: DRIVE ends with error TAKEN_OVER")
+        await terminal.until_shown("TAKEN_OVER is not", "handled: the mission will fail")
+        await terminal.press("y")
         await world.fake.until_called("cancel", "r1.b1")
         assert await holder(world) == "anna@gcs1"
         await terminal.until_shown("  with anna@gcs1", "DRIVE: error TAKEN_OVER", "FAILED")
@@ -29,6 +32,40 @@ async def test_taking_a_vehicle_ends_what_it_did_and_says_who_has_it(world: Worl
         await terminal.until_gone("  with anna@gcs1")
 
 
+async def test_no_digit_nor_enter_takes_a_vehicle_from_a_mission(world: World) -> None:
+    async with world.terminal() as terminal:
+        await world.start()
+        await terminal.until_shown("● DRIVE", "Is the gate open?")
+        await terminal.press("t")
+        await terminal.until_shown("1 scout  DRIVE")
+        await terminal.press("1")
+        await terminal.until_shown(
+            "Take scout?", "TAKEN_OVER is not", "handled: the mission will fail"
+        )
+        await terminal.press("1", "2", "9", "enter", "space", "t", "p")
+        await terminal.until_shown("Take scout?")
+        await terminal.press("escape")
+        await terminal.until_gone("Take scout?")
+        await terminal.until_shown("Is the gate open?", "RUNNING")
+        assert await holder(world) == "r1.b1"
+
+
+async def test_a_vehicle_whose_work_changed_while_it_was_asked_is_asked_again(world: World) -> None:
+    async with world.terminal() as terminal:
+        await world.start()
+        await world.fake.until_called("start", "r1.b1")
+        await terminal.until_shown("● DRIVE")
+        await terminal.press("t", "1")
+        await terminal.until_shown("the mission will fail")
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        await terminal.until_shown("✓ DRIVE")
+        await terminal.press("y")
+        await terminal.until_shown("No mission is commanding scout")
+        assert await holder(world) == ""
+        await terminal.press("y")
+        await terminal.until_shown("with anna@gcs1")
+
+
 async def test_choosing_what_one_has_gives_it_back(world: World) -> None:
     async with world.terminal() as terminal:
         await world.start()
@@ -36,10 +73,14 @@ async def test_choosing_what_one_has_gives_it_back(world: World) -> None:
         await terminal.press("t")
         await terminal.until_shown("3 uav/eye  free")
         await terminal.press("3")
+        await terminal.until_shown("No mission is commanding uav/eye")
+        await terminal.press("y")
         await terminal.until_shown("eye: with anna@gcs1")
         await terminal.press("t")
         await terminal.until_shown("3 uav/eye  anna@gcs1 (you)")
         await terminal.press("3")
+        await terminal.until_shown("Give back uav/eye?", "Missions may command it again")
+        await terminal.press("y")
         await terminal.until_shown("uav/eye given back by anna@gcs1")
         await terminal.until_gone("with anna@gcs1")
         assert await holder(world, "uav/eye") == ""
@@ -67,6 +108,8 @@ async def test_what_became_anothers_while_the_list_was_shown_is_left(world: Worl
         await world.control.take("scout", by="bob@gcs2")
         await world.control.take("uav", by="bob@gcs2")
         await terminal.press("1")
+        await terminal.until_shown("Give back scout?")
+        await terminal.press("y")
         await terminal.until_shown("Give back: scout is with bob@gcs2")
         assert await holder(world) == "bob@gcs2"
 
@@ -77,6 +120,8 @@ async def test_taking_what_another_took_meanwhile_is_refused(world: World) -> No
         await terminal.until_shown("1 scout  free")
         await world.control.take("scout", by="bob@gcs2")
         await terminal.press("1")
+        await terminal.until_shown("Take scout?")
+        await terminal.press("y")
         await terminal.until_shown("Take: scout is with bob@gcs2")
 
 
