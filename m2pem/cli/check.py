@@ -123,13 +123,19 @@ def _against_fleet(
 
 
 def _summary(mission: str, findings: list[Finding]) -> str:
-    errors = sum(finding.severity is Severity.ERROR for finding in findings)
-    warnings = len(findings) - errors
+    """How many findings each file has, the mission's own last."""
     if not findings:
         return f"{escaped(mission)}: nothing found"
+    files = sorted(dict.fromkeys(each.file for each in findings), key=lambda file: file == mission)
+    return "\n".join(_counts(file, findings) for file in files)
+
+
+def _counts(file: str, findings: list[Finding]) -> str:
+    own = [finding.severity is Severity.ERROR for finding in findings if finding.file == file]
+    errors = sum(own)
     counts = [
         f"{count} {word}{'' if count == 1 else 's'}"
-        for count, word in ((errors, "error"), (warnings, "warning"))
+        for count, word in ((errors, "error"), (len(own) - errors, "warning"))
         if count
     ]
-    return f"{escaped(mission)}: {', '.join(counts)}"
+    return f"{escaped(file)}: {', '.join(counts)}"

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -12,6 +13,8 @@ from m2pem.api.arbiter import (
     Connection,
     DetectingArbiter,
 )
+from m2pem.errors import FleetError
+from m2pem.findings import Finding
 from m2pem.model.behavior import BehaviorType
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
 from m2pem.model.geometry import Area
@@ -34,6 +37,15 @@ class ArbiterPlugins(Protocol):
         ...
 
 
+def _located(finding: Finding, fleet: Fleet) -> Finding:
+    """An arbiter's finding about "vehicle.connection.key", with the fleet's file and line."""
+    if finding.line:
+        return finding
+    resource = ResourceId(finding.element.partition(".")[0])
+    entry = fleet.vehicles.get(resource) or fleet.payloads.get(resource)
+    return replace(finding, file=fleet.file, line=entry.line if entry else 0)
+
+
 class FleetArbiters:
     """One object per registered name, built from the fleet. Building needs no connection.
 
@@ -42,6 +54,7 @@ class FleetArbiters:
 
     Raises:
         PluginError: the fleet names an arbiter that no plugin provides.
+        FleetError: an arbiter cannot use the settings of a resource.
     """
 
     def __init__(
@@ -91,9 +104,13 @@ class FleetArbiters:
             for name, group in connections.items()
             for connection in group.values()
         )
-        self.by_name: dict[str, Arbiter] = {
-            name: plugins.arbiter(name)(group, context) for name, group in connections.items()
-        }
+        try:
+            self.by_name: dict[str, Arbiter] = {
+                name: plugins.arbiter(name)(group, context) for name, group in connections.items()
+            }
+        except FleetError as error:
+            found = [_located(finding, fleet) for finding in error.findings]
+            raise FleetError(error.what, found) from error
         self._of: dict[ResourceId, Arbiter] = {
             resource: self.by_name[name]
             for name, group in connections.items()

@@ -58,6 +58,7 @@ from m2pem.model.values import Value
 from m2pem.plugins import PluginManager
 from m2pem.resources.allocation import spelled_out
 from m2pem.resources.availability import Availability
+from m2pem.resources.distance import NO_ORIGIN, geometry_out_of_reach
 from m2pem.resources.fleet import Fleet
 from m2pem.resources.geojson import GeometryError, parse_geojson
 from m2pem.resources.snapshot import dump
@@ -422,9 +423,12 @@ class Executive:
             OperatorError: it is no geometry that m2pem knows.
         """
         try:
-            parse_geojson(geometry)
+            parsed = parse_geojson(geometry)
         except GeometryError as error:
             raise OperatorError(f"geometry {name!r} {error}") from error
+        origin = self.fleet.origin
+        if origin != NO_ORIGIN and (wrong := geometry_out_of_reach(parsed, origin)):
+            raise OperatorError(f"geometry {name!r}: {wrong[0]}; {wrong[1]}")
         item = GeometrySet(name, dict(geometry), by)
         if run is None:
             self.handed_over[name] = HandedOver(dict(geometry), by, self.clock.now_us())

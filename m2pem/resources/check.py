@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from m2pem.findings import Finding, Severity
 from m2pem.model.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
-from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.model.catalogue import BehaviorSpec, ParameterKind, ResourceId
 from m2pem.model.elements import (
     Activity,
     ScriptTask,
@@ -21,9 +21,12 @@ from m2pem.resources.graph import Catalogue, ResourceGraph
 from m2pem.resources.nearmiss import did_you_mean
 from m2pem.resources.parameters import ParameterProblem, examine
 from m2pem.resources.team_needs import lacking
-from m2pem.resources.units import article
+from m2pem.resources.units import Dimension, UnitError, article, quantity
 
 DETECTOR_SERVICE = "Detector"
+
+FAST = 5
+"""A speed of more than so many times that at which the vehicle cruises is a finding."""
 
 
 def check_mission(
@@ -142,6 +145,9 @@ class _Check:
             )
         for taker in takers:
             self._check_parameters(behavior, taker, findings)
+        for role in matching:
+            for resource in resources_of(role, self.fleet):
+                self._check_speed(behavior, role, resource, findings)
 
     def _check_role_kinds(
         self, behavior: Behavior, filled: Sequence[Role], findings: TaskFindings
@@ -173,6 +179,34 @@ class _Check:
             message = f"{place(self.fleet, resource)} is manned and cannot be commanded"
             remedy = "a target may be manned, a role may not"
             findings.add("manned", message, remedy, line=role.line, role=role.name)
+
+    def _check_speed(
+        self, behavior: Behavior, role: Role, resource: ResourceId, findings: TaskFindings
+    ) -> None:
+        """A speed far beyond that at which a vehicle cruises is likely in another unit."""
+        vehicle = self.fleet.vehicles.get(resource)
+        spec = self.graph.spec(resource, behavior.name, behavior.type)
+        if vehicle is None or vehicle.cruise_speed_m_s is None or spec is None:
+            return
+        speeds = {each.name for each in spec.parameters if each.kind is ParameterKind.SPEED}
+        for parameter in behavior.parameters:
+            if parameter.name not in speeds or not isinstance(parameter.value, str):
+                continue
+            try:
+                speed = quantity(parameter.value, Dimension.SPEED)
+            except UnitError:
+                continue  # a finding of its own
+            if speed > FAST * vehicle.cruise_speed_m_s:
+                findings.add(
+                    "fast",
+                    f"parameter '{parameter.name}': {speed:g} m/s is more than {FAST} times the "
+                    f"{vehicle.cruise_speed_m_s:g} m/s at which {place(self.fleet, resource)} "
+                    "cruises",
+                    "is the unit right?",
+                    line=parameter.line,
+                    role=role.name,
+                    severity=Severity.WARNING,
+                )
 
     def _not_offered(self, behavior: Behavior, resource: ResourceId) -> tuple[str, str, str]:
         """Message, remedy and rule for a behavior that a resource does not take."""

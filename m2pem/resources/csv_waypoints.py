@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from io import StringIO
 
 from m2pem.model.geometry import Area, Coordinate, Point, Route
-from m2pem.resources.geojson import ALTITUDE_FRAMES, GeometryError, coordinate
+from m2pem.resources.geojson import ALTITUDE_FRAMES, GeometryError, checked, coordinate
 from m2pem.resources.nearmiss import suggest
 from m2pem.resources.units import UNITS, Dimension
 
@@ -153,5 +153,5 @@ def _geometry(positions: list[Coordinate], frame: str, kind: str) -> Point | Rou
         ring = positions if positions[0][:2] == positions[-1][:2] else [*positions, positions[0]]
         if len({corner[:2] for corner in ring}) < 3:
             raise GeometryError("an area has at least three different corners")
-        return Area((tuple(ring),), frame)
+        return Area(checked((tuple(ring),)), frame)
     return Route(tuple(positions), frame)

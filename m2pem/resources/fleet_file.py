@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from m2pem.errors import FleetError
 from m2pem.model.catalogue import ResourceId
 from m2pem.model.geometry import Area, Coordinate, Geometry, Point, Route
+from m2pem.resources.distance import NO_ORIGIN, Origin, geometry_out_of_reach
 from m2pem.resources.fleet import Domain, Fleet, LostMemberPolicy, Payload, Team, Vehicle
 from m2pem.resources.fleet_schema import DeconflictionModel, FleetModel, VehicleModel
 from m2pem.resources.geofiles import GeometryError, read_geometry
@@ -43,6 +44,8 @@ def load_fleet(path: str | Path) -> Fleet:
         _check_teams(source)
         geometries = _read_geometries(source, path.parent)
         _check_fence(source)
+        if model is not None:
+            _check_distances(source, model, geometries)
     if source.findings or model is None:
         findings = sorted(source.findings, key=lambda finding: finding.line)
         raise FleetError(f"{path} cannot be used as a fleet", findings)
@@ -102,6 +105,18 @@ def _check_fence(source: YamlSource) -> None:
     if isinstance(fence, str) and fence not in source.mapping("areas"):
         hint = suggest(fence, source.mapping("areas"), "areas")
         source.error(("fence",), "unknown-area", f"no area is named '{fence}'", hint)
+
+
+def _check_distances(
+    source: YamlSource, model: FleetModel, geometries: dict[str, Geometry]
+) -> None:
+    origin = _origin(model, geometries)
+    for section in _GEOMETRY_KINDS:
+        for name in source.mapping(section):
+            geometry = geometries.get(name)
+            if geometry and (wrong := geometry_out_of_reach(geometry, origin)):
+                file = source.mapping(section)[name]
+                source.error((section, name), "out-of-reach", f"{file}: {wrong[0]}", wrong[1])
 
 
 def _read_geometries(source: YamlSource, folder: Path) -> dict[str, Geometry]:
@@ -184,13 +199,13 @@ def _names(names: list[str] | None) -> tuple[str, ...] | None:
     return None if names is None else tuple(names)
 
 
-def _origin(model: FleetModel, geometries: dict[str, Geometry]) -> tuple[float, float, float]:
+def _origin(model: FleetModel, geometries: dict[str, Geometry]) -> Origin:
     if model.origin is not None:
         return (model.origin.lat, model.origin.lon, model.origin.alt)
     for geometry in geometries.values():
         latitude, longitude, _ = _first_position(geometry)
         return (latitude, longitude, 0.0)
-    return (0.0, 0.0, 0.0)
+    return NO_ORIGIN
 
 
 def _first_position(geometry: Geometry) -> Coordinate:

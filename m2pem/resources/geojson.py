@@ -11,6 +11,7 @@ from typing import Any
 from m2pem.errors import M2pemError
 from m2pem.model.geometry import Area, Coordinate, Geometry, Point, Route
 from m2pem.resources.nearmiss import suggest
+from m2pem.resources.rings import ring_problem
 
 ALTITUDE_FRAMES = ("relative", "amsl", "terrain")
 
@@ -80,7 +81,7 @@ def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Ar
         if not isinstance(coordinates, list | tuple) or not coordinates:
             raise GeometryError("coordinates: a Polygon is a list of rings")
         rings = tuple(_ring(ring, f"coordinates[{i}]") for i, ring in enumerate(coordinates))
-        return Area(rings, altitude_frame)
+        return Area(checked(rings), altitude_frame)
     hint = suggest(str(kind), _TYPES, "types")
     raise GeometryError(f"GeoJSON type {kind!r} is not a route, area or point; {hint}")
 
@@ -108,6 +109,17 @@ def _ring(value: object, where: str) -> tuple[Coordinate, ...]:
     if len({corner[:2] for corner in ring}) < 3:
         raise GeometryError(f"{where}: a ring has at least three different corners")
     return ring
+
+
+def checked(rings: tuple[tuple[Coordinate, ...], ...]) -> tuple[tuple[Coordinate, ...], ...]:
+    """The closed rings of an area.
+
+    Raises:
+        GeometryError: an edge crosses another or the antimeridian, or a hole lies outside.
+    """
+    if problem := ring_problem(rings):
+        raise GeometryError(problem)
+    return rings
 
 
 def _positions(value: object, where: str, minimum: int) -> tuple[Coordinate, ...]:

@@ -2,16 +2,10 @@
 
 import json
 import math
-from typing import TypeAlias
 
 from m2pem.model.geometry import Point
+from m2pem.resources.distance import Origin
 from m2pem.resources.geojson import GeometryError
-
-Origin: TypeAlias = tuple[float, float, float]
-"""Latitude and longitude in degrees, altitude in metres above mean sea level."""
-
-NO_ORIGIN: Origin = (0.0, 0.0, 0.0)
-"""Of a fleet that gives none."""
 
 FARTHEST_M = 1_000_000.0
 _PREFIX = "enu"

@@ -14,8 +14,9 @@ from m2pem.model.catalogue import BehaviorSpec, ParameterKind, ParameterSpec
 from m2pem.model.geometry import Geometry, Point, VehiclePosition
 from m2pem.model.values import Value
 from m2pem.resources.behaviors import ALTITUDE_FRAME, takes_altitude
+from m2pem.resources.distance import NO_ORIGIN, Origin, out_of_reach
 from m2pem.resources.geojson import GeometryError, coordinate, kind_of
-from m2pem.resources.local_positions import NO_ORIGIN, Origin, is_local, local_point
+from m2pem.resources.local_positions import is_local, local_point
 from m2pem.resources.nearmiss import did_you_mean, suggest
 from m2pem.resources.offsets import REMEDY, read_offsets
 from m2pem.resources.units import UNITS, Dimension, UnitError, article, plain_number, quantity
@@ -226,9 +227,13 @@ class _Reader:
         frame = self.frame if isinstance(self.frame, str) else "relative"
         altitude = value[2] if len(value) == 3 else None
         try:
-            return Point(coordinate(value[0], value[1], altitude, "position"), frame)
+            place = coordinate(value[0], value[1], altitude, "position")
         except GeometryError as error:
             raise _ProblemError("bad-value", str(error)) from None
+        origin = self.origin or NO_ORIGIN
+        if origin != NO_ORIGIN and (wrong := out_of_reach(place, origin)):
+            raise _ProblemError("out-of-reach", *wrong)
+        return Point(place, frame)
 
     def _vehicle(self, value: Value) -> VehiclePosition:
         if isinstance(value, str) and value in self.vehicles:

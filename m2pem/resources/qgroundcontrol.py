@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from m2pem.model.geometry import Area, Coordinate, Route
-from m2pem.resources.geojson import GeometryError, coordinate
+from m2pem.resources.geojson import GeometryError, checked, coordinate
 
 _PLACE_COMMANDS = frozenset({16, 17, 18, 19, 21, 22, 31, 82, 84, 85})
 """MAV_CMD_NAV_: waypoint, loiter (three kinds), land, takeoff, loiter to altitude, spline, VTOL."""
@@ -72,7 +72,7 @@ def _plan_area(plan: Mapping[str, Any], items: Sequence[Mapping[str, Any]]) -> A
     if not isinstance(corners, list) or len(corners) < 3:
         raise GeometryError(f"{where}: at least three corners are expected")
     ring = tuple(_corner(corner, f"{where}[{index}]") for index, corner in enumerate(corners))
-    return Area(((*ring, ring[0]),))
+    return Area(checked(((*ring, ring[0]),)))
 
 
 def _corner(value: object, where: str) -> Coordinate:

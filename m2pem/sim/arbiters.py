@@ -63,7 +63,8 @@ class SimArbiter:
         now_us = context.clock.now_us()
         self._frame = frame = Frame(context.origin)
         self._settings = {
-            resource: read_settings(connection) for resource, connection in connections.items()
+            resource: read_settings(connection, context.origin)
+            for resource, connection in connections.items()
         }
         self._bodies: dict[ResourceId, Body] = {}
         for resource, connection in connections.items():

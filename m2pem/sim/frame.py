@@ -10,10 +10,8 @@ in a rehearsal of hours, and an array library takes some twenty times as long fo
 import math
 
 from m2pem.api.telemetry import GeoPosition
+from m2pem.resources.distance import MAX_RANGE_M
 from m2pem.sim.phases import Vector
-
-MAX_RANGE_M = 500_000.0
-"""Farther from the origin the plane is no longer a picture of the Earth."""
 
 _MEAN_RADIUS_M = 6_371_000.0
 _SEMI_MAJOR_M = 6_378_137.0

@@ -14,6 +14,7 @@ from m2pem.api.arbiter import Connection
 from m2pem.errors import FleetError
 from m2pem.findings import Finding, Severity
 from m2pem.model.catalogue import ResourceId
+from m2pem.resources.distance import NO_ORIGIN, Origin, out_of_reach
 from m2pem.resources.units import Dimension, quantity
 from m2pem.sim.domains import DEFAULTS, Kinematics
 from m2pem.sim.faults import FAULT_KINDS, Fault
@@ -97,13 +98,13 @@ _GIMBAL = {
 _MAY_BE_ZERO = {"turn_radius", "climb_rate", "default_altitude", "tilt_low", "tilt_high", "shutter"}
 
 
-def read_settings(connection: Connection) -> Settings:
-    """Read the settings of one resource.
+def read_settings(connection: Connection, origin: Origin) -> Settings:
+    """Read the settings of one resource; positions must be near the fleet's `origin`.
 
     Raises:
         FleetError: with every value that cannot be used.
     """
-    reader = _Reader(connection)
+    reader = _Reader(connection, origin)
     default = DEFAULTS.get(connection.domain, DEFAULTS["ground"])
     said = {"cruise_speed_m_s": connection.cruise_speed_m_s, "endurance_s": connection.endurance_s}
     default = dataclasses.replace(default, **{key: v for key, v in said.items() if v is not None})
@@ -136,8 +137,9 @@ def own_faults(resource: ResourceId, known: Mapping[ResourceId, Settings]) -> Se
 class _Reader:
     """Reads values and gathers what is wrong with them."""
 
-    def __init__(self, connection: Connection) -> None:
+    def __init__(self, connection: Connection, origin: Origin) -> None:
         self._connection = connection
+        self._origin = origin
         own = connection.settings.get("sim")
         self._settings = own if isinstance(own, Mapping) else connection.settings
         self._findings: list[Finding] = []
@@ -147,11 +149,19 @@ class _Reader:
             what = f"{self._connection.resource} cannot be simulated"
             raise FleetError(what, self._findings)
 
-    def wrong(self, key: str, problem: object) -> None:
+    def wrong(self, key: str, problem: object, remedy: str = "") -> None:
         element = f"{self._connection.resource}.connection.{key}"
+        rule = "bad-simulation-setting"
         self._findings.append(
-            Finding(Severity.ERROR, "fleet", 0, element, "bad-simulation-setting", str(problem))
+            Finding(Severity.ERROR, "fleet", 0, element, rule, str(problem), remedy)
         )
+
+    def near(self, key: str, place: Coordinates | None) -> None:
+        """Note a position that is too far from the fleet's origin."""
+        if place is not None and (wrong := out_of_reach(place, self._origin)):
+            if self._origin == NO_ORIGIN:
+                wrong = ("the fleet has no origin", "set the fleet's `origin` near its vehicles")
+            self.wrong(key, *wrong)
 
     def numbers(self, keys: Mapping[str, tuple[str, Dimension | None]]) -> dict[str, float]:
         found = {}
@@ -217,10 +227,12 @@ class _Reader:
         if value is None:
             return None
         try:
-            return _coordinates(value)
+            place = _coordinates(value)
         except ValueError as error:
             self.wrong(key, error)
             return None
+        self.near(key, place)
+        return place
 
     def items(self, key: str, read: Any) -> tuple[Any, ...]:
         value = self._settings.get(key)
@@ -236,6 +248,7 @@ class _Reader:
                 continue
             try:
                 found.append(read(item))
+                self.near(f"{key}[{index}].position", getattr(found[-1], "position", None))
             except KeyError as error:
                 self.wrong(f"{key}[{index}]", f"{error} is missing")
             except ValueError as error:

@@ -1,8 +1,10 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from tests.cli.conftest import Invoke
-from tests.command_line import FLEET, REPOSITORY
+from tests.command_line import FLEET, MISSION, REPOSITORY
 
 
 def test_a_fleet_is_shown(invoke: Invoke) -> None:
@@ -50,3 +52,42 @@ def test_what_is_wrong_with_a_fleet_is_listed(invoke: Invoke, tmp_path: Path) ->
 def test_a_fleet_must_be_named(invoke: Invoke) -> None:
     assert invoke("fleet")[0] == 2
     assert invoke("fleet", "sim")[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("home", "message"),
+    [
+        ("[9.97, 153.54]", "the fleet's `origin` near its vehicles"),
+        ("[-77.319291, 38.107455]", "are latitude and longitude swapped?"),
+        ("[38.107455, 253.54]", "is not a position"),
+    ],
+)
+def test_a_vehicle_whose_home_is_far_from_the_origin_is_a_fault_of_the_fleet(
+    invoke: Invoke, tmp_path: Path, home: str, message: str
+) -> None:
+    fleet = tmp_path / "fleet.yaml"
+    fleet.write_text(
+        "version: 1\norigin: {lat: 38.1075, lon: -77.3192}\nvehicles:\n"
+        f"  evsg1: {{domain: ground, arbiter: sim, connection: {{home: {home}}}}}\n"
+    )
+    mission = tmp_path / "mission.bpmn"
+    mission.write_bytes(MISSION.read_bytes())
+    where = f"{fleet}:4: evsg1.connection.home: error: "
+    journal = tmp_path / "journal.db"
+    for command in (("fleet", fleet), ("run", mission, "--fleet", fleet, "--journal", journal)):
+        status, _, err = invoke(*command)
+        assert (status, "bug" in err, where in err, message in err) == (2, False, True, True), err
+    status, out, _ = invoke("check", mission, "--fleet", fleet)
+    assert status == 2
+    assert where in out
+    assert out.splitlines()[-1].startswith(f"{fleet}: 1 error"), out
+    assert "mission.bpmn: 1 error" not in out
+
+
+def test_a_fleet_without_an_origin_is_asked_for_one(invoke: Invoke, tmp_path: Path) -> None:
+    fleet = tmp_path / "fleet.yaml"
+    settings = "{domain: ground, arbiter: sim, connection: {home: [38.1, -77.3]}}"
+    fleet.write_text(f"version: 1\nvehicles:\n  evsg1: {settings}\n")
+    status, _, err = invoke("fleet", fleet)
+    assert status == 2
+    assert "set the fleet's `origin` near its vehicles" in err

@@ -34,7 +34,7 @@ points: {gate: gate.geojson}
 """
 
 LINE = {"type": "LineString", "coordinates": [[-77.0, 38.0], [-77.1, 38.1, 5]]}
-SQUARE = {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]]]}
+SQUARE = {"type": "Polygon", "coordinates": [[[-77, 38], [-76, 38], [-76, 39], [-77, 38]]]}
 POINT = {"type": "Point", "coordinates": [-77.0, 38.0]}
 
 

@@ -248,3 +248,13 @@ def test_a_problem_that_two_vehicles_share_is_told_once(fleet: Fleet) -> None:
 def test_findings_come_in_the_order_of_the_mission(fleet: Fleet) -> None:
     findings = check(fleet, drive(vehicle("evsg9")), drive(vehicle("evsg1"), speed="1 m/s"))
     assert [f.element for f in findings] == ["DriveRoute", "Task2"]
+
+
+def test_a_speed_far_beyond_that_of_cruising_is_doubtful(tmp_path: Path) -> None:
+    slow = PATROL.replace("  evsg1:\n", "  evsg1:\n    cruise_speed: 2 m/s\n")
+    fleet = patrol(tmp_path, slow)
+    finding = only(check(fleet, drive(vehicle("evsg1"), route="alpha", speed="2000 m/s")))
+    assert (finding.rule, finding.severity) == ("fast", Severity.WARNING)
+    assert "2000 m/s is more than 5 times the 2 m/s at which evsg1" in finding.message
+    assert check(fleet, drive(vehicle("evsg1"), route="alpha", speed="10 m/s")) == []
+    assert check(fleet, drive(vehicle("evsg3"), route="alpha", speed="2000 m/s")) == []

@@ -10,9 +10,11 @@ from m2pem.model.catalogue import ResourceId
 from m2pem.sim.faults import Fault
 from m2pem.sim.settings import PlannedDetection, Settings, Target, read_settings
 
+ORIGIN = (38.1, -77.3, 0.0)
+
 
 def read(domain: str = "ground", **settings: Any) -> Settings:
-    return read_settings(Connection(ResourceId("v"), domain, settings))
+    return read_settings(Connection(ResourceId("v"), domain, settings), ORIGIN)
 
 
 def test_units_are_read_and_the_rest_is_the_domains_own() -> None:
@@ -26,9 +28,9 @@ def test_units_are_read_and_the_rest_is_the_domains_own() -> None:
 
 def test_what_the_fleet_says_of_a_vehicle_holds_unless_its_simulation_says_otherwise() -> None:
     said = Connection(ResourceId("v"), "ground", cruise_speed_m_s=2.0, endurance_s=600.0)
-    kinematics = read_settings(said).kinematics
+    kinematics = read_settings(said, ORIGIN).kinematics
     assert (kinematics.cruise_speed_m_s, kinematics.endurance_s) == (2.0, 600.0)
-    own = read_settings(replace(said, settings={"cruise_speed": 3.0})).kinematics
+    own = read_settings(replace(said, settings={"cruise_speed": 3.0}), ORIGIN).kinematics
     assert (own.cruise_speed_m_s, own.endurance_s) == (3.0, 600.0)
 
 
