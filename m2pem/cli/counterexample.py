@@ -80,7 +80,7 @@ def _read(file: Path) -> dict[str, Any]:
         report = json.loads(file.read_bytes())
     except OSError as error:
         raise UnusableError(f"{file} cannot be read: {error.strerror}") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise UnusableError(f"{file} is no JSON: {error}") from error
     if not isinstance(report, dict) or report.get("version") not in VERSIONS:
         raise UnusableError(

@@ -67,7 +67,7 @@ def result_of(answer: bytes) -> Any:
         raise ControlSocketError("the executive closed the connection; has it just ended?")
     try:
         response = msgspec.json.decode(answer, type=Response)
-    except msgspec.MsgspecError as error:
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
         raise ControlSocketError(f"the executive answered what is no JSON-RPC: {error}") from error
     if isinstance(response.error, Fault):
         fault = response.error

@@ -88,9 +88,9 @@ class ControlSocket:
             if not is_same_user(writer.get_extra_info("socket")):
                 log.warning("a process of another user was turned away")
                 return
-            while message := await reader.readline():
+            while message := await _next_line(reader, writer):
                 await self._answer(message, reader, writer)
-        except (OSError, ValueError) as error:  # hung up, or a line without an end
+        except OSError as error:
             log.debug("a caller is gone: %s", error)
         except asyncio.CancelledError:
             pass  # the executive ends
@@ -106,8 +106,9 @@ class ControlSocket:
         except msgspec.ValidationError as error:
             await _send(writer, _refusal(None, Code.INVALID_REQUEST, str(error)))
             return
-        except msgspec.DecodeError as error:
-            await _send(writer, _refusal(None, Code.PARSE_ERROR, str(error)))
+        except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
+            reason = "nested too deep" if isinstance(error, RecursionError) else str(error)
+            await _send(writer, _refusal(None, Code.PARSE_ERROR, f"this is no JSON: {reason}"))
             return
         number = None if request.id is msgspec.UNSET else request.id
         if request.method in STREAMS:
@@ -161,6 +162,16 @@ class ControlSocket:
             sending.cancel()
             await asyncio.gather(hung_up, sending, return_exceptions=True)
             writer.close()
+
+
+async def _next_line(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bytes:
+    """The next message; b"" at the end, also after one that is too long."""
+    try:
+        return await reader.readline()
+    except ValueError:  # what has come of the line is lost, and where the next begins not known
+        reason = f"a message is longer than {LONGEST_LINE_BYTES:,} bytes"
+        await _send(writer, _refusal(None, Code.INVALID_REQUEST, reason))
+        return b""
 
 
 async def _send_all(method: str, stream: Any, writer: asyncio.StreamWriter) -> None:

@@ -42,7 +42,7 @@ from m2pem.journal.mission import mission_of
 from m2pem.model.catalogue import BehaviorSpec, ResourceId
 from m2pem.model.events import Signal
 from m2pem.model.mission import Mission
-from m2pem.model.values import Value
+from m2pem.model.values import MAX_DEPTH, Value, is_too_deep
 from m2pem.resources.fleet import Fleet
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class Control:
         by: str = "",
     ) -> RunId:
         """Start a mission; returns when its beginning is in the journal."""
-        return await self._executive.start(mission, process, data, by)
+        return await self._executive.start(mission, process, _bounded(data), by)
 
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
         """End every token, cancel every behavior."""
@@ -102,6 +102,7 @@ class Control:
         by: str = "",
     ) -> None:
         """Emit a signal to one run or to all that are active."""
+        given = _bounded(data)
         runners = (
             [self._executive.runner(run)]
             if run is not None
@@ -129,13 +130,13 @@ class Control:
                 )
         for runner, ids in meant:
             for key in ids:
-                await self._ask(runner.id, i.SignalReceived(key, dict(data or {}), by))
+                await self._ask(runner.id, i.SignalReceived(key, given, by))
 
     async def message(
         self, message: str, *, run: RunId, data: Mapping[str, Value] | None = None, by: str = ""
     ) -> None:
         """Send a message."""
-        await self._ask(run, i.MessageReceived(message, dict(data or {}), by))
+        await self._ask(run, i.MessageReceived(message, _bounded(data), by))
 
     async def answer(self, run: RunId, prompt: str, decision: str, *, by: str = "") -> None:
         """Answer a prompt; the first answer wins."""
@@ -147,7 +148,7 @@ class Control:
         self, name: str, geometry: Mapping[str, Value], *, run: RunId | None = None, by: str = ""
     ) -> None:
         """Hand over a route, area or point (GeoJSON)."""
-        self._executive.set_geometry(name, geometry, run, by)
+        self._executive.set_geometry(name, _bounded(geometry), run, by)
 
     async def take(self, resource: str, *, by: str = "") -> None:
         """Take a vehicle or payload from the missions."""
@@ -337,6 +338,14 @@ class Control:
     def services(self) -> Mapping[str, Sequence[str]]:
         """The service-task classes that there are, with what each writes."""
         return self._executive.plugins.service_writes()
+
+
+def _bounded(data: Mapping[str, Value] | None) -> dict[str, Value]:
+    """Data from outside, not nested deeper than the engine and the journal can take."""
+    for name, value in (data or {}).items():
+        if is_too_deep(value, MAX_DEPTH - 1):
+            raise OperatorError(f"{name!r} is nested deeper than {MAX_DEPTH} levels")
+    return dict(data or {})
 
 
 def _named(name: str, signals: Mapping[str, Signal]) -> list[str]:

@@ -12,3 +12,21 @@ else:
 
 ReadValue: TypeAlias = Callable[[str], Value]
 """Reads the value under a dotted name; a name that is not in the store is None (null)."""
+
+MAX_DEPTH = 50
+"""Levels of lists and maps in each other. Deeper values could not be written to a journal."""
+
+
+def is_too_deep(value: Value, levels: int = MAX_DEPTH) -> bool:
+    """Whether lists and maps are nested deeper than `levels`."""
+    layer = [value]
+    for _ in range(levels + 1):
+        containers = [each for each in layer if isinstance(each, list | dict)]
+        if not containers:
+            return False
+        layer = [
+            inner
+            for each in containers
+            for inner in (each.values() if isinstance(each, dict) else each)
+        ]
+    return True

@@ -16,11 +16,10 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from m2pem.findings import Finding, Severity
-from m2pem.model.values import Value
+from m2pem.model.values import MAX_DEPTH, Value
 
 MAX_BYTES = 2_000_000
 MAX_VALUES = 200_000
-MAX_DEPTH = 50
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 """Keys and list indices from the root of the file to a value."""

@@ -16,6 +16,8 @@ from m2pem.control_socket.place import address, live_sockets
 from m2pem.control_socket.server import ControlSocket
 from tests.control_socket.conftest import Served
 
+NESTED = b'{"jsonrpc": "2.0", "params": {"a": ' + b"[" * 100_000 + b"]" * 100_000 + b"}}"
+
 
 async def exchange(path: Path, *lines: bytes) -> list[dict[str, Any]]:
     """Send lines, then hang up; returns all that was answered."""
@@ -30,6 +32,13 @@ async def exchange(path: Path, *lines: bytes) -> list[dict[str, Any]]:
 
 def call(method: str, **params: Any) -> bytes:
     return json.dumps({"jsonrpc": "2.0", "id": 7, "method": method, "params": params}).encode()
+
+
+def nested(levels: int) -> Any:
+    value: Any = []
+    for _ in range(levels - 1):
+        value = [value]
+    return value
 
 
 async def test_only_the_owner_may_use_the_socket(served: Served) -> None:
@@ -53,6 +62,10 @@ async def test_a_notification_is_carried_out_and_not_answered(served: Served) ->
     ("line", "code", "says"),
     [
         (b"{", -32700, ""),
+        (NESTED, -32700, "nested too deep"),
+        (b'{"jsonrpc": "2.0", "method": "\xff"}', -32700, "utf-8"),
+        (call("signal", id="go", data={"a": nested(60)}), -32000, "'a' is nested deeper than 50"),
+        (call("set_geometry", name="a", geometry={"b": nested(500)}), -32000, "nested deeper"),
         (b"[]", -32600, "object"),
         (b'{"jsonrpc": "2.0"}', -32600, "method"),
         (call("jump"), -32601, "known: answer"),
@@ -70,9 +83,20 @@ async def test_what_is_wrong_is_said(served: Served, line: bytes, code: int, say
     assert says in answer["error"]["message"]
 
 
-async def test_one_wrong_line_does_not_end_the_connection(served: Served) -> None:
-    answers = await exchange(served.path, b"nonsense", call("runs"))
+@pytest.mark.parametrize("wrong", [b"nonsense", NESTED, b'{"method": "\xff"}'])
+async def test_a_wrong_line_is_answered_and_the_next_one_too(served: Served, wrong: bytes) -> None:
+    answers = await exchange(served.path, wrong, call("runs"))
     assert ["error" in answer for answer in answers] == [True, False]
+
+
+async def test_a_line_without_an_end_is_answered(
+    served: Served, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "LONGEST_LINE_BYTES", 1000)
+    async with ControlSocket(served.control, tmp_path / "other.db") as second:
+        assert second.path is not None
+        [answer] = await exchange(second.path, b"x" * 5000)
+    assert "longer than 1,000 bytes" in answer["error"]["message"]
 
 
 async def test_a_process_of_another_user_is_turned_away(

@@ -362,3 +362,60 @@ async def test_a_request_that_is_none_is_refused(world: MakeWorld) -> None:
             plain.sendall(b"\x16\x03\x01\x02\x00 not http at all\r\n\r\n")
             answer = await asyncio.to_thread(plain.recv, 100)
         assert b" 400 " in answer
+
+
+# --- bodies that are nested too deep, or no text ------------------------------------------------
+
+NESTED = b"[" * 100_000 + b"]" * 100_000
+DEEP = b"[" * 500 + b"]" * 500
+BODIES = (
+    NESTED,
+    b'{"data": {"a": ' + NESTED + b"}}",
+    b'{"a": "\xff"}',
+    b'{"geometry": ' + DEEP + b"}",
+)
+
+
+async def test_every_route_refuses_a_body_that_is_nested_too_deep(world: MakeWorld) -> None:
+    async with world() as here:
+        browser = await here.browser()
+        paths = (await browser.http.get("/api/openapi.json")).json()["paths"]
+        routes = [
+            (method, path.replace("{run}", "r1").replace("{name}", "x"))
+            for path, methods in paths.items()
+            for method, route in methods.items()
+            if "requestBody" in route
+        ]
+        assert len(routes) > 5
+        for method, path in routes:
+            for body in BODIES:
+                answer = await browser.http.request(
+                    method, path, content=body, headers={"Content-Type": "application/json"}
+                )
+                assert 400 <= answer.status_code < 500, (method, path, body[:30], answer.text)
+                assert answer.headers["content-type"] == "application/problem+json"
+        assert (await browser.http.get("/api/session")).status_code == 200
+
+
+async def test_data_and_geometries_that_are_nested_too_deep_are_refused(world: MakeWorld) -> None:
+    async with world() as here:
+        browser = await here.browser()
+        deep = (
+            b'{"geometry": {"type": "Point", "coordinates": [9, 53], "properties": ' + DEEP + b"}}"
+        )
+        answer = await browser.http.put(
+            "/api/geometries/x", content=deep, headers={"Content-Type": "application/json"}
+        )
+        assert answer.status_code in (409, 422), answer.text
+        assert "nested" in answer.json()["detail"]
+
+
+async def test_a_websocket_message_that_is_nested_too_deep_ends_that_socket_alone(
+    world: MakeWorld,
+) -> None:
+    async with world() as here:
+        browser = await here.browser()
+        live, other = await browser.live(), await browser.live()
+        await live.socket.send('{"x": ' + "[" * 1500 + "]" * 1500 + "}")
+        assert await live.until_closed() == MALFORMED
+        assert await other.watch(None)

@@ -129,7 +129,7 @@ async def _listen(socket: WebSocket, hub: Hub, viewer: Viewer) -> None:
             raise _Leave(FLOOD, "too many messages")
         try:
             said = _decoder.decode(text)
-        except (msgspec.DecodeError, UnicodeError) as error:
+        except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
             raise _Leave(MALFORMED, "not a message of this protocol") from error
         match said:
             case _Ack(seq=seq):
