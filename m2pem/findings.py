@@ -50,6 +50,15 @@ class Finding:
         return f"{where}:{element} {self.severity.value}: {_line(self.message)}{remedy} {rule}"
 
 
+def unreadable_remedy(error: OSError) -> str:
+    """What helps against an error of reading a file."""
+    if isinstance(error, IsADirectoryError):
+        return "this is a folder: name a file in it"
+    if isinstance(error, PermissionError):
+        return "check its owner and its permissions"
+    return "check the path"
+
+
 def _line(text: str) -> str:
     """The text on one line that can be read: it may quote whatever stands in a file."""
     line = escaped(" ".join(text.splitlines()))

@@ -53,6 +53,9 @@ _HOOKS = {
 }
 _CHECK = "m2pem_check_mission"
 _OBSERVE = "m2pem_records_committed"
+PUBLISHED = ("mavlink", "mocu", "ptz", "ros", "terminal", "web")
+"""What the plugins of m2pem itself are called, installed or not."""
+
 
 _logger = logging.getLogger(__name__)
 
@@ -215,8 +218,13 @@ class PluginManager:
         parts = [f"there is no {kind} {name!r}; known: {', '.join(sorted(offers)) or 'none'}"]
         if near := difflib.get_close_matches(name, offers, n=1):
             parts.append(f"did you mean {near[0]!r}?")
-        if kind in ("arbiter", "ocu") and re.fullmatch(r"[a-z][a-z0-9_-]*", name):
-            parts.append(f"if a plugin has it: pip install m2pem-plugin-{canonical(name)}")
+        elif kind in ("arbiter", "ocu") and re.fullmatch(r"[a-z][a-z0-9_-]*", name):
+            known = difflib.get_close_matches(canonical(name), PUBLISHED, n=1)
+            parts.append(
+                f"{known[0]!r} is in a plugin: pip install m2pem-plugin-{known[0]}"
+                if known
+                else "is the plugin that has it installed?"
+            )
         if broken:
             parts.append(f"or it belongs to one that was not loaded: {'; '.join(map(str, broken))}")
         return PluginError("; ".join(parts))

@@ -471,7 +471,7 @@ def test_an_unknown_arbiter_is_an_error_that_says_what_there_is_and_where_to_get
         manager().arbiter("mavlink")
     assert str(raised.value) == (
         "there is no arbiter 'mavlink'; known: boat, car; "
-        "if a plugin has it: pip install m2pem-plugin-mavlink"
+        "'mavlink' is in a plugin: pip install m2pem-plugin-mavlink"
     )
 
 
@@ -552,3 +552,16 @@ def test_every_hook_is_documented_with_its_arguments() -> None:
     assert missing == [], "hooks that docs/plugins.md does not describe"
     described = set(re.findall(r"\bm2pem_[a-z]+_[a-z]+(?=\()", text))
     assert described <= set(hooks), "docs/plugins.md describes hooks that do not exist"
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("mavlnk", "'mavlink' is in a plugin: pip install m2pem-plugin-mavlink"),
+        ("boat", "is the plugin that has it installed?"),
+    ],
+)
+def test_a_misspelled_plugin_is_not_recommended(name: str, hint: str) -> None:
+    error = str(PluginManager(block=("all",)).unknown("arbiter", name))
+    assert hint in error
+    assert f"m2pem-plugin-{name}" not in error

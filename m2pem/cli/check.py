@@ -49,7 +49,7 @@ def check(
     """Check a mission file, alone or against a fleet.
 
     Prints every finding. Ends with 0 if none is an error, with 1 if one is, and with 2 if the
-    mission is no BPMN at all or the fleet cannot be used.
+    mission is no BPMN at all, it has no such process, or the fleet cannot be used.
     """
     findings, unusable = _check(mission, fleet_file, process, search_path, data)
     if output == "json":
@@ -84,6 +84,7 @@ def _check(
         unusable = any(finding.rule in NO_BPMN_RULES for finding in error.findings)
     try:
         findings += _against_fleet(mission, fleet_file, process, data)
+        unusable |= any(finding.rule == "unknown-process" for finding in findings)
     except FleetError as error:
         findings += error.findings
         unusable = True

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from m2pem.cli.options import UnusableError
+from m2pem.findings import unreadable_remedy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -79,7 +80,8 @@ def _read(file: Path) -> dict[str, Any]:
     try:
         report = json.loads(file.read_bytes())
     except OSError as error:
-        raise UnusableError(f"{file} cannot be read: {error.strerror}") from error
+        remedy = unreadable_remedy(error)
+        raise UnusableError(f"{file} cannot be read: {error.strerror}; {remedy}") from error
     except (ValueError, RecursionError) as error:
         raise UnusableError(f"{file} is no JSON: {error}") from error
     if not isinstance(report, dict) or report.get("version") not in VERSIONS:

@@ -83,13 +83,19 @@ def _read_data(_: click.Context, __: click.Parameter, words: tuple[str, ...]) ->
     return data
 
 
-data_option = click.option(
-    "--data",
-    metavar="NAME=VALUE",
-    multiple=True,
-    callback=_read_data,
-    help="Data that the mission starts with; the value is YAML 1.2. Can be given again.",
-)
+def _data_option(data: str) -> Callable[[F], F]:
+    return click.option(
+        "--data",
+        metavar="NAME=VALUE",
+        multiple=True,
+        callback=_read_data,
+        help=f"Data that {data}; the value is YAML 1.2. Can be given again.",
+    )
+
+
+data_option = _data_option("the mission starts with")
+
+signal_data_option = _data_option("the signal brings")
 
 path_option = click.option(
     "--path",

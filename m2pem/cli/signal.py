@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from m2pem.cli.options import data_option, example, journal_option, run_argument
+from m2pem.cli.options import example, journal_option, run_argument, signal_data_option
 from m2pem.cli.steering import by_option, steer
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 @click.command(epilog=example("m2pem signal r1 'Stop driving'"))
 @run_argument
 @click.argument("signal_id", metavar="SIGNAL")
-@data_option
+@signal_data_option
 @journal_option
 @by_option
 def signal(

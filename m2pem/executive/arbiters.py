@@ -41,7 +41,7 @@ def _located(finding: Finding, fleet: Fleet) -> Finding:
     """An arbiter's finding about "vehicle.connection.key", with the fleet's file and line."""
     if finding.line:
         return finding
-    resource = ResourceId(finding.element.partition(".")[0])
+    resource = ResourceId(finding.element.partition(".connection.")[0])
     entry = fleet.vehicles.get(resource) or fleet.payloads.get(resource)
     return replace(finding, file=fleet.file, line=entry.line if entry else 0)
 

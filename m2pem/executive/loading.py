@@ -9,7 +9,7 @@ from urllib.parse import unquote, urlsplit
 from m2pem.api.authoring import Draft, MissionSource
 from m2pem.errors import MissionError
 from m2pem.executive.arbiters import FleetArbiters
-from m2pem.findings import Finding, Severity, has_errors, lines
+from m2pem.findings import Finding, Severity, has_errors, lines, unreadable_remedy
 from m2pem.model.bpmn import parse_mission
 from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.bpmn.search_path import SearchPath
@@ -51,7 +51,8 @@ def load_source(mission: MissionSource, search_path: Iterable[Path] = ()) -> Mis
             raise _too_large(str(mission), size)
         source = mission.read_bytes()
     except OSError as error:
-        raise _unreadable(str(mission), error.strerror or str(error)) from error
+        reason = error.strerror or str(error)
+        raise _unreadable(str(mission), reason, unreadable_remedy(error)) from error
     return parse_mission(source, str(mission), SearchPath(mission, search_path))
 
 
@@ -82,9 +83,9 @@ def _too_large(name: str, size: int | None) -> MissionError:
     return MissionError(f"{name} cannot be read", [finding])
 
 
-def _unreadable(name: str, why: str) -> MissionError:
+def _unreadable(name: str, why: str, remedy: str = "check the path") -> MissionError:
     finding = Finding(
-        Severity.ERROR, name, 0, "", "unreadable-file", f"cannot be read: {why}", "check the path"
+        Severity.ERROR, name, 0, "", "unreadable-file", f"cannot be read: {why}", remedy
     )
     return MissionError(f"{name} cannot be read", [finding])
 

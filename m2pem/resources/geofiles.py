@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
+from m2pem.findings import unreadable_remedy
 from m2pem.model.geometry import Area, Point, Route
 from m2pem.resources.csv_waypoints import parse_csv
 from m2pem.resources.geojson import GeometryError, kind_of, parse_geojson
@@ -42,7 +43,8 @@ def _read(path: Path, kind: str) -> Point | Route | Area:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except OSError as error:
-        raise GeometryError(f"cannot be read: {error.strerror}") from None
+        remedy = unreadable_remedy(error)
+        raise GeometryError(f"cannot be read: {error.strerror}; {remedy}") from None
     if len(content) > MAX_BYTES:
         raise GeometryError(f"is larger than {MAX_BYTES:,} bytes")
     try:

@@ -15,7 +15,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from m2pem.findings import Finding, Severity
+from m2pem.findings import Finding, Severity, unreadable_remedy
 from m2pem.model.values import MAX_DEPTH, Value
 
 MAX_BYTES = 2_000_000
@@ -75,7 +75,8 @@ def read_yaml(path: Path) -> YamlSource:
             content = file.read(MAX_BYTES + 1)
     except OSError as error:
         source = YamlSource(str(path))
-        source.error((), "unreadable", f"cannot be read: {error.strerror}")
+        reason = f"cannot be read: {error.strerror}"
+        source.error((), "unreadable", reason, unreadable_remedy(error))
         return source
     return parse_yaml(content, str(path))
 
@@ -106,6 +107,16 @@ def parse_yaml(content: bytes, name: str) -> YamlSource:
         reason = str(error) if isinstance(error, _TooMuchError) else "is nested too deep"
         source._note(0, (), "too-large", reason)
     return source
+
+
+def _key_remedy(node: MappingNode, text: str) -> str:
+    """A number in a flow map, as in {lat: 53,5400}, is what follows a decimal comma."""
+    previous = ""
+    for key, value in node.value:
+        if key.value == text and node.flow_style and text.isdecimal() and previous.isdecimal():
+            return f"is it part of {previous},{text}? Write a decimal point: {previous}.{text}"
+        previous = str(value.value).removeprefix("-")
+    return "keys are texts: quote it"
 
 
 class _TooMuchError(Exception):
@@ -151,7 +162,7 @@ class _Reader:
             elif not isinstance(key, str):
                 text = key_node.value if isinstance(key_node, ScalarNode) else "this key"
                 self.source._note(
-                    line, path, "key-not-text", f"{text} is not a text", "keys are texts: quote it"
+                    line, path, "key-not-text", f"{text} is not a text", _key_remedy(node, text)
                 )
             elif key in result:
                 first = self.source.line((*path, key))

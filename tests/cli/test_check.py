@@ -62,7 +62,7 @@ def test_errors_are_counted_and_end_with_1(invoke: Invoke, tmp_path: Path) -> No
 
 def test_an_unknown_process_is_an_error(invoke: Invoke) -> None:
     status, out, _ = invoke("check", MISSION, "--process", "DETECTON")
-    assert status == 1
+    assert status == 2
     assert "there is no process 'DETECTON'; name one of: VIGNETTE1, DETECTION" in out
 
 
@@ -160,3 +160,39 @@ def test_a_requirement_in_the_file_that_cannot_be_verified_is_a_warning(
     assert (formula, caret) == ("    <> endd", "       ^")
     assert last == f"{mission}: 1 warning"
     assert invoke("check", mission, *fleet, "--data", "mission.speed=3", "--strict")[0] == 1
+
+
+def test_an_unknown_process_is_a_usage_error_of_every_command(
+    invoke: Invoke, tmp_path: Path
+) -> None:
+    fleet = ("--fleet", FLEET, "--process", "Nothing")
+    for command in ("check", "simulate", "verify"):
+        status, out, err = invoke(command, MISSION, *fleet)
+        assert (command, status) == (command, 2)
+        assert "there is no process 'Nothing'" in out + err
+    run = invoke("run", MISSION, *fleet, "--simulate", "--journal", tmp_path / "journal.db")
+    assert run[0] == 2
+
+
+def test_a_payload_of_an_unknown_kind_is_found_in_the_fleet(invoke: Invoke, tmp_path: Path) -> None:
+    fleet = tmp_path / "fleet.yaml"
+    fleet.write_text(
+        "version: 1\nvehicles:\n  v.1:\n    domain: ground\n    arbiter: sim\n"
+        "    payloads:\n      eye: {connection: {kind: microscope}}\n"
+    )
+    status, out, _ = invoke("check", MISSION, "--fleet", fleet)
+    assert status == 2
+    assert f"{fleet}:7: v.1/eye.connection.kind: error: 'microscope' is not one of" in out
+
+
+def test_what_is_no_file_is_refused_with_what_to_do(invoke: Invoke, tmp_path: Path) -> None:
+    for arguments in ((tmp_path,), (MISSION, "--fleet", tmp_path)):
+        status, out, _ = invoke("check", *arguments)
+        assert status == 2
+        assert "Is a directory; this is a folder: name a file in it" in out
+    assert "check the path" in invoke("check", tmp_path / "no.bpmn")[1]
+
+
+def test_the_help_of_data_says_what_gets_it(invoke: Invoke) -> None:
+    assert "the mission starts with" in " ".join(invoke("run", "--help")[1].split())
+    assert "the signal brings" in " ".join(invoke("signal", "--help")[1].split())

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from m2pem.resources import yaml_source
-from m2pem.resources.yaml_source import YamlSource, dotted, read_yaml
+from m2pem.resources.yaml_source import YamlSource, dotted, parse_yaml, read_yaml
 
 
 @pytest.fixture
@@ -149,3 +149,12 @@ def test_any_bytes_come_out_as_plain_json_or_are_refused(
     path.write_bytes(data)
     read = read_yaml(path).data
     assert json.loads(json.dumps(read, allow_nan=False)) == read
+
+
+def test_a_decimal_comma_in_a_flow_map_is_recognised() -> None:
+    source = parse_yaml(b"home: {lat: 53,5400, lon: 9.97}", "fleet.yaml")
+    [finding] = source.findings
+    assert finding.message == "5400 is not a text"
+    assert finding.remedy == "is it part of 53,5400? Write a decimal point: 53.5400"
+    [other] = parse_yaml(b"home: {5400: 1}", "fleet.yaml").findings
+    assert other.remedy == "keys are texts: quote it"
