@@ -62,3 +62,17 @@ def test_names_that_are_loaded_when_asked_for_are_all_there() -> None:
             assert getattr(package, name) is not None
         with pytest.raises(AttributeError, match="no attribute 'nothing'"):
             _ = package.nothing
+
+
+def test_links_to_files_of_the_repository_lead_to_them(site: Path) -> None:
+    written = re.compile(r"\]\(\.\./(?!\.\.)([^)#]+)\)")
+    count = 0
+    for page in (REPOSITORY / "docs").glob("*.md"):
+        built = site / page.relative_to(REPOSITORY / "docs").with_suffix(".html")
+        links = re.findall(r'href="(repository/[^"#]+)"', built.read_text(encoding="utf-8"))
+        targets = written.findall(page.read_text(encoding="utf-8"))
+        assert len(links) == len(targets), page
+        for link, target in zip(links, targets, strict=True):
+            assert (site / link).read_bytes() == (REPOSITORY / target).read_bytes()
+            count += 1
+    assert count > 20
