@@ -12,7 +12,8 @@ import math
 import selectors
 import time
 from collections.abc import Awaitable, Callable
-from contextvars import Context
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import Context, copy_context
 from typing import Any, TypeVar, TypeVarTuple, Unpack
 
 from m2pem.errors import InternalError
@@ -95,9 +96,19 @@ class VirtualClock:
 def run_virtual(main: Callable[[VirtualClock], Awaitable[T]], start_us: int) -> T:
     """Run `main` to its end in virtual time that begins at `start_us`, as `asyncio.run` would.
 
+    Where an event loop runs already (a notebook, an async test), `main` gets a thread of its own;
+    that event loop waits for it.
+
     Raises:
         DeadlockError: nothing can happen any more, and `main` has not ended.
     """
+    if asyncio._get_running_loop() is None:
+        return _run_virtual(main, start_us)
+    with ThreadPoolExecutor(1) as threads:
+        return threads.submit(copy_context().run, _run_virtual, main, start_us).result()
+
+
+def _run_virtual(main: Callable[[VirtualClock], Awaitable[T]], start_us: int) -> T:
     loop = VirtualLoop()
 
     async def entry() -> T:
