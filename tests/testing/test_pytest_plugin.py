@@ -53,7 +53,7 @@ def test_the_report_is_the_same_when_other_processes_run_the_tests(tmp_path: Pat
 def test_without_contracts_it_reports_nothing(tmp_path: Path) -> None:
     printed = run_pytest(tmp_path, "def test_a(): pass")
     assert "1 passed" in printed
-    assert "m2pem" not in printed
+    assert "m2pem contracts" not in printed
 
 
 def test_a_subject_that_there_is_not_is_refused_with_what_was_meant(tmp_path: Path) -> None:
