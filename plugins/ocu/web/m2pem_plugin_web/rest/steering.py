@@ -1,14 +1,11 @@
 """/api/runs/{run}/...: what operators do with a run that goes on; and with all of them at once."""
 
-import asyncio
-
 from fastapi import APIRouter
 from pydantic import BaseModel
 
-from m2pem.api import MissionControl, RunStatus
-from m2pem.errors import M2pemError
+from m2pem.api import MissionControl
 from m2pem_plugin_web.access.people import Operator
-from m2pem_plugin_web.problems import RESPONSES, ProblemError
+from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.lookup import find_run
 from m2pem_plugin_web.rest.models import Body, Data, Name, Reason
 
@@ -43,26 +40,11 @@ def router(control: MissionControl) -> APIRouter:
     """The routes of steering."""
     routes = APIRouter(prefix="/api", tags=["steering"], responses=RESPONSES)
 
-    @routes.post("/stop")
+    @routes.post("/stop-all")
+    @routes.post("/stop", include_in_schema=False)
     async def stop_all(person: Operator, wanted: StopModel) -> StoppedModel:
         """Stop every run that goes on. One that cannot be stopped does not keep the others."""
-        going = [
-            each.run
-            for each in await control.runs()
-            if each.status in (RunStatus.RUNNING, RunStatus.PAUSED)
-        ]
-        outcomes = await asyncio.gather(
-            *(control.stop(run, by=person.name, reason=wanted.reason) for run in going),
-            return_exceptions=True,
-        )
-        failed = [
-            f"{run}: {outcome}"
-            for run, outcome in zip(going, outcomes, strict=True)
-            if isinstance(outcome, BaseException) and not await _has_ended(control, run)
-        ]
-        if failed:
-            raise ProblemError(409, f"not stopped: {'; '.join(failed)}")
-        return StoppedModel(runs=going)
+        return StoppedModel(runs=list(await control.stop_all(by=person.name, reason=wanted.reason)))
 
     @routes.post("/runs/{run}/stop", status_code=204)
     async def stop(person: Operator, run: str, wanted: StopModel) -> None:
@@ -100,10 +82,3 @@ def router(control: MissionControl) -> APIRouter:
         await control.message(wanted.message, run=run, data=wanted.data, by=person.name)
 
     return routes
-
-
-async def _has_ended(control: MissionControl, run: str) -> bool:
-    try:
-        return (await find_run(control, run)).status.ended
-    except (M2pemError, ProblemError):
-        return False
