@@ -13,6 +13,7 @@ from m2pem_plugin_web.access.bodies import BoundedBodies
 from m2pem_plugin_web.access.entry import Entry
 from m2pem_plugin_web.access.guard import Guard
 from m2pem_plugin_web.access.headers import SafeHeaders
+from m2pem_plugin_web.access.slots import Slots
 from m2pem_plugin_web.live import socket
 from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.pages import Pages
@@ -65,15 +66,23 @@ def routers_of(
     ]
 
 
-def create_app(routers: Iterable[APIRouter], entry: Entry, settings: Settings) -> ASGIApp:
-    """The app. `entry` says who may come in."""
+def create_app(
+    routers: Iterable[APIRouter], entry: Entry, settings: Settings, slots: Slots
+) -> ASGIApp:
+    """The app. `entry` says who may come in; `slots` are the server's connections."""
     # The pages of FastAPI about an API load scripts from elsewhere.
     app = FastAPI(title="m2pem", openapi_url=OPENAPI, docs_url=None, redoc_url=None)
     for router in routers:
         app.include_router(router)
     handle_problems(app, settings.missions)
     app.openapi = lambda: _described(app)  # type: ignore[method-assign]
-    guard = Guard(BoundedBodies(app), entry=entry, names=settings.names, scheme=settings.scheme)
+    guard = Guard(
+        BoundedBodies(app),
+        entry=entry,
+        names=settings.names,
+        scheme=settings.scheme,
+        slots=slots,
+    )
     return SafeHeaders(guard)
 
 

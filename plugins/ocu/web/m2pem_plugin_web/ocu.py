@@ -45,7 +45,7 @@ class WebOcu:
             self._recorder = Recorder(control, self.hub.feed.pictures, self.hub.fleet, place)
             self._services = services_of(control, settings.missions)
             routers = routers_of(self._services, settings, self.hub, entry, self._recorder)
-            self._app = create_app(routers, entry, settings)
+            self._app = create_app(routers, entry, settings, self._server.slots)
         except BaseException:
             self._server.close()
             raise

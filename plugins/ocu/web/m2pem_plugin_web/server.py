@@ -8,12 +8,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import h11
 import uvicorn
 from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from m2pem.errors import PluginError
+from m2pem_plugin_web.access.slots import Slots
 from m2pem_plugin_web.live.socket import ABORT, LONGEST_MESSAGE
 from m2pem_plugin_web.settings import HOST, PORT, Settings
 
@@ -21,9 +23,6 @@ LAST_WORDS_S = 1
 """For responses that are being sent when it ends."""
 
 BACKLOG = 128
-CONNECTIONS = 256
-"""At once; whoever comes then is told to come later."""
-
 HEADERS_S = 10.0
 """Within which the head of a request comes, once a connection is there or its head has begun."""
 
@@ -57,10 +56,13 @@ def listen(settings: Settings) -> socket.socket:
 class _Http(H11Protocol):
     """Lets go of connections on which the head of a request does not come."""
 
+    slots: Slots
     _patience: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
+        if self.client is not None:
+            self.slots.opened(self.client, transport.abort)
         self._patience = self.loop.call_later(HEADERS_S, transport.abort)
 
     def data_received(self, data: bytes) -> None:
@@ -73,7 +75,16 @@ class _Http(H11Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._be_patient()
+        self._leave()
         super().connection_lost(exc)
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        self._leave()
+        super().handle_websocket_upgrade(event)
+
+    def _leave(self) -> None:
+        if self.client is not None:
+            self.slots.closed(self.client)
 
     def _be_patient(self) -> None:
         if self._patience is not None:
@@ -108,6 +119,7 @@ class Server:
             _refuse_bad_certificate(settings.certificate, settings.key)
             self._more = {"ssl_certfile": settings.certificate, "ssl_keyfile": settings.key}
         self._listener = listen(settings)
+        self.slots = Slots()
         self.port: int = self._listener.getsockname()[1]
 
     def close(self) -> None:
@@ -125,11 +137,10 @@ class Server:
                 access_log=False,
                 server_header=False,
                 proxy_headers=False,
-                http=_Http,
+                http=type("_Http", (_Http,), {"slots": self.slots}),
                 ws=_WebSocket,
                 ws_max_size=LONGEST_MESSAGE,
                 ws_per_message_deflate=False,
-                limit_concurrency=CONNECTIONS,
                 timeout_graceful_shutdown=LAST_WORDS_S,
                 **self._more,
             )

@@ -9,20 +9,31 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from m2pem_plugin_web.access.entry import Entry
 from m2pem_plugin_web.access.origins import SAFE_METHODS, foreign, wrong_host
 from m2pem_plugin_web.access.people import SCOPE_KEY
+from m2pem_plugin_web.access.slots import Slots
 from m2pem_plugin_web.problems import problem
 
 API = "/api"
 SIGN_IN = "/api/session"
+STOPS = ("/stop", "/stop-all")
 
 
 class Guard:
     """Below /api it lets in nobody who has not signed in, but to sign in. `names`: our own."""
 
-    def __init__(self, app: ASGIApp, *, entry: Entry, names: Collection[str], scheme: str) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        entry: Entry,
+        names: Collection[str],
+        scheme: str,
+        slots: Slots,
+    ) -> None:
         self._app = app
         self._entry = entry
         self._names = names
         self._scheme = scheme
+        self._slots = slots
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or refuse it."""
@@ -48,4 +59,8 @@ class Guard:
         person = scope[SCOPE_KEY] = self._entry.person(HTTPConnection(scope).cookies)
         if of_api and person is None and not (scope["path"] == SIGN_IN and method == "POST"):
             return 401, "sign in first"
+        if person is not None and scope["client"] is not None:
+            self._slots.known(tuple(scope["client"]))
+        if self._slots.full and not scope["path"].endswith(STOPS):
+            return 503, "too many connections are open: close other pages"
         return None
