@@ -50,7 +50,7 @@ def routers_of(
         session.router(control, settings, entry, tiles.pictured if tiles is not None else None),
         runs.router(control, folder),
         tracks.router(control, recorder),
-        steering.router(control),
+        steering.router(control, hub),
         prompts.router(control, hub),
         resources.router(control),
         missions.router(control, folder),

@@ -7,9 +7,10 @@ from fastapi import Depends
 from fastapi.requests import HTTPConnection
 from starlette.exceptions import HTTPException
 
+from m2pem_plugin_web.access.lateness import refuse_late
 from m2pem_plugin_web.access.roles import Person, Role
 
-__all__ = ["Commander", "Operator", "Person", "Role", "Viewer", "needs", "person_of"]
+__all__ = ["Commander", "Operator", "Person", "Role", "Stopper", "Viewer", "needs", "person_of"]
 
 SCOPE_KEY = "m2pem.person"
 """Where the guard puts who asks, in the ASGI scope of a connection."""
@@ -21,8 +22,12 @@ def person_of(connection: HTTPConnection) -> Person | None:
     return person if isinstance(person, Person) else None
 
 
-def needs(role: Role) -> Callable[[HTTPConnection], Person]:
-    """A dependency of FastAPI: the person who asks, if their role covers `role`."""
+def needs(role: Role, *, however_late: bool = False) -> Callable[[HTTPConnection], Person]:
+    """A dependency of FastAPI: the person who asks, if their role covers `role`.
+
+    It is resolved when the body of a request is complete. A command that arrives too late by then
+    is refused, but not if `however_late`.
+    """
 
     def person(connection: HTTPConnection) -> Person:
         found = person_of(connection)
@@ -30,6 +35,8 @@ def needs(role: Role) -> Callable[[HTTPConnection], Person]:
             raise HTTPException(401, "sign in first")
         if not found.role.covers(role):
             raise HTTPException(403, f"this needs the role {role}; {found.name} is {found.role}")
+        if not however_late:
+            refuse_late(connection)
         return found
 
     return person
@@ -37,4 +44,5 @@ def needs(role: Role) -> Callable[[HTTPConnection], Person]:
 
 Viewer = Annotated[Person, Depends(needs(Role.VIEWER))]
 Operator = Annotated[Person, Depends(needs(Role.OPERATOR))]
+Stopper = Annotated[Person, Depends(needs(Role.OPERATOR, however_late=True))]
 Commander = Annotated[Person, Depends(needs(Role.COMMANDER))]

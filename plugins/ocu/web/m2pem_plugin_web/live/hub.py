@@ -22,6 +22,7 @@ from m2pem.api import (
     RunStatus,
 )
 from m2pem.errors import M2pemError
+from m2pem_plugin_web.access.lateness import now_s
 from m2pem_plugin_web.live import words
 from m2pem_plugin_web.live.feed import Feed
 from m2pem_plugin_web.live.fleet import FleetPicture, Heard
@@ -85,6 +86,10 @@ class Hub:
     def failed(self, run: RunId, text: str) -> None:
         """Something went wrong in a run."""
         self._tell_all(words.fault(f"{run}: {text}"))
+
+    def announce(self, text: str) -> None:
+        """Tell every page of something that all operators have to know."""
+        self._tell_all(words.fault(text))
 
     def _lost(self, resource: ResourceId) -> None:
         self._tell_all(words.fault(f"{resource} is no longer heard"))
@@ -193,10 +198,10 @@ class Hub:
 
     def _head(self, kind: str, picture: Picture | None) -> dict[str, Any]:
         if picture is None:
-            return {"type": kind, "run": None, "t": 0.0, "events": 0}
+            return {"type": kind, "run": None, "now": now_s(), "t": 0.0, "events": 0}
         run = picture.summary.run
         t_s = max(self._times.get(run, 0.0), picture.t_s)
-        return {"type": kind, "run": run, "t": t_s, "events": picture.seq}
+        return {"type": kind, "run": run, "now": now_s(), "t": t_s, "events": picture.seq}
 
     def _snapshot(self, viewer: Viewer) -> dict[str, Any]:
         picture = viewer.picture

@@ -14,7 +14,7 @@ from m2pem_plugin_web.access.entry import Entry
 from m2pem_plugin_web.access.people import person_of
 from m2pem_plugin_web.live import words
 from m2pem_plugin_web.live.hub import MOST_VIEWERS, Hub
-from m2pem_plugin_web.live.viewer import Viewer
+from m2pem_plugin_web.live.viewer import HEARTBEAT_S, Viewer
 
 LONGEST_MESSAGE = 4096
 """Bytes of a message of a browser; the server refuses more."""
@@ -136,9 +136,20 @@ async def _listen(socket: WebSocket, hub: Hub, viewer: Viewer) -> None:
                 viewer.acknowledge(seq)
             case _Watch(run=run):
                 try:
-                    await hub.watch(viewer, run)
+                    await _watch(hub, viewer, run)
                 except M2pemError as error:
                     viewer.refuse(words.fault(str(error)))
+
+
+async def _watch(hub: Hub, viewer: Viewer, run: str | None) -> None:
+    """Have a run shown; while a long one is read, the page hears that the server goes on."""
+    watching = asyncio.ensure_future(hub.watch(viewer, run))
+    try:
+        while not (await asyncio.wait({watching}, timeout=HEARTBEAT_S))[0]:
+            viewer.refuse(words.alive())
+        await watching
+    finally:
+        watching.cancel()
 
 
 async def _look_after(viewer: Viewer, may_stay: Callable[[], bool]) -> None:

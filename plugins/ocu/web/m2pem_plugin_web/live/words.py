@@ -53,6 +53,11 @@ def fault(text: str) -> dict[str, Any]:
     return {"type": "fault", "text": text}
 
 
+def alive() -> dict[str, Any]:
+    """The server goes on; what was asked for takes longer."""
+    return {"type": "alive"}
+
+
 def log(records: Iterable[StampedRecord]) -> dict[str, Any]:
     """The newest records of the watched run."""
     return {"type": "log", "records": [msgspec.Raw(record_of(each)) for each in records]}

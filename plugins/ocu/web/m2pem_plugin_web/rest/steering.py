@@ -1,11 +1,13 @@
 """/api/runs/{run}/...: what operators do with a run that goes on; and with all of them at once."""
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from pydantic import BaseModel
 
 from m2pem.api import MissionControl
-from m2pem_plugin_web.access.people import Operator
-from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.access.lateness import LONGEST_S, age_s
+from m2pem_plugin_web.access.people import Operator, Person, Stopper
+from m2pem_plugin_web.live.hub import Hub
+from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.lookup import find_run
 from m2pem_plugin_web.rest.models import Body, Data, Name, Reason
 
@@ -36,21 +38,34 @@ class StoppedModel(BaseModel):
     runs: list[str]
 
 
-def router(control: MissionControl) -> APIRouter:
-    """The routes of steering."""
+def router(control: MissionControl, hub: Hub) -> APIRouter:
+    """The routes of steering. A STOP that arrives late is carried out, and every page says so."""
     routes = APIRouter(prefix="/api", tags=["steering"], responses=RESPONSES)
+
+    def reason_of(request: Request, person: Person, what: str, wanted: StopModel) -> str:
+        try:
+            age = age_s(request)
+        except ProblemError:  # whatever its clock says, a STOP is a STOP
+            age = 0.0
+        if age <= LONGEST_S:
+            return wanted.reason
+        late = f"given {age:.0f} s before it arrived"
+        hub.announce(f"{what} by {person.name} was {late}; it is carried out")
+        return f"{wanted.reason} ({late})".lstrip()
 
     @routes.post("/stop-all")
     @routes.post("/stop", include_in_schema=False)
-    async def stop_all(person: Operator, wanted: StopModel) -> StoppedModel:
+    async def stop_all(request: Request, person: Stopper, wanted: StopModel) -> StoppedModel:
         """Stop every run that goes on. One that cannot be stopped does not keep the others."""
-        return StoppedModel(runs=list(await control.stop_all(by=person.name, reason=wanted.reason)))
+        reason = reason_of(request, person, "STOP of all runs", wanted)
+        return StoppedModel(runs=list(await control.stop_all(by=person.name, reason=reason)))
 
     @routes.post("/runs/{run}/stop", status_code=204)
-    async def stop(person: Operator, run: str, wanted: StopModel) -> None:
+    async def stop(request: Request, person: Stopper, run: str, wanted: StopModel) -> None:
         """End every token of a run, and cancel its behaviors."""
         await find_run(control, run)
-        await control.stop(run, by=person.name, reason=wanted.reason)
+        reason = reason_of(request, person, f"STOP of {run}", wanted)
+        await control.stop(run, by=person.name, reason=reason)
 
     @routes.post("/runs/{run}/pause", status_code=204)
     async def pause(person: Operator, run: str) -> None:

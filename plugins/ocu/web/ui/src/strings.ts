@@ -11,8 +11,20 @@ export const strings = {
     stop: "STOP",
     stopAgain: "Again to STOP",
     stopHint:
-      "Stop every run, and every vehicle that a run commands: click twice, or hold; Shift+Escape twice",
-    stopped: "All runs were told to stop.",
+      "STOP all runs, and every vehicle that a run commands: click twice, or hold; Shift+Escape twice",
+    stopAllRuns: "all runs",
+    stopOneRun: "run {run}",
+    stopDelivered: "STOP of {what} was delivered.",
+    stopLate: "STOP of {what} was delivered {age} s after it was given.",
+    stopUndelivered: "STOP was NOT delivered.",
+    stopRetried: "The executive has not confirmed STOP of {what}. It is sent again until it does.",
+    stopRefused: "The executive refuses STOP of {what}.",
+    stopOtherwise:
+      "Stop the vehicles another way: m2pem stop in a terminal of the executive's machine, or each vehicle's own stop.",
+    stopGiveUp: "Give up this STOP",
+    notSent: "Not connected: nothing was sent.",
+    notConfirmed:
+      "No answer within the time limit. What arrives later is refused: look at what is shown when it is connected again.",
     stopReason: "STOP on the web page",
     home: "Missions",
     signedInAs: "Signed in as",

@@ -2,7 +2,7 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { ApiError, get } from "../shared/api";
-import { isOver, listen } from "../shared/executive";
+import { connection, isOver, listen } from "../shared/executive";
 import { fill, strings } from "../strings";
 import type { RunSummary } from "../shared/types";
 import { operateContext, OperatingProvider, type OperateContext } from "./context";
@@ -72,9 +72,10 @@ export default function Operate({ source }: { source: Source }) {
   }
   const { scene } = shown;
   const isReplay = scene instanceof ReplayScene;
+  const stale = isReplay ? "" : ` operate-live${connection.value === "open" ? "" : " stale"}`;
   return (
     <OperatingProvider value={shown}>
-      <div class="operate">
+      <div class={`operate${stale}`}>
         <h1 class="for-readers">{scene.run || text.run.rehearsal}</h1>
         <RunBar />
         {!isReplay && <PromptPanel />}

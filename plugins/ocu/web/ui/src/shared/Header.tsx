@@ -1,13 +1,14 @@
 // On every page: which fleet, who looks, whether what moves is real, and how to stop it.
 import { effect } from "@preact/signals";
 import { strings } from "../strings";
-import { post } from "./api";
 import { connect, connection, prompts } from "./executive";
 import { go, route } from "./router";
 import { may, session, signOut } from "./session";
+import { StopAlert } from "./StopAlert";
 import { StopButton } from "./StopButton";
+import { ALL, stop } from "./stopping";
 import { switchTheme, theme } from "./theme";
-import { attempt, toast } from "./Toasts";
+import { attempt } from "./Toasts";
 import "./header.css";
 
 const text = strings.shell;
@@ -21,11 +22,6 @@ effect(() => {
     .join(" ");
 });
 
-async function stopAll(): Promise<void> {
-  const done = await attempt(() => post("/stop", { reason: text.stopReason }));
-  if (done) toast(text.stopped, "good");
-}
-
 export function Header() {
   const who = session.value;
   return (
@@ -34,48 +30,50 @@ export function Header() {
         {text.skip}
       </a>
       <header class="header">
-        <a class="brand" href="/" onClick={leave("/")}>
-          <svg viewBox="0 0 24 24" width="22" height="22" aria-hidden="true">
-            <path d="M4 12h5m6 0h5" stroke="currentColor" stroke-width="2" fill="none" />
-            <path d="M9 12 12 8l3 4-3 4z" fill="currentColor" />
-            <circle cx="4" cy="12" r="2.6" fill="currentColor" />
-            <circle cx="20" cy="12" r="2.6" fill="currentColor" />
-          </svg>
-          {text.title}
-        </a>
-        {who && (
-          <>
-            <span class="fleet" title={text.fleet}>
-              {who.fleet}
+        <div class="header-rest">
+          <a class="brand" href="/" onClick={leave("/")}>
+            <svg viewBox="0 0 24 24" width="22" height="22" aria-hidden="true">
+              <path d="M4 12h5m6 0h5" stroke="currentColor" stroke-width="2" fill="none" />
+              <path d="M9 12 12 8l3 4-3 4z" fill="currentColor" />
+              <circle cx="4" cy="12" r="2.6" fill="currentColor" />
+              <circle cx="20" cy="12" r="2.6" fill="currentColor" />
+            </svg>
+            {text.title}
+          </a>
+          {who && (
+            <>
+              <span class="fleet" title={text.fleet}>
+                {who.fleet}
+              </span>
+              <Reality simulated={who.simulated} />
+              <Link />
+            </>
+          )}
+          <span class="space" />
+          {who && <Questions />}
+          {who && (
+            <span class="who" title={text.signedInAs}>
+              {who.user} <small>{text.roles[who.role]}</small>
             </span>
-            <Reality simulated={who.simulated} />
-            <Link />
-          </>
-        )}
-        <span class="space" />
-        {who && <Questions />}
-        {who && (
-          <span class="who" title={text.signedInAs}>
-            {who.user} <small>{text.roles[who.role]}</small>
-          </span>
-        )}
-        <button
-          type="button"
-          class="plain"
-          aria-label={theme.value === "dark" ? text.light : text.dark}
-          title={theme.value === "dark" ? text.light : text.dark}
-          onClick={switchTheme}
-        >
-          <svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true">
-            <circle cx="12" cy="12" r="8" fill="none" stroke="currentColor" stroke-width="2" />
-            <path d="M12 4a8 8 0 0 1 0 16z" fill="currentColor" />
-          </svg>
-        </button>
-        {who && (
-          <button type="button" class="plain" onClick={() => void attempt(signOut)}>
-            {text.signOut}
+          )}
+          <button
+            type="button"
+            class="plain"
+            aria-label={theme.value === "dark" ? text.light : text.dark}
+            title={theme.value === "dark" ? text.light : text.dark}
+            onClick={switchTheme}
+          >
+            <svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true">
+              <circle cx="12" cy="12" r="8" fill="none" stroke="currentColor" stroke-width="2" />
+              <path d="M12 4a8 8 0 0 1 0 16z" fill="currentColor" />
+            </svg>
           </button>
-        )}
+          {who && (
+            <button type="button" class="plain" onClick={() => void attempt(signOut)}>
+              {text.signOut}
+            </button>
+          )}
+        </div>
         {may("operator") && (
           <StopButton
             class="stop-all"
@@ -83,10 +81,11 @@ export function Header() {
             again={text.stopAgain}
             hint={text.stopHint}
             hotkey
-            onStop={() => void stopAll()}
+            onStop={() => void stop(ALL, text.stopAllRuns)}
           />
         )}
       </header>
+      {who && <StopAlert />}
       {who && connection.value === "lost" && (
         <div class="offline" role="alert">
           {text.offline}
@@ -117,7 +116,7 @@ function Link() {
   return (
     <span class={`link link-${state}`} title={said ?? text.offline}>
       <i aria-hidden="true" />
-      <span class="for-readers">{said ?? text.offlineShort}</span>
+      <span class={said ? "for-readers" : ""}>{said ?? text.offlineShort}</span>
     </span>
   );
 }

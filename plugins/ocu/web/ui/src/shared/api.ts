@@ -20,10 +20,35 @@ export class ApiError extends Error {
   }
 }
 
-async function request<T>(method: string, path: string, body?: unknown): Promise<T> {
-  const init: RequestInit = { method, credentials: "same-origin" };
+/** The server did not answer in time, or could not be reached. */
+export class UnreachableError extends Error {}
+
+/** How long an answer may take; what a request says beside its body. */
+export interface Options {
+  limit_ms?: number;
+  headers?: Record<string, string>;
+}
+
+const LIMIT_MS = 30_000;
+
+async function request<T>(
+  method: string,
+  path: string,
+  body?: unknown,
+  { limit_ms = LIMIT_MS, headers = {} }: Options = {},
+): Promise<T> {
+  try {
+    const signal = AbortSignal.timeout(limit_ms);
+    return await ask<T>(path, body, { method, credentials: "same-origin", headers, signal });
+  } catch (error) {
+    if (error instanceof ApiError) throw error;
+    throw new UnreachableError(error instanceof Error ? error.message : String(error));
+  }
+}
+
+async function ask<T>(path: string, body: unknown, init: RequestInit): Promise<T> {
   if (body !== undefined) {
-    init.headers = { "Content-Type": "application/json" };
+    init.headers = { ...init.headers, "Content-Type": "application/json" };
     init.body = JSON.stringify(body);
   }
   const response = await fetch(`/api${path}`, init);
@@ -41,7 +66,8 @@ async function problemOf(response: Response): Promise<Problem> {
 }
 
 export const get = <T>(path: string): Promise<T> => request("GET", path);
-export const post = <T>(path: string, body: unknown = {}): Promise<T> =>
-  request("POST", path, body);
-export const put = <T>(path: string, body: unknown): Promise<T> => request("PUT", path, body);
+export const post = <T>(path: string, body: unknown = {}, options?: Options): Promise<T> =>
+  request("POST", path, body, options);
+export const put = <T>(path: string, body: unknown, options?: Options): Promise<T> =>
+  request("PUT", path, body, options);
 export const remove = <T>(path: string): Promise<T> => request("DELETE", path);

@@ -27,5 +27,10 @@ export const browser: Surroundings = {
     const timer = setTimeout(callback, delay_ms);
     return () => clearTimeout(timer);
   },
+  every: (callback, ms) => {
+    const timer = setInterval(callback, ms);
+    return () => clearInterval(timer);
+  },
+  now_ms: () => performance.now(),
   chance: Math.random,
 };

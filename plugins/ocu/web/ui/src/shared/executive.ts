@@ -3,6 +3,7 @@
 import { batch, computed, signal } from "@preact/signals";
 import { browser } from "./browser";
 import { LiveClient, type Connection } from "./live";
+import { ServerClock } from "./serverClock";
 import { loadSession, session, toSignIn } from "./session";
 import { toast } from "./Toasts";
 import { strings } from "../strings";
@@ -22,6 +23,9 @@ export const holders = signal<Record<string, string>>({});
 export const vehicles = signal<Record<string, VehicleState>>({});
 export const payloads = signal<Record<string, PayloadState>>({});
 export const teams = signal<Record<string, TeamState>>({});
+
+/** Known from the stream, while it is connected. */
+export const serverClock = new ServerClock();
 
 const OVER = new Set(["completed", "terminated", "failed", "stopped"]);
 
@@ -51,6 +55,7 @@ export function listen(listener: Listener): () => void {
 
 const client = new LiveClient(browser, {
   received: (message) => {
+    if ("now" in message) serverClock.heard(message.now);
     batch(() => {
       take(message);
       for (const listener of listeners) listener(message);
@@ -58,6 +63,7 @@ const client = new LiveClient(browser, {
   },
   connection: (state) => {
     connection.value = state;
+    if (state !== "lost") serverClock.forget();
     if (state === "lost") void afterLoss();
     if (state === "refused") signedOut();
   },
@@ -119,6 +125,7 @@ function take(message: ServerMessage): void {
     case "fault":
       toast(`${strings.shell.fault}: ${message.text}`, "bad");
       break;
+    case "alive":
     case "log":
       break;
   }

@@ -20,6 +20,10 @@ export interface Surroundings {
   paint(callback: () => void): void;
   /** Call back after some milliseconds; what is returned prevents it. */
   after(callback: () => void, delay_ms: number): () => void;
+  /** Call back again and again; what is returned ends it. */
+  every(callback: () => void, ms: number): () => void;
+  /** A clock that only rises. */
+  now_ms(): number;
   /** 0 ... 1, so that not all pages come back at once. */
   chance(): number;
 }
@@ -30,7 +34,13 @@ export interface Listener {
 }
 
 const FIRST_DELAY_MS = 500;
-const LONGEST_DELAY_MS = 10_000;
+const LONGEST_DELAY_MS = 4000;
+/** Frames come every second: a connection that says nothing for so long is dead. */
+export const SILENT_MS = 3000;
+/** Within which a connection is made. */
+const OPENING_MS = 5000;
+const LOOK_MS = 250;
+const NO_CLOSE = 1006;
 /** Not signed in (any more): to ask again is of no use. 1008 is a policy violation. */
 const REFUSED = new Set([1008, 4001, 4401, 4403]);
 
@@ -43,6 +53,9 @@ export class LiveClient {
   private isOpen = false;
   /** From a break until it is open again, however often that is tried. */
   private isBroken = false;
+  private heardAt_ms = 0;
+  private isSuspect = false;
+  private stopLooking: (() => void) | null = null;
 
   constructor(
     private readonly around: Surroundings,
@@ -56,10 +69,13 @@ export class LiveClient {
     if (!this.isBroken) this.listener.connection("connecting");
     const socket = this.around.connect();
     this.socket = socket;
+    this.heard();
+    this.stopLooking = this.around.every(() => this.look(), LOOK_MS);
     socket.onopen = () => {
       this.failures = 0;
       this.isBroken = false;
       this.isOpen = true;
+      this.heard();
       this.say({ type: "watch", run: this.watched });
       this.listener.connection("open");
     };
@@ -83,8 +99,28 @@ export class LiveClient {
     if (this.isOpen) this.say({ type: "watch", run });
   }
 
+  private heard(): void {
+    this.heardAt_ms = this.around.now_ms();
+    this.isSuspect = false;
+  }
+
+  /** Twice in a row: what has come while this page was busy is taken between the two. */
+  private look(): void {
+    const silent_ms = this.around.now_ms() - this.heardAt_ms;
+    const isSilent = silent_ms >= (this.isOpen ? SILENT_MS : OPENING_MS);
+    const socket = this.socket;
+    if (isSilent && this.isSuspect) {
+      this.closed(NO_CLOSE);
+      socket?.close();
+    }
+    this.isSuspect = isSilent;
+  }
+
   private take(text: string): void {
     const message = JSON.parse(text) as ServerMessage;
+    // Frames are sent only if this page has acknowledged those before: both directions work.
+    if (message.type === "snapshot" || message.type === "frame" || message.type === "alive")
+      this.heard();
     if (message.type !== "snapshot" && message.type !== "frame") {
       // Urgent ones come at once; but never before the frames that were sent before them.
       this.apply();
@@ -109,6 +145,8 @@ export class LiveClient {
   }
 
   private forget(): void {
+    this.stopLooking?.();
+    this.stopLooking = null;
     if (this.socket) {
       this.socket.onopen = this.socket.onmessage = this.socket.onclose = null;
     }

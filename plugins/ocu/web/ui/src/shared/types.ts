@@ -229,6 +229,8 @@ export type Elements = Record<string, Record<string, ElementState>>;
 /** What is new since the last frame; a snapshot has all of it. */
 export interface Live {
   seq: number;
+  /** The executive's clock, in seconds: it only rises. */
+  now: number;
   run: string | null;
   t: number;
   events: number;
@@ -243,9 +245,10 @@ export interface Live {
 
 export type ServerMessage =
   | ({ type: "snapshot"; status: RunStatus | null; speed: number; prompts: Prompt[] } & Live)
-  | ({ type: "frame" } & Pick<Live, "seq" | "run" | "t" | "events"> & Partial<Live>)
+  | ({ type: "frame" } & Pick<Live, "seq" | "run" | "now" | "t" | "events"> & Partial<Live>)
   | { type: "prompt"; seq: number; prompt: Prompt }
   | { type: "prompt_closed"; seq: number; run: string; prompt: string; decision: string; by: string }
   | { type: "run"; seq: number; run: RunSummary }
   | { type: "fault"; seq: number; text: string }
+  | { type: "alive"; seq: number }
   | { type: "log"; seq: number; records: RunRecord[] };

@@ -1,7 +1,8 @@
 // To draw with the keyboard: the vertices as numbers, and what the geometry is called.
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { get, put } from "../../shared/api";
+import { get } from "../../shared/api";
+import { command } from "../../shared/command";
 import { attempt, toast } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
 import type { AltitudeFrame, Geometry } from "../../shared/types";
@@ -37,7 +38,7 @@ export function DrawForm({ draft }: { draft: Draft }) {
     const { name } = draft;
     const body = { geometry: featureOf(draft), ...(runOnly.value && run ? { run } : {}) };
     saving.value = true;
-    const done = await attempt(() => put(`/geometries/${encodeURIComponent(name)}`, body));
+    const done = await command(`/geometries/${encodeURIComponent(name)}`, body, true);
     saving.value = false;
     if (!done) return;
     toast(fill(text.saved, { name }), "good");

@@ -51,7 +51,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
         if (!fitted) made.fitAll();
       }),
       scene.vehicles.subscribe((states) => {
-        made.vehicles.vehicles(states);
+        made.vehicles.vehicles(states, scene.pace.peek());
         if (!fitted && made.vehicles.positions().length > 0) {
           made.fitAll();
           fitted = true;

@@ -3,6 +3,7 @@ import L from "leaflet";
 import type { Fleet, GeoPosition, PayloadState, VehicleState } from "../../shared/types";
 import { heading_deg } from "../../shared/format";
 import { TRAIL_POINTS } from "../scene/scene";
+import { GAP_S, isGap } from "./trail";
 import { DOMAIN_PATHS } from "../vehicles/DomainSymbol";
 
 type Vehicle = Fleet["vehicles"][number];
@@ -39,7 +40,8 @@ export class VehicleLayer {
   private readonly shown = new Map<string, Shown>();
   private readonly trails = L.layerGroup();
   private readonly footprints = L.layerGroup();
-  private been: (resource: string) => GeoPosition[] = () => [];
+  private been: (resource: string) => GeoPosition[][] = () => [];
+  private longest_s = GAP_S;
   private readonly seen = new Map<string, { polygon: L.Polygon; state: PayloadState }>();
 
   constructor(
@@ -66,7 +68,9 @@ export class VehicleLayer {
     this.map.getContainer().classList.toggle("map-nameless", !names);
   }
 
-  vehicles(states: Record<string, VehicleState>): void {
+  /** `pace`: mission seconds in a second, in which more time passes between two states. */
+  vehicles(states: Record<string, VehicleState>, pace: number): void {
+    this.longest_s = GAP_S * Math.max(1, pace);
     for (const vehicle of this.fleet.vehicles) {
       const state = states[vehicle.id];
       const shown = this.shown.get(vehicle.id);
@@ -79,10 +83,11 @@ export class VehicleLayer {
   }
 
   /** Draw trails anew: `been` says where a vehicle was, and where it is ends the trail. */
-  retrace(been: (resource: string) => GeoPosition[]): void {
+  retrace(been: (resource: string) => GeoPosition[][]): void {
     this.been = been;
     for (const [resource, { marker, trail }] of this.shown) {
-      trail.setLatLngs([...been(resource).map(place), marker.getLatLng()]);
+      trail.setLatLngs(been(resource).map((piece) => piece.map((each) => L.latLng(place(each)))));
+      this.extend(trail, marker.getLatLng(), 0);
     }
   }
 
@@ -125,7 +130,10 @@ export class VehicleLayer {
     const marker = L.marker(place(position), { icon, keyboard: false, zIndexOffset: 1000 });
     marker.on("click", () => this.chosen(vehicle.id)).addTo(this.map);
     const symbol = marker.getElement()?.querySelector("svg") ?? null;
-    const trail = L.polyline(this.been(vehicle.id).map(place), TRAIL).addTo(this.trails);
+    const trail = L.polyline(
+      this.been(vehicle.id).map((piece) => piece.map(place)),
+      TRAIL,
+    ).addTo(this.trails);
     const shown: Shown = { marker, trail, state: undefined, symbol };
     this.shown.set(vehicle.id, shown);
     return shown;
@@ -137,16 +145,24 @@ export class VehicleLayer {
     if (state.yaw_rad !== null && shown.symbol) {
       shown.symbol.style.transform = `rotate(${heading_deg(state.yaw_rad).toFixed(1)}deg)`;
     }
-    this.draw(shown, at);
+    const before_us = shown.state?.time_us ?? state.time_us;
+    this.extend(shown.trail, at, (state.time_us - before_us) / 1e6);
     shown.state = state;
   }
 
-  private draw({ trail }: Shown, at: L.LatLng): void {
-    const points = trail.getLatLngs() as L.LatLng[];
-    const last = points.at(-1);
-    if (last && last.distanceTo(at) < TRAIL_STEP_M) return;
-    if (points.length >= TRAIL_POINTS) trail.setLatLngs(points.slice(TRAIL_POINTS / 4));
-    trail.addLatLng(at);
+  /** Go on with a trail; after a gap, with a new piece of it. */
+  private extend(trail: L.Polyline, at: L.LatLng, since_s: number): void {
+    const known = (trail.getLatLngs() as L.LatLng[][]).filter(Array.isArray);
+    const last = known.at(-1)?.at(-1);
+    const step_m = last?.distanceTo(at) ?? Infinity;
+    if (step_m < TRAIL_STEP_M) return;
+    if (!last || isGap(since_s, step_m, this.longest_s)) known.push([at]);
+    else known.at(-1)!.push(at);
+    while (known.reduce((count, piece) => count + piece.length, 0) > TRAIL_POINTS) {
+      known[0] = known[0]!.slice(TRAIL_POINTS / 4);
+      if (known[0].length === 0) known.shift();
+    }
+    trail.setLatLngs(known);
   }
 
   private remove(resource: string, { marker, trail }: Shown): void {

@@ -1,11 +1,11 @@
 // Questions to the operators: above all else on the page until they are answered.
 import { useComputed, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { post } from "../../shared/api";
+import { command } from "../../shared/command";
 import { listen } from "../../shared/executive";
 import { go } from "../../shared/router";
 import { may, session } from "../../shared/session";
-import { attempt, toast } from "../../shared/Toasts";
+import { toast } from "../../shared/Toasts";
 import type { Prompt } from "../../shared/types";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
@@ -57,7 +57,7 @@ export function PromptPanel() {
     if (!prompt || !usable) return;
     sending.value = id;
     const path = `/runs/${encodeURIComponent(prompt.run)}/prompts/${encodeURIComponent(prompt.prompt)}`;
-    const done = await attempt(() => post(path, { decision }));
+    const done = await command(path, { decision });
     if (!done) sending.value = "";
   };
 

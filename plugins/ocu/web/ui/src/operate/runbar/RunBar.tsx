@@ -1,13 +1,13 @@
 // Which run is shown, how it stands, and what may be done with all of it.
 import { useSignal } from "@preact/signals";
-import { post } from "../../shared/api";
+import { command } from "../../shared/command";
 import { activeRuns } from "../../shared/executive";
 import { clock, dateTime } from "../../shared/format";
 import { go } from "../../shared/router";
 import { titleOf } from "../../shared/runs";
 import { may } from "../../shared/session";
 import { StopButton } from "../../shared/StopButton";
-import { attempt } from "../../shared/Toasts";
+import { stop } from "../../shared/stopping";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
 import { Icon } from "../layout/icons";
@@ -115,8 +115,8 @@ function Clock() {
 function Controls({ status }: { status: string }) {
   const { scene, replay } = useOperating();
   const sending = useSignal<"signal" | "message" | null>(null);
-  const ask = (what: string, body?: unknown) =>
-    void attempt(() => post(`/runs/${encodeURIComponent(scene.run)}/${what}`, body));
+  const path = `/runs/${encodeURIComponent(scene.run)}`;
+  const ask = (what: string) => void command(`${path}/${what}`);
   const goesOn = status === "running" || status === "paused";
   if (!goesOn && status !== "interrupted") {
     return (
@@ -167,7 +167,9 @@ function Controls({ status }: { status: string }) {
         again={fill(text.stopRunAgain, { run: scene.run })}
         hint={text.stopRun}
         disabled={!goesOn}
-        onStop={() => ask("stop", { reason: strings.shell.stopReason })}
+        onStop={() =>
+          void stop(`${path}/stop`, fill(strings.shell.stopOneRun, { run: scene.run }))
+        }
       />
       {sending.value && <SendDialog what={sending.value} onClose={() => (sending.value = null)} />}
     </>

@@ -1,8 +1,8 @@
 // To send a signal or a message, by its name; those that are meant for operators come first.
 import { useSignal } from "@preact/signals";
-import { post } from "../../shared/api";
+import { command } from "../../shared/command";
 import { Dialog } from "../../shared/Dialog";
-import { attempt, toast } from "../../shared/Toasts";
+import { toast } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
 import type { Definition } from "../mission/missionModel";
@@ -26,7 +26,7 @@ export function SendDialog({ what, onClose }: { what: "signal" | "message"; onCl
         ? "/signals"
         : `/runs/${encodeURIComponent(scene.run)}/${what}s`;
     const body = { [what]: what === "signal" ? nameOf(chosen.value) : chosen.value, data: parsed };
-    if (!(await attempt(() => post(path, body)))) return;
+    if (!(await command(path, body))) return;
     toast(fill(text.sent, { name: mission.definition(chosen.value) }), "good");
     onClose();
   };

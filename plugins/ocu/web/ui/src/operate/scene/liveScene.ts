@@ -74,7 +74,7 @@ export class LiveScene implements Scene {
     return this.feed.older();
   }
 
-  trail(resource: string): GeoPosition[] {
+  trail(resource: string): GeoPosition[][] {
     return this.before.trail(resource, Infinity, TRAIL_POINTS);
   }
 

@@ -85,7 +85,7 @@ export class ReplayScene implements Scene {
     return this.track.silentFor_s(resource, this.position_s);
   }
 
-  trail(resource: string): GeoPosition[] {
+  trail(resource: string): GeoPosition[][] {
     return this.track.trail(resource, this.position_s, TRAIL_POINTS);
   }
 

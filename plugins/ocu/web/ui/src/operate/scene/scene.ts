@@ -52,8 +52,8 @@ export interface Scene {
   readonly knownFrom_s: number;
   /** Why it is not known, or has gaps; "": nothing went wrong. */
   readonly telemetryProblem: string;
-  /** Where a vehicle has been up to now, the newest last. */
-  trail(resource: string): GeoPosition[];
+  /** Where a vehicle has been up to now, the newest last; cut where nothing is known of it. */
+  trail(resource: string): GeoPosition[][];
   /** Rises when trails are to be drawn anew: time has jumped, or more is known of before. */
   readonly jumps: ReadonlySignal<number>;
   /** Seconds since a resource was heard; null: never. */

@@ -45,7 +45,7 @@ describe("telemetry track", () => {
   it("knows the way to any moment, of which the newest places count", () => {
     const there = track();
     const way = (t: number, most: number) =>
-      there.trail("a", t, most).map(({ latitude_deg }) => latitude_deg);
+      there.trail("a", t, most).flat().map(({ latitude_deg }) => latitude_deg);
     expect(way(1.5, 10)).toEqual([0, 1]);
     expect(way(Infinity, 2)).toEqual([1, 2]);
     expect(way(-1, 10)).toEqual([]);

@@ -1,4 +1,5 @@
 // Where everybody was at any moment of a rehearsal, or of a run as far as that was kept.
+import { longestStep_s, pieces } from "../map/trail";
 import type { GeoPosition, PayloadState, TeamState, VehicleState } from "../../shared/types";
 
 export interface TelemetrySample {
@@ -25,6 +26,7 @@ export class TelemetryTrack {
   private states: States = { vehicles: {}, payloads: {}, teams: {} };
   private readonly places = new Map<string, { t: number; position: GeoPosition }[]>();
   private readonly heard_s = new Map<string, number>();
+  private readonly longest_s = new Map<string, number>();
 
   private readonly samples: readonly TelemetrySample[];
   private readonly onlyNews: boolean;
@@ -68,11 +70,17 @@ export class TelemetryTrack {
     return this.onlyNews ? 0 : Math.max(0, t - heard_s);
   }
 
-  /** Where a vehicle has been up to then, the newest last; at most `most` places. */
-  trail(resource: string, t: number, most: number): GeoPosition[] {
+  /** Where a vehicle has been up to then, the newest last, cut at gaps; at most `most` places. */
+  trail(resource: string, t: number, most: number): GeoPosition[][] {
     const places = this.places.get(resource) ?? [];
     const count = countUpTo(places, t);
-    return places.slice(Math.max(0, count - most), count).map(({ position }) => position);
+    return pieces(places.slice(Math.max(0, count - most), count), this.longestStep_s(resource));
+  }
+
+  private longestStep_s(resource: string): number {
+    const known = this.longest_s.get(resource) ?? longestStep_s(this.places.get(resource) ?? []);
+    this.longest_s.set(resource, known);
+    return known;
   }
 
   private rewind(): void {

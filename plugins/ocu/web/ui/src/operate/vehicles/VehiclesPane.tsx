@@ -2,8 +2,8 @@
 import { usePaced } from "../layout/pace";
 import { age, heading_deg, speed_m_s } from "../../shared/format";
 import { may, session } from "../../shared/session";
-import { post } from "../../shared/api";
-import { attempt, toast } from "../../shared/Toasts";
+import { command } from "../../shared/command";
+import { toast } from "../../shared/Toasts";
 import { fill, strings } from "../../strings";
 import type { Fleet, PayloadState, VehicleState } from "../../shared/types";
 import { useOperating } from "../context";
@@ -211,7 +211,7 @@ function HandOver({ resource, name }: { resource: string; name?: string }) {
   const holder = scene.holders.value[resource] ?? "";
   const ask = async (what: "take" | "give-back", done: string) => {
     const path = resource.split("/").map(encodeURIComponent).join("/");
-    if (await attempt(() => post(`/resources/${path}/${what}`))) {
+    if (await command(`/resources/${path}/${what}`)) {
       toast(fill(done, { resource }), "good");
     }
   };

@@ -1,6 +1,7 @@
 // The start of a run: what is drawn is saved first, and it is started once.
 import { signal } from "@preact/signals";
-import { get, post } from "../../../shared/api";
+import { get } from "../../../shared/api";
+import { start } from "../../../shared/command";
 import type { MissionFile } from "../../../shared/types";
 import { beginningOf } from "../begin/beginning";
 import { refusalOf, type Refusal } from "../job";
@@ -21,7 +22,7 @@ export class Starting {
       const { mission } = editor;
       const { version } = await get<MissionFile>(`/missions/${encodeURIComponent(mission)}`);
       const request = { mission, version, ...beginningOf(editor).request() };
-      return (await post<{ run: string }>("/runs", request)).run;
+      return (await start<{ run: string }>("/runs", request)).run;
     } catch (error) {
       this.refusal.value = refusalOf(error);
       return undefined;

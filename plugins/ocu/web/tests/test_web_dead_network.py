@@ -1,0 +1,161 @@
+"""A network that stops passing bytes without closing: what operators see, and what happens."""
+
+import re
+import shutil
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Browser, Locator, Page, expect
+from web_browsing import page_at
+from web_desk import FLEET, IN_ONE_LOOP, element
+from web_proxy import Proxy, proxy_to
+from web_running import answer, press_twice, wait_for_status
+from web_served import REPOSITORY, Served, served
+
+pytestmark = IN_ONE_LOOP
+
+MISSION = "vignette1"
+LATE = re.compile(r"was delivered \d+ s after it was given")
+
+
+@dataclass
+class Field:
+    """An operator in the field: their page reaches the executive through `proxy` alone."""
+
+    executive: Served
+    proxy: Proxy
+    page: Page
+    origin: str
+
+    @property
+    def stop(self) -> Locator:
+        return self.page.locator("header button.stop")
+
+    @property
+    def undelivered(self) -> Locator:
+        return self.page.locator(".undelivered")
+
+    async def start(self) -> None:
+        """The page of a run that asks its first question, started in the page."""
+        await self.page.goto(f"{self.origin}/missions/{MISSION}")
+        await self.page.get_by_role("tab", name="Run", exact=True).click()
+        await self.page.get_by_role("button", name="Start", exact=True).click()
+        await expect(answer(self.page, "Continue")).to_be_enabled()
+        await expect(self.page.locator(".link-open")).to_have_count(1)
+
+    async def is_dead(self) -> None:
+        """The page says that it is not connected."""
+        await expect(self.page.get_by_text("Not connected to the executive")).to_be_visible()
+        await expect(self.page.locator(".operate.stale")).to_have_count(1)
+
+    async def given_s(self, least: int) -> None:
+        """Wait until a STOP is so old."""
+        await self.page.wait_for_function(
+            "least => parseInt(document.querySelector('.undelivered > span')?.innerText) >= least",
+            arg=least,
+        )
+
+
+@asynccontextmanager
+async def field(chromium: Browser, folder: Path) -> AsyncIterator[Field]:
+    shutil.copytree(REPOSITORY / "missions", folder / "missions")
+    words = ("--simulate", "--speed", "2", "--journal", "memory:")
+    with served(folder, fleet=FLEET, words=words) as executive:
+        async with proxy_to(executive.origin) as proxy:
+            origin = f"http://127.0.0.1:{proxy.port}"
+            url = executive.url.replace(executive.origin, origin)
+            async with page_at(chromium, url) as it:
+                yield Field(executive, proxy, it.page, origin)
+
+
+@pytest.mark.parametrize("directions", ["both", "up", "down"])
+async def test_a_stop_that_is_not_delivered_is_said_and_carried_out_when_the_network_heals(
+    chromium: Browser, tmp_path: Path, directions: str
+) -> None:
+    async with field(chromium, tmp_path) as here:
+        await here.start()
+        here.proxy.stall(directions)
+        await here.is_dead()
+        clock = here.page.locator(".clock")
+        stood = await clock.text_content()
+        await expect(here.undelivered).to_have_count(0)
+        await press_twice(here.page, here.stop.click)
+        await expect(here.undelivered).to_contain_text("STOP was NOT delivered.")
+        await expect(here.undelivered).to_contain_text("m2pem stop")
+        await here.given_s(6)
+        assert await clock.text_content() == stood
+        here.proxy.heal()
+        await expect(here.undelivered).to_have_count(0)
+        await expect(here.page.get_by_text(LATE)).to_be_visible()
+        await expect(here.page.locator(".link-open")).to_have_count(1)
+        await wait_for_status(here.page, "Stopped")
+
+
+async def test_a_stop_of_a_moment_ago_is_said_before_the_stream_is_known_to_be_dead(
+    chromium: Browser, tmp_path: Path
+) -> None:
+    async with field(chromium, tmp_path) as here:
+        await here.start()
+        await here.stop.click()
+        await expect(here.stop).to_have_text("Again to STOP")
+        here.proxy.stall()
+        # Two presses within BETWEEN_MS are one; pressed until the second one counts.
+        while await here.stop.text_content() != "STOP":
+            await here.stop.click()
+        await expect(here.undelivered).to_be_visible()
+        await here.page.get_by_role("button", name="Give up this STOP").click()
+        await expect(here.undelivered).to_have_count(0)
+
+
+async def test_an_answer_that_the_network_held_back_is_not_given(
+    chromium: Browser, tmp_path: Path
+) -> None:
+    async with field(chromium, tmp_path) as here:
+        await here.start()
+        here.proxy.stall("up")
+        await answer(here.page, "Continue").click()
+        await expect(here.page.get_by_text("No answer within the time limit")).to_be_visible()
+        await here.is_dead()
+        here.proxy.heal()
+        await expect(here.page.locator(".link-open")).to_have_count(1)
+        await expect(answer(here.page, "Continue")).to_be_enabled()
+        await answer(here.page, "Continue").click()
+        await expect(element(here.page, "DriveRoute")).to_contain_class("m2-active")
+
+
+# The map is a canvas: in how many pieces the trail was drawn that has most of them.
+PIECES = """
+  const { beginPath, moveTo, stroke } = CanvasRenderingContext2D.prototype;
+  let moves = 0;
+  window.pieces = 0;
+  Object.assign(CanvasRenderingContext2D.prototype, {
+    beginPath() { moves = 0; beginPath.call(this); },
+    moveTo(...at) { moves += 1; moveTo.apply(this, at); },
+    stroke() {
+      if (this.strokeStyle === "#3a7bd0") window.pieces = Math.max(window.pieces, moves);
+      stroke.call(this);
+    },
+  });
+"""
+
+
+async def test_no_line_is_drawn_where_nothing_was_known_of_a_vehicle(
+    chromium: Browser, tmp_path: Path
+) -> None:
+    async with field(chromium, tmp_path) as here:
+        await here.page.add_init_script(PIECES)
+        await here.start()
+        await answer(here.page, "Continue").click()
+        await expect(element(here.page, "DriveRoute")).to_contain_class("m2-active")
+        await here.page.wait_for_function("() => window.pieces === 1")
+        here.proxy.stall()
+        await here.is_dead()
+        await press_twice(here.page, here.stop.click)
+        await here.given_s(8)
+        await here.page.get_by_role("button", name="Give up this STOP").click()
+        here.proxy.heal()
+        await expect(here.page.locator(".link-open")).to_have_count(1)
+        await here.page.wait_for_function("() => window.pieces >= 2")
