@@ -883,6 +883,7 @@ export const strings = {
       does: "does",
       idle: "nothing",
       heldBy: "with {by}",
+      heldByRun: "driven by run {run}",
       take: "Take over",
       giveBack: "Give back",
       takeHint: "Steer it by hand; what it does for a mission ends",

@@ -104,7 +104,9 @@ class Opening {
     const live = this.source.kind === "run" && !isOver(summary);
     const replayed = live ? null : await loadReplay(this.source, summary, this.progress);
     if (this.left) return;
-    replayed?.seek(positionInAddress() ?? 0);
+    // A run that is over is shown as it ended, unless its replay was asked for here.
+    const isOverAlready = this.source.kind === "run" && !this.known;
+    replayed?.seek(positionInAddress() ?? (isOverAlready ? Infinity : 0));
     this.scene = replayed ?? new LiveScene(summary.run);
     show({ ...stage, scene: this.scene });
   }

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { Command } from "../../shared/types";
-import { isOperator, workOf } from "./work";
+import { isOperator, runOf, workOf } from "./work";
 
 const command = (name: string, since: number, ...resources: string[]): Command => ({
   name,
@@ -27,5 +27,9 @@ describe("work", () => {
       false,
       false,
     ]);
+  });
+
+  it("knows the run that drives a vehicle, whichever page it is shown on", () => {
+    expect(["r12.b144", "anna@gcs1", ""].map(runOf)).toEqual(["r12", "", ""]);
   });
 });

@@ -18,5 +18,8 @@ export function workOf(resource: string, commands: Record<string, Command>): Wor
 export const isOperator = (holder: string): boolean =>
   holder !== "" && !/^r\d+\.b\d+$/.test(holder);
 
+/** The run whose behavior holds a resource; "": none does. */
+export const runOf = (holder: string): string => /^(r\d+)\.b\d+$/.exec(holder)?.[1] ?? "";
+
 export const payloadsOf = (fleet: Fleet, vehicle: string): string[] =>
   fleet.payloads.filter((payload) => payload.vehicle === vehicle).map(({ id }) => id);
