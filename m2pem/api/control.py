@@ -170,7 +170,7 @@ class MissionControl(Protocol):
 
         Raises:
             OperatorError: the run has ended; or the cancels are sent, and the journal has not
-                written the stop within 2 s.
+                written the stop within 1.5 s.
         """
         ...
 

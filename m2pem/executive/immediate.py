@@ -20,7 +20,7 @@ from m2pem.executive.stop_marks import StopMark, StopMarks
 ACKNOWLEDGED_WITHIN_S = 1.0
 """An arbiter that has not taken a STOP or hold by then: operators are alerted."""
 
-WRITTEN_WITHIN_S = 2.0
+WRITTEN_WITHIN_S = 1.5
 """How long an operator's STOP or pause waits for the journal, before it says how things are."""
 
 

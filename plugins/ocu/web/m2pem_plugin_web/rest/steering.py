@@ -4,6 +4,7 @@ from fastapi import APIRouter, Request
 from pydantic import BaseModel
 
 from m2pem.api import MissionControl
+from m2pem.errors import NotDrivenError
 from m2pem_plugin_web.access.lateness import LONGEST_S, age_s
 from m2pem_plugin_web.access.people import Operator, Person, Stopper
 from m2pem_plugin_web.live.hub import Hub
@@ -63,15 +64,22 @@ def router(control: MissionControl, hub: Hub) -> APIRouter:
     @routes.post("/runs/{run}/stop", status_code=204)
     async def stop(request: Request, person: Stopper, run: str, wanted: StopModel) -> None:
         """End every token of a run, and cancel its behaviors."""
-        await find_run(control, run)
         reason = reason_of(request, person, f"STOP of {run}", wanted)
-        await control.stop(run, by=person.name, reason=reason)
+        try:
+            # Not after a look into the journal, which may be what does not answer.
+            await control.stop(run, by=person.name, reason=reason)
+        except NotDrivenError:
+            await find_run(control, run)
+            raise
 
     @routes.post("/runs/{run}/pause", status_code=204)
     async def pause(person: Operator, run: str) -> None:
         """Hold the vehicles of a run, and its time."""
-        await find_run(control, run)
-        await control.pause(run, by=person.name)
+        try:
+            await control.pause(run, by=person.name)
+        except NotDrivenError:
+            await find_run(control, run)
+            raise
 
     @routes.post("/runs/{run}/resume", status_code=204)
     async def resume(person: Operator, run: str) -> None:

@@ -20,7 +20,7 @@ export const strings = {
     stopRetried: "The executive has not confirmed STOP of {what}. It is sent again until it does.",
     stopRefused: "The executive refuses STOP of {what}.",
     stopOtherwise:
-      "Stop the vehicles another way: m2pem stop in a terminal of the executive's machine, or each vehicle's own stop.",
+      "Stop the vehicles another way: m2pem stop --all in a terminal of the executive's machine, or each vehicle's own stop.",
     stopGiveUp: "Give up this STOP",
     notSent: "Not connected: nothing was sent.",
     notConfirmed:
