@@ -127,27 +127,30 @@ class Dispatcher:
         """
         self._barred.add(run)
         return {
-            behavior: self._order(active, partial(self._stop, behavior, active, epoch))
+            behavior: self._order(active.resources, partial(self._stop, behavior, active, epoch))
             for behavior, active in self._active_of(run)
         }
 
     def hold_at_once(self, run: str) -> dict[str, Order]:
-        """Hold all that a run commands, by behavior; out of turn as `stop_at_once` is."""
+        """Hold all that a run commands, by resource; out of turn as `stop_at_once` is."""
         return {
-            behavior: self._order(active, partial(self._hold_now, behavior, active))
+            resource: self._order((resource,), partial(self._hold_now, behavior, resource))
             for behavior, active in self._active_of(run)
+            for resource in active.resources
         }
 
     def _active_of(self, run: str) -> list[tuple[str, _Active]]:
         return [each for each in self._active.items() if each[0].partition(".")[0] == run]
 
-    def _order(self, active: _Active, send: Callable[[], Awaitable[str]]) -> Order:
-        order = Order(active.resources)
+    def _order(
+        self, resources: tuple[ResourceId, ...], send: Callable[[], Awaitable[str]]
+    ) -> Order:
+        order = Order(resources)
 
         async def carry_out() -> None:
             order.wrong = await send()
 
-        order.task = self._enqueue(active.resources, carry_out, set())
+        order.task = self._enqueue(resources, carry_out, set())
         return order
 
     async def _stop(self, behavior: str, active: _Active, epoch: int) -> str:
@@ -160,19 +163,16 @@ class Dispatcher:
             return ""  # it was not sent: `_start` saw that its run is barred
         wrong = await self._cancel_active(behavior, active, active.resources, epoch)
         if abandoned:
-            held = [await self._turn("hold", resource) for resource in active.resources]
             wrong = wrong or "its start had not returned and was abandoned; it is held as well"
+            held = await asyncio.gather(*(self._turn("hold", each) for each in active.resources))
             wrong = "; ".join([wrong, *filter(None, held)])
         return wrong
 
-    async def _hold_now(self, behavior: str, active: _Active) -> str:
-        start = self._starts.get(behavior)
-        if not await _returns(start):
+    async def _hold_now(self, behavior: str, resource: ResourceId) -> str:
+        if not await _returns(self._starts.get(behavior)):
             # The vehicle may set off when its start returns at last: it is held then, too.
-            for resource in active.resources:
-                self.hold(resource)
-        held = [await self._turn("hold", resource) for resource in active.resources]
-        return "; ".join(filter(None, held))
+            self.hold(resource)
+        return await self._turn("hold", resource)
 
     # --- what is known of behaviors -------------------------------------------------------------
 

@@ -16,6 +16,7 @@ async def assert_opens(url, path):
         assert await journal.create(HEADER) == "r1"
     assert path.stat().st_size > 0
     path.unlink()
+    path.with_name(f"{path.name}-mark").unlink()
 
 
 async def test_memory_opens_a_journal_in_memory():
