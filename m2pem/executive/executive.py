@@ -220,6 +220,7 @@ class Executive:
             self._locks.release()
             if self._observers is not None:
                 await self._observers.close()
+            await self._marks.close()
             self.bus.close()
             self.notices.end()
             await self._stack.aclose()

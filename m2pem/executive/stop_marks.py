@@ -3,18 +3,23 @@
 A STOP goes to the vehicles before the journal has it. If the executive then dies while the disk
 does not answer, the journal still says that the run goes on; the mark says that it must not. It is
 written to two places, as one of them may be on the disk that fails: beside the journal, and in the
-folder for files of running programs. Writing never holds up the executive.
+runtime folder, which is in memory on most systems. Writing never holds up the executive.
 """
 
+import asyncio
 import json
 import logging
 import os
-import tempfile
 import threading
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from queue import SimpleQueue
+from queue import Queue
 from uuid import UUID
+
+from m2pem.executive.runtime_folder import runtime_folder
+
+CLOSED_WITHIN_S = 1.0
 
 log = logging.getLogger("m2pem.executive")
 
@@ -36,10 +41,11 @@ class StopMarks:
 
     def __init__(self, file: Path | None, identity: UUID) -> None:
         self._identity = str(identity)
-        self._places: dict[Path, SimpleQueue[tuple[Path, bytes | None]]] = {}
+        self._places: dict[str, Queue[tuple[Path, bytes | None]]] = {}
         if file is not None:
-            for folder in (file.with_name(f"{file.name}-stops"), _runtime_folder(identity)):
-                self._places[folder] = SimpleQueue()
+            self._places[f"{file}-stopped-"] = Queue()
+            with suppress(OSError):
+                self._places[f"{runtime_folder()}/{identity}-stopped-"] = Queue()
         self._started = False
 
     def put(self, run: str, mark: StopMark) -> None:
@@ -54,9 +60,9 @@ class StopMarks:
 
     def get(self, run: str) -> StopMark | None:
         """The mark of a run that was left without an end; None: it was not stopped."""
-        for folder in self._places:
+        for place in self._places:
             try:
-                content = json.loads((folder / run).read_bytes())
+                content = json.loads(Path(f"{place}{run}").read_bytes())
             except (OSError, ValueError):
                 continue
             if content.get("journal") == self._identity:
@@ -64,10 +70,19 @@ class StopMarks:
                 return StopMark(str(content.get("by", "")), str(content.get("reason", "")))
         return None
 
+    async def close(self) -> None:
+        """Wait until what was asked for is done, at most `CLOSED_WITHIN_S`: a disk may hang."""
+        if self._started:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(CLOSED_WITHIN_S):
+                    # Not in a thread that waits: the program would wait for that one in the end.
+                    while any(queue.unfinished_tasks for queue in self._places.values()):  # noqa: ASYNC110
+                        await asyncio.sleep(0.01)
+
     def _queue(self, run: str, content: bytes | None) -> None:
         self._start()
-        for folder, queue in self._places.items():
-            queue.put((folder / run, content))
+        for place, queue in self._places.items():
+            queue.put((Path(f"{place}{run}"), content))
 
     def _start(self) -> None:
         if self._started:
@@ -79,7 +94,7 @@ class StopMarks:
             threading.Thread(target=_serve, args=(queue,), name="stop marks", daemon=True).start()
 
 
-def _serve(queue: "SimpleQueue[tuple[Path, bytes | None]]") -> None:
+def _serve(queue: "Queue[tuple[Path, bytes | None]]") -> None:
     while True:
         path, content = queue.get()
         try:
@@ -89,12 +104,11 @@ def _serve(queue: "SimpleQueue[tuple[Path, bytes | None]]") -> None:
                 _write(path, content)
         except OSError as error:
             log.warning("%s: the mark of a stopped run: %s", path, error.strerror)
+        finally:
+            queue.task_done()
 
 
 def _write(path: Path, content: bytes) -> None:
-    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    if path.parent.stat().st_uid != os.geteuid():
-        raise PermissionError(1, "its folder belongs to another user")
     new = path.with_name(f"{path.name}.new")
     descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600)
     try:
@@ -103,9 +117,3 @@ def _write(path: Path, content: bytes) -> None:
     finally:
         os.close(descriptor)
     new.rename(path)
-
-
-def _runtime_folder(identity: UUID) -> Path:
-    """In memory on most systems: it answers while a disk does not."""
-    base = os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()
-    return Path(base) / f"m2pem-{os.geteuid()}-{identity}"

@@ -9,16 +9,13 @@ import json
 import os
 import shlex
 import sys
-import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from m2pem.errors import M2pemError
 from m2pem.executive.arbiters import SIMULATED, FleetArbiters
+from m2pem.executive.runtime_folder import VARIABLE, runtime_folder
 from m2pem.model.catalogue import ResourceId
-
-FOLDER = "M2PEM_RUNTIME_DIR"
-"""The environment variable that names the folder of the locks."""
 
 
 class VehicleInUseError(M2pemError):
@@ -51,7 +48,7 @@ class VehicleLocks:
             self.release()
             raise VehicleInUseError(
                 f"{error.filename}: {error.strerror}: the locks of vehicles cannot be kept there; "
-                f"name another folder by {FOLDER}"
+                f"name another folder by {VARIABLE}"
             ) from error
         if taken:
             self.release()
@@ -66,7 +63,7 @@ class VehicleLocks:
 
     def _take(self, address: str) -> str | None:
         """Lock an address; returns what its holder has written, if another one has it."""
-        path = _folder() / f"{hashlib.sha256(address.encode()).hexdigest()[:32]}.lock"
+        path = runtime_folder() / f"{hashlib.sha256(address.encode()).hexdigest()[:32]}.lock"
         if path in self._held:
             return None
         while True:
@@ -101,23 +98,6 @@ def addresses_of(arbiters: FleetArbiters, journal: Path | None) -> dict[Resource
             addresses.append(f"{journal.resolve()}: {arbiters.fleet.name}: {resource}")
         found[resource] = addresses
     return found
-
-
-def _folder() -> Path:
-    """A folder of this user's own: not of the session, whose environment may say another one."""
-    configured = os.environ.get(FOLDER, "")
-    user = os.geteuid()
-    session = Path(f"/run/user/{user}")
-    if configured:
-        folder = Path(configured)
-    elif session.is_dir() and session.stat().st_uid == user:
-        folder = session / "m2pem"
-    else:
-        folder = Path(tempfile.gettempdir()) / f"m2pem-{user}"
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    if folder.lstat().st_uid != user:
-        raise PermissionError(1, "is not a folder of this user's own", str(folder))
-    return folder
 
 
 def _is_at(file: int, path: Path) -> bool:
