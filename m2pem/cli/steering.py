@@ -21,13 +21,13 @@ def steer(journal_url: str | None, run: str, method: str, by: str | None, **para
     """
     from m2pem.api.operator import operator_name
     from m2pem.control_socket.client import ask_driver
-    from m2pem.errors import OperatorError
+    from m2pem.errors import NotDrivenError
 
     path = _journal_file(journal_url)
     try:
         ask_driver(path, run, method, by=by or operator_name(), **params)
-    except OperatorError as error:
-        raise OperatorError(f"{error}{_left_behind(journal_url, path, run)}") from error
+    except NotDrivenError as error:
+        raise NotDrivenError(f"{error}{_left_behind(journal_url, path, run)}") from error
 
 
 def steer_all(journal_url: str | None, method: str, by: str | None, **params: Any) -> list[str]:
@@ -39,13 +39,13 @@ def steer_all(journal_url: str | None, method: str, by: str | None, **params: An
     """
     from m2pem.api.operator import operator_name
     from m2pem.control_socket.client import ask_all
-    from m2pem.errors import OperatorError
+    from m2pem.errors import NotDrivenError
 
     path = _journal_file(journal_url)
     try:
         return ask_all(path, method, by=by or operator_name(), **params)
-    except OperatorError as error:
-        raise OperatorError(f"{error}{_left_behind(journal_url, path)}") from error
+    except NotDrivenError as error:
+        raise NotDrivenError(f"{error}{_left_behind(journal_url, path)}") from error
 
 
 def _left_behind(journal_url: str | None, path: Path, run: str | None = None) -> str:

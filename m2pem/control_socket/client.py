@@ -45,7 +45,7 @@ def ask_driver(journal: Path, run: str, method: str, **params: Any) -> Any:
         except NotDrivenError as error:
             elsewhere.append(str(error))
     if elsewhere:
-        raise OperatorError("; ".join(elsewhere))
+        raise NotDrivenError("; ".join(elsewhere))
     raise _nobody(journal)
 
 
@@ -101,8 +101,8 @@ def find_executive(journal: Path, run: str | None) -> Path:
     raise OperatorError("; ".join(elsewhere))
 
 
-def _nobody(journal: Path) -> OperatorError:
-    return OperatorError(
+def _nobody(journal: Path) -> NotDrivenError:
+    return NotDrivenError(
         f"no executive with the journal {journal} is running here; "
         "name the journal of the one you mean with --journal"
     )

@@ -1,10 +1,9 @@
 """STOP while the journal of a real executive does not write: what the vehicles saw of it."""
 
 import signal
-import sqlite3
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -28,6 +27,21 @@ def m2pem_records_committed(run_id, records):
 """
 
 
+STALLING = """
+import os, time
+from m2pem.journal.ledger import Ledger
+
+commit = Ledger.commit
+
+def stalled(self):
+    while os.path.exists("stalled"):
+        time.sleep(0.01)
+    return commit(self)
+
+Ledger.commit = stalled
+"""
+
+
 def driving(m2pem: CommandLine, fleet: Path, journal: Path, **environment: str) -> Program:
     """The mission of the paper, with evsg1 on its route and nothing detected."""
     program = m2pem.start(
@@ -39,12 +53,12 @@ def driving(m2pem: CommandLine, fleet: Path, journal: Path, **environment: str) 
 
 
 @contextmanager
-def locked(journal: Path) -> Iterator[None]:
-    """Another process has the journal: nothing is written to it within the block."""
-    with closing(sqlite3.connect(journal, isolation_level=None, timeout=30)) as other:
-        other.execute("BEGIN IMMEDIATE")
-        yield
-        other.execute("ROLLBACK")
+def stalled(folder: Path) -> Iterator[None]:
+    """No commit of an executive with the plugin STALLING comes to its end within the block."""
+    file = folder / "stalled"
+    file.touch()
+    yield
+    file.unlink()
 
 
 def until(true: Callable[[], bool]) -> None:
@@ -59,13 +73,13 @@ def effects(state: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("how", ["command", "all", "signal"])
-def test_a_vehicle_is_cancelled_while_the_journal_is_locked(
+def test_a_vehicle_is_cancelled_while_the_disk_is_stalled(
     m2pem: CommandLine, tmp_path: Path, how: str
 ) -> None:
     fleet, state = fleet_with_state(tmp_path)
     journal = tmp_path / "j.db"
-    program = driving(m2pem, fleet, journal)
-    with locked(journal):
+    program = driving(m2pem, fleet, journal, **install_plugin(tmp_path, "stalling", STALLING))
+    with stalled(tmp_path):
         if how == "signal":
             program.send(signal.SIGTERM)
         else:
@@ -84,8 +98,8 @@ def test_a_run_that_was_stopped_before_its_executive_died_stays_stopped(
 ) -> None:
     fleet, state = fleet_with_state(tmp_path)
     journal = tmp_path / "j.db"
-    program = driving(m2pem, fleet, journal)
-    with locked(journal):
+    program = driving(m2pem, fleet, journal, **install_plugin(tmp_path, "stalling", STALLING))
+    with stalled(tmp_path):
         m2pem.run("stop", "r1", "--reason", "people", "--journal", journal)
         until(lambda: "cancel" in effects(state))
         program.kill()
