@@ -27,7 +27,7 @@ COMMANDS = {
     "resume": "Take up a run that was interrupted.",
     "answer": "Answer a prompt of a run that is running on this host.",
     "signal": "Send a signal to a run that is running on this host.",
-    "stop": "Stop a run that is running on this host.",
+    "stop": "Stop a run that is running on this host, or all of them.",
     "pause": "Pause a run that is running on this host.",
     "continue": "Let a run on this host go on after a pause.",
     "attach": "Serve an operator of an executive that is running on this host.",
