@@ -15,7 +15,7 @@ from m2pem.sim.rehearsal import rehearse
 from m2pem.verify.explore import Limits
 
 NAMES = ("escort", "patrol", "search", "survey", "sweep_and_detect")
-ROUTE = {"type": "LineString", "coordinates": [[7, 50], [7.001, 50]]}
+ROUTE = {"type": "LineString", "coordinates": [[-77.319, 38.107], [-77.318, 38.107]]}
 
 
 async def test_a_check_tells_findings_and_what_is_in_the_file(tmp_path: Path) -> None:

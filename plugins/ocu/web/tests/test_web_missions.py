@@ -229,7 +229,7 @@ async def test_roles_are_what_they_may_do(tmp_path: Path) -> None:
             await rest.put("/missions/one", body, 403, headers=headers)
             await rest.delete("/missions/one", 403, headers=headers)
             await rest.get("/missions", headers=headers)
-        point = {"geometry": {"type": "Point", "coordinates": [7, 50]}}
+        point = {"geometry": {"type": "Point", "coordinates": [-77.319, 38.107]}}
         await rest.put("/geometries/gate", point, 403, headers=viewer)
         await rest.put("/geometries/gate", point, 204, headers=operator)
         for path in ("/verifications", "/rehearsals"):
