@@ -8,7 +8,7 @@ together and share a commit.
 import asyncio
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from m2pem.api.clock import Clock
 from m2pem.api.control import Alert, OpenPrompt, PromptClosed, RunId, StampedRecord
@@ -408,8 +408,10 @@ class Runner:
     # --- taking over after a restart --------------------------------------------------------------
 
     def take_up(self, commands: Sequence[c.Command]) -> None:
-        """Carry out what stands from before a restart."""
+        """Carry out what was open before a restart, under this epoch: older ones are refused."""
         for command in commands:
+            if isinstance(command, (c.StartBehavior, c.CancelBehavior)):
+                command = replace(command, epoch=self.epoch)  # noqa: PLW2901
             self._dispatch(command)
 
 
