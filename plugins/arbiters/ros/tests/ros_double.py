@@ -158,7 +158,7 @@ class DoubleDriver:
             await asyncio.Event().wait()
         if order.goal == self.body.goal:
             self.known.add(order.goal)
-            return Outcome(BehaviorState.RUNNING)
+            return Outcome(BehaviorState.RUNNING, held=self.body.held)
         return self.body.outcomes.get(order.goal, Outcome(BehaviorState.UNKNOWN))
 
     def forget(self) -> None:
