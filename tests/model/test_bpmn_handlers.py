@@ -249,7 +249,8 @@ WRONG_LINKS = {
     "a target in a subprocess": (
         process(
             f"{throw('a')}\n<subProcess id='X'>{throw('a', 'in')}{catch('a')}{TASK}"
-            f"<task id='B'/>{flow('B', 'in')}{flow('L2', 'T')}</subProcess>\n{line_of('X')}{flow('X', 'L1')}"
+            f"<task id='B'/>{flow('B', 'in')}{flow('L2', 'T')}</subProcess>\n"
+            f"{line_of('X')}{flow('X', 'L1')}"
         ),
         [("link-crosses-border", 3, "L1")],
     ),
