@@ -132,7 +132,7 @@ class RosArbiter:
         settings = self._settings.get(resource)
         if settings is None:
             return []
-        domain = settings.domain_id
+        domain: int | str | None = settings.domain_id
         if domain is None:
             domain = os.environ.get("ROS_DOMAIN_ID") or 0
         return [f"domain {domain}, namespace {settings.namespace or '/'}"]
