@@ -292,6 +292,7 @@ class OcuContract(Contract):
             await bench.asked(scenarios.question("Road?"))
             await bench.shows("Road?")
             await bench.end_executive()
+            await bench.takes_notice()
             await bench.leave()
 
         sit(main)

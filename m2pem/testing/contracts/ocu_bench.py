@@ -15,6 +15,7 @@ from m2pem.testing.stage import stage
 
 WITHIN_S = 10.0
 LOOK_EVERY_S = 0.01
+TURNS = 100
 SPEED = 20.0
 VEHICLE = "ugv1"
 
@@ -117,6 +118,11 @@ class OcuBench:
     def unfinished(self) -> list[asyncio.Task[Any]]:
         """The tasks that the unit made, and those that they made, which have not ended."""
         return [task for task in self._tasks if not task.done()]
+
+    async def takes_notice(self) -> None:
+        """Wait until every task that can go on has gone on: a unit that breaks breaks here."""
+        for _ in range(TURNS):
+            await asyncio.sleep(0)
 
     async def leave(self) -> None:
         """Cancel the unit, and see it end; what broke it is raised."""

@@ -177,7 +177,9 @@ async def test_what_goes_wrong_is_told_at_once(world: MakeWorld) -> None:
         live = await (await here.browser()).live()
         await live.watch(None)
         await here.control.take(VEHICLE, by="anna")
-        run = await here.control.start(scenarios.one_behavior("goto", VEHICLE, target="[0, 0]"))
+        run = await here.control.start(
+            scenarios.one_behavior("goto", VEHICLE, target=list(scenarios.ORIGIN))
+        )
         told = await live.until(lambda message: message["type"] == "fault")
         assert told["text"].startswith(f"{run}: ")
 
