@@ -75,10 +75,10 @@ class Output:
             printed += 1
             if printed % TURN == 0:
                 await asyncio.sleep(0)  # a backlog comes without waiting, and STOP must not wait
-            if isinstance(notice, StampedRecord):
-                self.show(notice)
                 if self.writer.full:
                     await self.drain()
+            if isinstance(notice, StampedRecord):
+                self.show(notice)
             elif isinstance(notice, Alert) and not self._covered:
                 where = f"{notice.run}: " if notice.run else ""
                 writer_for(sys.stderr).put(f"m2pem: {where}{printable(notice.text)}")

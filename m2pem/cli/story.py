@@ -46,10 +46,10 @@ class Story:
         """One line for a record; None for one that matters to programs only."""
         if self._main is None:
             self._main = stamped.run
-        if not self._asks and isinstance(stamped.record, r.PromptOpened):
-            return None
         teller = _TELLERS.get(type(stamped.record))
-        told = teller(self, stamped.run, stamped.record) if teller else None
+        if teller is None or (not self._asks and isinstance(stamped.record, r.PromptOpened)):
+            return None
+        told = teller(self, stamped.run, stamped.record)
         if told is None:
             return None
         text, colour = told
@@ -99,7 +99,8 @@ class Story:
 
 def printable(text: str) -> str:
     """On one line, and without what would steer a terminal: names come from strangers' files."""
-    return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
+    line = " ".join(text.split())
+    return line if line.isprintable() else "".join(c if c.isprintable() else "?" for c in line)
 
 
 def _by(record: Any) -> str:

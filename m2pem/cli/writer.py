@@ -1,6 +1,5 @@
 """Prints lines from a thread, so that a reader who stands still never holds up a mission."""
 
-import queue
 import threading
 import weakref
 from collections.abc import Callable
@@ -16,19 +15,24 @@ class LineWriter:
     def __init__(self, stream: TextIO) -> None:
         self.broken = False
         self._stream = stream
-        self._waiting: queue.Queue[str] = queue.Queue()
+        self._changed = threading.Condition()
+        self._waiting: list[str] = []
+        self._printing = 0
         self._when_broken: list[Callable[[], None]] = []
         # A daemon: one that is stuck in a write must not keep the program from ending.
         threading.Thread(target=self._write, name="printing", daemon=True).start()
 
     def put(self, line: str) -> None:
         """Have a line printed; returns at once."""
-        self._waiting.put(line)
+        with self._changed:
+            self._waiting.append(line)
+            if len(self._waiting) == 1:
+                self._changed.notify_all()
 
     @property
     def full(self) -> bool:
         """Whether so much waits that whoever prints many lines ought to wait."""
-        return self._waiting.qsize() >= MAX_WAITING
+        return len(self._waiting) >= MAX_WAITING
 
     def when_broken(self, call: Callable[[], None]) -> None:
         """Call this, from another thread, when nobody reads the stream any more."""
@@ -36,20 +40,19 @@ class LineWriter:
 
     def drain(self, timeout_s: float | None = None) -> None:
         """Wait until all is printed, at most `timeout_s`."""
-        with self._waiting.all_tasks_done:
-            self._waiting.all_tasks_done.wait_for(
-                lambda: not self._waiting.unfinished_tasks, timeout_s
-            )
+        with self._changed:
+            self._changed.wait_for(lambda: not self._waiting and not self._printing, timeout_s)
 
     def _write(self) -> None:
         while True:
-            lines = [self._waiting.get()]
-            while len(lines) < MAX_WAITING and not self._waiting.empty():
-                lines.append(self._waiting.get())
+            with self._changed:
+                self._printing = 0
+                self._changed.notify_all()
+                self._changed.wait_for(lambda: self._waiting)
+                lines, self._waiting = self._waiting, []
+                self._printing = len(lines)
             if not self.broken:
                 self._print(lines)
-            for _ in lines:
-                self._waiting.task_done()
 
     def _print(self, lines: list[str]) -> None:
         try:

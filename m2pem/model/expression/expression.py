@@ -1,6 +1,7 @@
 """A parsed expression, and the ways to get one from text."""
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import NoReturn
 
 from m2pem.errors import ExpressionError
@@ -75,6 +76,7 @@ class Expression:
         return self.text
 
 
+@lru_cache(maxsize=1024)  # missions repeat their conditions, and an expression never changes
 def parse(text: str, language: str | None = None) -> Expression:
     """Parse one expression: `${...}` (Camunda 7), a leading `=` (FEEL), else bare.
 

@@ -4,7 +4,7 @@ from lxml import etree
 
 from m2pem.model.bpmn.names import BPMN
 from m2pem.model.bpmn.rules.rule import Rule, Topic, W, declared
-from m2pem.model.bpmn.rules.tree import ACTIVITIES, Tree, is_false, is_true, parent, what
+from m2pem.model.bpmn.rules.tree import ACTIVITIES, Tree, is_false, is_true, named, parent, what
 
 LONE_CONDITION = Rule(
     8476,
@@ -49,6 +49,9 @@ UNLISTED = Rule(
     "add it to the incoming or outgoing elements; the flows count",
 )
 
+_INCOMING = BPMN + "incoming"
+_OUTGOING = BPMN + "outgoing"
+
 
 def _condition(tree: Tree, element: etree._Element) -> None:
     flow = parent(element)
@@ -68,30 +71,33 @@ def _immediate(tree: Tree) -> None:
 
 
 def _listed(tree: Tree) -> None:
-    lists = (BPMN + "incoming", BPMN + "outgoing")
-    known = {flow.get("id"): flow for flow in tree.flows}
-    named: dict[tuple[etree._Element, str], set[str]] = {}
-    for element in tree.root.iter(*lists):
-        name = (element.text or "").strip()
-        flow = known.get(name)
-        if flow is None:
-            flow = known.get(name.rpartition(":")[2])
-        if flow is None:
-            if name:
-                tree.say(LISTED, element, f"'{name}'")
-            continue
-        end = "targetRef" if element.tag == lists[0] else "sourceRef"
-        owner = parent(element).get("id")
-        if owner and flow.get(end, "").rpartition(":")[2] != owner:
-            tree.say(LISTED_ELSEWHERE, element, f"{end} of '{name}' is '{flow.get(end, '')}'")
-
-        else:
-            named.setdefault((parent(element), element.tag), set()).add(flow.get("id", ""))
-    for (element, tag), listed in named.items():
-        own = tree.into(element) if tag == lists[0] else tree.out(element)
-        missing = [each for each in own if each.get("id", "") not in listed]
-        if missing:
-            tree.say(UNLISTED, element, ", ".join(what(each) for each in missing))
+    known = {flow.get("id", ""): flow for flow in tree.flows}
+    for tag, end in (_INCOMING, "targetRef"), (_OUTGOING, "sourceRef"):
+        # The ends of flows that are still to be listed, as (id of the element, id of the flow).
+        ends = {(named(flow.get(end, "")), name): flow for name, flow in known.items()}
+        listing: dict[str, etree._Element] = {}
+        for element in tree.root.iter(tag):
+            name = (element.text or "").strip()
+            holder = parent(element)
+            owner = holder.get("id", "")
+            if ends.pop((owner, name), None) is None:
+                flow = known.get(name, known.get(named(name)))
+                if flow is None:
+                    if name:
+                        tree.say(LISTED, element, f"'{name}'")
+                    continue
+                there = flow.get(end, "")
+                if owner and named(there) != owner:
+                    tree.say(LISTED_ELSEWHERE, element, f"{end} of '{name}' is '{there}'")
+                    continue
+                ends.pop((owner, flow.get("id", "")), None)
+            listing[owner] = holder
+        missing: dict[str, list[str]] = {}
+        for (owner, _), flow in ends.items():
+            if owner and owner in listing:
+                missing.setdefault(owner, []).append(what(flow))
+        for owner, flows in missing.items():
+            tree.say(UNLISTED, listing[owner], ", ".join(flows))
 
 
 TOPIC = Topic(declared(globals()), {"conditionExpression": _condition}, (_immediate, _listed))

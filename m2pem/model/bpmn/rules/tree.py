@@ -54,7 +54,8 @@ _NAMED_BY_READERS = NODES | names("sequenceFlow process")
 _TRUE = frozenset({"true", "1"})
 
 
-def _named(text: str) -> str:
+def named(text: str) -> str:
+    """The id that a reference names, without the prefix of its namespace."""
     return text.rpartition(":")[2] if ":" in text else text
 
 
@@ -103,8 +104,8 @@ class Tree:
         into: dict[str, list[etree._Element]] = {}
         out: dict[str, list[etree._Element]] = {}
         for flow in self.flows:
-            out.setdefault(_named(flow.get("sourceRef", "")), []).append(flow)
-            into.setdefault(_named(flow.get("targetRef", "")), []).append(flow)
+            out.setdefault(named(flow.get("sourceRef", "")), []).append(flow)
+            into.setdefault(named(flow.get("targetRef", "")), []).append(flow)
         return into, out
 
     def into(self, element: etree._Element) -> list[etree._Element]:
