@@ -1,16 +1,17 @@
 """What is doubtful about a mission as a whole; what is wrong with one element, reading finds.
 
-The findings are warnings, but for elements that no start event can reach: those load, so that
-they can be verified and simulated, and are errors of `check`.
+The findings are warnings, but for elements that no start event can reach and loops that never wait
+and have no end: those load, and are errors of `check`.
 """
 
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from m2pem.findings import Finding, Severity
 from m2pem.model.bpmn import collector
 from m2pem.model.bpmn.graph import unreachable
 from m2pem.model.bpmn.rules.registry import code
+from m2pem.model.busy_loops import busy_loops
+from m2pem.model.components import components
 from m2pem.model.elements import (
     Activity,
     CallActivity,
@@ -57,6 +58,7 @@ def lint(
             *_undecided_gateways(mission),
             *_outside_only(mission),
             *_recursion(mission),
+            *busy_loops(mission, known_names),
             *unwritten(mission, known_names, service_writes or {}, behavior_writes or {}),
         ]
     order = by_file(mission)
@@ -174,7 +176,9 @@ def _recursion(mission: Mission) -> Iterator[Finding]:
     for node in mission.nodes:
         if isinstance(node, CallActivity):
             calls[node.container.process].append(node)
-    group = _groups(calls)
+    group = components(
+        {process: [call.called for call in inside] for process, inside in calls.items()}
+    )
     for process, inside in calls.items():
         for call in inside:
             if group[call.called] == group[process]:
@@ -189,36 +193,3 @@ def _recursion(mission: Mission) -> Iterator[Finding]:
                         "make sure that a decision before the call can end it",
                     ),
                 )
-
-
-def _groups(calls: Mapping[Process, Sequence[CallActivity]]) -> dict[Process, int]:
-    """Processes that can call each other have the same number (Kosaraju's algorithm).
-
-    A process that cannot call itself has a number of its own, and is in no call's group but its
-    own: a call to itself is a cycle of one.
-    """
-    callers: dict[Process, list[Process]] = {process: [] for process in calls}
-    for process, inside in calls.items():
-        for call in inside:
-            callers[call.called].append(process)
-    finished: list[Process] = []
-    seen: set[Process] = set()
-    for start in calls:
-        waiting = [(start, False)]
-        while waiting:
-            process, done = waiting.pop()
-            if done:
-                finished.append(process)
-            elif process not in seen:
-                seen.add(process)
-                waiting.append((process, True))
-                waiting += [(call.called, False) for call in calls[process]]
-    group: dict[Process, int] = {}
-    for number, last in enumerate(reversed(finished)):
-        members = deque([last])
-        while members:
-            process = members.popleft()
-            if process not in group:
-                group[process] = number
-                members += callers[process]
-    return group

@@ -75,7 +75,6 @@ def unwritten(
         if isinstance(node, SubProcess):
             within[node] = store
         for mapping in _data_mappings(node):
-            store.written.add(mapping.target)
             if mapping.source.text not in mapping.source.names:  # a copy may well copy nothing
                 store.reads.append(Read(mapping.source, node.id, mapping.line))
         store.reads += _reads(node)
@@ -84,7 +83,11 @@ def unwritten(
         of_main = begins and node.container not in called
         if isinstance(node, Event):
             (stores[main] if of_main else store).reads += _conditions(node)
-        _note_writes(node, store, service_writes)
+        store.written |= written_by(node)
+        if isinstance(node, ServiceTask) and node.call is not None:
+            writes = service_writes.get(node.call.service)
+            store.written.update(writes or ())
+            store.anything |= writes is None
         behavior = getattr(node, "behavior", None)
         if isinstance(behavior, Behavior):
             store.written.update(behavior_writes.get(behavior.name, ()))
@@ -187,29 +190,26 @@ def _parameters(node: FlowNode, parameters: Iterable[Parameter]) -> Iterator[Rea
             yield Read(parameter.value, node.id, parameter.line)
 
 
-def _note_writes(
-    node: FlowNode, store: _Store, service_writes: Mapping[str, Sequence[str]]
-) -> None:
+def written_by(node: FlowNode) -> set[str]:
+    """The names that a node itself writes, without those of its service or behavior."""
+    written = {mapping.target for mapping in _data_mappings(node)}
     if isinstance(node, Activity) and node.loop is not None:
-        store.written.add(LOOP_COUNTER)
+        written.add(LOOP_COUNTER)
         if isinstance(node.loop, MultiInstance):
-            store.written |= {*INSTANCE_COUNTS, node.loop.item, node.loop.output_item}
-            store.written.add(node.loop.output_collection)
+            written |= {*INSTANCE_COUNTS, node.loop.item, node.loop.output_item}
+            written.add(node.loop.output_collection)
     if isinstance(node, ScriptTask) and node.script is not None:
         for statement in node.script.statements:
             if isinstance(statement, Assignment):
-                store.written.add(statement.key)
+                written.add(statement.key)
     elif isinstance(node, UserTask) and node.prompt is not None:
-        store.written.add(node.prompt.store)
+        written.add(node.prompt.store)
     elif isinstance(node, ComplexGateway):
-        store.written |= {"activationCount", "waitingForStart"}
-        store.written.update(flow.local_id for flow in node.incoming)
-    elif isinstance(node, ServiceTask) and node.call is not None:
-        writes = service_writes.get(node.call.service)
-        if writes is None:
-            store.anything = True
-        else:
-            store.written.update(writes)
+        written |= {"activationCount", "waitingForStart"}
+        written.update(flow.local_id for flow in node.incoming)
+    elif isinstance(node, CallActivity):
+        written.update(mapping.target for mapping in node.mappings.outputs)
+    return written
 
 
 def _note_mappings(call: CallActivity, caller: _Store, called: _Store) -> None:
@@ -218,4 +218,3 @@ def _note_mappings(call: CallActivity, caller: _Store, called: _Store) -> None:
         called.written.add(mapping.target)
     for mapping in call.mappings.outputs:
         called.reads.append(Read(mapping.source, call.id, mapping.line))
-        caller.written.add(mapping.target)

@@ -54,6 +54,8 @@ no-conditions | no flow out of a gateway has a condition | give the flows condit
 call-recursion | a process can call itself | make sure that a decision can end it
 empty-assignment | an assignment's 'from' is empty | write what it assigns, or delete it
 foreign-extension | another program's extension elements have no effect here | see extensions.md
+endless-loop | a loop has no wait and no end | wait in each round, or draw a way out | error
+busy-loop | a loop has no wait; only data can end it | wait in each round, or count the rounds
 """
 
 
