@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, Union
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, Union
 
 from m2pem.api.authoring import (
     DEFAULT_LIMITS,
@@ -72,8 +72,7 @@ class RunSummary:
     began_us: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class StampedRecord:
+class StampedRecord(NamedTuple):
     """A record with where it stands: `seq` counts from 1 in its run; `t_s` is mission time."""
 
     run: RunId

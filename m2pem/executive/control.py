@@ -180,8 +180,7 @@ class Control:
     def subscribe(self, run: RunId | None = None, size: int = 10_000) -> AsyncIterator[Notice]:
         """What is committed from now on, and first the prompts that stand now."""
         subscription = self._executive.notices.subscribe(run, size)
-        for prompt in self.prompts():
-            subscription.put(prompt)
+        subscription.put(self.prompts())
         return subscription
 
     def telemetry(self, size: int = 100) -> AsyncIterator[Telemetry]:

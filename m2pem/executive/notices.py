@@ -3,7 +3,7 @@
 import asyncio
 import weakref
 from collections import deque
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 
 from m2pem.api.control import Notice, RunId
 from m2pem.errors import OperatorError
@@ -20,14 +20,15 @@ class Subscription:
         self._overrun = False
         self._ended = False
 
-    def put(self, notice: Notice) -> None:
-        """Hand a notice over, unless it is of another run."""
-        if self._overrun or (self._run is not None and notice.run not in ("", self._run)):
+    def put(self, notices: Sequence[Notice]) -> None:
+        """Hand notices over, but those of another run."""
+        if self._overrun:
             return
-        if len(self._waiting) >= self._size:
-            self._overrun = True
-        else:
-            self._waiting.append(notice)
+        if self._run is not None:
+            notices = [notice for notice in notices if notice.run in ("", self._run)]
+        room = self._size - len(self._waiting)
+        self._overrun = len(notices) > room
+        self._waiting.extend(notices[:room])
         self._wake.set()
 
     def end(self) -> None:
@@ -82,12 +83,12 @@ class Notices:
             ]
         return subscription
 
-    def publish(self, notice: Notice) -> None:
+    def publish(self, *notices: Notice) -> None:
         """Tell all."""
         for reference in self._subscriptions:
             subscription = reference()
             if subscription is not None:
-                subscription.put(notice)
+                subscription.put(notices)
 
     def end(self) -> None:
         """Let every reader come to its end, after what waits for it."""

@@ -325,14 +325,15 @@ class Runner:
     def _publish(self, step: Step) -> None:
         outside = self._outside
         outside.observe(self.id, step.records)
-        tell = outside.notices.anybody
-        for place, record in enumerate(step.records):
+        for record in step.records:
             if isinstance(record, r.BehaviorEnded):
                 outside.dispatcher.ended(record.behavior)
-            if tell:
-                outside.notices.publish(
-                    StampedRecord(self.id, step.seq + place, step.t_us / 1_000_000, record)
-                )
+        if outside.notices.anybody:
+            t_s = step.t_us / 1_000_000
+            places = enumerate(step.records, step.seq)
+            outside.notices.publish(
+                *(StampedRecord(self.id, seq, t_s, record) for seq, record in places)
+            )
 
     def _dispatch_early(self, step: Step) -> None:
         for command in step.commands:
