@@ -438,7 +438,7 @@ def test_a_search_that_finds_nothing_is_given_up_within_an_hour(play: Rehearse) 
 @pytest.mark.parametrize("max_steps", [50, 25_000])
 def test_a_loop_that_takes_no_time_is_bounded_by_its_steps(play: Rehearse, max_steps: int) -> None:
     body = '<exclusiveGateway id="G"/><task id="T"/>'
-    flows = flow("S", "G") + flow("G", "T") + flow("T", "G") + flow("G", "E", "false")
+    flows = flow("S", "G") + flow("G", "E", "over") + flow("G", "T") + flow("T", "G")
     result = play(process(body + flows), max_steps=max_steps)
     assert result.summary.status is RunStatus.FAILED
     assert f"the {max_steps} steps that are allowed" in result.summary.detail
