@@ -24,6 +24,10 @@ WAIT = """<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targe
 BACK = """
     <sequenceFlow id="F2" sourceRef="Wait" targetRef="Merge"/>
     <exclusiveGateway id="Merge"/>
+    <sequenceFlow id="F5" sourceRef="Merge" targetRef="End">
+      <conditionExpression>over</conditionExpression>
+    </sequenceFlow>
+    <endEvent id="End"/>
     <sequenceFlow id="F3" sourceRef="Merge" targetRef="Task"/>
     <task id="Task"/>
     <sequenceFlow id="F4" sourceRef="Task" targetRef="Merge"/>

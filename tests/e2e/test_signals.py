@@ -95,6 +95,10 @@ LOOP = """<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targe
     <startEvent id="Start"/>
     <sequenceFlow id="F1" sourceRef="Start" targetRef="Merge"/>
     <exclusiveGateway id="Merge"/>
+    <sequenceFlow id="F0" sourceRef="Merge" targetRef="End">
+      <conditionExpression>over</conditionExpression>
+    </sequenceFlow>
+    <endEvent id="End"/>
     <sequenceFlow id="F2" sourceRef="Merge" targetRef="Work"/>
     <task id="Work"/>
     <sequenceFlow id="F3" sourceRef="Work" targetRef="Merge"/>
