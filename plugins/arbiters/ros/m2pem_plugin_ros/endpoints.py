@@ -13,6 +13,7 @@ from m2pem_plugin_ros.settings import DriverName, Settings, Via
 if TYPE_CHECKING:
     from m2pem_plugin_ros.runtime import RosRuntime
 
+NAMELESS = "a node whose name is not known yet"
 LEASE = "one that has crashed is listed for up to 20 s more"
 ODOMETRY = "nav_msgs/msg/Odometry"
 VEHICLE_STATUS = "m2pem_interfaces/msg/VehicleStatus"
@@ -103,10 +104,13 @@ def _singles(settings: Settings, *, is_payload: bool) -> tuple[Single, ...]:
 
 def _named(found: Sequence[Any]) -> str:
     """Nodes by their full names and gids: two of them may have one name."""
-    names = sorted(
-        f"{each.node_namespace.rstrip('/')}/{each.node_name} (gid {_gid(each)})" for each in found
-    )
-    return ", ".join(names)
+    return ", ".join(sorted(f"{_name(each)} (gid {_gid(each)})" for each in found))
+
+
+def _name(endpoint: Any) -> str:
+    if endpoint.node_name == "_NODE_NAME_UNKNOWN_":  # an endpoint is discovered before its node
+        return NAMELESS
+    return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
 
 
 def _gid(endpoint: Any) -> str:

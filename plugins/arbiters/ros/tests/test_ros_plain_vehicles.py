@@ -1,6 +1,7 @@
 """Vehicles of plain rclpy nodes: one that returns, two in one namespace, and wrong frames."""
 
 import asyncio
+import itertools
 import logging
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
@@ -10,6 +11,7 @@ from uuid import UUID
 
 import pytest
 from m2pem_plugin_ros.arbiter import RosArbiter
+from m2pem_plugin_ros.endpoints import NAMELESS
 from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.testing import Peer
@@ -157,7 +159,7 @@ async def test_two_vehicles_in_one_namespace_are_both_named_and_not_commanded(
     arguments = ["/ugv1", kind, "map"]
     with Peer(PEER, ros_domain, arguments), Peer(PEER, ros_domain, arguments):
         async with connected(ros_domain, **settings) as (bench, truth):
-            await until(lambda: "has 2 publishers" in reasons(bench))
+            await until(lambda: reasons(bench).count("/ugv1/vehicle (gid ") == 2)
             assert state(bench).ready is False  # type: ignore[union-attr]
             await bench.start("r1.b1", "goto", UGV1, target=ahead())
             end = await bench.ended("r1.b1", AMPLE_S)
@@ -209,10 +211,15 @@ async def test_odometry_in_a_frame_that_is_not_the_declared_one_is_refused_by_na
     with Peer(PEER, ros_domain, ["/ugv1", kind, frame]):
         async with connected(ros_domain, **settings) as (bench, truth):
             await until(lambda: says in reasons(bench) or settings)
-            await bench.start("r1.b1", "goto", UGV1, target=ahead())
-            end = await bench.ended("r1.b1", AMPLE_S)
-            assert end.state is BehaviorState.REJECTED
-            assert says in end.reason
+            reason = NAMELESS
+            for number in itertools.count(1):
+                if NAMELESS not in reason:
+                    break
+                await bench.start(f"r1.b{number}", "goto", UGV1, target=ahead())
+                end = await bench.ended(f"r1.b{number}", AMPLE_S)
+                assert end.state is BehaviorState.REJECTED
+                reason = end.reason
+            assert says in reason
             assert truth.begun() == 0
 
 
