@@ -102,7 +102,7 @@ def _resume(x: Steps, item: i.ResumeRun) -> None:
 
 
 def _continue(x: Steps, item: i.Continue) -> None:
-    if not x.queue:
+    if not (x.queue or x.entered):
         x.ignore("no step was left over")
 
 
@@ -113,7 +113,7 @@ def _tick(x: Steps, item: i.Tick) -> None:
         fired = True
         trigger(x, due[1], {})
         x.run_steps()
-        if x.queue:
+        if x.queue or x.entered:
             return
     if not fired:
         x.ignore("no timer is due")

@@ -7,6 +7,7 @@ Every change is a record that is applied at once, so that what is decided next s
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
+from enum import Enum
 
 from m2pem.engine import records as r
 from m2pem.engine.apply import apply
@@ -14,18 +15,28 @@ from m2pem.engine.data import Store, flatten, store_for
 from m2pem.engine.records import Record, TokenOutcome
 from m2pem.engine.state import RunState, Scope, Token
 from m2pem.model.elements import (
+    Activity,
     AdHocSubProcess,
     CallActivity,
     EndEvent,
     Event,
     EventBasedGateway,
     FlowNode,
+    IntermediateCatchEvent,
     IntermediateThrowEvent,
     ReceiveTask,
     SequenceFlow,
     StartEvent,
+    SubProcess,
+    Transaction,
 )
-from m2pem.model.events import EventDefinition, MessageEventDefinition
+from m2pem.model.events import (
+    ConditionalEventDefinition,
+    EventDefinition,
+    MessageEventDefinition,
+    SignalEventDefinition,
+    TimerEventDefinition,
+)
 from m2pem.model.mission import Mission
 from m2pem.model.upstream import upstream
 from m2pem.model.values import Value
@@ -35,6 +46,16 @@ NO_FLEET = Fleet("", "no fleet", {})
 """For a mission that commands no resource."""
 
 
+class Waits(Enum):
+    """What a node waits for as soon as a token enters it."""
+
+    NOTHING = "nothing"
+    AT_ITSELF = "at itself"
+    """All that it does is to wait, or it opens a scope that does: there is no later step."""
+    AT_ITS_BOUNDARY = "at its boundary"
+    """Its boundary events are armed at once; its work begins in its turn."""
+
+
 class Execution:
     """The records of the input being decided, and the steps it still causes."""
 
@@ -42,8 +63,10 @@ class Execution:
         "_reach",
         "_receivable",
         "_triggered_starts",
+        "_waits",
         "changed",
         "ended_instances",
+        "entered",
         "fleet",
         "mission",
         "moved",
@@ -61,10 +84,17 @@ class Execution:
         self.now_us = 0
         self.records: list[Record] = []
         self.queue: deque[Token | Scope] = deque()
+        self.entered: deque[Token] = deque()  # at what waits: they come before the queue
         self.ended_instances: deque[tuple[Token, TokenOutcome]] | None = None
         self.moved: set[int] = set()  # scopes whose inclusive joins must be looked at
         self.changed = False  # whether conditions must be looked at before the next step
         self.process_ids = [node.container.process.id for node in self.mission.nodes]
+        self._waits = {
+            node: waits
+            for node in self.mission.nodes
+            if (type(node) in _MAY_WAIT or getattr(node, "boundary", ()))
+            and (waits := waits_when_entered(node)) is not Waits.NOTHING
+        }
         self._reach: dict[FlowNode, dict[FlowNode, int]] = {}
         self._receivable: frozenset[str] | None = None
         self._triggered_starts: tuple[FlowNode, ...] | None = None
@@ -140,9 +170,32 @@ class Execution:
             )
         )
         entered = self.state.tokens[token]
-        self.queue.append(entered)
+        if instance is None and node not in self._waits:
+            self.queue.append(entered)
+        else:
+            self.execute_later(entered)
         self.moved.add(scope.id)
         return entered
+
+    def execute_later(self, token: Token) -> None:
+        """Have a token executed in its turn, or at once if its node waits."""
+        node = token.node
+        waits = self._waits.get(node, Waits.NOTHING)
+        if token.instance is not None:
+            waits = waits_when_entered(node, instance=True)
+        elif type(node) is StartEvent and self.has_been_triggered(token):
+            waits = Waits.NOTHING
+        if waits is not Waits.NOTHING:
+            self.entered.append(token)
+        if waits is not Waits.AT_ITSELF:
+            self.queue.append(token)
+
+    def has_been_triggered(self, token: Token) -> bool:
+        """Whether the trigger of the start event that a token is on has made its scope."""
+        container = token.node.container
+        if isinstance(container, SubProcess) and container.triggered_by_event:
+            return True
+        return token.scope.parent is None and token.scope is not self.state.root
 
     def spawn(self, node: FlowNode, scope: Scope) -> Token:
         """A new token on a node."""
@@ -235,6 +288,62 @@ class Execution:
         """Write several values."""
         for key, value in data.items():
             self.write(token, key, value)
+
+
+_MAY_WAIT: frozenset[type[FlowNode]] = frozenset(
+    {
+        AdHocSubProcess,
+        CallActivity,
+        EventBasedGateway,
+        IntermediateCatchEvent,
+        ReceiveTask,
+        StartEvent,
+        SubProcess,
+        Transaction,
+    }
+)
+"""Kinds that may wait without a boundary event."""
+
+
+def waits_when_entered(node: FlowNode, *, instance: bool = False) -> Waits:
+    """What a node waits for as soon as a token enters it.
+
+    `instance`: of an instance of a loop or multi-instance activity, whose boundary events are the
+    whole activity's; the whole itself only begins its instances.
+    """
+    if not isinstance(node, Activity):
+        if isinstance(node, StartEvent):
+            container = node.container
+            begun = isinstance(container, SubProcess) and container.triggered_by_event
+            waits = bool(node.definitions) and not begun
+        elif isinstance(node, IntermediateCatchEvent):
+            waits = bool(node.definitions) and not node.linked_from
+        else:
+            waits = isinstance(node, EventBasedGateway)
+        return Waits.AT_ITSELF if waits else Waits.NOTHING
+    at_boundary = not instance and any(map(_is_awaited, node.boundary))
+    if instance or node.loop is None:
+        if isinstance(node, ReceiveTask) and node.message is not None:
+            return Waits.AT_ITSELF
+        if isinstance(node, CallActivity | SubProcess):
+            container = node.called if isinstance(node, CallActivity) else node
+            starts = [start for inner in container.event_subprocesses for start in inner.starts]
+            at_boundary = at_boundary or any(map(_is_awaited, starts))
+            return Waits.AT_ITSELF if at_boundary else Waits.NOTHING
+    return Waits.AT_ITS_BOUNDARY if at_boundary else Waits.NOTHING
+
+
+def _is_awaited(event: Event) -> bool:
+    """Whether a trigger comes to an event; the others look for their catcher when thrown."""
+    return any(isinstance(definition, _AWAITED) for definition in event.definitions)
+
+
+_AWAITED = (
+    ConditionalEventDefinition,
+    MessageEventDefinition,
+    SignalEventDefinition,
+    TimerEventDefinition,
+)
 
 
 def definitions_of(node: FlowNode) -> Sequence[EventDefinition]:

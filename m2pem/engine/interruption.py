@@ -50,4 +50,5 @@ def end_run(x: Execution, outcome: RunOutcome, detail: str = "") -> None:
     for scope in [scope for scope in x.state.scopes.values() if scope.parent is None]:
         kill(x, scope, left)
     x.queue.clear()
+    x.entered.clear()
     x.emit(r.RunEnded(outcome, detail))

@@ -167,6 +167,8 @@ class Token:
     """It is on a compensation activity, or again on a completed activity, to undo one."""
     kept: Scope | None = None
     """The scope of its activity, which has completed and holds something to undo."""
+    armed: bool = False
+    """It has begun to wait: what it waits for is not armed again in its turn."""
     abnormal: bool = False
     """What its activity did was ended early (terminated, or interrupted by an event subprocess),
     so that there is nothing to undo."""

@@ -1,6 +1,7 @@
 """Doing the steps that an input causes, one after the other: the engine's only loop."""
 
 from m2pem.engine import records as r
+from m2pem.engine.arming import arm_entered, arm_next
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.interruption import end_run
 from m2pem.engine.nodes import EXECUTE, look_at
@@ -10,6 +11,10 @@ from m2pem.engine.state import RunState, RunStatus, Scope, Token
 from m2pem.engine.triggering import look_at_conditions
 from m2pem.model.events import MessageEventDefinition, SignalEventDefinition
 from m2pem.resources.fleet import Fleet
+
+_MOST_BEYOND = 10_000
+"""Elements that may still begin to wait when the batch is used up: what is left over waits already.
+Only a circle of events whose conditions are all true comes to this bound."""
 
 
 class Steps(Execution):
@@ -29,12 +34,19 @@ class Steps(Execution):
         self.left = self.batch
         if self.state.yielded and self.state.status is RunStatus.RUNNING:
             self.reload_queue()
+            arm_entered(self)
 
     def run_steps(self) -> None:
         """Execute tokens until none can move, or the batch is used up."""
-        state, queue = self.state, self.queue
+        state, queue, entered = self.state, self.queue, self.entered
         while state.status is RunStatus.RUNNING:
-            while queue or self.changed:
+            while queue or entered or self.changed:
+                if entered:
+                    if self.left <= -_MOST_BEYOND:
+                        return
+                    self.left -= 1
+                    arm_next(self)
+                    continue
                 if self.changed:
                     self.changed = False
                     look_at_conditions(self)
@@ -42,7 +54,7 @@ class Steps(Execution):
                 item = queue.popleft()
                 if not self._is_there(item):
                     continue
-                if not self.left:
+                if self.left <= 0:
                     queue.appendleft(item)
                     return
                 self.left -= 1
@@ -63,7 +75,7 @@ class Steps(Execution):
     def finish(self) -> list[Record]:
         """All records of the input: its steps are done, or left over in a `RunYielded`."""
         self.run_steps()
-        if self.queue:
+        if self.queue or self.entered:
             self._yield()
         else:
             self._notice_a_stuck_run()
@@ -74,10 +86,11 @@ class Steps(Execution):
     def _yield(self) -> None:
         steps = tuple(
             item.id if isinstance(item, Token) else -item.id
-            for item in self.queue
+            for item in dict.fromkeys((*self.queue, *self.entered))
             if self._is_there(item)
         )
         self.queue.clear()
+        self.entered.clear()
         self.emit(r.RunYielded(steps))
 
     def reload_queue(self) -> None:
@@ -85,12 +98,14 @@ class Steps(Execution):
         steps = self.state.yielded
         if steps:
             self.emit(r.RunYielded(()))
-            self.moved.update(self.state.scopes)  # the batch before may have been another process
+            # The batch before may have been another process.
+            self.moved.update(self.state.scopes)
+            self.changed = True
         for number in steps:
             if number > 0:
                 token = self.state.tokens.get(number)
                 if token is not None:
-                    self.queue.append(token)
+                    self.execute_later(token)
             else:
                 scope = self.state.scopes.get(-number)
                 if scope is not None:

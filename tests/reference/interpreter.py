@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from tests.reference.catching import TooLargeError, broadcast, catchers
 from tests.reference.diagram import Level, Many, birth, levels
 from tests.reference.marking import Key, Marking, Scope
-from tests.reference.rules import finish, steps, take
+from tests.reference.rules import enter_what_waits, finish, steps, take
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +73,8 @@ class Reference:
 
     def _rest(self, begin: list[Marking]) -> list[Marking]:
         resting = {}
+        for marking in begin:
+            enter_what_waits(marking)
         for marking in {marking.key(): marking for marking in begin}.values():
             alone = self._in_one_order(marking)
             for rest in [alone] if alone is not None else self._in_every_order(marking):

@@ -32,6 +32,11 @@ class Work:
     completed: int = 0
     caught: bool = False  # the event has happened; what is left is to follow the flows out of it
 
+    @property
+    def has_not_begun(self) -> bool:
+        """Of a repeating activity: its token has come, and no instance has begun."""
+        return self.instances == [] and not self.begun
+
     def key(self) -> Key:
         inside = () if self.inside is None else self.inside.key()
         instances = sorted_keys(self.instances or ())

@@ -24,6 +24,7 @@ from tests.reference.diagram import (
     Node,
     birth,
     is_link_target,
+    start_of,
 )
 from tests.reference.joins import complex_is_activated, complex_resets, inclusive_is_activated
 from tests.reference.marking import Marking, Scope, Work
@@ -33,7 +34,8 @@ NO_FLOW = Event("error", "NO_FLOW")
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """`what` is fire (a node of a scope), reset (a complex gateway) or done (a work; a run)."""
+    """`what` is fire (a node of a scope), reset (a complex gateway), begin (an activity that
+    repeats) or done (a work; a run)."""
 
     what: str
     number: int
@@ -49,6 +51,7 @@ def steps(marking: Marking) -> list[Step]:
                 found.append(Step("reset", scope.number, node.id))
             elif _can_fire(scope, node):
                 found.append(Step("fire", scope.number, node.id))
+        found += [Step("begin", w.number, w.node.id) for w in scope.works if w.has_not_begun]
     for work in marking.works():
         empty = work.inside is not None and work.inside.is_empty()
         if empty or work.caught or work.node.kind == "task":
@@ -60,7 +63,52 @@ def steps(marking: Marking) -> list[Step]:
 
 def take(marking: Marking, step: Step) -> list[Marking]:
     """The markings after a step; the given one stays as it is."""
+    results = _take(marking, step)
+    for after in results:
+        enter_what_waits(after)
+    return results
+
+
+def enter_what_waits(marking: Marking) -> None:
+    """A token that comes to an event is in it, and waits (13.5.2): nothing comes in between.
+
+    Likewise one that comes to an activity with something to catch at its boundary (13.5.3), or to a
+    subprocess with an event subprocess (13.5.4).
+    """
+    entering = True
+    while entering:
+        entering = False
+        for scope in list(marking.scopes()):
+            for node in scope.level.nodes:
+                while _waits(scope, node) and _can_fire(scope, node):
+                    _fire(marking, scope, node)
+                    entering = True
+
+
+def _waits(scope: Scope, node: Node) -> bool:
+    match node.kind:
+        case "start":
+            return node.event is not None and scope.owner is None
+        case "catch":
+            return not is_link_target(node)
+        case "event_gateway":
+            return True
+        case "task" | "user" | "subprocess":
+            events = [boundary.event for boundary in scope.level.boundaries[node.id]]
+            if node.inside is not None and node.repeat is None:
+                events += [start_of(handler).event for handler in node.inside.handlers]
+            return any(event is not None and event.kind == "signal" for event in events)
+        case _:
+            return False
+
+
+def _take(marking: Marking, step: Step) -> list[Marking]:
     after = marking.copy()
+    if step.what == "begin":
+        whole = after.work(step.number)
+        assert whole is not None
+        _begin_whole(after, whole)
+        return [after]
     if step.what == "done":
         work = after.work(step.number)
         if work is None:
@@ -222,10 +270,13 @@ def _begin_activity(marking: Marking, scope: Scope, node: Node) -> None:
     if node.repeat is None:
         _begin_instance(marking, scope, node, None)
         return
-    whole = Work(marking.next_number(), node, scope, instances=[])
-    scope.works.append(whole)
-    if isinstance(node.repeat, Many) and not node.repeat.sequential:
-        while whole.begun < node.repeat.count:
+    scope.works.append(Work(marking.next_number(), node, scope, instances=[]))
+
+
+def _begin_whole(marking: Marking, whole: Work) -> None:
+    repeat = whole.node.repeat
+    if isinstance(repeat, Many) and not repeat.sequential:
+        while whole.begun < repeat.count:
             _begin_next(marking, whole)
     _repeat_or_end(marking, whole)
 

@@ -41,6 +41,7 @@ def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
     holder: Token | Scope
     if record.token:
         holder = token = state.tokens[record.token]
+        token.armed = True
         scope = token.scope
     else:
         holder, token, scope = state.scopes[record.scope], None, state.scopes[record.scope]

@@ -1,11 +1,13 @@
 """One handler for each kind of BPMN element: what executing a token on it does.
 
-`EXECUTE` maps a kind of node to its handler; `m2pem.engine.triggering.WHEN_TRIGGERED` maps kinds
-that wait at their own node to what follows.
+`EXECUTE` maps a kind of node to its handler; `m2pem.engine.arming.WHEN_ENTERED` maps kinds that
+wait to what happens as soon as they are entered; `m2pem.engine.triggering.WHEN_TRIGGERED` maps
+kinds that wait at their own node to what follows.
 """
 
 from collections.abc import Callable
 
+from m2pem.engine.arming import WHEN_ENTERED
 from m2pem.engine.compensation import advance, close_undone
 from m2pem.engine.execution import Execution
 from m2pem.engine.nodes import (
@@ -17,7 +19,7 @@ from m2pem.engine.nodes import (
     events,
     gateways,
 )
-from m2pem.engine.nodes.beginning import WORK, begin_activity
+from m2pem.engine.nodes.beginning import WORK, begin_activity, enter_activity
 from m2pem.engine.nodes.completion import complete
 from m2pem.engine.state import Scope, Token
 from m2pem.engine.transactions import leave_cancelled
@@ -54,6 +56,15 @@ EXECUTE: dict[type[FlowNode], Callable[[Execution, Token], None]] = {
     e.IntermediateThrowEvent: events.throw,
     e.BoundaryEvent: events.boundary,
 }
+
+WHEN_ENTERED.update(
+    {
+        **dict.fromkeys(WORK, enter_activity),
+        e.EventBasedGateway: event_gateway.event_based,
+        e.StartEvent: events.start,
+        e.IntermediateCatchEvent: events.catch,
+    }
+)
 
 WHEN_TRIGGERED.update(
     {

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from m2pem.engine import records as r
 from m2pem.engine.data_flow import take_in
-from m2pem.engine.execution import Execution
+from m2pem.engine.execution import Execution, Waits, waits_when_entered
 from m2pem.engine.nodes import activities, ad_hoc, containers
 from m2pem.engine.nodes.completion import pass_on
 from m2pem.engine.nodes.loops import begin_loop
@@ -45,8 +45,19 @@ def _gather(x: Execution, token: Token, node: Activity) -> bool:
     return True
 
 
+def enter_activity(x: Execution, token: Token) -> None:
+    """Arm an activity's boundary events; if it begins to wait with it, begin it."""
+    node = token.node
+    assert isinstance(node, Activity)
+    instance = token.instance is not None
+    if waits_when_entered(node, instance=instance) is Waits.AT_ITSELF:
+        begin_activity(x, token)
+    elif not token.armed and (node.start_quantity <= 1 or _gather(x, token, node)):
+        arm_boundary(x, token, node)
+
+
 def begin_activity(x: Execution, token: Token) -> None:
-    """A token has come to an activity: arm its boundary events, then do its work.
+    """Begin the work of an activity, whose boundary events are armed.
 
     An instance of a loop or multi-instance activity only works: what else there is to an activity
     is the whole's, once.
@@ -56,7 +67,7 @@ def begin_activity(x: Execution, token: Token) -> None:
     if node.start_quantity > 1 and not _gather(x, token, node):
         return
     if token.instance is None:
-        if node.boundary and not arm_boundary(x, token, node):
+        if node.boundary and not token.armed and not arm_boundary(x, token, node):
             return
         if node.loop is not None and token.inner is None:
             if begin_loop(x, token, node.loop):

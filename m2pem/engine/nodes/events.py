@@ -1,6 +1,7 @@
 """Events (BPMN 2.0.2, clauses 10.5 and 13.5)."""
 
 from m2pem.engine import records as r
+from m2pem.engine.arming import arm_entered
 from m2pem.engine.compensation import throw_compensation
 from m2pem.engine.data_flow import payload
 from m2pem.engine.execution import Execution
@@ -20,7 +21,6 @@ from m2pem.model.elements import (
     IntermediateCatchEvent,
     IntermediateThrowEvent,
     StartEvent,
-    SubProcess,
 )
 from m2pem.model.events import (
     CancelEventDefinition,
@@ -48,13 +48,7 @@ def start(x: Execution, token: Token) -> None:
     """
     node = token.node
     assert isinstance(node, StartEvent)
-    root = x.state.root
-    assert root is not None
-    triggered = token.scope.parent is None and token.scope is not root
-    container = node.container
-    if isinstance(container, SubProcess) and container.triggered_by_event:
-        triggered = True
-    if node.definitions and not triggered:
+    if node.definitions and not x.has_been_triggered(token):
         catch(x, token)
     elif not token.waits:  # else others of its triggers must still come
         complete(x, token)
@@ -76,6 +70,9 @@ def throw(x: Execution, token: Token) -> None:
     node = token.node
     assert isinstance(node, Event)
     for definition in node.definitions:
+        arm_entered(x)  # what the definition before has led to
+        if x.state.tokens.get(token.id) is not token:
+            return
         _throw(x, token, definition)
         if x.state.tokens.get(token.id) is not token:
             return
@@ -119,6 +116,9 @@ def end(x: Execution, token: Token) -> None:
     node = token.node
     assert isinstance(node, Event)
     for definition in sorted(node.definitions, key=_ends_the_scope):
+        arm_entered(x)  # what the definition before has led to
+        if x.state.tokens.get(token.id) is not token:
+            return
         match definition:
             case TerminateEventDefinition():
                 _terminate(x, token)

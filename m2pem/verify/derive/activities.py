@@ -1,5 +1,8 @@
 """Tasks and other activities: their beginning, their work, and how it ends."""
 
+from dataclasses import replace
+
+from m2pem.engine.execution import Waits, waits_when_entered
 from m2pem.model import elements as e
 from m2pem.model.behavior import Assignment, Behavior
 from m2pem.model.expression.expression import literal
@@ -15,7 +18,7 @@ from m2pem.verify.derive.net import Area, at
 from m2pem.verify.derive.throwing import catchable, message_effects, throw_error
 from m2pem.verify.derive.timers import due_us, runs, written
 from m2pem.verify.derive.undoable import noted
-from m2pem.verify.derive.waiting import boundaries
+from m2pem.verify.derive.waiting import boundaries, caught_before_work
 from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step, Trigger
 
 
@@ -33,16 +36,38 @@ def activity(making: Making, node: e.FlowNode, area: Area) -> None:
     host.cut = lambda: pass_on(making, host, well=False)
     inside.host = host
     boundaries(making, host)
-    if node.loop is not None:
-        begun = looped(making, host, work)
-    else:
-        begun = work(making, host)
     come = Effect(
         steps=(Step(node.id, Action.ENTERED),),
         consume=(at(net, node, area),) * node.start_quantity,
     )
-    for effect in product([come], begun):
-        net.rule(effect)
+    waits = waits_when_entered(node)
+    host.armed_before = waits is Waits.AT_ITS_BOUNDARY and not isinstance(node, e.UserTask)
+    begun = looped(making, host, work) if node.loop is not None else work(making, host)
+    if host.armed_before:
+        _arm_before_work(making, host, come, begun)
+        return
+    making.rules(product([come], begun))
+    if waits is not Waits.NOTHING:
+        net.at_once.add(at(net, node, area))
+
+
+def _arm_before_work(making: Making, host: Host, come: Effect, begun: list[Effect]) -> None:
+    """The boundary events are armed as the token comes, and the work begins in its turn."""
+    net, node = making.net, host.node
+    later = begun[0].produce if len(begun) == 1 else ()
+    if len(later) == 1 and later != (host.active,) and begun[0] == Effect(produce=later):
+        due = later[0]  # a behavior or message: its work is to begin as it is
+    else:
+        due = net.place(node, host.outer, Role.ENTERING, f":due{host.inside.index}")
+        for effect in begun:
+            over = host.active not in effect.produce
+            ended = frozenset({host.inside.index}) if over else frozenset()
+            making.rules(product([Effect(consume=(due,), kill_scopes=ended)], [effect]))
+    armed = come.then(Effect(produce=(due, *host.armed)))
+    assert armed is not None
+    net.rule(armed)
+    net.at_once.add(at(net, node, host.outer))
+    caught_before_work(making, replace(host, active=due, armed=[]))
 
 
 def pass_on(making: Making, host: Host, *, well: bool = True) -> list[Effect]:
@@ -244,8 +269,9 @@ def _send(making: Making, host: Host, message: str) -> list[Effect]:
 
     def spell_out() -> None:
         sends = Effect(steps=(Step(host.node.id, Action.THROWN, message),), consume=(thrown,))
-        for effect in product(product([sends], message_effects(making, message)), _at_once(host)):
-            making.net.rule(effect)
+        over = Effect(kill_scopes=frozenset({host.inside.index}))
+        ways = product(product([sends], message_effects(making, message)), [over])
+        making.rules(product(ways, _at_once(host)))
 
     making.later.append(spell_out)
     return [Effect(produce=(thrown,))]

@@ -18,6 +18,7 @@ from m2pem.verify.derive.catching import what_and_ref
 from m2pem.verify.derive.compensation import give_back
 from m2pem.verify.derive.containers import build, choose
 from m2pem.verify.derive.effect import Effect, product
+from m2pem.verify.derive.entering import enter_at_once
 from m2pem.verify.derive.events import after, awaited
 from m2pem.verify.derive.gathering import AWAITED, all_must_come, gathering
 from m2pem.verify.derive.making import Catcher, Making
@@ -71,6 +72,7 @@ def derive(
     if making.options.timers_in_order:
         put_in_order(making)
     _completes(making)
+    initial = enter_at_once(making.net, initial)
     return making.net.finish(
         mission.file,
         root.id,

@@ -70,29 +70,22 @@ def catch(making: Making, node: e.FlowNode, area: Area) -> None:
 def _wait(making: Making, node: e.Event, area: Area) -> None:
     net = making.net
     waiting = net.place(node, area, Role.ACTIVE, several=node in making.repeated)
-    come = _come(making, node, area, Action.ENTERED).then(Effect(produce=(waiting,)))
-    assert come is not None
-    net.rule(come)
     if all_must_come(node):
-        _wait_for_all(making, node, area, waiting)
+        gathering = gather(making, node, area, area)
+        _enter(making, node, area, (waiting, *gathering.awaited))
+        _all_have_come(making, node, area, waiting, gathering)
         return
+    _enter(making, node, area, (waiting,))
     for number, definition in enumerate(node.definitions):
         _trigger(making, node, area, definition, waiting, _leave(making, node, area), number)
 
 
-def _wait_for_all(making: Making, node: e.Event, area: Area, waiting: int) -> None:
-    """All of its triggers must come, in any order."""
-    gathering = gather(making, node, area, area)
-    for awaited_place, told in zip(gathering.awaited, gathering.came, strict=True):
-        making.net.rule(
-            Effect(
-                steps=(Step(node.id, Action.ENTERED, "waits"),),
-                read=frozenset({waiting}),
-                inhibit=frozenset({awaited_place, told}),
-                produce=(awaited_place,),
-            )
-        )
-    _all_have_come(making, node, area, waiting, gathering)
+def _enter(making: Making, node: e.FlowNode, area: Area, places: tuple[int, ...]) -> None:
+    """A token that comes waits at once."""
+    come = _come(making, node, area, Action.ENTERED).then(Effect(produce=places))
+    assert come is not None
+    making.net.rule(come)
+    making.net.at_once.add(at(making.net, node, area))
 
 
 def _all_have_come(
@@ -152,9 +145,7 @@ def event_based(making: Making, node: e.FlowNode, area: Area) -> None:
     assert isinstance(node, e.EventBasedGateway)
     net = making.net
     waiting = net.place(node, area, Role.ACTIVE, several=node in making.repeated)
-    come = _come(making, node, area, Action.ENTERED).then(Effect(produce=(waiting,)))
-    assert come is not None
-    net.rule(come)
+    _enter(making, node, area, (waiting,))
     number = 0
     for flow in node.outgoing:
         target = flow.target

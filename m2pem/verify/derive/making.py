@@ -38,11 +38,13 @@ class Host:
     done: Callable[[], list[Effect]]
     boundary: bool = True
     armed: list[int] = field(default_factory=list)
+    armed_before: bool = False
+    """Whether its boundary events are armed before its work begins."""
     cut: Callable[[], list[Effect]] | None = None
 
     def begin(self) -> Effect:
         """The token comes to work."""
-        return Effect(produce=(self.active, *self.armed))
+        return Effect(produce=(self.active, *(() if self.armed_before else self.armed)))
 
     def leave(self) -> Effect:
         """The token is taken off, with all that belongs to the activity."""

@@ -84,6 +84,8 @@ class Net:
         self.elements: dict[str, str] = {}
         self.holders: dict[str, list[int]] = {}
         self.timed: dict[int, list[Timed]] = {}
+        self.at_once: set[int] = set()
+        """Places of tokens at what waits as soon as it is entered (`entering`)."""
         self._at: dict[tuple[object, int, str], int] = {}
 
     # --- parts ----------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from m2pem.verify.derive.areas import handler_host
 from m2pem.verify.derive.catching import catching, first, what_and_ref
 from m2pem.verify.derive.data import ERROR
 from m2pem.verify.derive.effect import Effect, product
-from m2pem.verify.derive.gathering import all_must_come, gather
+from m2pem.verify.derive.gathering import Gathering, all_must_come, gather, gathering
 from m2pem.verify.derive.leaving import leave
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at, is_join
@@ -40,6 +40,28 @@ def boundaries(making: Making, host: Host) -> None:
             continue
         for number, definition in enumerate(event.definitions):
             _boundary(making, host, event, definition, out, number)
+
+
+def caught_before_work(making: Making, host: Host) -> None:
+    """What can come to the boundary of an activity whose work has not begun: nothing from outside,
+    for that begins before."""
+    for event in host.node.boundary:
+        out = at(making.net, event, host.outer)
+        if all_must_come(event):
+            _all_came(making, host, event, out, gathering(making, event, host.inside))
+            continue
+        for number, definition in enumerate(event.definitions):
+            match definition:
+                case SignalEventDefinition() | MessageEventDefinition():
+                    told = making.net.place(event, host.outer, Role.TRIGGERED, f":{number}")
+                    what, ref = what_and_ref(definition)
+                    catching(making, what, ref, host.active, told, not event.interrupting, event)
+                case ConditionalEventDefinition(condition=condition):
+                    if making.data.is_followed([condition], event):
+                        comes, _ = _comes(host, event, out)
+                        _boundary_condition(making, host, event, condition, comes, number)
+                case _:
+                    pass
 
 
 def _leave_boundary(making: Making, host: Host, event: e.BoundaryEvent, out: int) -> None:
@@ -65,19 +87,7 @@ def _boundary(
     number: int,
 ) -> None:
     net = making.net
-    caught = Step(event.id, Action.TRIGGERED)
-    if event.interrupting:
-        stop = host.leave().saying(host.node.id, Action.INTERRUPTED)
-        comes = Effect(steps=(caught, *stop.steps), produce=(out,)).then(
-            Effect(consume=stop.consume, kill_scopes=stop.kill_scopes)
-        )
-        told_comes = Effect(
-            steps=(caught, *stop.steps), kill_scopes=stop.kill_scopes, produce=(out,)
-        )
-    else:
-        comes = Effect(steps=(caught,), read=frozenset({host.active}), produce=(out,))
-        told_comes = Effect(steps=(caught,), produce=(out,))
-    assert comes is not None
+    comes, told_comes = _comes(host, event, out)
     match definition:
         case TimerEventDefinition():
             running = host.active
@@ -103,17 +113,32 @@ def _boundary(
             pass  # errors and escalations look for their catcher
 
 
+def _comes(host: Host, event: e.BoundaryEvent, out: int) -> tuple[Effect, Effect]:
+    """What follows when the trigger comes; and when it has taken the activity's token already."""
+    caught = Step(event.id, Action.TRIGGERED)
+    if not event.interrupting:
+        comes = Effect(steps=(caught,), read=frozenset({host.active}), produce=(out,))
+        return comes, Effect(steps=(caught,), produce=(out,))
+    stop = host.leave().saying(host.node.id, Action.INTERRUPTED)
+    told_comes = Effect(steps=(caught, *stop.steps), kill_scopes=stop.kill_scopes, produce=(out,))
+    return replace(told_comes, consume=stop.consume), told_comes
+
+
 def _gathered(making: Making, host: Host, event: e.BoundaryEvent, out: int) -> None:
     """All of its triggers must come; what does not interrupt then awaits them all anew."""
-    gathering = gather(making, event, host.outer, host.inside)
-    host.armed += gathering.awaited
-    caught = Effect(
-        steps=(Step(event.id, Action.TRIGGERED),), consume=gathering.came, produce=(out,)
-    )
+    places = gather(making, event, host.outer, host.inside)
+    host.armed += places.awaited
+    _all_came(making, host, event, out, places)
+
+
+def _all_came(
+    making: Making, host: Host, event: e.BoundaryEvent, out: int, places: Gathering
+) -> None:
+    caught = Effect(steps=(Step(event.id, Action.TRIGGERED),), consume=places.came, produce=(out,))
     if event.interrupting:
         stop = host.leave().saying(host.node.id, Action.INTERRUPTED)
     else:
-        stop = Effect(read=frozenset({host.active}), produce=gathering.again)
+        stop = Effect(read=frozenset({host.active}), produce=places.again)
     making.rules(product(making.data.receive([caught], host.outer, event), [stop]))
 
 
@@ -248,17 +273,17 @@ def arm_handler(making: Making, area: Area, start: e.StartEvent) -> None:
 def _gathered_start(making: Making, area: Area, start: e.StartEvent) -> None:
     """All of its triggers must come; what does not interrupt then awaits them all anew."""
     assert area.open is not None
-    gathering = gather(making, start, area, area)
-    come = Effect(read=frozenset({area.open}), consume=gathering.came)
+    places = gather(making, start, area, area)
+    come = Effect(read=frozenset({area.open}), consume=places.came)
     if not start.interrupting:
         missed = Effect(
             steps=(Step(start.id, Action.TRIGGERED),),
-            consume=gathering.came,
+            consume=places.came,
             read=frozenset({_host_of(making, area, start).active}),
-            produce=gathering.again,
+            produce=places.again,
         )
         making.net.rule(missed)
-        again = replace(come, produce=gathering.again)
+        again = replace(come, produce=places.again)
         alone = again.then(_once_at_a_time(making, area, start))
         assert alone is not None
         come = alone

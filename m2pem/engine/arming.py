@@ -1,0 +1,28 @@
+"""What an element does as soon as a token enters it, before anything else happens in the run.
+
+To enter a catch event is to wait for it (BPMN 2.0.2, clause 13.5.2), so that nothing thrown after
+record `TokenEntered` is missed. Tokens that enter such elements are in `Execution.entered`; all
+other steps come in their turn, from `Execution.queue`.
+"""
+
+from collections.abc import Callable
+
+from m2pem.engine.execution import Execution
+from m2pem.engine.state import Token
+from m2pem.model.elements import FlowNode
+
+WHEN_ENTERED: dict[type[FlowNode], Callable[[Execution, Token], None]] = {}
+"""What happens at once when a token enters a kind of node; filled by the handlers."""
+
+
+def arm_next(x: Execution) -> None:
+    """Let the token wait that entered first, unless it has left already."""
+    token = x.entered.popleft()
+    if x.state.tokens.get(token.id) is token:
+        WHEN_ENTERED[type(token.node)](x, token)
+
+
+def arm_entered(x: Execution) -> None:
+    """Let every token wait that has entered what waits: something is about to be thrown."""
+    while x.entered:
+        arm_next(x)
