@@ -15,6 +15,7 @@ from tests.reference.catching import (
     throw_outwards,
 )
 from tests.reference.diagram import (
+    ACTIVITIES,
     WAITING_FOR_START,
     Event,
     Flow,
@@ -195,8 +196,11 @@ def _leave(
             # Table 13.5 sends a token where a condition is true; a flow without one had its token
             # at the activation (documented choice of the engine: docs/missions.md, "Complex").
             chosen = [flow for flow in chosen if flow.condition is not None]
-        if not chosen and node.default is not None:
-            chosen = [scope.level.flow_by_id[node.default]]
+        asked = chosen
+        if node.kind in ACTIVITIES:  # flows without a condition are a parallel split (13.3.1)
+            asked = [flow for flow in chosen if flow.condition is not None]
+        if not asked and node.default is not None:
+            chosen.append(scope.level.flow_by_id[node.default])
         if node.kind == "exclusive":
             chosen = chosen[:1]
     if chosen:

@@ -7,7 +7,7 @@ from m2pem.engine.execution import Execution
 from m2pem.engine.state import Token
 from m2pem.engine.throwing import throw_error
 from m2pem.errors import ExpressionError
-from m2pem.model.elements import SequenceFlow
+from m2pem.model.elements import Activity, SequenceFlow
 from m2pem.model.values import ReadValue
 
 
@@ -21,6 +21,8 @@ def true_flows(
 ) -> Sequence[SequenceFlow] | None:
     """The flows whose condition is true, in the XML's order, else the default one.
 
+    Out of an activity, flows with and without conditions are an inclusive and a parallel split
+    (clause 13.3.1): its default is taken when no condition is true, beside those that have none.
     `read`: how conditions read names, when not just as the token's element does. None: an error
     was thrown instead, because a condition could not be evaluated (EXPRESSION) or nothing was true
     and there is no default (NO_FLOW).
@@ -42,6 +44,8 @@ def true_flows(
         chosen.append(flow)
         if first_only:
             break
+    if default is not None and isinstance(node, Activity):
+        return chosen if any(flow.condition for flow in chosen) else [*chosen, default]
     if chosen or not node.outgoing:
         return chosen
     if default is not None:

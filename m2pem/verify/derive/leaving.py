@@ -36,12 +36,16 @@ def leave(
     times: int = 1,
     own: frozenset[str] = frozenset(),
 ) -> list[Effect]:
-    """Every flow that is true, or the first of them, else the default one, else NO_FLOW."""
+    """Every flow that is true, or the first of them, else the default one, else NO_FLOW.
+
+    The default of an activity goes with the flows that have no condition (clause 13.3.1).
+    """
+    beside = default is not None and isinstance(node, e.Activity)
     flows = [flow for flow in node.outgoing if flow is not default]
     if not any(flow.condition is not None for flow in flows):
         taken = flows[:1] if first_only else flows
-        if not taken and default is not None:
-            taken = [default]
+        if default is not None and (beside or not taken):
+            taken = [*taken, default]
         return [along(making, area, taken, times)]
     asked = [flow.condition for flow in flows if flow.condition is not None]
 
@@ -71,7 +75,10 @@ def leave(
             ways = fail(outcome)
         else:
             taken = [flows[number] for number in outcome]
-            ways = [along(making, area, taken or [default], times)]  # type: ignore[list-item]
+            asks = any(flow.condition is not None for flow in taken)
+            if default is not None and not (asks if beside else taken):
+                taken.append(default)
+            ways = [along(making, area, taken, times)]
         found += [both for way in ways if (both := when.then(way)) is not None]
     return found
 
