@@ -10,6 +10,7 @@ from typing import Any
 from m2pem.engine import control
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
+from m2pem.engine.arming import arm_entered
 from m2pem.engine.data import flatten
 from m2pem.engine.interruption import end_run
 from m2pem.engine.lifecycle import Welcome, welcome
@@ -98,6 +99,7 @@ def _resume(x: Steps, item: i.ResumeRun) -> None:
     x.reload_queue()
     for late in deferred:
         x.run_steps()
+        arm_entered(x)
         decide(x, late)
 
 

@@ -12,10 +12,6 @@ from m2pem.engine.triggering import look_at_conditions
 from m2pem.model.events import MessageEventDefinition, SignalEventDefinition
 from m2pem.resources.fleet import Fleet
 
-_MOST_BEYOND = 10_000
-"""Elements that may still begin to wait when the batch is used up: what is left over waits already.
-Only a circle of events whose conditions are all true comes to this bound."""
-
 
 class Steps(Execution):
     """An execution that can work its queue off."""
@@ -42,14 +38,14 @@ class Steps(Execution):
         while state.status is RunStatus.RUNNING:
             while queue or entered or self.changed:
                 if entered:
-                    if self.left <= -_MOST_BEYOND:
-                        return
-                    self.left -= 1
+                    self.left -= 1  # also beyond the batch: what is left over waits already
                     arm_next(self)
                     continue
                 if self.changed:
                     self.changed = False
                     look_at_conditions(self)
+                    if entered and self.left <= 0:
+                        return  # conditions in a circle; `begin` arms them before all else
                     continue
                 item = queue.popleft()
                 if not self._is_there(item):

@@ -153,6 +153,10 @@ class Action(StrEnum):
     """An event throws, or an activity's error goes up."""
 
 
+BEGINS = "begins"
+"""Detail of the step in which an activity begins its work, after its boundary events are armed."""
+
+
 @dataclass(frozen=True, slots=True)
 class Step:
     """Something that a rule does, in the words of the mission: `element` is an id of it."""

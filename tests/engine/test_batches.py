@@ -132,3 +132,49 @@ def test_a_stuck_run_is_noticed_in_batches_too(batch: int) -> None:
     ).start()
     assert play.ended == "failed"
     assert play.detail == "stuck: no token can move from one, two"
+
+
+def test_events_whose_conditions_are_true_leave_the_batch_its_bound() -> None:
+    play = Play(
+        """
+        <startEvent id="start"/> <exclusiveGateway id="merge"/>
+        <intermediateCatchEvent id="a">conditional n > 0</intermediateCatchEvent>
+        <intermediateCatchEvent id="b">conditional n > 0</intermediateCatchEvent>
+        start -> merge -> a -> b -> merge
+    """,
+        batch=20,
+    )
+    play.goes_on = False
+    play.start({"n": 1})
+    assert play.run.wants_continue
+    for _ in range(3):
+        assert len(play.give(Continue()).steps[-1].records) < 200
+    assert play.run.wants_continue
+    assert play.stop().ended == "stopped"
+
+
+@pytest.mark.parametrize("batch", range(1, 9))
+def test_what_has_been_entered_misses_no_signal_that_comes_between_batches(batch: int) -> None:
+    play = Play(
+        """
+        <startEvent id="start"/> <parallelGateway id="fork"/> <userTask id="u"/>
+        <intermediateCatchEvent id="x">signal S</intermediateCatchEvent>
+        <intermediateCatchEvent id="y">signal S</intermediateCatchEvent>
+        <intermediateCatchEvent id="z">signal S</intermediateCatchEvent>
+        start -> fork -> x
+        fork -> y
+        fork -> z
+        fork -> u
+    """,
+        batch=batch,
+    )
+    play.goes_on = False
+    play.start()
+    entered = [each for each in "xyz" if f"enter {each}" in play.trace()]
+    play.pause().signal("S")
+    play.goes_on = True
+    play.resume()
+    play.answer()
+    assert play.trace().count("triggered") >= len(entered)
+    if len(entered) == 3:
+        assert play.ended == "completed"

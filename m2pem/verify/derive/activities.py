@@ -19,7 +19,7 @@ from m2pem.verify.derive.throwing import catchable, message_effects, throw_error
 from m2pem.verify.derive.timers import due_us, runs, written
 from m2pem.verify.derive.undoable import noted
 from m2pem.verify.derive.waiting import boundaries, caught_before_work
-from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step, Trigger
+from m2pem.verify.system import BEGINS, Action, Exactness, Flag, Kind, Role, Step, Trigger
 
 
 def activity(making: Making, node: e.FlowNode, area: Area) -> None:
@@ -54,19 +54,25 @@ def activity(making: Making, node: e.FlowNode, area: Area) -> None:
 def _arm_before_work(making: Making, host: Host, come: Effect, begun: list[Effect]) -> None:
     """The boundary events are armed as the token comes, and the work begins in its turn."""
     net, node = making.net, host.node
+    net.at_once.add(at(net, node, host.outer))
     later = begun[0].produce if len(begun) == 1 else ()
-    if len(later) == 1 and later != (host.active,) and begun[0] == Effect(produce=later):
+    only_brings = len(begun) == 1 and begun[0] == Effect(produce=later)
+    if only_brings and host.active in later:
+        # Its instances begin each in its turn: what interrupts it finds it at work already.
+        making.rules(product([replace(come, produce=tuple(host.armed))], begun))
+        return
+    if only_brings and len(later) == 1:
         due = later[0]  # a behavior or message: its work is to begin as it is
     else:
         due = net.place(node, host.outer, Role.ENTERING, f":due{host.inside.index}")
         for effect in begun:
             over = host.active not in effect.produce
             ended = frozenset({host.inside.index}) if over else frozenset()
-            making.rules(product([Effect(consume=(due,), kill_scopes=ended)], [effect]))
+            begins = () if effect.steps else (Step(node.id, Action.ENTERED, BEGINS),)
+            making.rules(product([Effect(begins, (due,), kill_scopes=ended)], [effect]))
     armed = come.then(Effect(produce=(due, *host.armed)))
     assert armed is not None
     net.rule(armed)
-    net.at_once.add(at(net, node, host.outer))
     caught_before_work(making, replace(host, active=due, armed=[]))
 
 

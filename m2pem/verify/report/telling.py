@@ -8,7 +8,7 @@ from m2pem.model import elements as e
 from m2pem.model.values import Value
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.report.words import Words
-from m2pem.verify.system import UNDOES, UNDONE, Action, Kind, Rule, Step, System, Trigger
+from m2pem.verify.system import BEGINS, UNDOES, UNDONE, Action, Kind, Rule, Step, System, Trigger
 
 COMMANDS = "commands"
 """Detail of the step in which a task's behavior is asked for, after the task was entered."""
@@ -105,7 +105,8 @@ def _beside(one: Step, other: Step) -> bool:
 
 
 def _commanded_later(rules: Sequence[Rule]) -> dict[int, int]:
-    """By place in the run where a task commands its vehicles, the place where it was entered.
+    """By place in the run where a task commands its vehicles, or begins its work, the place where
+    it was entered.
 
     To people that is one step, also when others are in between.
     """
@@ -115,7 +116,7 @@ def _commanded_later(rules: Sequence[Rule]) -> dict[int, int]:
         if not rule.steps:
             continue
         first = rule.steps[0]
-        if len(rule.steps) == 1 and first.action is Action.ENTERED and first.detail == COMMANDS:
+        if len(rule.steps) == 1 and first.detail in (COMMANDS, BEGINS):
             if first.element in entered:
                 found[number] = entered.pop(first.element)
         elif len(rule.steps) == 1 and first.action is Action.ENTERED and rule.trigger is None:
