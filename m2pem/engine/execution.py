@@ -92,7 +92,7 @@ class Execution:
         self._waits = {
             node: waits
             for node in self.mission.nodes
-            if (type(node) in _MAY_WAIT or getattr(node, "boundary", ()))
+            if (type(node) in _MAY_WAIT or (isinstance(node, Activity) and node.boundary))
             and (waits := waits_when_entered(node)) is not Waits.NOTHING
         }
         self._reach: dict[FlowNode, dict[FlowNode, int]] = {}

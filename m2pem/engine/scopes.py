@@ -1,5 +1,7 @@
 """Opening and ending scopes, and what is active in them (BPMN 2.0.2, clause 13.3.2)."""
 
+from collections.abc import Collection
+
 from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import TokenOutcome
@@ -16,35 +18,54 @@ def open_scope(x: Execution, token: Token) -> Scope:
     return x.state.scopes[number]
 
 
-def withdraw(x: Execution, token: Token, outcome: TokenOutcome, code: str = "") -> None:
+Failing = Collection[Token | Scope]
+"""What an error goes through, from where it arose outwards: that has failed. All else that it ends
+is interrupted or terminated (clause 13.3.2)."""
+
+
+def failing(token: Token) -> Failing:
+    """What an error from a token goes through, until it is caught."""
+    place: Token | None = token
+    found: set[Token | Scope] = set()
+    while place is not None:
+        found |= {place, place.scope}
+        place = place.scope.owner
+    return found
+
+
+def withdraw(x: Execution, token: Token, outcome: TokenOutcome, failed: Failing = ()) -> None:
     """End what the activity under a token does: its behavior, prompt, service or inside."""
     if token.behavior:
-        x.emit(r.BehaviorCancelRequested(token.behavior, code))
+        x.emit(r.BehaviorCancelRequested(token.behavior))
     if token.prompt:
         x.emit(r.PromptWithdrawn(token.prompt))
     if token.service:
         x.emit(r.ServiceWithdrawn(token.service))
     if token.inner is not None:
-        kill(x, token.inner, outcome)
+        kill(x, token.inner, outcome, failed)
 
 
-def kill(x: Execution, scope: Scope, outcome: TokenOutcome) -> None:
+def kill(x: Execution, scope: Scope, outcome: TokenOutcome, failed: Failing = ()) -> None:
     """End a scope and all within it, innermost first."""
-    empty(x, scope, outcome)
-    close(x, scope, outcome)
+    empty(x, scope, outcome, failed)
+    close(x, scope, _how(scope, outcome, failed))
 
 
-def empty(x: Execution, scope: Scope, outcome: TokenOutcome) -> None:
+def empty(x: Execution, scope: Scope, outcome: TokenOutcome, failed: Failing = ()) -> None:
     """End every token of a scope, and all within it, but not the scope itself."""
     doomed = [scope]
     for each in doomed:
         doomed.extend(token.inner for token in each.tokens.values() if token.inner is not None)
     for each in reversed(doomed):
         for token in list(each.tokens.values()):
-            withdraw(x, token, outcome)
-            x.leave(token, outcome)
+            withdraw(x, token, outcome, failed)
+            x.leave(token, _how(token, outcome, failed))
         if each is not scope:
-            close(x, each, outcome)
+            close(x, each, _how(each, outcome, failed))
+
+
+def _how(item: Token | Scope, outcome: TokenOutcome, failed: Failing) -> TokenOutcome:
+    return TokenOutcome.FAILED if item in failed else outcome
 
 
 def close(x: Execution, scope: Scope, outcome: TokenOutcome) -> None:

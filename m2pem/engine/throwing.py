@@ -8,6 +8,7 @@ from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
 from m2pem.engine.interruption import begin_event_subprocess, divert, end_run
 from m2pem.engine.records import RunOutcome, TokenOutcome
+from m2pem.engine.scopes import Failing, failing
 from m2pem.engine.state import Scope, Token
 from m2pem.model.elements import Activity, BoundaryEvent, Event, StartEvent
 from m2pem.model.events import (
@@ -43,15 +44,19 @@ def throw_error(
             caught.event.id if caught is not None else "",
         )
     )
+    failed = failing(token)
     if leaving:
         x.leave(token, TokenOutcome.COMPLETED)
     if caught is None:
         because = f": {reason}" if reason else ""
         end_run(
-            x, RunOutcome.FAILED, f"error {code} from {node.id} was caught by no boundary{because}"
+            x,
+            RunOutcome.FAILED,
+            f"error {code} from {node.id} was caught by no boundary{because}",
+            failed,
         )
     else:
-        _hand_over(x, caught, TokenOutcome.FAILED)
+        _hand_over(x, caught, failed)
 
 
 def throw_error_in(x: Execution, scope: Scope, code: str, reason: str) -> None:
@@ -61,7 +66,7 @@ def throw_error_in(x: Execution, scope: Scope, code: str, reason: str) -> None:
         return
     element = scope.container.id
     x.emit(r.ErrorThrown(0, element, element, scope.id, code, reason))
-    end_run(x, RunOutcome.FAILED, f"error {code} from {element}: {reason}")
+    end_run(x, RunOutcome.FAILED, f"error {code} from {element}: {reason}", {scope})
 
 
 # --- escalations --------------------------------------------------------------------------------
@@ -98,7 +103,7 @@ def throw_escalation(
         else:
             begin_event_subprocess(x, caught.place, caught.event)
         return True
-    _hand_over(x, caught, TokenOutcome.INTERRUPTED)
+    _hand_over(x, caught)
     return False
 
 
@@ -117,11 +122,11 @@ class _InScope:
     event: StartEvent
 
 
-def _hand_over(x: Execution, caught: _AtBoundary | _InScope, outcome: TokenOutcome) -> None:
+def _hand_over(x: Execution, caught: _AtBoundary | _InScope, failed: Failing = ()) -> None:
     if isinstance(caught, _AtBoundary):
-        divert(x, caught.place, caught.event, outcome)
+        divert(x, caught.place, caught.event, failed)
     else:
-        begin_event_subprocess(x, caught.place, caught.event, outcome)
+        begin_event_subprocess(x, caught.place, caught.event, failed)
 
 
 def _error_code(definition: EventDefinition) -> str | None:

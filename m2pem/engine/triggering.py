@@ -9,7 +9,7 @@ from m2pem.engine.data import Place
 from m2pem.engine.data_flow import receive_payload
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.interruption import begin_event_subprocess, divert
-from m2pem.engine.records import TokenOutcome, Trigger
+from m2pem.engine.records import Trigger
 from m2pem.engine.state import Scope, Token, Wait
 from m2pem.engine.waiting import arm, arm_again
 from m2pem.model.elements import (
@@ -183,7 +183,7 @@ def _at_boundary(
     if _is_one_of_several(node, token.waits):
         x.write_all(token, data)
     elif node.interrupting:
-        receive_payload(x, divert(x, token, node, TokenOutcome.INTERRUPTED), data)
+        receive_payload(x, divert(x, token, node), data)
     else:
         _arm_again(x, wait)
         receive_payload(x, x.spawn(node, token.scope), data)

@@ -26,8 +26,8 @@ def test_an_error_end_event_is_caught_on_its_subprocess_and_ends_what_is_in_it()
     assert play.trace() == table("""
         answer p1 done; write user.decision = done; leave u; take f2
         enter bad; error E caught by catch; leave bad
-        withdraw p2; leave v failed
-        cancel b1; leave drive failed
+        withdraw p2; leave v interrupted
+        cancel b1; leave drive interrupted
         close sub failed; leave sub failed
         enter catch; leave catch; take f6
         enter after; ask p3 after
@@ -102,8 +102,8 @@ def test_an_error_that_nobody_catches_fails_the_run_and_cancels_every_behavior()
     assert play.ended == "failed"
     assert play.trace("leave", "close") == table("""
         leave u; leave bad
-        leave b failed; leave c failed; close sub failed
-        leave a failed; leave sub failed; close MAIN failed
+        leave b terminated; leave c terminated; close sub terminated
+        leave a terminated; leave sub terminated; close MAIN failed
     """)
     assert play.detail == "error E from bad was caught by no boundary: thrown by Oh no"
     assert sorted(play.orders()) == ["cancel b1", "cancel b2", "cancel s1", "close p1 done"]
@@ -143,3 +143,34 @@ def test_an_error_has_the_place_where_it_was_thrown() -> None:
     play = Play(SCOPES.format(thrown="Y")).start()
     [error] = [record for record in play.records() if isinstance(record, r.ErrorThrown)]
     assert (error.process, error.element, error.caught_by) == ("P", "bad", "outer")
+
+
+def test_only_what_an_error_goes_through_has_failed() -> None:
+    play = Play("""
+        <startEvent id="start"/> <userTask id="after"/>
+        <subProcess id="outer"> <startEvent id="s"/> <userTask id="beside"/>
+          <subProcess id="inner"> <startEvent id="t"/> <userTask id="u"/>
+            <serviceTask id="bad">call Detector</serviceTask>
+            t -> bad
+            t -> u
+          </subProcess>
+          s -> inner
+          s -> beside
+        </subProcess>
+        <boundaryEvent id="catch" attachedToRef="outer">error</boundaryEvent>
+        start -> outer
+        catch -> after
+    """).start()
+    play.trace()
+    play.fail("bad", "E")
+    left = set(play.trace("leave", "close"))
+    assert left == {
+        "leave bad failed",
+        "leave u interrupted",
+        "close inner failed",
+        "leave inner failed",
+        "leave beside interrupted",
+        "close outer failed",
+        "leave outer failed",
+        "leave catch",
+    }

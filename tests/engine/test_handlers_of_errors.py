@@ -41,7 +41,7 @@ def test_an_error_in_the_scope_begins_it_and_ends_the_rest() -> None:
     play.trace()
     play.fail("t", "E")
     assert play.trace("error", "leave", "enter") == table("""
-        error E caught by hs; leave a failed; leave t failed; enter h; enter hs; leave hs
+        error E caught by hs; leave a interrupted; leave t failed; enter h; enter hs; leave hs
         enter hu
     """)
     assert play.answer().entered().endswith("done")

@@ -20,6 +20,27 @@ def test_as_many_tokens_as_its_start_quantity_begin_an_activity() -> None:
     assert play.ended == "completed"
 
 
+def test_an_execution_that_several_tokens_begin_is_completed_once() -> None:
+    play = Play(TEAM).start().answer().answer()
+    left = [line for line in play.trace("leave") if line.startswith("leave work")]
+    assert sorted(left) == [
+        "leave work",
+        "leave work",
+        "leave work consumed",
+        "leave work consumed",
+    ]
+
+
+def test_an_execution_that_several_tokens_leave_is_completed_once() -> None:
+    play = Play("""
+        <startEvent id="start"/> <task id="work" completionQuantity="3"/> <task id="a"/>
+        start -> work -> a
+    """).start()
+    lines = play.trace("leave", "take")
+    assert lines.count("leave work") == 1
+    assert lines.count("take f2") == 3
+
+
 def test_too_few_tokens_do_not_begin_it_and_the_run_says_where_it_is_stuck() -> None:
     play = Play(TEAM.replace('"2"', '"3"')).start()
     assert len(play.run.state.prompts) == 1

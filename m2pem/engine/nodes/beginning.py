@@ -40,7 +40,7 @@ def _gather(x: Execution, token: Token, node: Activity) -> bool:
         return False
     others = [other for other in waiting if other is not token]
     for other in others[: node.start_quantity - 1]:
-        x.leave(other, TokenOutcome.COMPLETED)
+        x.leave(other, TokenOutcome.CONSUMED)
     x.emit(r.TokensGathered(token.id, x.process_of(node), node.id, token.scope.id))
     return True
 

@@ -12,6 +12,8 @@ class TokenOutcome(StrEnum):
     INTERRUPTED = "interrupted"
     TERMINATED = "terminated"
     FAILED = "failed"
+    CONSUMED = "consumed"
+    """With other tokens it began one execution of an activity (`startQuantity`)."""
 
 
 class RunOutcome(StrEnum):

@@ -187,7 +187,7 @@ class Board:
                 )
             case r.TokenLeft():
                 left = self.active.pop(record.token, None)
-                if left is None:
+                if left is None or record.outcome is r.TokenOutcome.CONSUMED:
                     return
                 if record.outcome is r.TokenOutcome.COMPLETED:
                     self.completed.add(left.element)

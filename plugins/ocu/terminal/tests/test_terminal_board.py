@@ -24,14 +24,15 @@ MISSION = """
   </process>
 </definitions>"""
 
+TWICE = """<userTask id="work" startQuantity="2"/>
+<sequenceFlow id="again" sourceRef="start" targetRef="work"/>"""
+
 
 class Watched:
     """A run, and the board that its records are shown on."""
 
-    def __init__(self, interrupting: str) -> None:
-        mission = parse_mission(
-            MISSION.format(interrupting=interrupting).strip().encode(), "m.bpmn"
-        )
+    def __init__(self, interrupting: str, text: str = MISSION) -> None:
+        mission = parse_mission(text.format(interrupting=interrupting).strip().encode(), "m.bpmn")
         self.run = MissionRun(mission, None, "r1")
         self.board = Board(RunId("r1"), mission)
         self.give(StartRun("P"))
@@ -60,3 +61,9 @@ def test_it_is_awaited_no_more_when_its_scope_has_ended() -> None:
     watched = Watched("false")
     watched.give(PromptAnswer("p1", "done", "ops"))
     assert not watched.awaited
+
+
+def test_tokens_that_begin_an_activity_with_another_are_not_shown_as_done() -> None:
+    watched = Watched("false", MISSION.replace('<userTask id="work"/>', TWICE))
+    watched.give(PromptAnswer("p1", "done", "ops"))
+    assert [done.element for done in watched.board.done] == ["work"]
