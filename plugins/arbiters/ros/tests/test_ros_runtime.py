@@ -3,6 +3,7 @@
 import asyncio
 import signal
 import threading
+import warnings
 from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 from uuid import UUID, uuid5
@@ -11,9 +12,10 @@ import pytest
 from m2pem_interfaces.action import ExecuteBehavior
 from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus
 from m2pem_interfaces.srv import AnswerPrompt, ListRuns
-from m2pem_plugin_ros.runtime import RosError, RosRuntime, RosTimeoutError, qos
+from m2pem_plugin_ros.runtime import RosError, RosRuntime, RosTimeoutError, qos, responses
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from rclpy.action import ActionClient
+from rclpy.service import Service
 from std_msgs.msg import String
 
 ECHO = Path(__file__).with_name("ros_echo_peer.py")
@@ -150,6 +152,52 @@ async def test_a_handler_that_raises_answers_with_its_error(
     assert not answer.success
     assert "out of paper" in answer.message
     assert "service broken failed" in caplog.text
+
+
+def drop_responses(monkeypatch: pytest.MonkeyPatch, times: int) -> None:
+    """What rclpy does while DDS has not discovered who asked."""
+    send = Service.send_response
+    left = [times]
+
+    def dropped(service: Service, response: object, header: object) -> None:
+        if left[0] == 0:
+            send(service, response, header)
+            return
+        left[0] -= 1
+        warnings.warn("failed to send response (timeout): no client", RuntimeWarning, stacklevel=1)
+
+    monkeypatch.setattr(Service, "send_response", dropped)
+
+
+async def test_a_response_is_sent_again_until_its_client_is_discovered(
+    ros: RosRuntime, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    handled = []
+
+    async def serve(request: ListRuns.Request, response: ListRuns.Response) -> ListRuns.Response:
+        handled.append(request)
+        response.message = "at last"
+        return response
+
+    drop_responses(monkeypatch, 3)
+    ros.serve(ListRuns, "late", serve)
+    answer = await ros.call(ros.client(ListRuns, "late"), ListRuns.Request(), AMPLE_S)
+    assert answer.message == "at last"
+    assert len(handled) == 1
+
+
+async def test_a_response_that_can_never_be_sent_is_reported(
+    ros: RosRuntime, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def serve(_: ListRuns.Request, response: ListRuns.Response) -> ListRuns.Response:
+        return response
+
+    monkeypatch.setattr(responses, "AGAIN_S", (0.01, 0.01))
+    drop_responses(monkeypatch, -1)
+    ros.serve(ListRuns, "gone", serve)
+    call = asyncio.create_task(ros.call(ros.client(ListRuns, "gone"), ListRuns.Request(), AMPLE_S))
+    await connected(lambda: "service gone: DDS has not discovered the client" in caplog.text)
+    call.cancel()
 
 
 async def test_a_goal_is_accepted_fed_back_and_succeeds(ros: RosRuntime) -> None:

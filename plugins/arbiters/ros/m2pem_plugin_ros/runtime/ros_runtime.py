@@ -23,6 +23,7 @@ from m2pem_plugin_ros.installation import RosError
 from m2pem_plugin_ros.runtime import qos as qualities
 from m2pem_plugin_ros.runtime.calls import Calls
 from m2pem_plugin_ros.runtime.inbox import Inbox
+from m2pem_plugin_ros.runtime.responses import Responses
 
 JOIN_S = 5.0
 WAITING = 1000
@@ -197,13 +198,16 @@ class RosRuntime:
                     empty.message = f"internal error: {error!r}"
                 return empty
 
-        return (node or self.node).create_service(
+        service = (node or self.node).create_service(
             service_type,
             name,
             self.coroutine(answer),
             qos_profile=qualities.SERVICES,
             callback_group=ReentrantCallbackGroup(),
         )
+        # The executor sends with the service's method, and has no other place for this.
+        service.send_response = Responses(service, self.executor, self._loop).send
+        return service
 
     def coroutine(
         self, handler: Callable[..., Coroutine[Any, Any, Any]]
