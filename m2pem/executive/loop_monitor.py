@@ -76,11 +76,12 @@ class LoopMonitor:
 def blocking(frame: FrameType | None) -> str:
     """Where a stack is: "m2pem_plugin_x.arbiter, cancel, line 3".
 
-    The innermost code of a plugin, if there is any; else of another library, else of m2pem.
+    Of what the loop runs, the innermost code of a plugin, if there is any; else of another library,
+    else of m2pem. What runs the loop itself does not count.
     """
     plugins = {each.module.partition(".")[0] for each in entry_points(group="m2pem")}
     found: dict[str, str] = {}
-    while frame is not None:
+    while frame is not None and frame.f_code.co_name != "run_forever":
         module = str(frame.f_globals.get("__name__", "?"))
         package = module.partition(".")[0]
         if package == "m2pem":

@@ -1,7 +1,9 @@
 """STOP and pause reach the arbiters whatever the journal, the mission or an arbiter does."""
 
 import asyncio
+import sys
 import threading
+import types
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -10,7 +12,7 @@ import pytest
 from m2pem.api.control import Alert, RunStatus
 from m2pem.engine.records import BehaviorRequested, RunPaused
 from m2pem.errors import OperatorError
-from m2pem.executive.loop_monitor import LoopMonitor
+from m2pem.executive.loop_monitor import LoopMonitor, blocking
 from m2pem.executive.notices import Notices
 from m2pem.executive.observers import MAX_WAITING, Observers
 from m2pem.journal import MemoryJournal
@@ -326,3 +328,16 @@ async def test_what_blocks_the_event_loop_is_named(caplog: pytest.LogCaptureFixt
     assert isinstance(alert, Alert)
     assert alert.code == "BLOCKED"
     assert "test_what_blocks_the_event_loop_is_named" in alert.text
+
+
+async def test_what_runs_the_event_loop_is_not_named_for_what_blocks_it() -> None:
+    named: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+
+    def read_a_mission() -> None:
+        named.set_result(blocking(sys._getframe()))
+
+    # As if it were in a module of m2pem: around it are asyncio, and pytest that runs the loop.
+    known = {"__name__": "m2pem.reading", "blocking": blocking, "sys": sys}
+    code, closure = read_a_mission.__code__, read_a_mission.__closure__
+    asyncio.get_running_loop().call_soon(types.FunctionType(code, known, closure=closure))
+    assert (await named).startswith("m2pem.reading, read_a_mission, line ")
