@@ -1,12 +1,13 @@
 """A vehicle in plain rclpy, with nothing of m2pem but its interfaces.
 
-    ros_plain_peer.py NAMESPACE node|base FRAME [TYPE]
+    ros_plain_peer.py NAMESPACE node|base|nav2 FRAME [TYPE]
 
 `node` keeps to docs/ros.md, "Write your own node"; `base` takes `cmd_vel`, and goes on with
-the last command that it got. FRAME: of its odometry; TYPE: of `cmd_vel`, Twist or TwistStamped, or
-`pose`, which publishes odometry as a PoseStamped. On /link, NAMESPACE makes it deaf and dumb, and
-"" lets it speak again: it drives on meanwhile. On /truth it says what it does, whatever its link:
-name, speed, behaviors begun, and the epochs of the CANCELs that it has heard.
+the last command that it got; `nav2` drives as long as it has a goal of `navigate_to_pose`. FRAME:
+of its odometry; TYPE: of `cmd_vel`, Twist or TwistStamped, or `pose`, which publishes odometry as a
+PoseStamped. On /link, NAMESPACE makes it deaf and dumb, and "" lets it speak again: it drives on
+meanwhile. On /truth it says what it does, whatever its link: name, speed, behaviors begun, and the
+epochs of the CANCELs that it has heard.
 """
 
 import contextlib
@@ -15,8 +16,13 @@ from typing import Any
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
+from lifecycle_msgs.msg import State
+from lifecycle_msgs.srv import GetState
 from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus, VehicleStatus
+from nav2_msgs.action import NavigateToPose
 from nav_msgs.msg import Odometry
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
@@ -36,6 +42,7 @@ class Plain:
         self.known: dict[str, tuple[int, int]] = {}
         self.epochs: dict[str, int] = {}
         self.linked = True
+        self.handle, self.over = None, None
         odometry = PoseStamped if type_ == "pose" else Odometry
         self.odom = node.create_publisher(odometry, "odom", 5)
         self.truth = node.create_publisher(String, "/truth", 10)
@@ -48,6 +55,8 @@ class Plain:
                 lambda message: self.hear_velocity(message.twist if stamped else message),
                 10,
             )
+        elif kind == "nav2":
+            self.serve_goals()
         else:
             latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             self.says = node.create_publisher(BehaviorStatus, "behavior_status", latched)
@@ -55,6 +64,38 @@ class Plain:
             self.status = node.create_publisher(VehicleStatus, "vehicle_status", latched)
             node.create_subscription(BehaviorCommand, "command", self.hear_command, 10)
         node.create_timer(PERIOD_S, self.step)
+
+    def serve_goals(self) -> None:
+        async def state(_: Any, response: Any) -> Any:
+            if not self.linked:
+                await rclpy.Future()  # no answer
+            response.current_state = State(id=State.PRIMARY_STATE_ACTIVE, label="active")
+            return response
+
+        def accept(_: Any) -> GoalResponse:
+            return GoalResponse.ACCEPT if self.linked else GoalResponse.REJECT
+
+        def cancel(_: Any) -> CancelResponse:
+            return CancelResponse.ACCEPT if self.linked else CancelResponse.REJECT
+
+        async def drive(handle: Any) -> Any:
+            self.speed, self.begun = SPEED_M_S, self.begun + 1
+            over = self.over = rclpy.Future()
+            self.handle = handle
+            await over
+            self.speed = 0.0
+            handle.canceled()
+            return NavigateToPose.Result()
+
+        reentrant = ReentrantCallbackGroup()
+        name = "bt_navigator/get_state"
+        self.node.create_service(GetState, name, state, callback_group=reentrant)
+        ActionServer(
+            *(self.node, NavigateToPose, "navigate_to_pose", drive),
+            goal_callback=accept,
+            cancel_callback=cancel,
+            callback_group=reentrant,
+        )
 
     def hear_link(self, message: Any) -> None:
         self.linked = message.data != self.namespace
@@ -88,6 +129,8 @@ class Plain:
 
     def step(self) -> None:
         self.steps += 1
+        if self.handle is not None and self.handle.is_cancel_requested and not self.over.done():
+            self.over.set_result(None)
         self.east += self.speed * PERIOD_S
         words = [self.namespace, f"{self.speed:.2f}", str(self.begun), ",".join(self.cancels)]
         self.truth.publish(String(data=" ".join(words)))
