@@ -27,7 +27,7 @@ class Browser:
     """What one was told. Latencies in ms: of frames, and of the newest event in each."""
 
     address: str
-    cookie: str
+    secrets: dict[str, str]
     run: str
     frames: int = 0
     urgent: int = 0
@@ -44,7 +44,7 @@ class Browser:
         base = self.address.rstrip("/")
         socket = await websockets.connect(
             f"{base.replace('http', 'ws', 1)}/api/live",
-            additional_headers={"Cookie": self.cookie},
+            additional_headers=self.secrets,
             origin=websockets.Origin(base),
             compression=None,
             max_size=None,
@@ -103,14 +103,18 @@ class Browser:
                 await socket.wait_closed()
 
 
-def sign_in(url: str) -> str:
-    """Use the token up; the cookie."""
+def sign_in(url: str) -> dict[str, str]:
+    """Use the token up; the headers of a request of the session."""
     parts = urlsplit(url)
+    body = json.dumps({"token": parts.query.removeprefix("token=")})
     connection = HTTPConnection(parts.hostname or "", parts.port)
-    connection.request("GET", f"/?{parts.query}")
-    cookie = connection.getresponse().headers["set-cookie"].partition(";")[0]
+    said = {"Content-Type": "application/json", "Origin": f"{parts.scheme}://{parts.netloc}"}
+    connection.request("POST", "/api/session", body, said)
+    answer = connection.getresponse()
+    cookie = answer.headers["set-cookie"].partition(";")[0]
+    secrets = {"Cookie": cookie, "M2pem-Key": json.load(answer)["key"]}
     connection.close()
-    return cookie
+    return secrets
 
 
 def percentile(values: list[float], share: float) -> float:
@@ -120,9 +124,9 @@ def percentile(values: list[float], share: float) -> float:
 
 async def watch(url: str, run: str) -> dict[str, Any]:
     """All three; the answer."""
-    address, cookie = url.partition("?")[0], sign_in(url)
-    quick = [Browser(address, cookie, run) for _ in range(2)]
-    stalled = asyncio.create_task(Browser(address, cookie, run).stand_still())
+    address, secrets = url.partition("?")[0], sign_in(url)
+    quick = [Browser(address, secrets, run) for _ in range(2)]
+    stalled = asyncio.create_task(Browser(address, secrets, run).stand_still())
     async with asyncio.timeout(LIMIT_S):
         await asyncio.gather(*(each.look() for each in quick))
     stalled.cancel()

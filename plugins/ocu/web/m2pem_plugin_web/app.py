@@ -62,7 +62,7 @@ def routers_of(
         geometries.router(control),
         map_tiles.router(tiles),
         socket.router(hub, entry),
-        pages.router(entry, Pages()),
+        pages.router(Pages()),
     ]
 
 

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fastapi import APIRouter, Request
-from fastapi.responses import RedirectResponse, Response
+from fastapi.responses import Response
 from starlette.datastructures import Headers
 
-from m2pem_plugin_web.access.entry import Entry, ThrottledError
 from m2pem_plugin_web.problems import ProblemError
 
 STATIC = Path(__file__).parent / "static"
@@ -94,24 +93,12 @@ def _read(path: Path) -> _File:
     return _File(content, compressed, media_type, f'"{hashlib.sha256(content).hexdigest()[:32]}"')
 
 
-def router(entry: Entry, pages: Pages) -> APIRouter:
-    """The routes of the page. `?token=` in any of its addresses signs in, once, and disappears."""
+def router(pages: Pages) -> APIRouter:
+    """The routes of the page. `?token=` in any of its addresses is for the page: it signs in."""
     routes = APIRouter(include_in_schema=False)
 
     async def page(request: Request) -> Response:
-        token = request.query_params.get("token")
-        if token is None:
-            return await pages.answer("index.html", request.headers)
-        address = request.client.host if request.client else ""
-        try:
-            key = entry.redeem(token, address)
-        except ThrottledError:
-            key = None
-        if key is None:
-            return RedirectResponse("/sign-in?refused=token", 303)
-        response = RedirectResponse(request.url.path, 303, {"cache-control": "no-store"})
-        set_cookie(response, entry, key)
-        return response
+        return await pages.answer("index.html", request.headers)
 
     for address in ADDRESSES:
         routes.add_api_route(address, page, methods=["GET"])
@@ -127,10 +114,3 @@ def router(entry: Entry, pages: Pages) -> APIRouter:
         return await pages.answer(f"assets/{name}", request.headers)
 
     return routes
-
-
-def set_cookie(response: Response, entry: Entry, key: str) -> None:
-    """Have a browser keep the key of a session, where no script can read it."""
-    response.set_cookie(
-        entry.cookie, key, httponly=True, samesite="lax", secure=entry.secure, path="/"
-    )

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from playwright.async_api import Browser, Page, expect
-from web_browsing import page_at
+from web_browsing import KEY, page_at
 from web_desk import IN_ONE_LOOP, Desk
 from web_served import served
 
@@ -40,7 +40,7 @@ TAKEOFF = """\
 async def runs_of(page: Page) -> list[str]:
     """The missions of all runs."""
     found: list[str] = await page.evaluate(
-        "fetch('/api/runs').then((answer) => answer.json())"
+        f"fetch('/api/runs', {{ headers: {{ {KEY} }} }}).then((answer) => answer.json())"
         ".then((runs) => runs.map(({mission}) => mission))"
     )
     return [Path(each).stem for each in found]

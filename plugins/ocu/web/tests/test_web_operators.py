@@ -12,7 +12,7 @@ from m2pem_plugin_web.access.passwords import hash_password
 from m2pem_plugin_web.access.roles import Role
 from m2pem_plugin_web.access.users import User, write_users
 from playwright.async_api import Browser, Page, expect
-from web_browsing import Watched, page_at
+from web_browsing import KEY, Watched, page_at
 from web_desk import IN_ONE_LOOP, element
 from web_running import answer, wait_for_status
 from web_served import REPOSITORY, Served, served
@@ -27,9 +27,9 @@ STEERING = ["STOP", "Pause", "Stop this run", "Signal…", "Message…", "Take o
 STEERED = ["pause", "resume", "stop"]
 REFUSED = """async ([run, what]) => {
   const path = what === "STOP" ? "/api/stop" : `/api/runs/${run}/${what}`;
-  const said = { method: "POST", headers: { "Content-Type": "application/json" }, body: "{}" };
+  const said = { method: "POST", headers: HEADERS, body: "{}" };
   return (await fetch(path, said)).status;
-}"""
+}""".replace("HEADERS", f'{{ {KEY}, "Content-Type": "application/json" }}')
 
 
 def put(executive: Served) -> None:

@@ -1,6 +1,8 @@
 """Named users: their roles, their passwords, and what ends their sessions."""
 
 import asyncio
+import json
+import time
 from pathlib import Path
 
 import pytest
@@ -8,7 +10,7 @@ from m2pem_plugin_web.access.entry import OF_A_NAME_HERE
 from m2pem_plugin_web.access.passwords import hash_password
 from m2pem_plugin_web.access.private_files import NotPrivateError
 from m2pem_plugin_web.access.roles import Role
-from m2pem_plugin_web.access.sessions import IDLE_S, LONGEST_S, Sessions
+from m2pem_plugin_web.access.sessions import IDLE_S, LONGEST_S, Sessions, hash_of
 from m2pem_plugin_web.access.throttle import WITHIN_S, Throttle
 from m2pem_plugin_web.access.users import User, Users, write_users
 from m2pem_plugin_web.live.socket import SIGNED_OUT
@@ -107,8 +109,9 @@ async def test_the_journal_says_who_did_it(world: MakeWorld) -> None:
 async def test_where_users_are_named_no_token_is_printed(world: MakeWorld) -> None:
     async with world(users=EVERYBODY) as here:
         assert "token" not in here.ocu.url
-        answer = await here.stranger().http.get("/?token=")
-        assert answer.headers["location"] == "/sign-in?refused=token"
+        answer = await here.stranger().http.post("/api/session", json={"token": ""})
+        assert answer.status_code == 401
+        assert "name and its password" in answer.json()["detail"]
 
 
 async def test_where_nobody_is_named_nobody_signs_in_by_name(world: MakeWorld) -> None:
@@ -152,10 +155,10 @@ async def test_who_signs_out_is_out_and_so_is_the_page(world: MakeWorld) -> None
     async with world(users=EVERYBODY) as here:
         browser = await here.browser("otto")
         live = await browser.live()
-        cookie = browser.cookie
+        secrets = browser.secrets
         assert (await browser.http.delete("/api/session")).status_code == 204
         assert await live.until_closed() == SIGNED_OUT
-        answer = await here.stranger().http.get("/api/session", headers={"Cookie": cookie})
+        answer = await here.stranger().http.get("/api/session", headers=secrets)
         assert answer.status_code == 401
 
 
@@ -228,27 +231,51 @@ def test_a_session_ends_when_it_is_not_used_and_after_a_week_anyway() -> None:
     sessions = Sessions(clock=clock)
     idle, used = sessions.begin("anna"), sessions.begin("ben")
     clock.now += IDLE_S / 2
-    assert sessions.find(used)
+    assert sessions.find(*used)
     clock.now += IDLE_S / 2 + 1
-    assert sessions.find(idle) is None
+    assert sessions.find(*idle) is None
     began = clock.now
     while clock.now - began < LONGEST_S:
-        sessions.find(used)
+        sessions.find(*used)
         clock.now += IDLE_S / 2
-    assert sessions.find(used) is None
+    assert sessions.find(*used) is None
 
 
 def test_sessions_are_kept_as_hashes(tmp_path: Path) -> None:
     kept = tmp_path / "sessions.json"
-    key = Sessions(kept).begin("anna")
-    assert key not in kept.read_text()
+    made = Sessions(kept).begin("anna")
+    assert not [each for each in made if each in kept.read_text()]
     assert kept.stat().st_mode & 0o777 == 0o600
     again = Sessions(kept)
-    found = again.find(key)
+    found = again.find(*made)
     assert found is not None
     assert found.name == "anna"
-    again.end(key)
-    assert Sessions(kept).find(key) is None
+    again.end(made.cookie)
+    assert Sessions(kept).find(*made) is None
+
+
+def test_only_the_right_key_makes_a_session_last_longer() -> None:
+    clock = Clock()
+    sessions = Sessions(clock=clock)
+    cookie, key = sessions.begin("anna")
+    other = sessions.begin("ben")
+    for wrong in ("", "x" * 43, cookie, other.key):
+        assert sessions.find(cookie, wrong) is None
+    clock.now += IDLE_S / 2
+    assert sessions.of_cookie(cookie) is not None
+    assert sessions.find(cookie, "wrong") is None
+    clock.now += IDLE_S / 2 + 1
+    assert sessions.find(cookie, key) is None
+
+
+def test_a_session_without_a_key_of_an_older_release_lets_nobody_in(tmp_path: Path) -> None:
+    kept = tmp_path / "sessions.json"
+    kept.touch(mode=0o600)
+    old = {"name": "anna", "proof": "", "began": time.time(), "used": time.time()}
+    kept.write_text(json.dumps({hash_of("its cookie"): old}))
+    sessions = Sessions(kept)
+    assert sessions.of_cookie("its cookie") is not None
+    assert [sessions.find("its cookie", key) for key in ("", "its cookie")] == [None, None]
 
 
 def test_a_damaged_file_of_sessions_is_forgotten(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 from playwright.async_api import Browser, Page, expect
-from web_browsing import browser, page_at
+from web_browsing import KEY, browser, page_at
 from web_served import Served, served
 
 from m2pem.testing import scenarios
@@ -16,16 +16,16 @@ WORDS = ("--simulate", "--speed", "10", "--journal", "journal.db")
 MISSION = scenarios.in_sequence("reverse", VEHICLE, *({"distance": "20 m"} for _ in range(6)))
 
 RUN = """async (mission) => {
-  const headers = {"Content-Type": "application/json"};
+  const headers = {KEY, "Content-Type": "application/json"};
   const body = JSON.stringify({mission});
   const answer = await fetch("/api/runs", {method: "POST", headers, body});
   const {run} = await answer.json();
   for (;;) {
-    const {status} = await (await fetch(`/api/runs/${run}`)).json();
+    const {status} = await (await fetch(`/api/runs/${run}`, {headers})).json();
     if (status === "completed") return run;
     await new Promise((resolve) => setTimeout(resolve, 100));
   }
-}"""
+}""".replace("KEY", KEY)
 
 PLACE = """([vehicle]) => {
   for (const marker of document.querySelectorAll(".map .vehicle")) {

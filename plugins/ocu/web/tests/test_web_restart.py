@@ -48,14 +48,15 @@ async def test_a_page_goes_on_after_the_executive_was_started_again(tmp_path: Pa
         browser = await first.browser()
         ended = await first.asked(scenarios.question("Before?"))
         await (await browser.live()).watch(ended.run)
-        cookie, base = browser.cookie, first.base
+        cookie, base, key = browser.cookie, first.base, browser.key
     async with AsyncExitStack() as stack:
         second, _ = await begun(stack, tmp_path, port)
         assert second.base == base
         again = Browser(base)
         second.browsers.append(again)
-        name, _, key = cookie.partition("=")
-        again.http.cookies.set(name, key)
+        name, _, value = cookie.partition("=")
+        again.http.cookies.set(name, value)
+        again.key = key
         assert (await again.http.get("/api/session")).status_code == 200
         live = await again.live()
         told = await live.watch(ended.run)

@@ -11,11 +11,12 @@ import httpx
 import pytest
 import websockets
 from m2pem_plugin_web.access.bodies import LARGEST_BYTES, BoundedBodies
+from m2pem_plugin_web.access.throttle import WITHIN_S
 from m2pem_plugin_web.live.socket import BURST, FLOOD, LONGEST_MESSAGE, MALFORMED
 from m2pem_plugin_web.pages import ADDRESSES
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse
-from web_world import MakeWorld, World, connect
+from web_world import Browser, MakeWorld, World, connect, token_of
 
 STOP = "/api/stop"
 EVIL = "http://evil.example"
@@ -25,7 +26,7 @@ async def refused_socket(world: World, **how: Any) -> int:
     """The status with which a WebSocket is refused."""
     browser = await world.browser()
     with pytest.raises(websockets.InvalidStatus) as refused:
-        await connect(world.base, **{"cookie": browser.cookie, **how})
+        await connect(world.base, **{"cookie": browser.cookie, "key": browser.key, **how})
     return refused.value.response.status_code
 
 
@@ -125,16 +126,23 @@ async def test_a_made_up_cookie_is_refused(world: MakeWorld) -> None:
         name = next(iter(browser.http.cookies))
         for value in ("", "x" * 43, "x" * 4000):
             stranger = here.stranger()
-            answer = await stranger.http.get("/api/session", headers={"Cookie": f"{name}={value}"})
+            said = {**browser.secrets, "Cookie": f"{name}={value}"}
+            answer = await stranger.http.get("/api/session", headers=said)
             assert answer.status_code == 401
+
+
+async def redeem(browser: Browser, token: str) -> httpx.Response:
+    """What a page does with the token of its address."""
+    return await browser.http.post("/api/session", json={"token": token})
 
 
 async def test_a_token_works_once(world: MakeWorld) -> None:
     async with world() as here:
         url = here.ocu.url
         await here.browser()
-        again = await here.stranger().http.get(url)
-        assert again.headers["location"] == "/sign-in?refused=token"
+        again = await redeem(here.stranger(), token_of(url))
+        assert again.status_code == 401
+        assert "m2pem web url" in again.json()["detail"]
         assert "set-cookie" not in again.headers
         assert here.ocu.url != url
         assert (await here.browser()).cookie
@@ -146,30 +154,35 @@ async def test_a_wrong_token_lets_nobody_in_and_too_many_not_even_the_right_one(
     async with world() as here:
         stranger = here.stranger()
         for _ in range(25):
-            answer = await stranger.http.get("/", params={"token": "wrong"})
-            assert answer.headers["location"] == "/sign-in?refused=token"
-        late = await stranger.http.get(here.ocu.url)
-        assert late.headers["location"] == "/sign-in?refused=token"
+            assert (await redeem(stranger, "wrong")).status_code in (401, 429)
+        late = await redeem(stranger, token_of(here.ocu.url))
+        assert late.status_code == 429
+        assert 0 < int(late.headers["retry-after"]) <= WITHIN_S
 
 
-async def test_the_token_leaves_the_address_and_the_cookie_is_out_of_reach(
+async def test_an_address_alone_signs_nobody_in_and_the_cookie_is_out_of_reach(
     world: MakeWorld,
 ) -> None:
     async with world() as here:
-        token = here.ocu.url.partition("?")[2]
-        answer = await here.stranger().http.get(f"/runs/r1?{token}")
-        assert answer.headers["location"] == "/runs/r1"
+        stranger = here.stranger()
+        opened = await stranger.http.get(here.ocu.url)
+        assert opened.status_code == 200
+        assert "set-cookie" not in opened.headers
+        answer = await redeem(stranger, token_of(here.ocu.url))
+        assert len(answer.json()["key"]) == 43
+        assert answer.json()["key"] not in answer.headers["set-cookie"]
         cookie = answer.headers["set-cookie"].lower()
         assert cookie.startswith(f"m2pem_{urlsplit(here.base).port}=")
         assert "httponly" in cookie
-        assert "samesite=lax" in cookie
+        assert "samesite=strict" in cookie
 
 
 async def test_another_programs_cookies_do_not_hide_ours(world: MakeWorld) -> None:
     async with world() as here:
         browser = await here.browser()
         cookie = f'other={{"a": [1, 2]}}; {browser.cookie}; more=x'
-        answer = await here.stranger().http.get("/api/session", headers={"Cookie": cookie})
+        said = {**browser.secrets, "Cookie": cookie}
+        answer = await here.stranger().http.get("/api/session", headers=said)
         assert answer.status_code == 200
 
 
@@ -223,7 +236,7 @@ def raw(base: str, method: str, path: str, headers: dict[str, str]) -> int:
 async def test_no_path_leads_out_of_the_page(world: MakeWorld, path: str) -> None:
     async with world() as here:
         browser = await here.browser()
-        status = await asyncio.to_thread(raw, here.base, "GET", path, {"Cookie": browser.cookie})
+        status = await asyncio.to_thread(raw, here.base, "GET", path, browser.secrets)
         assert status in (400, 401, 404)
 
 
@@ -251,7 +264,8 @@ async def test_a_body_of_100_mb_is_refused_before_it_is_read(world: MakeWorld) -
         reader, writer = await asyncio.open_connection(parts.hostname, parts.port)
         writer.write(
             f"POST {STOP} HTTP/1.1\r\nHost: {parts.netloc}\r\nOrigin: {here.base}\r\n"
-            f"Cookie: {browser.cookie}\r\nContent-Type: application/json\r\n"
+            f"Cookie: {browser.cookie}\r\nM2pem-Key: {browser.key}\r\n"
+            "Content-Type: application/json\r\n"
             "Content-Length: 100000000\r\n\r\n".encode()
         )
         # Not a byte of the body was sent.

@@ -10,17 +10,17 @@ import pytest
 from m2pem_plugin_web.settings import SettingError, read_settings
 from m2pem_plugin_web.tiles import Tiles
 from playwright.async_api import expect
-from web_browsing import browser, page_at
+from web_browsing import KEY, browser, page_at
 from web_served import REPOSITORY, served
 
 ZOOM = 15
 START = """
 fetch("/api/runs", {
   method: "POST",
-  headers: { "content-type": "application/json" },
+  headers: { KEY, "content-type": "application/json" },
   body: JSON.stringify({ mission: "vignette1" }),
 }).then((answer) => answer.json()).then(({ run }) => run)
-"""
+""".replace("KEY", KEY)
 GREEN = (60, 160, 60)
 
 

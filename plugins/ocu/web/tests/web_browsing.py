@@ -1,5 +1,6 @@
 """A real browser, and what went wrong in it."""
 
+import json
 import shutil
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -49,6 +50,20 @@ async def browser() -> AsyncIterator[Browser]:
             await started.close()
 
 
+KEY = """"M2pem-Key": JSON.parse(localStorage.getItem("m2pem.key"))"""
+"""A header, for requests of scripts of tests in a page that has signed in."""
+
+
+def key_of(state: StorageState) -> str:
+    """The key of a session, from what a browser has stored."""
+    stored = {
+        each["name"]: each["value"]
+        for origin in state["origins"]
+        for each in origin["localStorage"]
+    }
+    return str(json.loads(stored["m2pem.key"]))
+
+
 @dataclass(slots=True)
 class Watched:
     """A page, and all that it complained about: errors that nobody caught, and on the console."""
@@ -84,7 +99,7 @@ async def page_at(
 ) -> AsyncIterator[Watched]:
     """A page of its own profile, so of its own operator, at an address.
 
-    `state`: the cookies of somebody who has signed in.
+    `state`: cookies and key of somebody who has signed in.
     """
     context = await started.new_context(
         viewport={"width": width, "height": height},
@@ -99,6 +114,8 @@ async def page_at(
     watched.listen(page)
     try:
         await page.goto(url)
+        if "token=" in url:
+            await page.locator(".who").wait_for(state="attached")  # the page has signed in
         yield watched
     finally:
         await context.close()

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Locator, Page, StorageState, expect
-from web_browsing import TIMEOUT_MS, Watched, browser, page_at
+from web_browsing import TIMEOUT_MS, Watched, browser, key_of, page_at
 from web_running import answer
 from web_served import REPOSITORY, Served, served
 
@@ -31,6 +31,7 @@ class Desk:
 
     executive: Served
     watched: Watched
+    key: str
     refusals: list[int] = field(default_factory=list)
     """Answers that the test asks for, which Chromium logs as errors."""
 
@@ -80,7 +81,11 @@ class Desk:
         response = await self.watched.context.request.fetch(
             f"{self.executive.origin}{path}",
             method=method,
-            headers={"Origin": self.executive.origin, "Content-Type": "application/json"},
+            headers={
+                "Origin": self.executive.origin,
+                "Content-Type": "application/json",
+                "M2pem-Key": self.key,
+            },
             data=None if body is None else json.dumps(body),
         )
         assert response.ok, await response.text()
@@ -127,7 +132,7 @@ def executive(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 @pytest_asyncio.fixture(scope="session", loop_scope="session")
 async def signed_in(chromium: Browser, executive: Served) -> StorageState:
-    """The cookies of somebody who has signed in: the printed address does so once."""
+    """Cookie and key of somebody who has signed in: the printed address does so once."""
     async with page_at(chromium, executive.url) as it:
         await it.page.get_by_role("heading", name="Missions").wait_for()
         return await it.context.storage_state()
@@ -146,7 +151,7 @@ async def desk(
     dark = "callspec" in dir(request.node) and request.node.callspec.params.get("dark", False)
     async with AsyncExitStack() as stack:
         opening = page_at(chromium, "about:blank", dark=dark, state=signed_in)
-        here = Desk(executive, await stack.enter_async_context(opening))
+        here = Desk(executive, await stack.enter_async_context(opening), key_of(signed_in))
         stack.push_async_callback(here.release)
         yield here
     here.assert_well()

@@ -7,10 +7,12 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 import httpx
 import pytest
 import websockets
+from m2pem_plugin_web.access.entry import KEY_HEADER, KEY_SUBPROTOCOL, SUBPROTOCOL
 from m2pem_plugin_web.access.passwords import hash_password
 from m2pem_plugin_web.access.roles import Role
 from m2pem_plugin_web.access.users import User, write_users
@@ -104,7 +106,7 @@ class Live:
 
 
 class Browser:
-    """What a page does: keeps the cookie, and says its origin. `http` is an httpx client."""
+    """What a page does: keeps cookie and key, and says its origin. `http` is an httpx client."""
 
     def __init__(self, base: str, verify: Any = True) -> None:
         self.base = base
@@ -115,18 +117,35 @@ class Browser:
     def cookie(self) -> str:
         return "; ".join(f"{name}={value}" for name, value in self.http.cookies.items())
 
+    @property
+    def key(self) -> str:
+        return str(self.http.headers.get(KEY_HEADER, ""))
+
+    @key.setter
+    def key(self, key: str) -> None:
+        self.http.headers[KEY_HEADER] = key
+
+    @property
+    def secrets(self) -> dict[str, str]:
+        """Headers of a request of its session."""
+        return {"Cookie": self.cookie, KEY_HEADER: self.key}
+
     async def open(self, url: str) -> "Browser":
         response = await self.http.get(url, headers={"Sec-Fetch-Site": "none"})
-        assert response.status_code == 303, response.text
-        return self
+        assert response.status_code == 200, response.text
+        return await self._begin({"token": token_of(url)})
 
     async def sign_in(self, name: str, password: str = PASSWORD) -> "Browser":
-        response = await self.http.post("/api/session", json={"name": name, "password": password})
+        return await self._begin({"name": name, "password": password})
+
+    async def _begin(self, wanted: object) -> "Browser":
+        response = await self.http.post("/api/session", json=wanted)
         assert response.status_code == 200, response.text
+        self.key = response.json()["key"]
         return self
 
     async def live(self, *, acknowledges: bool = True, **options: Any) -> Live:
-        socket = await connect(self.base, cookie=self.cookie, **options)
+        socket = await connect(self.base, cookie=self.cookie, key=self.key, **options)
         self.lives.append(Live(socket, acknowledges=acknowledges))
         return self.lives[-1]
 
@@ -136,8 +155,19 @@ class Browser:
         await self.http.aclose()
 
 
+def token_of(url: str) -> str:
+    """The token of a printed address."""
+    return parse_qs(urlsplit(url).query)["token"][0]
+
+
 async def connect(
-    base: str, *, cookie: str = "", origin: str | None = "", host: str = "", **options: Any
+    base: str,
+    *,
+    cookie: str = "",
+    key: str = "",
+    origin: str | None = "",
+    host: str = "",
+    **options: Any,
 ) -> websockets.ClientConnection:
     """A WebSocket. `origin` "": the page's own; None: it says none."""
     headers = {"Cookie": cookie} if cookie else {}
@@ -149,6 +179,10 @@ async def connect(
     return await websockets.connect(
         f"{where}/api/live",
         additional_headers=headers,
+        subprotocols=[
+            websockets.Subprotocol(each)
+            for each in (SUBPROTOCOL, *([KEY_SUBPROTOCOL + key] if key else []))
+        ],
         origin=websockets.Origin(base) if origin == "" else origin,  # type: ignore[arg-type]
         compression=None,
         close_timeout=1,

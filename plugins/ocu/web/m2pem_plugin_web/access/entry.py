@@ -1,13 +1,15 @@
-"""How one gets in: a one-time token, or a name with its password; and who a cookie stands for."""
+"""How one gets in: a one-time token, or a name with its password; and whose a session is."""
 
 import logging
 from collections.abc import Callable, Hashable, Mapping
 from pathlib import Path
 
+from starlette.requests import HTTPConnection
+
 from m2pem_plugin_web.access.passwords import BusyError, PasswordChecker
 from m2pem_plugin_web.access.private_files import NotPrivateError
 from m2pem_plugin_web.access.roles import Person, Role
-from m2pem_plugin_web.access.sessions import Sessions, hash_of
+from m2pem_plugin_web.access.sessions import Secrets, Session, Sessions, hash_of
 from m2pem_plugin_web.access.throttle import Throttle
 from m2pem_plugin_web.access.tokens import OneTimeToken
 from m2pem_plugin_web.access.users import Users
@@ -18,6 +20,11 @@ OF_A_NAME = 50
 """Failures within five minutes: of one name at one address, of one address, of one name."""
 
 BUSY_S = 2.0
+
+KEY_HEADER = "M2pem-Key"
+SUBPROTOCOL = "m2pem"
+KEY_SUBPROTOCOL = f"{SUBPROTOCOL}.key."
+"""Scripts of a page cannot set headers of a WebSocket: the key follows this in a subprotocol."""
 
 log = logging.getLogger("m2pem.ocu.web")
 
@@ -57,8 +64,8 @@ class Entry:
         self._checker = PasswordChecker() if users is not None else None
         self._throttle = Throttle()
 
-    def redeem(self, token: str, address: str) -> str | None:
-        """The key of a new session for who has the token; None: it is not the token.
+    def redeem(self, token: str, address: str) -> tuple[Person, Secrets] | None:
+        """Return the owner and a new session for who has the token; None: it is not the token.
 
         Raises:
             ThrottledError: there were too many attempts.
@@ -68,10 +75,12 @@ class Entry:
         if self._token is None or self._owner is None or not self._token.redeem(token):
             self._throttle.failed(bounds)
             return None
-        return self._sessions.begin(self._owner.name)
+        return self._owner, self._sessions.begin(self._owner.name)
 
-    async def sign_in(self, name: str, password: str, address: str) -> tuple[Person, str] | None:
-        """Who signs in, and the key of their session; None: the name or the password is wrong.
+    async def sign_in(
+        self, name: str, password: str, address: str
+    ) -> tuple[Person, Secrets] | None:
+        """Return who signs in, and a new session; None: the name or the password is wrong.
 
         Raises:
             ThrottledError: there were too many attempts.
@@ -98,18 +107,22 @@ class Entry:
             return None
         self._throttle.succeeded(bounds)
         self._throttle.forget(here)
-        key = self._sessions.begin(name, hash_of(user.password))
-        return Person(name, user.role), key
+        return Person(name, user.role), self._sessions.begin(name, hash_of(user.password))
 
     def leave(self, cookies: Mapping[str, str]) -> None:
-        """Somebody signs out."""
-        if key := cookies.get(self.cookie):
-            self._sessions.end(key)
+        """End the session of a browser: its user signs out."""
+        if cookie := cookies.get(self.cookie):
+            self._sessions.end(cookie)
 
-    def person(self, cookies: Mapping[str, str]) -> Person | None:
-        """Who asks, by the cookies of their browser."""
-        key = cookies.get(self.cookie)
-        session = self._sessions.find(key) if key else None
+    def person(self, cookies: Mapping[str, str], key: str) -> Person | None:
+        """Return who asks, by the cookies of their browser and the key of their page."""
+        return self._person(self._sessions.find(cookies.get(self.cookie, ""), key))
+
+    def person_of_cookie(self, cookies: Mapping[str, str]) -> Person | None:
+        """Return whose session a cookie is. Servers at other ports of this host receive it, too."""
+        return self._person(self._sessions.of_cookie(cookies.get(self.cookie, "")))
+
+    def _person(self, session: Session | None) -> Person | None:
         if session is None:
             return None
         if self._users is None:
@@ -128,6 +141,15 @@ class Entry:
         wait_s = self._throttle.wait_s(bounds)
         if wait_s > 0:
             raise ThrottledError(wait_s)
+
+
+def key_of(connection: HTTPConnection) -> str:
+    """Return the key that a request or a WebSocket's handshake has; "": none."""
+    if key := connection.headers.get(KEY_HEADER):
+        return key
+    offered: list[str] = connection.scope.get("subprotocols", [])
+    found = (each for each in offered if each.startswith(KEY_SUBPROTOCOL))
+    return next(found, "").removeprefix(KEY_SUBPROTOCOL)
 
 
 def owner_of(name: str) -> Person:

@@ -1,12 +1,12 @@
 """Looks at every request before anything else does: where it comes from, and who asks."""
 
 from collections.abc import Collection
+from typing import Any
 
-from starlette.datastructures import Headers
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from m2pem_plugin_web.access.entry import Entry
+from m2pem_plugin_web.access.entry import KEY_HEADER, Entry, key_of
 from m2pem_plugin_web.access.origins import SAFE_METHODS, foreign, wrong_host
 from m2pem_plugin_web.access.people import SCOPE_KEY
 from m2pem_plugin_web.access.slots import Slots
@@ -14,11 +14,22 @@ from m2pem_plugin_web.problems import problem
 
 API = "/api"
 SIGN_IN = "/api/session"
+TILES = "/tiles/"
+"""Pictures below the map: a browser sends no header of the page with a request for an image."""
+
 STOPS = ("/stop", "/stop-all")
+NO_KEY = (
+    f"the cookie is of a session, but the request has not the key of it ({KEY_HEADER}), which "
+    "signing in gives: sign in again"
+)
 
 
 class Guard:
-    """Below /api it lets in nobody who has not signed in, but to sign in. `names`: our own."""
+    """Below /api it lets in nobody who has not signed in, but to sign in. `names`: our own.
+
+    The cookie alone is not enough there: browsers send it to other ports of this host, whose
+    servers could send it here.
+    """
 
     def __init__(
         self,
@@ -42,25 +53,30 @@ class Guard:
             return
         refused = self._refused(scope)
         if refused is not None:
-            status, why = refused
-            await problem(status, why)(scope, receive, send)
+            status, why, more = refused
+            await problem(status, why, **more)(scope, receive, send)
             return
         await self._app(scope, receive, send)
 
-    def _refused(self, scope: Scope) -> tuple[int, str] | None:
-        headers = Headers(scope=scope)
+    def _refused(self, scope: Scope) -> tuple[int, str, dict[str, Any]] | None:
+        connection = HTTPConnection(scope)
+        headers, cookies = connection.headers, connection.cookies
         if why := wrong_host(headers, self._names):
-            return 400, why
+            return 400, why, {}
         method = scope.get("method", "")
         changes = scope["type"] == "websocket" or method not in SAFE_METHODS
         of_api = scope["path"] == API or scope["path"].startswith(f"{API}/")
         if (changes or of_api) and (why := foreign(headers, self._scheme, strict=changes)):
-            return 403, why
-        person = scope[SCOPE_KEY] = self._entry.person(HTTPConnection(scope).cookies)
+            return 403, why, {}
+        person = scope[SCOPE_KEY] = self._entry.person(cookies, key_of(connection))
         if of_api and person is None and not (scope["path"] == SIGN_IN and method == "POST"):
-            return 401, "sign in first"
+            if self._entry.person_of_cookie(cookies) is None:
+                return 401, "sign in first", {}
+            return 401, NO_KEY, {"missing": KEY_HEADER}
         if person is not None and scope["client"] is not None:
             self._slots.known(tuple(scope["client"]))
+        if person is None and scope["path"].startswith(TILES):
+            scope[SCOPE_KEY] = self._entry.person_of_cookie(cookies)
         if self._slots.full and not scope["path"].endswith(STOPS):
-            return 503, "too many connections are open: close other pages"
+            return 503, "too many connections are open: close other pages", {}
         return None

@@ -1,11 +1,17 @@
-"""Who has signed in: a random key in a cookie of the browser, and its hash here."""
+"""Who has signed in: two random secrets in the browser, and their hashes here.
+
+One is in a cookie. Browsers send cookies to every port of a host, so to servers of other programs
+and users as well. The other, the key, is known to the page's own origin alone, which has the port.
+"""
 
 import hashlib
+import hmac
 import logging
 import secrets
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 
@@ -25,20 +31,29 @@ KEY_BYTES = 32
 log = logging.getLogger("m2pem.ocu.web")
 
 
+class Secrets(NamedTuple):
+    """What a browser has of a session: the value of its cookie, and the key."""
+
+    cookie: str
+    key: str
+
+
 class Session(msgspec.Struct):
     """`name`: who signed in. `proof`: what they knew; if that has changed, it is over.
 
-    Times are seconds since the Unix epoch.
+    Times are seconds since the Unix epoch. `key_hash` "": an older release began the session
+    without a key, and no key is the right one.
     """
 
     name: str
     proof: str
     began: float
     used: float
+    key_hash: str = ""
 
 
 class Sessions:
-    """Sessions by the hashes of their keys: whoever reads them cannot use them.
+    """Sessions by the hashes of their cookies: whoever reads them cannot use them.
 
     `kept`: a file, so that a page that is open goes on after the executive was started again.
     """
@@ -49,26 +64,32 @@ class Sessions:
         self._sessions: dict[str, Session] = _read(kept) if kept is not None else {}
         self._tidy()
 
-    def begin(self, name: str, proof: str = "") -> str:
-        """A new session; the key that its cookie holds."""
-        key = secrets.token_urlsafe(KEY_BYTES)
+    def begin(self, name: str, proof: str = "") -> Secrets:
+        """Begin a session; return its secrets."""
+        made = Secrets(secrets.token_urlsafe(KEY_BYTES), secrets.token_urlsafe(KEY_BYTES))
         now = self._clock()
-        self._sessions[hash_of(key)] = Session(name, proof, now, now)
+        session = Session(name, proof, now, now, hash_of(made.key))
+        self._sessions[hash_of(made.cookie)] = session
         self._tidy()
         self._keep()
-        return key
+        return made
 
-    def find(self, key: str) -> Session | None:
-        """The session of a key, which has been used just now."""
-        session = self._sessions.get(hash_of(key))
-        if session is None or self._is_over(session):
+    def of_cookie(self, cookie: str) -> Session | None:
+        """Return the session of a cookie, whoever sends it. It does not last longer by this."""
+        session = self._sessions.get(hash_of(cookie))
+        return None if session is None or self._is_over(session) else session
+
+    def find(self, cookie: str, key: str) -> Session | None:
+        """Return the session of a cookie and its key, and note that it was used now."""
+        session = self.of_cookie(cookie)
+        if session is None or not hmac.compare_digest(hash_of(key), session.key_hash):
             return None
         session.used = self._clock()
         return session
 
-    def end(self, key: str) -> None:
-        """Somebody signs out."""
-        if self._sessions.pop(hash_of(key), None) is not None:
+    def end(self, cookie: str) -> None:
+        """End the session of a cookie: its user signs out."""
+        if self._sessions.pop(hash_of(cookie), None) is not None:
             self._keep()
 
     def _is_over(self, session: Session) -> bool:
@@ -101,6 +122,6 @@ def _read(path: Path) -> dict[str, Session]:
         return {}
 
 
-def hash_of(key: str) -> str:
-    """What is kept of a key."""
-    return hashlib.sha256(key.encode(errors="replace")).hexdigest()
+def hash_of(secret: str) -> str:
+    """What is kept of a secret."""
+    return hashlib.sha256(secret.encode(errors="replace")).hexdigest()

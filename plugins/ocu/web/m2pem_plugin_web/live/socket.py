@@ -10,7 +10,7 @@ from fastapi import APIRouter, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
 from m2pem.errors import M2pemError
-from m2pem_plugin_web.access.entry import Entry
+from m2pem_plugin_web.access.entry import SUBPROTOCOL, Entry, key_of
 from m2pem_plugin_web.access.people import person_of
 from m2pem_plugin_web.live import words
 from m2pem_plugin_web.live.hub import MOST_VIEWERS, Hub
@@ -70,14 +70,17 @@ def router(hub: Hub, entry: Entry) -> APIRouter:
         if person is None:
             await socket.close(SIGNED_OUT, "sign in first")
             return
-        await socket.accept()
+        offered: list[str] = socket.scope["subprotocols"]
+        await socket.accept(SUBPROTOCOL if SUBPROTOCOL in offered else None)
         if len(hub.viewers) >= MOST_VIEWERS:
             await socket.close(FULL, "too many pages are open")
             return
-        viewer = Viewer()
+        viewer, key = Viewer(), key_of(socket)
         hub.viewers.add(viewer)
         try:
-            await _converse(socket, hub, viewer, lambda: entry.person(socket.cookies) == person)
+            await _converse(
+                socket, hub, viewer, lambda: entry.person(socket.cookies, key) == person
+            )
         except _Leave as leave:
             await _close(socket, leave)
         finally:

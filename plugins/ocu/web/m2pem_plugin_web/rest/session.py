@@ -11,7 +11,7 @@ from m2pem.api import MissionControl
 from m2pem_plugin_web.access.entry import Entry, ThrottledError
 from m2pem_plugin_web.access.passwords import LONGEST
 from m2pem_plugin_web.access.people import Person, Role, Viewer
-from m2pem_plugin_web.pages import set_cookie
+from m2pem_plugin_web.access.sessions import Secrets
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.models import Body, Name
 from m2pem_plugin_web.settings import Settings
@@ -35,6 +35,18 @@ class SessionModel(BaseModel):
     version: str
     missions_folder: str
     tiles: TilesModel | None
+
+
+class BegunModel(SessionModel):
+    """A new session. `key`: the header M2pem-Key of every request below /api."""
+
+    key: str
+
+
+class TokenModel(Body):
+    """The token of the address that the executive printed."""
+
+    token: Annotated[str, Field(max_length=LONGEST)]
 
 
 class SignInModel(Body):
@@ -71,23 +83,19 @@ def router(
         return session_of(person)
 
     @routes.post("")
-    async def sign_in(request: Request, response: Response, wanted: SignInModel) -> SessionModel:
-        """Sign in, with a name and its password."""
-        if not entry.by_name:
-            raise ProblemError(
-                401, "no users are named here: open the address that `m2pem web url` prints"
-            )
+    async def sign_in(
+        request: Request, response: Response, wanted: TokenModel | SignInModel
+    ) -> BegunModel:
+        """Sign in, with a token or with a name and its password."""
         address = request.client.host if request.client else ""
         try:
-            found = await entry.sign_in(wanted.name, wanted.password, address)
+            found = await _signed_in(entry, wanted, address)
         except ThrottledError as error:
             wait = {"Retry-After": str(math.ceil(error.wait_s))}
             raise ProblemError(429, str(error), headers=wait) from None
-        if found is None:
-            raise ProblemError(401, "the name or the password is wrong")
-        person, key = found
-        set_cookie(response, entry, key)
-        return session_of(person)
+        person, secrets = found
+        _set_cookie(response, entry, secrets)
+        return BegunModel(**session_of(person).model_dump(), key=secrets.key)
 
     @routes.delete("", status_code=204)
     async def sign_out(request: Request, response: Response, _: Viewer) -> None:
@@ -96,3 +104,34 @@ def router(
         response.delete_cookie(entry.cookie, path="/")
 
     return routes
+
+
+async def _signed_in(
+    entry: Entry, wanted: TokenModel | SignInModel, address: str
+) -> tuple[Person, Secrets]:
+    if isinstance(wanted, TokenModel):
+        found = entry.redeem(wanted.token, address)
+        wrong = "the token was used already, or is too old: `m2pem web url` prints another"
+        if entry.by_name:
+            wrong = "users are named here: sign in with a name and its password"
+    elif entry.by_name:
+        found = await entry.sign_in(wanted.name, wanted.password, address)
+        wrong = "the name or the password is wrong"
+    else:
+        found = None
+        wrong = "no users are named here: open the address that `m2pem web url` prints"
+    if found is None:
+        raise ProblemError(401, wrong)
+    return found
+
+
+def _set_cookie(response: Response, entry: Entry, secrets: Secrets) -> None:
+    """Have a browser keep one secret of a session where no script can read it."""
+    response.set_cookie(
+        entry.cookie,
+        secrets.cookie,
+        httponly=True,
+        samesite="strict",
+        secure=entry.secure,
+        path="/",
+    )

@@ -5,7 +5,7 @@ import { useEffect } from "preact/hooks";
 import { connect } from "./shared/executive";
 import { Header } from "./shared/Header";
 import { route } from "./shared/router";
-import { loadSession, session, toSignIn } from "./shared/session";
+import { loadSession, redeem, session, takeToken, toSignIn } from "./shared/session";
 import { Toasts } from "./shared/Toasts";
 import { strings } from "./strings";
 import "./theme.css";
@@ -33,15 +33,15 @@ function Page() {
   }
 }
 
-async function begin(): Promise<void> {
-  const answered = await loadSession();
-  if (!answered) setTimeout(() => void begin(), 2000);
+async function begin(token: string): Promise<void> {
+  const answered = token ? await redeem(token) : await loadSession();
+  if (!answered) setTimeout(() => void begin(token), 2000);
   else if (session.value === null) toSignIn();
   else connect();
 }
 
 function App() {
-  useEffect(() => void begin(), []);
+  useEffect(() => void begin(takeToken()), []);
   const known = session.value !== undefined;
   const mayLook = session.value !== null || route.value.page === "signIn";
   return (

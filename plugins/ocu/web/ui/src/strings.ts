@@ -51,7 +51,11 @@ export const strings = {
     hint: "On the executive's own machine, open the address that it printed, or a new one:",
     command: "m2pem web url",
     wrong: "Name or password is wrong.",
-    used: "That address was used already, or is too old. Ask for a new one.",
+    refused: {
+      token: "That address was used already, or is too old. Ask for a new one.",
+      attempts: "There were too many attempts. Try again in five minutes.",
+      key: "This browser has lost the key of its session. Sign in again.",
+    },
     unreachable: "The executive does not answer.",
   },
   home: {

@@ -1,4 +1,5 @@
 // Requests to the server. What it refuses is an ApiError, with what it said (RFC 9457).
+import { sessionKey } from "./key";
 import type { Finding } from "./types";
 
 export interface Problem {
@@ -51,6 +52,8 @@ async function ask<T>(path: string, body: unknown, init: RequestInit): Promise<T
     init.headers = { ...init.headers, "Content-Type": "application/json" };
     init.body = JSON.stringify(body);
   }
+  const key = sessionKey();
+  if (key) init.headers = { ...init.headers, "M2pem-Key": key };
   const response = await fetch(`/api${path}`, init);
   if (response.ok) return (response.status === 204 ? undefined : await response.json()) as T;
   throw new ApiError(await problemOf(response));

@@ -1,4 +1,5 @@
 // What a live connection needs of the browser.
+import { sessionKey } from "./key";
 import type { Socket, Surroundings } from "./live";
 
 /** A page in the background does not paint; what it is told is applied all the same. */
@@ -20,7 +21,11 @@ function paint(callback: () => void): void {
 export const browser: Surroundings = {
   connect: () => {
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
-    return new WebSocket(`${scheme}//${location.host}/api/live`) as unknown as Socket;
+    const address = `${scheme}//${location.host}/api/live`;
+    // A script cannot set headers of a WebSocket, but it can offer subprotocols.
+    const key = sessionKey();
+    const protocols = key ? ["m2pem", `m2pem.key.${key}`] : ["m2pem"];
+    return new WebSocket(address, protocols) as unknown as Socket;
   },
   paint,
   after: (callback, delay_ms) => {

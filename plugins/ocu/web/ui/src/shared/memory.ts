@@ -1,4 +1,4 @@
-// What this browser remembers of its user's choices. Nothing depends on it.
+// What this browser remembers of its user, where it may store something.
 const PREFIX = "m2pem.";
 
 export function remembered<T>(name: string, otherwise: T): T {

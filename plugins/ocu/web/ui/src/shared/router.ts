@@ -50,6 +50,12 @@ export function go(path: string): void {
   show();
 }
 
+/** Go to a path; the one before is forgotten. */
+export function replace(path: string): void {
+  history.replaceState(null, "", path);
+  show();
+}
+
 /** The address of what is shown: the browser's is another one while it goes back. */
 let shown = location.href;
 

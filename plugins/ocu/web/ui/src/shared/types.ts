@@ -14,6 +14,11 @@ export interface Session {
   tiles: { max_zoom: number; attribution: string } | null;
 }
 
+/** A session that has just begun; `key` is the header M2pem-Key of every request. */
+export interface BegunSession extends Session {
+  key: string;
+}
+
 export interface Finding {
   severity: "error" | "warning";
   rule: string;

@@ -3,7 +3,7 @@ import { useState } from "preact/hooks";
 import { ApiError } from "../shared/api";
 import { connect } from "../shared/executive";
 import { go } from "../shared/router";
-import { nextPath, signIn } from "../shared/session";
+import { nextPath, signIn, type Refused } from "../shared/session";
 import { strings } from "../strings";
 import "./signin.css";
 
@@ -72,8 +72,10 @@ export default function SignIn() {
 }
 
 /** Why one was sent here. */
-const refused = (): string =>
-  new URLSearchParams(location.search).get("refused") === "token" ? text.used : "";
+function refused(): string {
+  const why = new URLSearchParams(location.search).get("refused");
+  return why === null ? "" : (text.refused[why as Refused] ?? "");
+}
 
 function problemOf(error: unknown): string {
   if (!(error instanceof ApiError)) return text.unreachable;
