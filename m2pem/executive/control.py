@@ -276,7 +276,15 @@ class Control:
         names, arbiters, plugins = tuple(data), executive.arbiters, executive.plugins
         simulated = executive.simulated
         return [
-            *findings_for(loaded, arbiters, plugins, names, process, simulated=simulated),
+            *findings_for(
+                loaded,
+                arbiters,
+                plugins,
+                names,
+                process,
+                simulated=simulated,
+                handed_over=executive.handed_over,
+            ),
             *requirement_findings(loaded, arbiters, plugins, names),
         ]
 
@@ -290,7 +298,7 @@ class Control:
             "search_path": executive.search_path,
             **options,
         }
-        return await executive.rehearse(mission, executive.fleet, **settings)
+        return await executive.rehearse(mission, executive.fleet_now, **settings)
 
     async def verify(
         self,
@@ -308,7 +316,7 @@ class Control:
         executive = self._executive
         return await verify_apart(
             mission,
-            executive.fleet,
+            executive.fleet_now,
             simulated=executive.simulated,
             search_path=executive.search_path,
             process=process,

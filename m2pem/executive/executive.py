@@ -12,6 +12,7 @@ import logging
 import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import AsyncExitStack
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Self
@@ -276,6 +277,12 @@ class Executive:
         loaded = load_source(mission, self.search_path)
         return loaded, self.admit(loaded, process, data)
 
+    @property
+    def fleet_now(self) -> Fleet:
+        """The fleet, with what operators have handed over for all runs."""
+        given = {name: parse_geojson(each.geometry) for name, each in self.handed_over.items()}
+        return replace(self.fleet, geometries={**self.fleet.geometries, **given})
+
     def admit(self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None) -> str:
         """Check a mission; returns the id of the process to begin with.
 
@@ -289,6 +296,7 @@ class Executive:
             known_data(data),
             process,
             simulated=self.simulated,
+            handed_over=self.handed_over,
         )
         refuse_errors(f"{loaded.file} cannot run with fleet {self.fleet.file}", findings)
         return loaded.process(process).id

@@ -1,6 +1,6 @@
 """Getting a mission: from a path, a URL or bytes; and checking it against the fleet."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -98,11 +98,12 @@ def findings_for(
     process: str | None = None,
     *,
     simulated: bool = False,
+    handed_over: Container[str] = (),
 ) -> list[Finding]:
     """All findings of `m2pem check` for a mission that was read: its own, the fleet's, plugins'.
 
     `data`: names given at start (`--data`). `arbiters` None: no fleet, so roles are only
-    checked to be there.
+    checked to be there. `handed_over`: names of geometries that operators have handed over.
     """
     writes = plugins.service_writes()
     findings = [*mission.warnings, *lint(mission, data, writes, _behavior_writes(arbiters))]
@@ -121,7 +122,8 @@ def findings_for(
         )
     fleet = arbiters.fleet if arbiters is not None else None
     if arbiters is not None:
-        findings += check_mission(mission, arbiters.fleet, arbiters.offered, simulated=simulated)
+        offered = arbiters.offered
+        findings += check_mission(mission, arbiters.fleet, offered, simulated, handed_over)
     else:
         findings += check_named(mission)
     findings += _unprovided(mission, writes)

@@ -1,6 +1,6 @@
 """The static check: whether a mission fits a fleet, before anything moves (paper, section 4.2)."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from m2pem.findings import Finding, Severity
@@ -30,15 +30,21 @@ FAST = 5
 
 
 def check_mission(
-    mission: Mission, fleet: Fleet, catalogue: Catalogue, simulated: bool = False
+    mission: Mission,
+    fleet: Fleet,
+    catalogue: Catalogue,
+    simulated: bool = False,
+    handed_over: Container[str] = (),
 ) -> list[Finding]:
     """Everything about a mission's roles, behaviors and parameters that does not fit the fleet.
 
     `catalogue` is what the arbiter of a resource offers; with `simulated` it is that of the
     simulated arbiter, which then stands in for all. Findings come in the order of the mission.
-    A geometry that the fleet lacks is a warning: an operator may hand it over in time.
+    `handed_over`: names of geometries that operators have handed over already. Another one that the
+    fleet lacks is a warning if the fleet says that operators hand it over, else an error.
     """
-    check = _Check(mission, fleet, ResourceGraph(fleet, catalogue), catalogue, simulated)
+    graph = ResourceGraph(fleet, catalogue)
+    check = _Check(mission, fleet, graph, catalogue, simulated, handed_over)
     findings = [finding for task in mission.activities() for finding in check.task(task)]
     return [*findings, *_returned(mission, fleet)]
 
@@ -110,6 +116,7 @@ class _Check:
     graph: ResourceGraph
     catalogue: Catalogue
     simulated: bool
+    handed_over: Container[str]
 
     def task(self, task: Activity) -> list[Finding]:
         findings = TaskFindings(self.mission.file_of(task), task)
@@ -247,21 +254,29 @@ class _Check:
             taker.spec, literal, geometry, self.fleet.vehicles, deferred, self.fleet.origin
         )
         for problem in problems:
-            warning = problem.rule == "unknown-geometry"
-            findings.add(
-                problem.rule,
-                taker.place + problem.message + (f" in {self.fleet.file}" if warning else ""),
-                self._geometry_remedy(problem, literal) if warning else problem.remedy,
-                line=lines.get(problem.name, behavior.line),
-                role=taker.role,
-                severity=Severity.WARNING if warning else Severity.ERROR,
-            )
+            line = lines.get(problem.name, behavior.line)
+            if problem.rule == "unknown-geometry":
+                self._unknown_geometry(problem, literal[problem.name], line, taker, findings)
+            else:
+                message = taker.place + problem.message
+                findings.add(problem.rule, message, problem.remedy, line=line, role=taker.role)
 
-    def _geometry_remedy(self, problem: ParameterProblem, literal: dict[str, str]) -> str:
-        name = literal[problem.name]
-        hint = problem.remedy or did_you_mean(name, self.fleet.geometries)
-        handed_over = "an operator must hand it over before the task starts"
-        return f"{hint} else {handed_over}" if hint else handed_over
+    def _unknown_geometry(
+        self, problem: ParameterProblem, name: str, line: int, taker: _Taker, findings: TaskFindings
+    ) -> None:
+        """An operator may still hand it over, if the fleet says so."""
+        if name in self.handed_over:
+            return
+        message = f"{taker.place}{problem.message} in {self.fleet.file}"
+        if name in self.fleet.handed_over:
+            remedy = "an operator must hand it over before the task starts"
+            severity = Severity.WARNING
+        else:
+            hint = problem.remedy or did_you_mean(name, self.fleet.geometries)
+            listed = "if an operator hands it over, list it in the fleet's 'handed_over'"
+            remedy = f"{hint} {listed}" if hint else listed
+            severity = Severity.ERROR
+        findings.add(problem.rule, message, remedy, line=line, role=taker.role, severity=severity)
 
     def _service(self, call: ServiceCall, findings: TaskFindings) -> None:
         filled = check_roles(call.roles, self.fleet, findings)

@@ -81,6 +81,7 @@ class Fleet:
     level). `fence`: name of an area that no vehicle may leave, or "". `vertical_separation_m`: of
     aircraft that are nearer than `horizontal_separation_m`; None: nobody keeps them apart.
     `time_separation_s`: between aircraft at a place of crossing routes; None: these conflict.
+    `handed_over`: names of geometries that missions may use and operators hand over.
     """
 
     name: str
@@ -96,6 +97,7 @@ class Fleet:
     vertical_separation_m: float | None = None
     horizontal_separation_m: float = 20.0
     time_separation_s: float | None = None
+    handed_over: tuple[str, ...] = ()
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:

@@ -178,6 +178,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         vertical_separation_m=apart.vertical if apart else None,
         horizontal_separation_m=(apart or DeconflictionModel()).horizontal,
         time_separation_s=apart.time if apart else None,
+        handed_over=tuple(model.handed_over),
     )
 
 

@@ -176,6 +176,10 @@ class FleetModel(_Model):
     ] = {}
     areas: Annotated[dict[Name, Text], Field(description="Files of Polygons.")] = {}
     points: Annotated[dict[Name, Text], Field(description="Files of Points.")] = {}
+    handed_over: Annotated[
+        list[Name],
+        Field(description="Routes, areas and points that operators hand over while missions run."),
+    ] = []
     fence: Annotated[
         Name | None, Field(description="Name of the area that no vehicle may leave.")
     ] = None

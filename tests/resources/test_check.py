@@ -1,4 +1,5 @@
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -21,8 +22,10 @@ def fleet(tmp_path: Path) -> Fleet:
     return patrol(tmp_path)
 
 
-def check(fleet: Fleet, *tasks: Behavior | ServiceCall) -> list[Finding]:
-    return check_mission(mission(*tasks), fleet, everything)
+def check(
+    fleet: Fleet, *tasks: Behavior | ServiceCall, handed_over: Sequence[str] = ()
+) -> list[Finding]:
+    return check_mission(mission(*tasks), fleet, everything, handed_over=handed_over)
 
 
 def only(findings: list[Finding]) -> Finding:
@@ -197,22 +200,32 @@ def test_a_behavior_without_a_role_and_unknown_to_all_is_found_twice(fleet: Flee
     [
         (
             drive(vehicle("evsg1"), route="alpga"),
-            "did you mean 'alpha'? else an operator must hand it over before the task starts",
+            "did you mean 'alpha'? if an operator hands it over, "
+            "list it in the fleet's 'handed_over'",
         ),
         (
             behavior("goto", vehicle("evsg1"), target="moon"),
-            "an operator must hand it over before the task starts",
+            "if an operator hands it over, list it in the fleet's 'handed_over'",
         ),
     ],
 )
-def test_a_geometry_that_the_fleet_lacks_is_a_warning(
+def test_a_geometry_that_the_fleet_lacks_is_an_error(
     fleet: Fleet, task: Behavior, remedy: str
 ) -> None:
     finding = only(check(fleet, task))
-    assert (finding.rule, finding.severity) == ("unknown-geometry", Severity.WARNING)
+    assert (finding.rule, finding.severity) == ("unknown-geometry", Severity.ERROR)
     assert finding.line == 20
     assert fleet.file in finding.message
     assert finding.remedy == remedy
+
+
+def test_a_geometry_that_operators_hand_over_is_a_warning_until_they_have(fleet: Fleet) -> None:
+    task = behavior("goto", vehicle("evsg1"), target="moon")
+    declared = replace(fleet, handed_over=("moon",))
+    finding = only(check(declared, task))
+    assert (finding.rule, finding.severity) == ("unknown-geometry", Severity.WARNING)
+    assert finding.remedy == "an operator must hand it over before the task starts"
+    assert not check(fleet, task, handed_over=("moon",))
 
 
 def test_a_vehicle_that_is_held_and_not_commanded_is_a_warning(fleet: Fleet) -> None:
