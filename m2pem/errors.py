@@ -13,7 +13,7 @@ Anything a running mission may handle (a behavior failed, a vehicle was lost, an
 divided by zero) is a record in the journal and never one of these.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from m2pem.findings import Finding, lines
 
@@ -68,6 +68,17 @@ class ExpressionError(M2pemError):
 
 class OperatorError(M2pemError):
     """A request of an operator or script that cannot be met now; nothing was changed."""
+
+
+class BusyError(OperatorError):
+    """A mission that is to start names resources that other runs or operators have.
+
+    `holders`: the run or the operator that has each.
+    """
+
+    def __init__(self, message: str, holders: Mapping[str, str]) -> None:
+        self.holders = dict(holders)
+        super().__init__(message)
 
 
 class NotDrivenError(OperatorError):

@@ -153,11 +153,16 @@ class MissionControl(Protocol):
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
         by: str = "",
+        even_if_busy: bool = False,
     ) -> RunId:
         """Start a mission.
 
+        `even_if_busy`: an operator has confirmed that it starts although other runs or operators
+        have vehicles or payloads that it names.
+
         Raises:
             MissionError: with every finding, when it is not well or does not fit the fleet.
+            BusyError: they have some, and that was not confirmed; it says who has what.
         """
         ...
 

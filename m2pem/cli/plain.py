@@ -19,7 +19,7 @@ from m2pem.cli.stdin import Lines
 from m2pem.cli.story import printable
 from m2pem.cli.writer import writer_for
 from m2pem.engine.records import RunClaimed, RunEnded, RunStarted
-from m2pem.errors import M2pemError, OperatorError
+from m2pem.errors import BusyError, M2pemError, OperatorError
 from m2pem.model.behavior import Decision
 
 NAME = "plain"
@@ -36,6 +36,7 @@ HELP = """\
   route NAME FILE    hand over a route, under the name that the mission uses
   area NAME FILE     hand over an area; point NAME FILE: a point
   start FILE         start another mission
+  start! FILE        the same, even if other runs or operators have its vehicles
   takeover evsg1     take a vehicle or payload from the missions, to steer it by hand
   handback evsg1     give it back
   who                say who has each vehicle and payload
@@ -69,6 +70,7 @@ class PlainOcu:
             "area": partial(self._hand_over, "area"),
             "point": partial(self._hand_over, "point"),
             "start": self._start,
+            "start!": partial(self._start, even_if_busy=True),
             "takeover": self._take,
             "handback": self._give,
             "who": self._who,
@@ -250,10 +252,14 @@ class PlainOcu:
         await self._control.set_geometry(name, as_geojson(geometry), by=NAME)
         self._say(f"{name} is handed over")
 
-    async def _start(self, words: list[str]) -> None:
+    async def _start(self, words: list[str], *, even_if_busy: bool = False) -> None:
         if not words:
             raise OperatorError("say which: start FILE")
-        await self._control.start(" ".join(words), by=NAME)
+        file = " ".join(words)
+        try:
+            await self._control.start(file, by=NAME, even_if_busy=even_if_busy)
+        except BusyError as error:
+            raise OperatorError(f"{error}. start! {file} starts it all the same") from error
 
     async def _take(self, words: list[str]) -> None:
         if len(words) != 1:

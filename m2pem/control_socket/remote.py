@@ -137,6 +137,7 @@ class RemoteControl:
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
         by: str = "",
+        even_if_busy: bool = False,
     ) -> RunId:
         """Refused."""
         raise OperatorError("missions are started where the executive runs: m2pem run")

@@ -67,9 +67,12 @@ class Control:
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
         by: str = "",
+        even_if_busy: bool = False,
     ) -> RunId:
         """Start a mission; returns when its beginning is in the journal."""
-        return await self._executive.start(mission, process, _bounded(data), by)
+        return await self._executive.start(
+            mission, process, _bounded(data), by, even_if_busy=even_if_busy
+        )
 
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
         """End every token, cancel every behavior."""

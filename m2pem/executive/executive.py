@@ -29,6 +29,7 @@ from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import RunStatus
 from m2pem.errors import JournalError, NotDrivenError, OperatorError, PluginError
 from m2pem.executive.arbiters import FleetArbiters
+from m2pem.executive.busy import refuse_busy
 from m2pem.executive.clearance import clearance_for
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control
@@ -307,10 +308,19 @@ class Executive:
         process: str | None,
         data: Mapping[str, Value] | None,
         by: str,
+        *,
+        even_if_busy: bool = False,
     ) -> RunId:
-        """Begin a run. Returns when its first records are durable."""
+        """Begin a run. Returns when its first records are durable.
+
+        Raises:
+            MissionError: with every finding.
+            BusyError: other runs or operators have what it names, unless `even_if_busy`.
+        """
         # Reading and checking take a while, and a URL may take longer: not in the event loop.
         loaded, process_id = await asyncio.to_thread(self.load, mission, process, data)
+        if not even_if_busy:
+            refuse_busy(loaded, self.fleet, self.handover.taken, self.availability.holder)
         return await self.begin(loaded, process_id, data, by)
 
     async def begin(

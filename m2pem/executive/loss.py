@@ -19,10 +19,9 @@ from m2pem.engine.state import Behavior, BehaviorPhase
 from m2pem.errors import OperatorError
 from m2pem.executive.runner import Runner
 from m2pem.journal.base import Loss
-from m2pem.model.behavior import Behavior as BehaviorOfTask
-from m2pem.model.behavior import Decision, ServiceCall
+from m2pem.model.behavior import Decision
 from m2pem.model.catalogue import BehaviorState, ResourceId, ResumePolicy
-from m2pem.resources.allocation import resources_of
+from m2pem.resources.allocation import resources_of_mission
 
 if TYPE_CHECKING:
     from m2pem.executive.executive import Executive
@@ -127,15 +126,7 @@ class Losses:
 
     def _allocated(self, runner: Runner) -> Sequence[ResourceId]:
         """Every vehicle and payload of the mission, but what another run commands now."""
-        fleet = self._executive.fleet
-        all_of_them = dict.fromkeys(
-            resource
-            for task in runner.run.state.mission.activities()
-            for asked in (getattr(task, "behavior", None), getattr(task, "call", None))
-            if isinstance(asked, BehaviorOfTask | ServiceCall)
-            for role in asked.roles
-            for resource in resources_of(role, fleet)
-        )
+        all_of_them = resources_of_mission(runner.run.state.mission, self._executive.fleet)
         holder = self._executive.availability.holder
         return [
             each

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from m2pem.errors import M2pemError
 from m2pem.model.behavior import Behavior, Role, RoleKind, ServiceCall
 from m2pem.model.catalogue import ResourceId
+from m2pem.model.mission import Mission
 from m2pem.resources.fleet import Fleet, Team
 
 
@@ -52,6 +53,19 @@ def resources_of(role: Role, fleet: Fleet) -> tuple[ResourceId, ...]:
         case RoleKind.TEAM:
             team = fleet.teams.get(role.resource)
             return spelled_out(team) if team else ()
+
+
+def resources_of_mission(mission: Mission, fleet: Fleet) -> tuple[ResourceId, ...]:
+    """Return every resource that roles of a mission name, each once, in the order of its tasks."""
+    found = dict.fromkeys(
+        resource
+        for task in mission.activities()
+        for asked in (getattr(task, "behavior", None), getattr(task, "call", None))
+        if isinstance(asked, Behavior | ServiceCall)
+        for role in asked.roles
+        for resource in resources_of(role, fleet)
+    )
+    return tuple(found)
 
 
 def spelled_out(team: Team) -> tuple[ResourceId, ...]:

@@ -21,7 +21,7 @@ from m2pem.cli import plain
 from m2pem.cli.plain import PlainOcu
 from m2pem.cli.writer import writer_for
 from m2pem.engine.records import Record, RunEnded, RunOutcome, RunStarted
-from m2pem.errors import OperatorError
+from m2pem.errors import BusyError, OperatorError
 from m2pem.model.behavior import Decision
 from m2pem.resources.geofiles import read_geometry
 from m2pem.resources.geojson import parse_geojson
@@ -52,12 +52,13 @@ class Control:
             self.notices.task_done()
 
     def __getattr__(self, name: str) -> Callable[..., Awaitable[None]]:
-        async def call(*words: Any, run: str | None = None, by: str) -> None:
+        async def call(*words: Any, run: str | None = None, by: str, **more: Any) -> None:
             if self.refuse is not None:
                 refusal, self.refuse = self.refuse, None
                 raise refusal
             assert by == "plain"
-            self.calls.append((name, *words) if run is None else (name, *words, run))
+            said = [key for key, value in more.items() if value]
+            self.calls.append((name, *words, *said) if run is None else (name, *words, run))
 
         return call
 
@@ -188,6 +189,15 @@ async def test_commands_are_for_the_only_run(operator: Operator) -> None:
         ("signal", "Stop driving"),
         ("start", "a b.bpmn"),
     ]
+
+
+async def test_a_start_with_busy_vehicles_is_confirmed_by_another_command(
+    operator: Operator,
+) -> None:
+    operator.control.refuse = BusyError("run r1 uses ugv1", {"ugv1": "r1"})
+    await operator.type("start a b.bpmn", "start! a b.bpmn")
+    assert "run r1 uses ugv1. start! a b.bpmn starts it all the same" in operator.screen
+    assert operator.control.calls == [("start", "a b.bpmn", "even_if_busy")]
 
 
 async def test_of_several_runs_one_is_named(operator: Operator) -> None:

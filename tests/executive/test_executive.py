@@ -5,7 +5,14 @@ import pytest
 from m2pem.api.control import OpenPrompt, RunStatus, StampedRecord
 from m2pem.api.telemetry import VehicleState
 from m2pem.engine.records import BehaviorEnded, ErrorThrown, RunEnded
-from m2pem.errors import InternalError, JournalError, MissionError, OperatorError, PluginError
+from m2pem.errors import (
+    BusyError,
+    InternalError,
+    JournalError,
+    MissionError,
+    OperatorError,
+    PluginError,
+)
 from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.testing.fakes import FakeArbiter
 
@@ -157,7 +164,7 @@ def test_a_vehicle_is_never_given_to_two_runs_at_once(play):
         control = world.executive.control
         first = await control.start(DRIVE)
         await world.fake.until_called("start", "r1.b1")
-        second = await control.start(DRIVE)
+        second = await control.start(DRIVE, even_if_busy=True)
         ended = await control.wait(second)
         assert world.fake.count("start") == 1
         world.fake.report(f"{first}.b1", BehaviorState.SUCCEEDED)
@@ -286,6 +293,55 @@ def test_a_pause_stops_durations(play):
     assert play(story) == 110_000_000
 
 
+def test_a_start_is_refused_while_another_run_has_a_vehicle_of_the_mission(play):
+    async def story(world: World):
+        control = world.executive.control
+        first = await control.start(DRIVE)
+        await world.fake.until_called("start", f"{first}.b1")
+        with pytest.raises(BusyError) as refused:
+            await control.start(DRIVE)
+        assert [each.run for each in await control.runs()] == [first]
+        world.fake.report(f"{first}.b1", BehaviorState.SUCCEEDED)
+        await control.wait(first)
+        second = await control.start(DRIVE)
+        await world.fake.until_called("start", f"{second}.b1")
+        return refused.value
+
+    refused = play(story, "ugv1")
+    assert refused.holders == {"ugv1": "r1"}
+    assert "run r1 uses ugv1" in str(refused)
+    assert "wait until run r1 is done with ugv1, or stop it" in str(refused)
+
+
+def test_a_start_is_refused_while_an_operator_has_a_vehicle_of_the_mission(play):
+    async def story(world: World):
+        control = world.executive.control
+        await control.take("ugv1", by="anna")
+        with pytest.raises(BusyError) as refused:
+            await control.start(DRIVE)
+        confirmed = await control.wait(await control.start(DRIVE, even_if_busy=True))
+        await control.give_back("ugv1", by="anna")
+        await control.start(DRIVE)
+        return refused.value, confirmed
+
+    refused, confirmed = play(story, "ugv1")
+    assert refused.holders == {"ugv1": "anna"}
+    assert "anna has ugv1. First have anna give back ugv1" in str(refused)
+    assert confirmed.status is RunStatus.FAILED
+    assert "RESOURCE_UNAVAILABLE" in confirmed.detail
+
+
+def test_a_start_is_not_refused_for_vehicles_that_the_mission_does_not_name(play):
+    async def story(world: World):
+        control = world.executive.control
+        await control.take("ugv2", by="anna")
+        run = await control.start(DRIVE)
+        await world.fake.until_called("start", f"{run}.b1")
+        return run
+
+    assert play(story, "ugv1", "ugv2") == "r1"
+
+
 def test_a_silent_vehicle_loses_its_behavior_and_is_given_to_nobody_until_heard(play):
     async def story(world: World):
         control = world.executive.control
@@ -380,7 +436,7 @@ def test_an_operator_takes_a_vehicle_and_gives_it_back(play):
         assert await control.holders() == {"ugv1": "anna"}
         with pytest.raises(OperatorError, match="anna"):
             await control.take("ugv1", by="ben")
-        refused = await control.wait(await control.start(DRIVE))
+        refused = await control.wait(await control.start(DRIVE, even_if_busy=True))
         await control.give_back("ugv1", by="anna")
         again = await control.start(DRIVE)
         await world.fake.until_called("start", f"{again}.b1")

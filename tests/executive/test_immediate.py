@@ -267,7 +267,7 @@ def test_stop_reaches_a_mission_that_never_waits_before_its_bound(play):
 def test_stop_all_stops_every_run_and_names_them(play):
     async def story(world: World):
         control = world.executive.control
-        runs = [await control.start(DRIVE) for _ in range(2)]
+        runs = [await control.start(DRIVE, even_if_busy=True) for _ in range(2)]
         other = mission(sequence(("Drive", behavior("Drive", "drive_stop", "ugv2"))))
         runs.append(await control.start(other))
         await world.fake.until_called("start", times=2)

@@ -15,6 +15,7 @@ from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
 from m2pem.errors import (
+    BusyError,
     ExpressionSyntaxError,
     FindingsError,
     InternalError,
@@ -96,6 +97,8 @@ def handle_problems(app: FastAPI, missions: Path = Path()) -> None:
         if isinstance(error, FindingsError):
             findings = [asdict(each) for each in called.findings(error.findings)]
             return problem(status, called.text(error.what), findings=findings)
+        if isinstance(error, BusyError):
+            return problem(status, str(error), busy=error.holders)
         if status == 500:
             log.error("a request failed: %s", error)
         return problem(status, str(error))

@@ -73,6 +73,7 @@ async def test_the_palette_is_what_elements_are_painted_with(desk: Desk) -> None
 
 async def test_what_is_over_fades_or_is_gray_at_once(desk: Desk) -> None:
     for fade, fades in (("2 s", True), ("no fade", False)):
+        await desk.release()
         page = await desk.start()
         await page.get_by_label("Fade").select_option(fade)
         await wait_for_colour(page, "USER SEND ROUTE", AMBER)

@@ -70,6 +70,7 @@ async def start(page: Page, executive: Served) -> str:
     """Start the mission from its page; the run's page."""
     await page.goto(f"{executive.origin}/missions/{NAME}")
     await page.get_by_role("tab", name="Run", exact=True).click()
+    await expect(page.locator(".link-open")).to_have_count(1)  # else nothing is sent
     await page.get_by_role("button", name="Start", exact=True).click()
     await page.wait_for_url("**/runs/*")
     await expect(answer(page, "Continue")).to_be_visible()

@@ -100,5 +100,7 @@ async def test_a_replay_says_why_it_shows_no_vehicles(tmp_path: Path) -> None:
         with served(tmp_path, words=WORDS) as executive:
             async with opened(chromium, executive) as page:
                 await page.goto(f"{executive.origin}/runs/{run}")
-                await expect(page.locator(".map-nobody")).to_contain_text("Nobody has kept")
+                await expect(page.locator(".map-nobody")).to_contain_text(
+                    "No positions of vehicles were recorded"
+                )
                 await expect(page.locator(".map .vehicle")).to_have_count(0)

@@ -27,12 +27,16 @@ _encode = msgspec.json.Encoder().encode
 
 
 class StartModel(Body):
-    """What to start. `version`: of the mission, None for its newest; `process`: None, its main."""
+    """What to start. `version`: of the mission, None for its newest; `process`: None, its main.
+
+    `even_if_busy`: an operator has confirmed it although others have vehicles that it names.
+    """
 
     mission: WrittenName
     version: str | None = None
     process: Name | None = None
     data: Data | None = None
+    even_if_busy: bool = False
 
 
 class StartedModel(BaseModel):
@@ -69,7 +73,13 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         """Start a mission."""
         source = await of_folder(folder.source, wanted.mission, wanted.version)
         draft = Draft(folder.file(wanted.mission), source)
-        run = await control.start(draft, process=wanted.process, data=wanted.data, by=person.name)
+        run = await control.start(
+            draft,
+            process=wanted.process,
+            data=wanted.data,
+            by=person.name,
+            even_if_busy=wanted.even_if_busy,
+        )
         return StartedModel(run=run)
 
     async def now(summary: RunSummary) -> RunModel:

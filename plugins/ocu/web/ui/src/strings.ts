@@ -614,6 +614,11 @@ export const strings = {
       yes: "Start: real vehicles move",
       no: "Do not start",
     },
+    busy: {
+      title: "Vehicles are busy",
+      yes: "Start all the same",
+      no: "Do not start",
+    },
     answers: {
       title: "What happens in the rehearsal",
       yaml: "Answers file (YAML)",
@@ -836,7 +841,7 @@ export const strings = {
       saved: "{name} can be used in the mission now.",
       clickHint: "Click the map to add vertices, drag them to move.",
       notKnown:
-        "Nobody has kept where the vehicles were: this page was not served while the run went on.",
+        "No positions of vehicles were recorded: the page was not served while the run went on, or the run ended before there were any.",
       notKnownYet: "Where the vehicles were is known from {time} on.",
       problem: "Some of it is missing: {problem}",
       kinds: { route: "Route", area: "Area", point: "Point" },

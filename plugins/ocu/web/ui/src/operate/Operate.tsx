@@ -34,8 +34,9 @@ export default function Operate({ source }: { source: Source }) {
     ended.value = false;
     opening.current = new Opening(source, (count) => (progress.value = count), known);
     opening.current
-      .open((parts) => {
+      .open((parts, hasEnded) => {
         context.value = operateContext({ ...parts, replay: () => open(parts) });
+        ended.value = hasEnded;
       })
       .catch((error: unknown) => (problem.value = problemOf(error, source)));
   };
@@ -98,17 +99,19 @@ class Opening {
     private readonly known?: Stage,
   ) {}
 
-  async open(show: (parts: Stage & { scene: Scene }) => void): Promise<void> {
+  /** `show` is also told whether the end of a run is to be said that was over before. */
+  async open(show: (parts: Stage & { scene: Scene }, hasEnded: boolean) => void): Promise<void> {
     const summary = await summaryOf(this.source);
     const stage = this.known ?? (await loadStage(this.source));
     const live = this.source.kind === "run" && !isOver(summary);
     const replayed = live ? null : await loadReplay(this.source, summary, this.progress);
     if (this.left) return;
     // A run that is over is shown as it ended, unless its replay was asked for here.
-    const isOverAlready = this.source.kind === "run" && !this.known;
-    replayed?.seek(positionInAddress() ?? (isOverAlready ? Infinity : 0));
+    const position = positionInAddress();
+    const hasEnded = !live && this.source.kind === "run" && !this.known && position === null;
+    replayed?.seek(position ?? (hasEnded ? Infinity : 0));
     this.scene = replayed ?? new LiveScene(summary.run);
-    show({ ...stage, scene: this.scene });
+    show({ ...stage, scene: this.scene }, hasEnded);
   }
 
   close(): void {

@@ -8,6 +8,7 @@ import type { Fleet } from "../../shared/types";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import { usePaced } from "../layout/pace";
+import { heldElsewhere } from "../vehicles/work";
 import { Bars } from "./Bars";
 import { lanes, marks, whole, zoomed, type Bar, type Window } from "./scale";
 import "./timeline.css";
@@ -16,6 +17,8 @@ const text = strings.operate.timeline;
 
 const LANE_PX = 22;
 const AXIS_PX = 22;
+/** Between a bar and who has the vehicle since. */
+const HELD_PX = 6;
 
 export interface Row {
   id: string;
@@ -139,6 +142,15 @@ export function TimelinePane({ onSeek }: { onSeek?: ((t: number) => void) | unde
               {rows.map((row) => (
                 <line key={row.id} class="row-line" x2="100%" y1={row.top} y2={row.top} />
               ))}
+              {scene.mode === "live" &&
+                rows.map((row) => (
+                  <Held
+                    key={row.id}
+                    row={row}
+                    held={heldElsewhere(scene.holders.value[row.id] ?? "", scene.run)}
+                    x={Math.max(0, x(lastOf(row))) + HELD_PX}
+                  />
+                ))}
               <Bars
                 rows={rows}
                 window={window}
@@ -156,6 +168,20 @@ export function TimelinePane({ onSeek }: { onSeek?: ((t: number) => void) | unde
     </Pane>
   );
 }
+
+/** Who else has the vehicle of a row, while this run does nothing with it. */
+function Held({ row, held, x }: { row: Row; held: string; x: number }) {
+  if (!held || row.bars.some(({ span }) => span.to === null)) return null;
+  return (
+    <g class="held" role="img" aria-label={`${row.title}: ${held}`}>
+      <text x={x} y={row.top + 17}>
+        {held}
+      </text>
+    </g>
+  );
+}
+
+const lastOf = (row: Row): number => Math.max(0, ...row.bars.map(({ span }) => span.to ?? 0));
 
 function rowsOf(spans: readonly Span[], fleet: Fleet): Row[] {
   const inRow = new Map<string, Span[]>();

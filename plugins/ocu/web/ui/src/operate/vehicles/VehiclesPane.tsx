@@ -10,7 +10,7 @@ import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import { DomainSymbol } from "./DomainSymbol";
 import { Teams } from "./Teams";
-import { isOperator, payloadsOf, runOf, workOf } from "./work";
+import { heldElsewhere, isOperator, payloadsOf, workOf } from "./work";
 import "./vehicles.css";
 
 const text = strings.operate.vehicles;
@@ -166,14 +166,12 @@ function Doing({ resource, name, look }: DoingProps) {
   const { scene, mission, selected } = useOperating();
   const work = workOf(resource, scene.commands.value);
   const holder = scene.holders.value[resource] ?? "";
-  const run = runOf(holder);
+  const held = heldElsewhere(holder, scene.run);
   return (
     <p class="card-work">
       <span>{name}</span>{" "}
-      {isOperator(holder) ? (
-        <b class="warn">{fill(text.heldBy, { by: holder })}</b>
-      ) : work.length === 0 && run && run !== scene.run ? (
-        <b class="warn">{fill(text.heldByRun, { run })}</b>
+      {held && (isOperator(holder) || work.length === 0) ? (
+        <b class="warn">{held}</b>
       ) : work.length === 0 ? (
         <i>{text.idle}</i>
       ) : (

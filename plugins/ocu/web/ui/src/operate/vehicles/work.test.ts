@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { Command } from "../../shared/types";
-import { isOperator, runOf, workOf } from "./work";
+import { heldElsewhere, isOperator, runOf, workOf } from "./work";
 
 const command = (name: string, since: number, ...resources: string[]): Command => ({
   name,
@@ -31,5 +31,10 @@ describe("work", () => {
 
   it("knows the run that drives a vehicle, whichever page it is shown on", () => {
     expect(["r12.b144", "anna@gcs1", ""].map(runOf)).toEqual(["r12", "", ""]);
+  });
+
+  it("says who else has a vehicle", () => {
+    const said = ["r12.b144", "r1.b2", "anna@gcs1", ""].map((each) => heldElsewhere(each, "r1"));
+    expect(said).toEqual(["driven by run r12", "", "with anna@gcs1", ""]);
   });
 });

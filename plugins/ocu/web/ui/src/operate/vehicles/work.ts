@@ -1,5 +1,8 @@
 // What a vehicle and its payloads do, and for whom.
 import type { Command, Fleet } from "../../shared/types";
+import { fill, strings } from "../../strings";
+
+const text = strings.operate.vehicles;
 
 export interface Work {
   behavior: string;
@@ -20,6 +23,13 @@ export const isOperator = (holder: string): boolean =>
 
 /** The run whose behavior holds a resource; "": none does. */
 export const runOf = (holder: string): string => /^(r\d+)\.b\d+$/.exec(holder)?.[1] ?? "";
+
+/** Who else than a run has a resource, in words; "": nobody else does. */
+export function heldElsewhere(holder: string, run: string): string {
+  if (isOperator(holder)) return fill(text.heldBy, { by: holder });
+  const other = runOf(holder);
+  return other && other !== run ? fill(text.heldByRun, { run: other }) : "";
+}
 
 export const payloadsOf = (fleet: Fleet, vehicle: string): string[] =>
   fleet.payloads.filter((payload) => payload.vehicle === vehicle).map(({ id }) => id);

@@ -102,9 +102,10 @@ function Start({ editor }: { editor: EditorContext }) {
   const ready = beginningOf(editor).isReadable();
   const busy = starting.isBusy.value;
   const refusal = starting.refusal.value;
-  const start = async () => {
+  const busyVehicles = starting.busyVehicles.value;
+  const start = async (evenIfBusy = false) => {
     setAsks(false);
-    const run = await starting.start(editor);
+    const run = await starting.start(editor, evenIfBusy);
     if (run !== undefined) go(`/runs/${encodeURIComponent(run)}`);
   };
   return (
@@ -125,6 +126,32 @@ function Start({ editor }: { editor: EditorContext }) {
       </div>
       {!allowed && <p class="m2-note">{words.startNotAllowed}</p>}
       {refusal && <ProblemView editor={editor} title={words.startFailed} refusal={refusal} />}
+      {busyVehicles && (
+        <Dialog
+          title={words.busy.title}
+          onClose={() => (starting.busyVehicles.value = "")}
+          actions={
+            <>
+              <button
+                type="button"
+                class="secondary"
+                onClick={() => (starting.busyVehicles.value = "")}
+              >
+                {words.busy.no}
+              </button>
+              <button
+                type="button"
+                class={simulated ? "primary" : "primary m2r-real"}
+                onClick={() => void start(true)}
+              >
+                {words.busy.yes}
+              </button>
+            </>
+          }
+        >
+          <p>{busyVehicles}</p>
+        </Dialog>
+      )}
       {asks && (
         <Dialog
           title={words.real.title}

@@ -1,6 +1,6 @@
 // The start of a run: what is drawn is saved first, and it is started once.
 import { signal } from "@preact/signals";
-import { get } from "../../../shared/api";
+import { ApiError, get } from "../../../shared/api";
 import { start } from "../../../shared/command";
 import type { MissionFile } from "../../../shared/types";
 import { beginningOf } from "../begin/beginning";
@@ -11,20 +11,25 @@ import type { EditorContext } from "../panel";
 export class Starting {
   readonly isBusy = signal(false);
   readonly refusal = signal<Refusal | null>(null);
+  /** Who has vehicles that the mission needs, in the server's words; "": it was not refused so. */
+  readonly busyVehicles = signal("");
 
   /** The run that began; undefined: none did, or another start goes on. */
-  async start(editor: EditorContext): Promise<string | undefined> {
+  async start(editor: EditorContext, evenIfBusy = false): Promise<string | undefined> {
     if (this.isBusy.peek()) return undefined;
     this.isBusy.value = true;
     this.refusal.value = null;
+    this.busyVehicles.value = "";
     try {
       if (!(await editor.save())) return undefined;
       const { mission } = editor;
       const { version } = await get<MissionFile>(`/missions/${encodeURIComponent(mission)}`);
-      const request = { mission, version, ...beginningOf(editor).request() };
+      const begins = beginningOf(editor).request();
+      const request = { mission, version, ...begins, even_if_busy: evenIfBusy };
       return (await start<{ run: string }>("/runs", request)).run;
     } catch (error) {
-      this.refusal.value = refusalOf(error);
+      if (error instanceof ApiError && error.problem.busy) this.busyVehicles.value = error.message;
+      else this.refusal.value = refusalOf(error);
       return undefined;
     } finally {
       this.isBusy.value = false;

@@ -1,0 +1,95 @@
+"""Vehicles that another run or an operator has, and runs that ended before they were looked at."""
+
+import asyncio
+
+from playwright.async_api import expect
+from web_browsing import TIMEOUT_MS
+from web_desk import IN_ONE_LOOP, OVER, Desk
+from web_running import wait_for_status
+
+from m2pem.testing import scenarios
+
+pytestmark = IN_ONE_LOOP
+
+VEHICLE = "evsg1"
+BUSY = "busy"
+DRIVES_AT_ONCE = scenarios.in_sequence("reverse", VEHICLE, {"distance": "20 m"})
+
+
+async def begun(desk: Desk) -> str:
+    """Start a mission whose first task needs the vehicle, whoever has it; its run."""
+    (desk.executive.missions / f"{BUSY}.bpmn").write_bytes(DRIVES_AT_ONCE)
+    wanted = {"mission": BUSY, "even_if_busy": True}
+    return str((await desk.ask("POST", "/api/runs", wanted))["run"])
+
+
+async def over(desk: Desk, run: str) -> None:
+    """Wait until a run has ended."""
+    async with asyncio.timeout(TIMEOUT_MS / 1000):
+        while (await desk.ask("GET", f"/api/runs/{run}"))["status"] not in OVER:
+            await desk.page.evaluate("new Promise(requestAnimationFrame)")
+
+
+def run_of(desk: Desk) -> str:
+    """The run that the page shows."""
+    return desk.page.url.rpartition("/")[2]
+
+
+async def test_the_time_line_says_which_run_drives_a_vehicle(desk: Desk) -> None:
+    page = await desk.driving()
+    driver = run_of(desk)
+    own = page.locator(".timeline .held")
+    await expect(page.locator(".timeline .bar-behavior.bar-open")).not_to_have_count(0)
+    await expect(own).to_have_count(0)
+    other = (await desk.ask("POST", "/api/runs", {"mission": "vignette1", "even_if_busy": True}))[
+        "run"
+    ]
+    await page.goto(f"{desk.executive.origin}/runs/{other}")
+    line = page.get_by_role("img", name=f"{VEHICLE}: driven by run {driver}", exact=True)
+    await expect(line).to_be_visible()
+    await expect(page.locator(".card", has_text=VEHICLE)).to_contain_text(f"driven by run {driver}")
+    await desk.ask("POST", "/api/resources/evsg2/take")
+    await expect(page.get_by_role("img", name="evsg2: with anna", exact=True)).to_be_visible()
+    await desk.ask("POST", f"/api/runs/{driver}/stop", {"reason": "the vehicle is needed"})
+    await expect(line).to_have_count(0)
+
+
+async def test_a_start_with_a_busy_vehicle_is_refused_until_it_is_confirmed(desk: Desk) -> None:
+    page = await desk.driving()
+    driver = run_of(desk)
+    desk.refusals.append(409)
+    runs = len(await desk.ask("GET", "/api/runs"))
+    await desk.edit(tab="Run")
+    start = page.get_by_role("button", name="Start", exact=True)
+    await start.click()
+    dialog = page.get_by_role("dialog", name="Vehicles are busy")
+    await expect(dialog).to_contain_text(f"run {driver} uses {VEHICLE}")
+    await expect(dialog).to_contain_text("or stop it")
+    await page.keyboard.press("Enter")  # the focus is not on what starts it
+    await dialog.get_by_role("button", name="Do not start").click()
+    await expect(dialog).to_have_count(0)
+    assert len(await desk.ask("GET", "/api/runs")) == runs
+    await start.click()
+    await dialog.get_by_role("button", name="Start all the same").click()
+    await page.wait_for_url("**/runs/*")
+    assert run_of(desk) != driver
+    assert len(await desk.ask("GET", "/api/runs")) == runs + 1
+
+
+async def test_a_run_that_ended_before_its_page_loaded_shows_its_end(desk: Desk) -> None:
+    page = await desk.driving()
+    run = await begun(desk)
+    await over(desk, run)
+    await page.goto(f"{desk.executive.origin}/runs/{run}")
+    ended = page.get_by_role("dialog", name="The run has ended")
+    await expect(ended).to_contain_text("Failed")
+    await expect(ended).to_contain_text(f"{run} failed")
+    await expect(ended).to_contain_text("RESOURCE_UNAVAILABLE")
+    await ended.get_by_role("button", name="Keep looking").click()
+    await wait_for_status(page, "Failed")
+    task = page.locator(".drawing:not([hidden]) [data-element-id='Task1']").first
+    await expect(task).to_contain_class("m2-failed")
+    # Whoever comes for a moment of it is not told of its end.
+    await page.goto(f"{desk.executive.origin}/runs/{run}?t=0")
+    await page.get_by_role("slider", name="Position").wait_for()
+    await expect(ended).to_have_count(0)
