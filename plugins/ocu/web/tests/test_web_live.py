@@ -178,7 +178,8 @@ async def test_what_goes_wrong_is_told_at_once(world: MakeWorld) -> None:
         await live.watch(None)
         await here.control.take(VEHICLE, by="anna")
         run = await here.control.start(
-            scenarios.one_behavior("goto", VEHICLE, target=list(scenarios.ORIGIN))
+            scenarios.one_behavior("goto", VEHICLE, target=list(scenarios.ORIGIN)),
+            even_if_busy=True,
         )
         told = await live.until(lambda message: message["type"] == "fault")
         assert told["text"].startswith(f"{run}: ")

@@ -42,6 +42,7 @@ async def test_with_tls_the_page_is_served_as_ever(
         answer = await browser.http.post("/api/session", json=body)
         assert answer.status_code == 200
         assert "; secure" in answer.headers["set-cookie"].lower()
+        browser.key = answer.json()["key"]
         assert (await browser.http.post("/api/stop", json={})).status_code == 200
         plain = here.base.replace("https", "http")
         refused = await browser.http.post("/api/stop", json={}, headers={"Origin": plain})
