@@ -50,7 +50,13 @@ class Element:
         """
         if not self.name or self.name.strip():
             return self.name or self.id
-        return f"{_CAPITAL.sub(' ', type(self).__name__).lower()} {self.id}"
+        return f"{self.kind} {self.id}"
+
+    @property
+    def kind(self) -> str:
+        """What BPMN calls such an element, in lower case: "exclusive gateway", "subprocess"."""
+        words = _CAPITAL.sub(" ", type(self).__name__).lower().replace("sub process", "subprocess")
+        return words.replace("event based", "event-based").replace("ad hoc", "ad-hoc")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""An element whose name is blank is called by its kind and id."""
+"""An element whose name is blank or missing is called by its kind and id."""
 
 import pytest
 
@@ -19,7 +19,18 @@ def test_an_element_with_a_blank_name_is_called_by_its_kind_and_id(name: str) ->
     assert words.name("f1") == "start → exclusive gateway which"
 
 
-def test_an_element_without_a_name_is_called_by_its_id() -> None:
+def test_an_element_without_a_name_is_called_by_its_kind_and_id_in_reports() -> None:
     drawn = mission(MODEL.replace('name=" "', ""))
     assert drawn.elements["which"].label == "which"
-    assert Words(drawn).name("which") == "which"
+    words = Words(drawn)
+    assert words.name("which") == words.with_id("which") == "exclusive gateway which"
+
+
+def test_kinds_are_called_what_bpmn_calls_them() -> None:
+    drawn = mission("""<startEvent id="s"/> <subProcess id="inner"><task id="t"/></subProcess>
+        <adHocSubProcess id="any"><task id="u"/></adHocSubProcess>
+        <intermediateThrowEvent id="out"/> <endEvent id="e"/>
+        s -> inner -> any -> out -> e
+    """)
+    kinds = [drawn.elements[each].kind for each in ("inner", "any", "out", "e")]
+    assert kinds == ["subprocess", "ad-hoc subprocess", "intermediate throw event", "end event"]

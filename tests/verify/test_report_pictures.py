@@ -61,7 +61,7 @@ def test_a_report_has_a_picture_of_each_file_that_the_run_passes(mission: Path) 
     assert "Call" not in drawn(called)
     text = report.read_text(encoding="utf-8")
     one, other = text.index("(found-1.svg)"), text.index("(found-1-look.svg)")
-    assert one < other < text.index("1. Start")
+    assert one < other < text.index("1. start event Start")
     assert (folder / "found-1-look.svg").read_bytes() == called.read_bytes()
 
 

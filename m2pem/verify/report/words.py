@@ -15,20 +15,22 @@ class Words:
         self.mission = mission
 
     def name(self, element: str) -> str:
-        """A name for a text: that of the diagram, else of the flow's ends, else the id."""
+        """A name for a text: that of the diagram, else of the flow's ends, else kind and id."""
         known = self.mission.elements.get(element)
         if known is None:
             return element
         if known.name:
             return _one_line(known.label)
         if isinstance(known, e.SequenceFlow):
-            return f"{self.name(known.source.id)} \u2192 {self.name(known.target.id)}"
-        return known.id
+            return f"{_one_line(known.source.label)} \u2192 {_one_line(known.target.label)}"
+        return f"{known.kind} {known.id}"
 
     def with_id(self, element: str) -> str:
         """The name, and the id where the name does not say it."""
         name = self.name(element)
-        return name if _letters(name) == _letters(element) else f"{name} ({element})"
+        if name.endswith(f" {element}") or _letters(name) == _letters(element):
+            return name
+        return f"{name} ({element})"
 
     def all_of(self, elements: Sequence[str]) -> str:
         """Several names in a text."""
