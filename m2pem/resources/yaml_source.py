@@ -109,14 +109,25 @@ def parse_yaml(content: bytes, name: str) -> YamlSource:
     return source
 
 
-def _key_remedy(node: MappingNode, text: str) -> str:
-    """A number in a flow map, as in {lat: 53,5400}, is what follows a decimal comma."""
+def _no_text(node: MappingNode, key_node: Node) -> tuple[str, str]:
+    """Message and remedy for a key that is no text.
+
+    A number in a flow map, as in {lat: 53,5400}, is what follows a decimal comma.
+    """
+    if not isinstance(key_node, ScalarNode):
+        return "this key is not a text", "keys are texts: quote it"
+    text = str(key_node.value)
     previous = ""
     for key, value in node.value:
-        if key.value == text and node.flow_style and text.isdecimal() and previous.isdecimal():
-            return f"is it part of {previous},{text}? Write a decimal point: {previous}.{text}"
-        previous = str(value.value).removeprefix("-")
-    return "keys are texts: quote it"
+        if key is key_node and node.flow_style and text.isdecimal():
+            if previous.removeprefix("-").isdecimal():
+                return (
+                    f"the comma splits the number {previous},{text} in two",
+                    f"write a decimal point: {previous}.{text}",
+                )
+            break
+        previous = str(value.value)
+    return f"{text} is not a text", "keys are texts: quote it"
 
 
 class _TooMuchError(Exception):
@@ -160,10 +171,7 @@ class _Reader:
                     line, path, "merge-key", "'<<' is not YAML 1.2", "write the keys out"
                 )
             elif not isinstance(key, str):
-                text = key_node.value if isinstance(key_node, ScalarNode) else "this key"
-                self.source._note(
-                    line, path, "key-not-text", f"{text} is not a text", _key_remedy(node, text)
-                )
+                self.source._note(line, path, "key-not-text", *_no_text(node, key_node))
             elif key in result:
                 first = self.source.line((*path, key))
                 self.source._note(

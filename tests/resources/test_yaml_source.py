@@ -152,9 +152,9 @@ def test_any_bytes_come_out_as_plain_json_or_are_refused(
 
 
 def test_a_decimal_comma_in_a_flow_map_is_recognised() -> None:
-    source = parse_yaml(b"home: {lat: 53,5400, lon: 9.97}", "fleet.yaml")
-    [finding] = source.findings
-    assert finding.message == "5400 is not a text"
-    assert finding.remedy == "is it part of 53,5400? Write a decimal point: 53.5400"
+    source = parse_yaml(b"home: {lat: 53,5400, lon: -9,5400}", "fleet.yaml")
+    for finding, whole in zip(source.findings, ("53,5400", "-9,5400"), strict=True):
+        assert finding.message == f"the comma splits the number {whole} in two"
+        assert finding.remedy == f"write a decimal point: {whole.replace(',', '.')}"
     [other] = parse_yaml(b"home: {5400: 1}", "fleet.yaml").findings
     assert other.remedy == "keys are texts: quote it"
