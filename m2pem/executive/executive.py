@@ -376,7 +376,7 @@ class Executive:
         if mark is not None:
             log.warning("%s was stopped before its executive ended; it stays stopped", number)
             runner.tell_stop(StopRun(mark.by, mark.reason), frozenset())
-        await take_over(runner, self.arbiters, self.dispatcher, outage_s, line.loss)
+        await take_over(runner, self.arbiters, self.dispatcher, outage_s, self._lost, line.loss)
         if line.loss is not None:
             await self.losses.ask(runner, line.loss)
         self._drive(runner)
@@ -425,13 +425,16 @@ class Executive:
         log.warning("%s: %s: %s", fault.resource, fault.code, fault.reason)
         resource = ResourceId(fault.resource)
         if not fault.reachable:
-            self._returning.lost(resource, fault.reason)
-            if self._clearance:
-                self._clearance.airspace.lost(resource)
+            self._lost(resource, fault.reason)
         with_team = self.arbiters.teams.fault(resource, fault.code, fault.reason)
         for runner in self.runners.values():
             if not with_team and fault.resource in runner.run.state.held:
                 runner.post(fault)
+
+    def _lost(self, resource: ResourceId, reason: str) -> None:
+        self._returning.lost(resource, reason)
+        if self._clearance:
+            self._clearance.airspace.lost(resource)
 
     def set_geometry(
         self, name: str, geometry: Mapping[str, Value], run: RunId | None, by: str

@@ -6,6 +6,7 @@ running is asked for at its arbiter. Nothing is sent again that may have been do
 
 import asyncio
 import logging
+from collections.abc import Callable
 from contextlib import suppress
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport
@@ -29,6 +30,9 @@ log = logging.getLogger("m2pem.resume")
 QUERY_TIMEOUT_S = 10.0
 """How long an arbiter may take to look at a vehicle before it counts as unreachable."""
 
+UNASKED = "its arbiter could not be asked after a restart"
+"""Why a resource counts as lost after a restart."""
+
 
 async def replay(journal: Journal, run: MissionRun, script: Script | None) -> int:
     """Fold all of a run's records; returns when the last was decided (us since the Unix epoch)."""
@@ -46,13 +50,15 @@ async def take_over(
     arbiters: FleetArbiters,
     dispatcher: Dispatcher,
     outage_s: float,
+    lost: Callable[[ResourceId, str], None],
     loss: Loss | None = None,
 ) -> None:
     """Bring a replayed and claimed run back to life. Its task must not run yet.
 
     `outage_s`: for how long nobody drove it. Longer than the fleet's `max_outage`, every behavior
-    is held and an operator is asked. `loss`: what the journal has lost of it: the run is paused,
-    and an operator is asked about every behavior when it goes on (see `Losses`).
+    is held and an operator is asked. `lost`: is called for each resource whose arbiter cannot be
+    asked, which must stop before it is free again. `loss`: what the journal has lost of it: the
+    run is paused, and an operator is asked about every behavior when it goes on (see `Losses`).
     """
     state = runner.run.state
     runner.post(ClaimRun(runner.epoch, lost=loss.records if loss is not None else 0))
@@ -82,6 +88,10 @@ async def take_over(
                 item = BehaviorMissing(behavior.id, ResumePolicy.HOLD, running, reason)
         if loss is not None:
             item = doubted(behavior, report, item, loss)
+        if report is None:
+            # After `occupy`: who returns is commanded to end what holds it.
+            for name in behavior.resources:
+                lost(ResourceId(name), UNASKED)
         if item is not None:
             runner.post(item)
     runner.take_up(
@@ -145,8 +155,7 @@ def _what_to_post(
 ) -> Input | None:
     """The input that what was seen amounts to; None: it is as the journal says."""
     if report is None:
-        reason = "its arbiter could not be asked after a restart"
-        return ResourceFault(behavior.resources[0], "LINK_LOST", reason, reachable=False)
+        return ResourceFault(behavior.resources[0], "LINK_LOST", UNASKED, reachable=False)
     if report.state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING):
         return None
     if report.state is BehaviorState.UNKNOWN:

@@ -6,6 +6,7 @@ import pytest
 
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.api.control import RunStatus
+from m2pem.api.telemetry import VehicleState
 from m2pem.engine.inputs import (
     BehaviorReported,
     ControlTaken,
@@ -20,7 +21,7 @@ from m2pem.errors import JournalError, OperatorError
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
 from m2pem.model.bpmn import parse_mission
-from m2pem.model.catalogue import BehaviorState
+from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.resources.snapshot import dump
 
 from .conftest import START_US, World, behavior, fleet, mission, question, sequence
@@ -261,6 +262,28 @@ def test_an_arbiter_that_cannot_be_asked_is_a_lost_vehicle(play):
     summary = play(story, "ugv1", journal=left_behind(GOTO, ACCEPTED), start_us=START_US + 1)
     assert summary.status is RunStatus.FAILED
     assert "LINK_LOST" in summary.detail
+
+
+def test_one_that_could_not_be_asked_must_stop_when_it_returns_before_it_is_free(play):
+    async def story(world: World):
+        control = world.executive.control
+        world.fake.raises["query"] = OSError("no route to host")
+        await world.executive.resume("r1")
+        await control.wait("r1")
+        refused = (await control.wait(await control.start(GOTO))).detail
+        held = world.fake.count("hold", "ugv1")
+        world.fake.say(VehicleState(ResourceId("ugv1"), world.clock.now_us(), ready=True))
+        await world.fake.until_called("hold", "ugv1", held + 1)
+        await world.clock.sleep(0.1)
+        again = await control.start(GOTO)
+        await world.fake.until_called("start", f"{again}.b1")
+        return refused, [call for call in world.fake.calls if call.what in ("cancel", "start")]
+
+    refused, calls = play(
+        story, "ugv1", journal=left_behind(GOTO, ACCEPTED, RUNNING), start_us=START_US + OUTAGE_US
+    )
+    assert "ugv1 is unavailable: lost: its arbiter could not be asked" in refused
+    assert [call.what for call in calls] == ["cancel", "start"]
 
 
 def test_who_has_a_vehicle_is_known_again_after_a_restart(play):
