@@ -110,11 +110,15 @@ class Dispatcher:
         """Let a resource go on after `hold`."""
         self._enqueue((resource,), lambda: self._turn("resume", ResourceId(resource)))
 
-    def hold_all(self, run: str) -> None:
-        """Bring everything that a run commands to its safe state, whatever its state says."""
-        for _, active in self._active_of(run):
-            for resource in active.resources:
-                self.hold(resource)
+    def hold_all(self, run: str) -> list[ResourceId]:
+        """Bring everything that a run commands to its safe state, whatever its state says.
+
+        Returns what is commanded to hold.
+        """
+        resources = [each for _, active in self._active_of(run) for each in active.resources]
+        for resource in resources:
+            self.hold(resource)
+        return resources
 
     # --- STOP and pause, out of turn -------------------------------------------------------------
 

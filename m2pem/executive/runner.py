@@ -162,10 +162,9 @@ class Runner:
             log.error("%s: another executive drives it now", self.id)
             self.failure = error
         except M2pemError as error:
-            log.error("%s: held: %s", self.id, error)
             self._hold_everything(error)
         except Exception as error:
-            log.exception("%s: held because of a bug in m2pem", self.id)
+            log.exception("%s: a bug in m2pem", self.id)
             self._hold_everything(InternalError(f"{type(error).__name__}: {error}"))
         finally:
             self.done.set()
@@ -404,7 +403,13 @@ class Runner:
 
     def _hold_everything(self, failure: M2pemError) -> None:
         self.failure = failure
-        self._outside.dispatcher.hold_all(self.id)
+        resources = ", ".join(sorted(self._outside.dispatcher.hold_all(self.id)))
+        text = (
+            f"held: {failure}. {resources or 'No vehicle'} was commanded to hold. Mend the cause, "
+            f"start again and go on with `m2pem resume {self.id}`"
+        )
+        log.error("%s: %s", self.id, text)
+        self._outside.notices.publish(Alert(self.id, "RUN_HELD", text))
 
     # --- taking over after a restart --------------------------------------------------------------
 

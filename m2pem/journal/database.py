@@ -1,6 +1,7 @@
 """The SQLite file of a journal: making and opening it, and its errors in plain words."""
 
 import logging
+import os
 import sqlite3
 import time
 from pathlib import Path
@@ -66,7 +67,10 @@ def _prepare(connection: sqlite3.Connection, path: Path, marked: UUID | None) ->
     migrate(connection, path)
     # The tables and the identity leave the log at once: they must outlast damage to it.
     connection.execute("PRAGMA wal_checkpoint(PASSIVE)")
-    if path.with_name(f"{path.name}-wal").stat().st_size < LOG_BYTES:
+    disk = os.statvfs(path.parent)
+    # On a small or almost full disk the log would take what the files beside it need.
+    roomy = disk.f_bavail * disk.f_frsize >= 2 * LOG_BYTES
+    if roomy and path.with_name(f"{path.name}-wal").stat().st_size < LOG_BYTES:
         _lengthen_log(connection)
 
 

@@ -95,7 +95,8 @@ class SqliteJournal:
                 locks = run_locks(_beside(path, "lock"))
                 marks = MarkFile(_beside(path, "mark"), identity)
             except OSError as error:
-                raise JournalError(f"{error.filename} can't be opened: {error.strerror}") from error
+                name = error.filename or _beside(path, "mark")  # what is written has no name
+                raise JournalError(f"{name} can't be opened: {error.strerror}") from error
             undo.callback(marks.close)
             try:
                 _compare(writing, marks, path)

@@ -167,7 +167,8 @@ class StateFile:
                 )
             run("COMMIT")
         except BaseException:
-            run("ROLLBACK")
+            if self._connection.in_transaction:  # on a full disk SQLite itself has rolled back
+                run("ROLLBACK")
             raise
 
     def load_bodies(self, bodies: dict[ResourceId, Body]) -> None:

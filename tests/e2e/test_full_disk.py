@@ -1,0 +1,71 @@
+"""The disk of the journal is full while a vehicle drives: it is held, and the run can go on."""
+
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from m2pem.sim.effects import EffectKind
+from m2pem.sim.statefile import recorded_effects
+from tests.command_line import CommandLine, fleet_with_state
+from tests.e2e.test_held import TARGET
+from tests.executive.conftest import behavior, flow, mission
+
+DRIVE = mission(
+    '<process id="P" isExecutable="true"><startEvent id="S"/>'
+    f"{behavior('Drive', 'goto', 'evsg1', parameters=TARGET)}"
+    '<boundaryEvent id="Often" attachedToRef="Drive" cancelActivity="false">'
+    "<timerEventDefinition><timeCycle>R200/PT0.1S</timeCycle></timerEventDefinition>"
+    f'</boundaryEvent><endEvent id="Noted"/><endEvent id="E"/>{flow("S", "Drive")}'
+    f"{flow('Often', 'Noted')}{flow('Drive', 'E')}</process>"
+)
+"""A drive of some 110 m, in which a timer has more written than a small disk takes."""
+
+
+class SmallDisk:
+    """A file system of its own, in memory, with room for the first entries of a journal."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        folder.mkdir()
+
+    def mount(self, size: str, *more: str) -> bool:
+        words = ["mount", "-t", "tmpfs", "-o", ",".join((*more, f"size={size}"))]
+        done = subprocess.run([*words, "none", self.folder], capture_output=True, check=False)
+        return done.returncode == 0
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[SmallDisk]:
+    disk = SmallDisk(tmp_path / "disk")
+    if shutil.which("mount") is None or not disk.mount("256k"):
+        pytest.skip("no file system may be mounted here")
+    yield disk
+    subprocess.run(["umount", "--lazy", disk.folder], check=True)
+
+
+def test_a_full_disk_holds_the_vehicles_and_after_room_is_made_the_run_goes_on(
+    m2pem: CommandLine, tmp_path: Path, small_disk: SmallDisk
+) -> None:
+    (tmp_path / "drive.bpmn").write_bytes(DRIVE)
+    fleet, state = fleet_with_state(tmp_path)
+    journal = small_disk.folder / "journal.db"
+    status, _, errors = m2pem.run(
+        "run", "drive.bpmn", "--fleet", fleet, "--ocu", "none", "--journal", journal,
+        M2PEM_MIN_FREE_MB="0",
+    )  # fmt: skip
+    assert (status, "the disk is full; make room" in errors) == (1, True), errors
+    assert "evsg1 was commanded to hold" in errors
+    assert "go on with `m2pem resume r1`" in errors
+    assert [effect.kind for effect in recorded_effects(state)][-1] is EffectKind.HOLD
+    status, _, errors = m2pem.run("resume", "r1", "--journal", journal, "--ocu", "none")
+    assert (status, "the disk is full; make room" in errors) == (1, True), errors
+    assert small_disk.mount("16m", "remount")
+    program = m2pem.start("resume", "r1", "--journal", journal, "--ocu", "plain")
+    program.until_text("held, and the journal does not say why")
+    program.type("resume")
+    program.until_text("r1 completed")
+    assert program.rest()[0] == 0
+    assert [effect.kind for effect in recorded_effects(state)].count(EffectKind.START) == 1
