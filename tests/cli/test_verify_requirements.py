@@ -86,7 +86,7 @@ def test_a_run_that_goes_on_for_ever_is_told_with_what_goes_on(invoke: Invoke, l
     violation = next(each for each in json.loads(out)["violations"] if each["required"])
     assert violation["property"] == "ends"
     told = [step["text"] for step in violation["loop"]]
-    assert "Ask: the operator answers 'again'" in told
+    assert "user task Ask: the operator answers 'again'" in told
     assert len(violation["steps"]) + 1 == violation["loop"][0]["step"]
 
 
