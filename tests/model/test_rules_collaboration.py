@@ -69,6 +69,14 @@ CASES = read_cases("""
 ^ </collaboration>
 ~ sourceRef="E" => sourceRef="T"
 
+# message-flow-message | m | 'N' is not 'M' of 'T'
+<startEvent id="S"/><endEvent id="E"/>[S>T][T>E]<sendTask id="T" messageRef="M"/>
+^ <message id="M" name="M"/><message id="N" name="N"/>
+^ <collaboration id="C"><participant id="p"/>
+^! <messageFlow id="m" sourceRef="T" targetRef="p" messageRef="N"/>
+^ </collaboration>
+~ messageRef="N" => messageRef="M"
+
 # message-flow-end | m | 'G' is an exclusive gateway
 <startEvent id="S"/><endEvent id="E"/>[S>G][T>E]<task id="T"/>
 <exclusiveGateway id="G"/>[G>T]<sequenceFlow id="f" sourceRef="S" targetRef="G"/>

@@ -13,6 +13,14 @@ CASES = read_cases("""
 *T
 ~ id="B-E" sourceRef="B" => id="B-E" sourceRef="S"
 
+# compensation-boundary-not-interrupting | B | has completed
+<task id="T"/><task id="C" isForCompensation="true"/>
+! <boundaryEvent id="B" attachedToRef="T" cancelActivity="false"><compensateEventDefinition/>
+</boundaryEvent>
+<association id="a" sourceRef="B" targetRef="C"/>
+*T
+~ cancelActivity="false" => cancelActivity="true"
+
 # compensated-activity | E | 'X'
 <startEvent id="S"/><endEvent id="E">
 ! <compensateEventDefinition activityRef="X"/>

@@ -138,6 +138,17 @@ CASES = read_cases("""
 ~ <sourceRef>F</sourceRef><targetRef>D</targetRef> => <sourceRef>F</sourceRef><targetRef>D
 ~~ </targetRef><transformation>D + F</transformation>
 
+# data-association-items | T | 'D' is 'string' and 'x' is 'int'
+^ <itemDefinition id="I" structureRef="string"/><itemDefinition id="J" structureRef="int"/>
+^ <itemDefinition id="K" structureRef="string"/>
+<dataObject id="F" itemSubjectRef="I"/><dataObjectReference id="D" dataObjectRef="F"/>
+<task id="T"><ioSpecification><dataInput id="x" itemSubjectRef="J"/>
+<inputSet><dataInputRefs>x</dataInputRefs></inputSet><outputSet/></ioSpecification>
+! <dataInputAssociation><sourceRef>D</sourceRef><targetRef>x</targetRef>
+</dataInputAssociation></task>
+*T
+~ itemSubjectRef="J" => itemSubjectRef="K"
+
 # bad-assignment | T | what to write
 <task id="T"><ioSpecification><dataInput id="i"/><inputSet><dataInputRefs>i</dataInputRefs>
 </inputSet><outputSet/></ioSpecification><dataInputAssociation><targetRef>i</targetRef>

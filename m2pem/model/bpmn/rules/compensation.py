@@ -12,6 +12,7 @@ from m2pem.model.bpmn.rules.tree import (
     SUBPROCESSES,
     Tree,
     has_trigger,
+    is_false,
     is_true,
     names,
     parent,
@@ -58,6 +59,14 @@ BOUNDARY_FLOW = Rule(
     E,
     "a compensation boundary event must not have an outgoing sequence flow",
     "draw an association to the activity that compensates",
+)
+BOUNDARY_GOES_ON = Rule(
+    10522,
+    "compensation-boundary-not-interrupting",
+    "10.5.4",
+    W,
+    "cancelActivity has no meaning on a compensation boundary event: its activity has completed",
+    'delete cancelActivity="false"',
 )
 HANDLER_IN = Rule(
     10701,
@@ -165,6 +174,8 @@ def _boundary(tree: Tree, event: etree._Element) -> None:
         return
     if tree.out(event):
         tree.say(BOUNDARY_FLOW, event)
+    if is_false(event, "cancelActivity"):
+        tree.say(BOUNDARY_GOES_ON, event)
     beside = tree.boundary.get(event.get("attachedToRef", ""), [])
     if [each for each in beside if has_trigger(tree, each, "compensate")][:1] != [event]:
         tree.say(TWO_EVENTS, event)

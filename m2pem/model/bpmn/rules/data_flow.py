@@ -4,7 +4,7 @@ from lxml import etree
 
 from m2pem.model.bpmn.rules.references import ITEMS
 from m2pem.model.bpmn.rules.rule import Rule, Topic, W, declared
-from m2pem.model.bpmn.rules.tree import Tree, has, name_of, names, parent, texts
+from m2pem.model.bpmn.rules.tree import Tree, has, name_of, named, names, parent, texts
 
 TARGET = Rule(
     10421,
@@ -48,6 +48,14 @@ PROCESS_OUTPUT = Rule(
     "a data association must not read a data output of its process; the caller does",
     "read a data object instead",
 )
+ITEM_MISMATCH = Rule(
+    10427,
+    "data-association-items",
+    "10.4.1",
+    W,
+    "a data association without a transformation must join data of one structure",
+    "give both ends an item definition of the same structureRef, or add a transformation",
+)
 BINDING = Rule(
     10323,
     "io-binding",
@@ -67,6 +75,11 @@ def _association(tree: Tree, element: etree._Element) -> None:
             tree.say(NOWHERE, element, f"'{name}'")
     if len(sources) > 1 and not has(element, "transformation"):
         tree.say(SOURCES, element, f"this one has {len(sources)}")
+    if not has(element, "transformation assignment"):
+        ends = [(name, _structure(tree, element, name)) for name in (*sources[:1], *targets[:1])]
+        if len(ends) == 2 and all(structure for _, structure in ends) and ends[0][1] != ends[1][1]:
+            said = " and ".join(f"'{name}' is '{structure}'" for name, structure in ends)
+            tree.say(ITEM_MISMATCH, element, said)
     for names_, data, rule in (
         (targets, "dataInput", PROCESS_INPUT),
         (sources, "dataOutput", PROCESS_OUTPUT),
@@ -75,6 +88,19 @@ def _association(tree: Tree, element: etree._Element) -> None:
             found = tree.find(element, name)
             if found is not None and name_of(found) == data and _of_process(found):
                 tree.say(rule, element, f"'{name}'")
+
+
+def _structure(tree: Tree, owner: etree._Element, name: str) -> str:
+    """Return the structure of data, also of what a reference refers to; "" if it has none.
+
+    Many editors write an item definition for each element, so their ids are not compared.
+    """
+    data = tree.find(owner, name)
+    for reference in ("dataObjectRef", "dataStoreRef"):
+        if data is not None and data.get(reference):
+            data = tree.find(data, data.get(reference, ""))
+    item = None if data is None else tree.find(data, data.get("itemSubjectRef", ""))
+    return "" if item is None else named(item.get("structureRef", ""))
 
 
 def _of_process(data: etree._Element) -> bool:

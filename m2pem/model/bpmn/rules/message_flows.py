@@ -14,6 +14,7 @@ from m2pem.model.bpmn.rules.tree import (
     has_trigger,
     name_of,
     names,
+    triggers,
     what,
 )
 
@@ -65,6 +66,14 @@ FROM_OTHER = Rule(
     "a message flow leads out of an event that does not send a message",
     "give the event a messageEventDefinition, or delete the flow",
 )
+OTHER_MESSAGE = Rule(
+    9403,
+    "message-flow-message",
+    "9.4",
+    W,
+    "the message flow carries another message than its end sends or receives",
+    "name the same message in both",
+)
 _ENDS = ACTIVITIES | EVENTS | names("participant conversation subConversation callConversation")
 
 
@@ -74,6 +83,8 @@ def _flow(tree: Tree, element: etree._Element) -> None:
     for end in (source, target):
         if end is not None and end.tag not in _ENDS:
             tree.say(END, element, f"{what(end)} is {a(kind(end.tag))}")
+        if end is not None:
+            _carries(tree, element, end)
     if source is None or target is None:
         return  # which a reader has said
     if source.tag in CATCHING:
@@ -87,6 +98,16 @@ def _flow(tree: Tree, element: etree._Element) -> None:
     homes = {_pool(tree, source), _pool(tree, target)}
     if len(homes) == 1 and None not in homes:
         tree.say(INSIDE, element, f"both ends are in '{homes.pop()}'")
+
+
+def _carries(tree: Tree, flow: etree._Element, end: etree._Element) -> None:
+    """Report a flow whose message is none of those that one of its ends names."""
+    message = tree.find(flow, flow.get("messageRef", ""))
+    own = [end] if end.tag in ACTIVITIES else triggers(tree, end) if end.tag in EVENTS else []
+    named = [tree.find(each, each.get("messageRef", "")) for each in own]
+    known = [each for each in named if each is not None]
+    if message is not None and known and message not in known:
+        tree.say(OTHER_MESSAGE, flow, f"{what(message)} is not {what(known[0])} of {what(end)}")
 
 
 def _pool(tree: Tree, element: etree._Element) -> str | None:
