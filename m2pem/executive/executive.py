@@ -49,6 +49,7 @@ from m2pem.executive.services import Services
 from m2pem.executive.space import watch_space
 from m2pem.executive.stop_marks import StopMarks
 from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
+from m2pem.findings import Severity
 from m2pem.gateway.bus import Bus
 from m2pem.gateway.watch import Watch, watch
 from m2pem.journal.base import Journal, RunHeader
@@ -367,6 +368,11 @@ class Executive:
             raise OperatorError(f"{number} never began: start its mission again")
         epoch = await self.journal.claim(number)
         mission = mission_of(line.header)
+        for finding in mission.warnings:
+            if finding.severity is Severity.ERROR:
+                log.warning(
+                    "%s goes on as it was begun, but would not begin now: %s", number, finding
+                )
         run = MissionRun(mission, self.fleet, number, STEPS_AT_ONCE)
         last_us = await replay(self.journal, run, self._script)
         runner = self._runner(run, epoch)

@@ -9,7 +9,11 @@ from m2pem.model.mission import Mission
 def mission_of(header: RunHeader) -> Mission:
     """Read a run's mission, and the files that it uses, again.
 
+    What this m2pem refuses, and the one that began the run did not, is an error among the
+    mission's `warnings`: a run goes on as it was begun.
+
     Raises:
-        MissionError: this m2pem refuses what the one that began the run did not.
+        MissionError: nothing that could be executed can be read any more.
     """
-    return parse_mission(header.mission, header.mission_name, KeptLibrary(header.library))
+    library = KeptLibrary(header.library)
+    return parse_mission(header.mission, header.mission_name, library, accepted=True)

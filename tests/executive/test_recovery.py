@@ -51,7 +51,7 @@ def left_behind(source: bytes, *inputs: Input) -> MemoryJournal:
         journal = MemoryJournal()
         vehicles = fleet("ugv1")
         number = await journal.create(RunHeader("m.bpmn", source, "P", dump(vehicles)))
-        run = MissionRun(parse_mission(source, "m.bpmn"), vehicles, number)
+        run = MissionRun(parse_mission(source, "m.bpmn", accepted=True), vehicles, number)
         for second, item in enumerate((StartRun("P"), *inputs)):
             at_us = START_US + second * 1_000_000
             step = run.receive(item, at_us)
@@ -306,3 +306,18 @@ def test_a_run_that_never_began_is_not_resumed(play):
             await world.executive.resume("r1")
 
     play(story, "ugv1", journal=asyncio.run(create()))
+
+
+def test_a_run_goes_on_though_this_release_refuses_its_mission(play, caplog):
+    async def story(world: World):
+        control = world.executive.control
+        await control.answer("r1", "p1", "yes", by="anna")
+        return (await control.wait("r1")).status
+
+    asked = mission(sequence(("Ask", question("Ask")), ("Wait", '<task id="Wait"/>')))
+    accepted = asked.replace(b"<m2pem:prompt", b'<m2pem:prompt tiemout="3 s"')
+    accepted = accepted.replace(b'<task id="Wait"', b'<task id="Wait" startQuantity="0"')
+    assert resumed(play, left_behind(accepted), story) is RunStatus.COMPLETED
+    assert "r1 goes on as it was begun, but would not begin now" in caplog.text
+    assert "did you mean 'timeout'?" in caplog.text
+    assert "startQuantity='0' is no number of tokens" in caplog.text

@@ -4,6 +4,7 @@ Everything that is wrong with a file is found at once. See docs/missions.md for 
 """
 
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 from m2pem.errors import MissionError
@@ -73,17 +74,21 @@ def read_mission(path: str | Path, search_path: Iterable[Path | str] = ()) -> Mi
     return parse_mission(data, file, SearchPath(Path(path), map(Path, search_path)))
 
 
-def parse_mission(data: bytes, file: str, library: Library | None = None) -> Mission:
+def parse_mission(
+    data: bytes, file: str, library: Library | None = None, *, accepted: bool = False
+) -> Mission:
     """Parse the bytes of a mission file; `file` is its name in findings.
 
     `library` has the other files that it calls into or imports; without one there are none.
+    `accepted`: an earlier release has begun a run of it. What is an error since is read as that
+    release read it, and is an error among the mission's `warnings`.
 
     Raises:
         MissionError: it is no BPMN 2.0, or has something that m2pem cannot execute; it carries
             every finding, errors and warnings, by file and line.
     """
     with collector.paused():
-        return _parse(data, file, library)
+        return _parse(data, file, library, accepted=accepted)
 
 
 def read_partly(data: bytes, file: str, library: Library | None = None) -> Reading:
@@ -100,7 +105,7 @@ def read_partly(data: bytes, file: str, library: Library | None = None) -> Readi
         return files.main.reading
 
 
-def _parse(data: bytes, file: str, library: Library | None) -> Mission:
+def _parse(data: bytes, file: str, library: Library | None, *, accepted: bool) -> Mission:
     files = Files(open_part(data, file), library)
     reached = find_called(files)
     parts = [part for part in files.parts if part.is_read]
@@ -108,6 +113,9 @@ def _parse(data: bytes, file: str, library: Library | None) -> Mission:
         _resolve(part)
     findings = [each for part in files.parts for each in part.reading.report.sorted()]
     if has_errors([*findings, *files.findings]):
+        if accepted:
+            with suppress(Exception):  # merging relies on what is no error in a mission
+                return merge(files, reached)
         for part in parts:
             add_unreachable(part.reading)
         raise _refusal(file, files)
