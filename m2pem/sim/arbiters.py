@@ -381,7 +381,8 @@ class SimArbiter:
         by_resource: dict[ResourceId, StateFile] = {}
         for resource, settings in self._settings.items():
             if settings.state:
-                file = files.get(settings.state) or StateFile(settings.state)
+                file = files.get(settings.state)
+                file = file or StateFile(settings.state, str(self._context.journal))
                 files[settings.state] = by_resource[resource] = file
         began_us = now_us
         found: dict[ResourceId, Sequence[int]] = {}

@@ -177,7 +177,12 @@ class Conductor:
         for resource in request.resources:
             busy = self._bodies[resource].behavior
             if busy and busy not in request.preempts:
-                raise RefusedError(f"{resource} is busy with {busy}", "RESOURCE_UNAVAILABLE")
+                journal, _, own = busy.rpartition("/")
+                if journal:
+                    own += (
+                        f" of journal {journal}: resume or stop it there, or remove the state file"
+                    )
+                raise RefusedError(f"{resource} is busy with {own}", "RESOURCE_UNAVAILABLE")
 
     def _begin(self, execution: Execution, assignment: Assignment, now_us: int) -> None:
         body = assignment.body

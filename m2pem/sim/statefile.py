@@ -105,10 +105,15 @@ def _make_private(path: str) -> None:
 
 
 class StateFile:
-    """One file; several resources may share it, one arbiter at a time may write it."""
+    """One file; several resources may share it, one arbiter at a time may write it.
 
-    def __init__(self, path: str) -> None:
+    `journal`: of the executive. Ids of behaviors are unique within a journal alone, so the file
+    keeps them with its name in front. Those of other journals are read with that name.
+    """
+
+    def __init__(self, path: str, journal: str = "") -> None:
         self.path = path
+        self._prefix = f"{journal}/" if journal else ""
         try:
             _make_private(path)
             self._connection = sqlite3.connect(path, isolation_level=None)
@@ -146,14 +151,18 @@ class StateFile:
         run("BEGIN IMMEDIATE")
         try:
             for body in bodies:
-                row = (body.id, msgspec.msgpack.encode(_body_record(body)))
+                kept = _body_record(body)
+                kept.behavior = self._kept(kept.behavior)
+                row = (body.id, msgspec.msgpack.encode(kept))
                 run("INSERT OR REPLACE INTO bodies VALUES (?, ?)", row)
             if execution is not None:
-                data = msgspec.msgpack.encode(_behavior_record(execution))
+                record = _behavior_record(execution)
+                record.id = self._kept(record.id)
+                data = msgspec.msgpack.encode(record)
                 run(
                     "INSERT INTO behaviors (id, ended, state) VALUES (?, ?, ?) "
                     "ON CONFLICT (id) DO UPDATE SET ended = excluded.ended, state = excluded.state",
-                    (execution.id, execution.ended, data),
+                    (record.id, execution.ended, data),
                 )
                 run(
                     "DELETE FROM behaviors WHERE ended AND number <= "
@@ -177,14 +186,14 @@ class StateFile:
             body = bodies.get(ResourceId(resource))
             if isinstance(body, SimVehicle):
                 vehicle = self._decode(data, _Vehicle)
-                body.behavior, body.doing = vehicle.behavior, vehicle.doing
+                body.behavior, body.doing = self._read(vehicle.behavior), vehicle.doing
                 body.held = vehicle.held
                 body.battery, body.cruise_m_s = vehicle.battery, vehicle.cruise_m_s
                 plan = Plan(vehicle.phases, vehicle.cycle_from)
                 body.track = Track(plan, vehicle.started_us, vehicle.warp, vehicle.counted_us)
             elif isinstance(body, SimPayload):
                 payload = self._decode(data, _Payload)
-                body.behavior, body.doing = payload.behavior, payload.doing
+                body.behavior, body.doing = self._read(payload.behavior), payload.doing
                 body.held = payload.held
                 looks = Plan(payload.phases, payload.cycle_from)
                 body.track = Track(looks, payload.started_us, payload.warp)
@@ -192,7 +201,16 @@ class StateFile:
     def load_behaviors(self, bodies: dict[ResourceId, Body]) -> list[Execution]:
         """The behaviors that are remembered, in the order of their first start."""
         rows = self._connection.execute("SELECT state FROM behaviors ORDER BY number")
-        return [_execution(self._decode(data, _Behavior), bodies) for (data,) in rows]
+        records = [self._decode(data, _Behavior) for (data,) in rows]
+        for record in records:
+            record.id = self._read(record.id)
+        return [_execution(record, bodies) for record in records]
+
+    def _kept(self, behavior: str) -> str:
+        return behavior if not behavior or "/" in behavior else self._prefix + behavior
+
+    def _read(self, behavior: str) -> str:
+        return behavior.removeprefix(self._prefix)
 
     def _decode(self, data: bytes, type_: type[Any]) -> Any:
         try:

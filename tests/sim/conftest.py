@@ -1,7 +1,9 @@
 """A bench for simulated vehicles in virtual time."""
 
 from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import replace
 from typing import Any, Protocol, TypeAlias
+from uuid import UUID
 
 import pytest
 
@@ -13,7 +15,7 @@ from m2pem.model.catalogue import ResourceId
 from m2pem.model.geometry import Area, Coordinate, Route
 from m2pem.sim.arbiters import SimArbiter
 from m2pem.sim.frame import Frame
-from m2pem.testing.contracts.bench import ORIGIN, ArbiterBench, context
+from m2pem.testing.contracts.bench import JOURNAL, ORIGIN, ArbiterBench, context
 
 START_US = 1_767_225_600_000_000
 
@@ -34,14 +36,14 @@ def connection(resource: str, domain: str, settings: Mapping[str, Any]) -> Conne
     return Connection(ResourceId(resource), domain, settings, detector=detector)
 
 
-def make(clock: Clock, fleet: Fleet, **kw: Any) -> SimArbiter:
+def make(clock: Clock, fleet: Fleet, journal: UUID = JOURNAL, **kw: Any) -> SimArbiter:
     """An arbiter, not connected; all vehicles are the team "team"."""
     connections = {
         ResourceId(name): connection(name, domain, settings)
         for name, (domain, settings) in fleet.items()
     }
     teams = {"team": tuple(r for r in connections if "/" not in r)}
-    return SimArbiter(connections, context(clock, teams), **kw)
+    return SimArbiter(connections, replace(context(clock, teams), journal=journal), **kw)
 
 
 @pytest.fixture

@@ -3,10 +3,11 @@ import subprocess
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from uuid import UUID
 
 import pytest
 
-from conftest import START_US, local, make, place, route
+from conftest import START_US, Fleet, local, make, place, route
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import VehicleState
 from m2pem.executive.clock import run_virtual
@@ -14,7 +15,7 @@ from m2pem.model.catalogue import BehaviorState, ResourceId
 from m2pem.model.geometry import Point, VehiclePosition
 from m2pem.sim.arbiters import SimArbiter
 from m2pem.sim.statefile import StateFileError, recorded_effects
-from m2pem.testing.contracts.bench import ArbiterBench
+from m2pem.testing.contracts.bench import JOURNAL, ArbiterBench
 
 S = 1_000_000
 EAST_100 = route((50, 0), (100, 0))
@@ -65,6 +66,31 @@ def test_a_behavior_goes_on_while_nobody_is_there(state: str) -> None:
         ]
 
     lives(state, drive, again, gap_s=6.0)
+
+
+def test_a_behavior_of_another_journal_is_neither_taken_over_nor_repeated(state: str) -> None:
+    fleet: Fleet = {"ugv": ("ground", {"state": state, "heading": "90 deg"})}
+    other = UUID("9b1c2f04-0d0e-4c35-8a54-5a7b6f3c2e10")
+
+    async def run(clock: Clock) -> None:
+        first = make(clock, fleet, telemetry_hz=0.0)
+        async with ArbiterBench(first, clock) as bench:
+            await drive(bench, first)
+        async with ArbiterBench(make(clock, fleet, other, telemetry_hz=0.0), clock) as bench:
+            await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
+            end = await bench.ended("r1.b1", 10)
+            assert (end.state, end.code) == (BehaviorState.REJECTED, "RESOURCE_UNAVAILABLE")
+            assert f"ugv is busy with r1.b1 of journal {JOURNAL}: resume or stop it" in end.reason
+        async with ArbiterBench(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
+            assert (await bench.arbiter.query("r1.b1", None)).state is BehaviorState.RUNNING
+            assert (await bench.ended("r1.b1", 100)).state is BehaviorState.SUCCEEDED
+        async with ArbiterBench(make(clock, fleet, other, telemetry_hz=0.0), clock) as bench:
+            await bench.start("r1.b2", "single_vehicle_routing", "ugv", route=EAST_100)
+            assert (await bench.ended("r1.b2", 100)).state is BehaviorState.SUCCEEDED
+
+    run_virtual(run, START_US)
+    starts = [e.behavior for e in recorded_effects(state) if e.kind == "start"]
+    assert starts == ["r1.b1", "r1.b2"]
 
 
 def test_what_ended_while_nobody_was_there_is_told_by_query_alone(state: str) -> None:

@@ -4,6 +4,7 @@ import asyncio
 import logging
 from collections.abc import Callable, Mapping
 from types import TracebackType
+from uuid import UUID
 
 from m2pem.api.arbiter import (
     Arbiter,
@@ -19,13 +20,16 @@ from m2pem.gateway.bus import Bus
 from m2pem.model.catalogue import BehaviorState, ResourceId
 
 ORIGIN = (38.1075, -77.3192, 60.0)
+JOURNAL = UUID("3f0e7d0a-6a51-4f5c-9a2c-0c1a7b1f2d11")
+"""Of every executive of a test: the next one resumes what the first has left."""
 
 
 def context(
     clock: Clock, teams: Mapping[str, tuple[ResourceId, ...]] | None = None
 ) -> ArbiterContext:
     """What an executive would lend to an arbiter."""
-    return ArbiterContext(clock, Bus(), logging.getLogger("m2pem.testing"), ORIGIN, teams or {})
+    logger = logging.getLogger("m2pem.testing")
+    return ArbiterContext(clock, Bus(), logger, ORIGIN, teams or {}, JOURNAL)
 
 
 class ArbiterBench:
