@@ -36,7 +36,7 @@ def test_a_member_takes_no_second_behavior_and_the_team_is_not_disturbed() -> No
         control = world.executive.control
         march = await control.start(MARCH)
         await world.clock.sleep(20)
-        refused = await control.wait(await control.start(stop))
+        refused = await control.wait(await control.start(stop, even_if_busy=True))
         (ended,) = world.ended()
         assert world.speed_m_s("b") > 1
         return refused.status, ended, (await control.wait(march)).status

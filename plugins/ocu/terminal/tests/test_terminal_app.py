@@ -177,7 +177,7 @@ async def test_the_end_is_told_and_the_screen_stays(world: World) -> None:
         await terminal.press("1")
         await terminal.until_shown("COMPLETED", "completed after 5:00", "r1 completed", "3/4")
         assert terminal.app.is_running
-        second = await world.start()
+        second = await world.control.start(MISSION, even_if_busy=True)
         await terminal.until_shown("RUNNING", second)
 
 

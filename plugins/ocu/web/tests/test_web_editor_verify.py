@@ -40,7 +40,9 @@ async def test_a_run_into_a_deadlock_is_stepped_through_on_the_diagram(desk: Des
     await expect(walk.get_by_text("12 of 12")).to_be_visible()
     await expect(drawn(page, "JoinDetection")).to_contain_class("m2v-stuck")
     await expect(drawn(page, "FlowStopped")).to_contain_class("m2v-missing")
-    await expect(page.locator(".m2v-reason")).to_contain_text("wait at JoinDetection")
+    await expect(page.locator(".m2v-reason")).to_contain_text(
+        "wait at parallel gateway JoinDetection"
+    )
 
     # By keyboard alone, from where the focus is.
     await expect(walk.get_by_role("button", name="All answers")).to_be_focused()

@@ -72,6 +72,11 @@ async def start(page: Page, executive: Served) -> str:
     await page.get_by_role("tab", name="Run", exact=True).click()
     await expect(page.locator(".link-open")).to_have_count(1)  # else nothing is sent
     await page.get_by_role("button", name="Start", exact=True).click()
+    # A test before may have left its run under way.
+    confirm = page.get_by_role("button", name="Start all the same", exact=True)
+    await expect(confirm.or_(answer(page, "Continue"))).to_be_visible()
+    if await confirm.is_visible():
+        await confirm.click()
     await page.wait_for_url("**/runs/*")
     await expect(answer(page, "Continue")).to_be_visible()
     return page.url
