@@ -1,6 +1,6 @@
 """Refuses to start a mission whose vehicles or payloads other runs or operators have."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 
 from m2pem.errors import BusyError
 from m2pem.model.catalogue import ResourceId
@@ -14,10 +14,12 @@ def refuse_busy(
     fleet: Fleet,
     taken: Mapping[ResourceId, str],
     holder: Callable[[ResourceId], str | None],
+    over: Container[str],
 ) -> None:
     """Check that everything that a mission names is free now.
 
     `taken`: the operators who have resources. `holder`: the behavior that holds a resource.
+    `over`: runs that have ended; a vehicle may still come to a stand for one.
 
     Raises:
         BusyError: it is not; the error says who has what, and what to do.
@@ -34,7 +36,9 @@ def refuse_busy(
     who = [f"run {run} uses {_list(names)}" for run, names in runs.items()]
     who += [f"{operator} has {_list(names)}" for operator, names in operators.items()]
     do = [
-        f"wait until run {run} is done with {_list(names)}, or stop it"
+        f"wait until {_list(names)} has come to a stand: run {run} has ended"
+        if run in over
+        else f"wait until run {run} is done with {_list(names)}, or stop it"
         for run, names in runs.items()
     ]
     do += [f"have {operator} give back {_list(names)}" for operator, names in operators.items()]

@@ -321,7 +321,10 @@ class Executive:
         # Reading and checking take a while, and a URL may take longer: not in the event loop.
         loaded, process_id = await asyncio.to_thread(self.load, mission, process, data)
         if not even_if_busy:
-            refuse_busy(loaded, self.fleet, self.handover.taken, self.availability.holder)
+            ended = RunStatus.ENDED
+            over = {run for run, one in self.runners.items() if one.run.state.status is ended}
+            taken, holder = self.handover.taken, self.availability.holder
+            refuse_busy(loaded, self.fleet, taken, holder, over)
         return await self.begin(loaded, process_id, data, by)
 
     async def begin(

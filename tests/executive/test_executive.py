@@ -313,6 +313,29 @@ def test_a_start_is_refused_while_another_run_has_a_vehicle_of_the_mission(play)
     assert "wait until run r1 is done with ugv1, or stop it" in str(refused)
 
 
+def test_a_start_is_refused_while_a_vehicle_comes_to_a_stand_for_a_run_that_has_ended(play):
+    cut = mission(
+        '<process id="P" isExecutable="true"><startEvent id="S"/><parallelGateway id="Fork"/>'
+        f'{behavior("Drive", "drive_stop", "ugv1")}<endEvent id="E"/>{question("Ask")}'
+        '<endEvent id="Cut"><terminateEventDefinition/></endEvent>'
+        f"{flow('S', 'Fork')}{flow('Fork', 'Drive')}{flow('Drive', 'E')}{flow('Fork', 'Ask')}"
+        f"{flow('Ask', 'Cut')}</process>"
+    )
+
+    async def story(world: World):
+        control = world.executive.control
+        first = await control.start(cut)
+        await world.fake.until_called("start", f"{first}.b1")
+        await control.answer(first, "p1", "yes", by="anna")
+        while "RunEnded" not in world.names():
+            await world.clock.sleep(0.01)
+        with pytest.raises(BusyError) as refused:
+            await control.start(DRIVE)
+        return str(refused.value)
+
+    assert "wait until ugv1 has come to a stand: run r1 has ended" in play(story, "ugv1")
+
+
 def test_a_start_is_refused_while_an_operator_has_a_vehicle_of_the_mission(play):
     async def story(world: World):
         control = world.executive.control
