@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport
 from m2pem.api.control import OpenPrompt, PromptClosed, RunId
+from m2pem.engine.commands import RunService
 from m2pem.engine.inputs import BehaviorMissing, Input
 from m2pem.engine.records import BehaviorRequested, Record, RunEnded, RunResumed
 from m2pem.engine.state import Behavior, BehaviorPhase
@@ -62,10 +63,12 @@ class Losses:
     def __init__(self, executive: "Executive") -> None:
         self._executive = executive
         self._held: dict[RunId, tuple[ResourceId, ...]] = {}
+        self._services: dict[RunId, tuple[RunService, ...]] = {}
 
     async def ask(self, runner: Runner, loss: Loss) -> None:
         """Cancel what the journal does not know, hold what the mission allocates, and ask.
 
+        Services that the run waits for begin again when it goes on.
         After the takeover, before the run is driven.
         """
         executive = self._executive
@@ -74,6 +77,9 @@ class Losses:
         for resource in held:
             executive.dispatcher.hold(resource)
             executive.availability.withdraw(resource, f"held: an operator is asked of {runner.id}")
+        self._services[runner.id] = tuple(
+            each for each in runner.run.outstanding() if isinstance(each, RunService)
+        )
         unknown = await self._cancel_unknown(runner, loss)
         prompt = OpenPrompt(
             runner.id,
@@ -104,15 +110,20 @@ class Losses:
         """Records were committed: the question is closed when the run goes on or has ended."""
         if run not in self._held:
             return
+        runner = self._executive.runners[run]
         for record in records:
             match record:
                 case RunResumed(by=by):
+                    open_ = runner.run.state.services
+                    services = self._services.pop(run)
+                    runner.take_up([each for each in services if each.service in open_])
                     for resource in self._close(run, "go_on", by):
                         if self._executive.availability.holder(resource) is None:
                             self._executive.dispatcher.resume(resource)
                     return
                 case RunEnded():
                     # What was held stays so: nobody has said that it may move.
+                    del self._services[run]
                     self._close(run, "stop", "")
                     return
 

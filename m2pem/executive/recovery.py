@@ -98,7 +98,9 @@ async def take_over(
         [
             command
             for command in runner.run.outstanding()
-            if not isinstance(command, c.StartBehavior) or command.behavior in resend
+            if not (isinstance(command, c.StartBehavior) and command.behavior not in resend)
+            # After a loss, services may command what an operator must be asked about first.
+            and not (loss is not None and isinstance(command, c.RunService))
         ]
     )
 

@@ -74,6 +74,26 @@ def test_a_request_that_may_have_been_sent_is_not_sent_before_the_operator_says_
     resumed(play, TWO, story)
 
 
+def test_a_service_that_was_under_way_begins_again_when_the_operator_says_so(play, monkeypatch):
+    begun = []
+    monkeypatch.setattr(
+        "m2pem.executive.services.Services.run", lambda _, run, command: begun.append(command.name)
+    )
+    serves = mission(sequence(("Look", '<serviceTask id="Look" m2pem:service="Detector"/>')))
+
+    async def story(world: World):
+        control = world.executive.control
+        await until_paused(world)
+        await world.clock.sleep(600)
+        assert begun == []
+        await control.answer("r1", "loss", "go_on", by="anna")
+        while not begun:
+            await world.clock.sleep(0.1)
+
+    resumed(play, serves, story)
+    assert begun == ["Detector"]
+
+
 def test_a_behavior_that_goes_on_is_held_until_the_operator_lets_it_go(play):
     async def story(world: World):
         control = world.executive.control
