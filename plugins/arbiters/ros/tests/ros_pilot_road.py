@@ -146,8 +146,9 @@ def off_path(place: Place, places: Sequence[Place]) -> float:
     nearest = math.inf
     for (ae, an), (be, bn) in pairwise(places):
         length2 = (be - ae) ** 2 + (bn - an) ** 2
-        along = ((place[0] - ae) * (be - ae) + (place[1] - an) * (bn - an)) / length2
-        along = max(0.0, min(1.0, along))
+        ahead = (place[0] - ae) * (be - ae) + (place[1] - an) * (bn - an)
+        # The square of a tiny length is 0.
+        along = max(0.0, min(1.0, ahead / length2)) if length2 else 0.0
         foot = (ae + along * (be - ae), an + along * (bn - an))
         nearest = min(nearest, math.dist(place, foot))
     return nearest
