@@ -405,7 +405,7 @@ class Runner:
         self.failure = failure
         resources = ", ".join(sorted(self._outside.dispatcher.hold_all(self.id)))
         text = (
-            f"held: {failure}. {resources or 'No vehicle'} was commanded to hold. Mend the cause, "
+            f"held: {failure}. Commanded to hold: {resources or 'no vehicle'}. Mend the cause, "
             f"start again and go on with `m2pem resume {self.id}`"
         )
         log.error("%s: %s", self.id, text)

@@ -57,7 +57,7 @@ def test_a_full_disk_holds_the_vehicles_and_after_room_is_made_the_run_goes_on(
         M2PEM_MIN_FREE_MB="0",
     )  # fmt: skip
     assert (status, "the disk is full; make room" in errors) == (1, True), errors
-    assert "evsg1 was commanded to hold" in errors
+    assert "Commanded to hold: evsg1." in errors
     assert "go on with `m2pem resume r1`" in errors
     assert [effect.kind for effect in recorded_effects(state)][-1] is EffectKind.HOLD
     status, _, errors = m2pem.run("resume", "r1", "--journal", journal, "--ocu", "none")
