@@ -8,6 +8,7 @@ import os
 import sqlite3
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,7 @@ class StateFile:
     """One file; several resources may share it, one arbiter at a time may write it.
 
     `journal`: of the executive. Ids of behaviors are unique within a journal alone, so the file
-    keeps them with its name in front. Those of other journals are read with that name.
+    stores them with its name in front. Those of other journals are read with that name.
     """
 
     def __init__(self, path: str, journal: str = "") -> None:
@@ -204,6 +205,8 @@ class StateFile:
         records = [self._decode(data, _Behavior) for (data,) in rows]
         for record in records:
             record.id = self._read(record.id)
+            if record.last is not None:  # another journal's executive may have kept it
+                record.last = replace(record.last, id=BehaviorId(record.id))
         return [_execution(record, bodies) for record in records]
 
     def _kept(self, behavior: str) -> str:

@@ -83,7 +83,11 @@ def test_a_behavior_of_another_journal_is_neither_taken_over_nor_repeated(state:
             assert f"ugv is busy with r1.b1 of journal {JOURNAL}: resume or stop it" in end.reason
         async with ArbiterBench(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
             assert (await bench.arbiter.query("r1.b1", None)).state is BehaviorState.RUNNING
-            assert (await bench.ended("r1.b1", 100)).state is BehaviorState.SUCCEEDED
+        async with ArbiterBench(make(clock, fleet, other, telemetry_hz=0.0), clock) as bench:
+            await bench.ended(f"{JOURNAL}/r1.b1", 100)  # while the other executive looks on
+        async with ArbiterBench(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
+            found = await bench.arbiter.query("r1.b1", None)
+            assert (found.id, found.state) == ("r1.b1", BehaviorState.SUCCEEDED)
         async with ArbiterBench(make(clock, fleet, other, telemetry_hz=0.0), clock) as bench:
             await bench.start("r1.b2", "single_vehicle_routing", "ugv", route=EAST_100)
             assert (await bench.ended("r1.b2", 100)).state is BehaviorState.SUCCEEDED
