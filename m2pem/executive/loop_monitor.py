@@ -34,6 +34,7 @@ class LoopMonitor:
         self._ticked_s = time.monotonic()
         self._ended = threading.Event()
         self._blocked_by = ""
+        self._blocked_s = 0.0
 
     async def __aenter__(self) -> Self:
         self._loop = asyncio.get_running_loop()
@@ -51,8 +52,10 @@ class LoopMonitor:
         late_s = now_s - self._ticked_s - TICK_S
         self._ticked_s = now_s
         if self._blocked_by:
+            # The loop may have turned while the thread was about to name what kept it.
+            blocked_s = max(late_s, self._blocked_s)
             text = (
-                f"nothing was done for {late_s:.1f} s, and STOP would not have been either: "
+                f"nothing was done for {blocked_s:.1f} s, and STOP would not have been either: "
                 f"{self._blocked_by} blocked the executive"
             )
             self._blocked_by = ""
@@ -65,6 +68,7 @@ class LoopMonitor:
             if late_s < LATE_AFTER_S or self._blocked_by:
                 continue
             frame = sys._current_frames().get(self._thread)
+            self._blocked_s = late_s
             self._blocked_by = blocking(frame)
             log.error(
                 "%s blocks the executive: STOP reaches no vehicle until it returns. Use the "

@@ -341,3 +341,13 @@ async def test_what_runs_the_event_loop_is_not_named_for_what_blocks_it() -> Non
     code, closure = read_a_mission.__code__, read_a_mission.__closure__
     asyncio.get_running_loop().call_soon(types.FunctionType(code, known, closure=closure))
     assert (await named).startswith("m2pem.reading, read_a_mission, line ")
+
+
+async def test_an_alert_says_how_long_the_loop_was_blocked_though_it_has_turned_since() -> None:
+    notices = Notices()
+    alerts = notices.subscribe(None, 10)
+    async with LoopMonitor(notices) as monitor:
+        monitor._blocked_s, monitor._blocked_by = 0.7, "a plugin"
+        alert = await anext(alerts)
+    assert isinstance(alert, Alert)
+    assert "nothing was done for 0.7 s" in alert.text
