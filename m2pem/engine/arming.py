@@ -16,13 +16,13 @@ WHEN_ENTERED: dict[type[FlowNode], Callable[[Execution, Token], None]] = {}
 
 
 def arm_next(x: Execution) -> None:
-    """Let the token wait that entered first, unless it has left already."""
+    """Arm what the first token that entered waits for, unless it has left already."""
     token = x.entered.popleft()
     if x.state.tokens.get(token.id) is token:
         WHEN_ENTERED[type(token.node)](x, token)
 
 
 def arm_entered(x: Execution) -> None:
-    """Let every token wait that has entered what waits: something is about to be thrown."""
+    """Arm what every token that entered waits for: something is about to be thrown."""
     while x.entered:
         arm_next(x)

@@ -94,15 +94,17 @@ async def take_over(
                 lost(ResourceId(name), UNASKED)
         if item is not None:
             runner.post(item)
-    runner.take_up(
-        [
-            command
-            for command in runner.run.outstanding()
-            if not (isinstance(command, c.StartBehavior) and command.behavior not in resend)
-            # After a loss, services may command what an operator must be asked about first.
-            and not (loss is not None and isinstance(command, c.RunService))
-        ]
-    )
+
+    def is_due(command: c.Command) -> bool:
+        match command:
+            case c.StartBehavior():
+                return command.behavior in resend
+            case c.RunService():  # it may command what an operator must be asked about first
+                return loss is None
+            case _:
+                return True
+
+    runner.take_up([command for command in runner.run.outstanding() if is_due(command)])
 
 
 def _recall(runner: Runner, arbiters: FleetArbiters, dispatcher: Dispatcher) -> None:

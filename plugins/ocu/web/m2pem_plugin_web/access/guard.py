@@ -19,13 +19,13 @@ TILES = "/tiles/"
 
 STOPS = ("/stop", "/stop-all")
 NO_KEY = (
-    f"the cookie is of a session, but the request has not the key of it ({KEY_HEADER}), which "
-    "signing in gives: sign in again"
+    f"the cookie is that of a session, but the session's key ({KEY_HEADER}), which signing in "
+    "gives, is missing or another: sign in again"
 )
 
 
 class Guard:
-    """Below /api it lets in nobody who has not signed in, but to sign in. `names`: our own.
+    """Below /api it refuses requests without a session, but for signing in. `names`: our own.
 
     The cookie alone is not enough there: browsers send it to other ports of this host, whose
     servers could send it here.

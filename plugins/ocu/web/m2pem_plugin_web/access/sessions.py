@@ -53,7 +53,7 @@ class Session(msgspec.Struct):
 
 
 class Sessions:
-    """Sessions by the hashes of their cookies: whoever reads them cannot use them.
+    """Sessions by the hashes of their cookies: to read them is not enough to use them.
 
     `kept`: a file, so that a page that is open goes on after the executive was started again.
     """
@@ -75,7 +75,7 @@ class Sessions:
         return made
 
     def of_cookie(self, cookie: str) -> Session | None:
-        """Return the session of a cookie, whoever sends it. It does not last longer by this."""
+        """Return the session of a cookie, also without its key. It does not last longer by this."""
         session = self._sessions.get(hash_of(cookie))
         return None if session is None or self._is_over(session) else session
 

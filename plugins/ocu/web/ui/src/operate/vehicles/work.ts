@@ -24,7 +24,7 @@ export const isOperator = (holder: string): boolean =>
 /** The run whose behavior holds a resource; "": none does. */
 export const runOf = (holder: string): string => /^(r\d+)\.b\d+$/.exec(holder)?.[1] ?? "";
 
-/** Who else than a run has a resource, in words; "": nobody else does. */
+/** Which other run or operator has a resource, in words; "": none has. */
 export function heldElsewhere(holder: string, run: string): string {
   if (isOperator(holder)) return fill(text.heldBy, { by: holder });
   const other = runOf(holder);
