@@ -25,6 +25,7 @@ from m2pem.api import (
 )
 from m2pem_plugin_mavlink.catalogue import offered
 from m2pem_plugin_mavlink.native_ref import Kept, native_ref, read_native_ref
+from m2pem_plugin_mavlink.protocol.url import chooses_port, parse_url
 from m2pem_plugin_mavlink.settings import Settings, read_settings
 
 if TYPE_CHECKING:
@@ -141,10 +142,18 @@ class MavlinkArbiter:
         return Limits(LOST_AFTER_S if own is None else own, HOLD_WITHIN_S, CANCEL_TIMEOUT_S)
 
     def addresses(self, resource: ResourceId) -> Sequence[str]:
-        """The system on each of its links; payloads are carried."""
+        """The system on each of its links; payloads are carried.
+
+        A port that the kernel chooses (0) is another one in each process: nothing is shared there.
+        """
         settings = self._settings.get(resource)
-        urls = settings.urls if settings is not None else ()
-        return [f"system {self._settings[resource].system_id} on {url}" for url in urls]
+        if settings is None:
+            return ()
+        return [
+            f"system {settings.system_id} on {url}"
+            for url in settings.urls
+            if not chooses_port(parse_url(url))
+        ]
 
     # --- life -----------------------------------------------------------------------------------
 

@@ -2,11 +2,14 @@ import subprocess
 import sys
 
 import pytest
+from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
 from m2pem_plugin_mavlink.catalogue import offered
 from m2pem_plugin_mavlink.settings import Settings, read_settings
 
 from m2pem.api import Connection, ResourceId
 from m2pem.errors import PluginError
+from m2pem.executive.clock import SystemClock
+from m2pem.testing.contracts.bench import context
 
 V, W = ResourceId("uav1"), ResourceId("uav2")
 URL = "udpin://127.0.0.1:14550"
@@ -110,3 +113,10 @@ def test_the_catalogue_needs_no_mavlink_library() -> None:
         "assert not {'pymavlink', 'mavsdk'} & set(sys.modules), sorted(sys.modules)\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_an_address_is_shared_unless_the_kernel_chooses_its_port() -> None:
+    urls = [URL, "udpin://127.0.0.1:0", "tcpin://127.0.0.1:0"]
+    connections = {V: Connection(V, "air", {"url": urls, "system_id": 7})}
+    arbiter = MavlinkArbiter(connections, context(SystemClock()))
+    assert arbiter.addresses(V) == [f"system 7 on {URL}"]

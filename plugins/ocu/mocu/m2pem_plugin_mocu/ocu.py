@@ -83,7 +83,12 @@ class MocuOcu:
                 await asyncio.wait([following])
                 self._say_why(following)
             finally:
-                await asyncio.shield(asyncio.create_task(self._end(topics, following, speaking)))
+                ending = asyncio.create_task(self._end(topics, following, speaking))
+                try:
+                    await asyncio.shield(ending)
+                finally:  # whoever cancels again does not wait for readers: the node goes now
+                    ending.cancel()
+                    await asyncio.gather(ending, return_exceptions=True)
 
     def _say_why(self, following: "asyncio.Task[None]") -> None:
         try:

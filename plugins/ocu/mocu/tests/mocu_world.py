@@ -143,12 +143,12 @@ class World:
         self.control = control
         self.faults = Faults(control)
         self.domain = domain
-        self._serving: asyncio.Task[None]
+        self.serving: asyncio.Task[None]
 
     def begin(self, namespace: str = ONE) -> MocuOcu:
         """Have a unit serve."""
         unit = MocuOcu(self.faults, environment={NAMESPACE: namespace}, domain_id=self.domain)
-        self._serving = asyncio.create_task(unit.serve())
+        self.serving = asyncio.create_task(unit.serve())
         return unit
 
     async def has_listeners(self, client: Client) -> None:
@@ -157,11 +157,11 @@ class World:
 
     async def leave(self) -> None:
         """Cancel it, and see it end."""
-        self._serving.cancel()
-        done, _ = await asyncio.wait([self._serving], timeout=WITHIN_S)
+        self.serving.cancel()
+        done, _ = await asyncio.wait([self.serving], timeout=WITHIN_S)
         assert done, "the unit does not end"
-        if not self._serving.cancelled():
-            self._serving.result()
+        if not self.serving.cancelled():
+            self.serving.result()
 
     async def asks(self, text: str = "Go on?", **options: Any) -> tuple[str, str]:
         """Start a mission that asks; the run and the prompt."""

@@ -6,7 +6,9 @@ import os
 import signal
 from itertools import pairwise
 
+import pytest
 from m2pem_plugin_mocu.pacing import LEAST_S
+from m2pem_plugin_mocu.topics import Topics
 from mocu_world import Client, Message, World, until, values
 
 from m2pem.errors import JournalError
@@ -231,3 +233,25 @@ async def test_diagnostics_tell_of_executive_journal_and_vehicles(
         "diagnostics", lambda each: by_name(each)["m2pem: journal"]["level"] == ERROR
     )
     assert "disk" in by_name(failed)["m2pem: journal"]["message"]
+
+
+async def test_who_cancels_a_unit_twice_leaves_nothing_that_still_publishes(
+    world: World, client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await world.has_listeners(client)
+    begun, ended = asyncio.Event(), asyncio.Event()
+
+    async def flush(_: Topics) -> None:
+        begun.set()
+        try:
+            await asyncio.Event().wait()
+        finally:
+            ended.set()
+
+    monkeypatch.setattr(Topics, "flush", flush)
+    world.serving.cancel()
+    await begun.wait()
+    world.serving.cancel()
+    await asyncio.wait([world.serving])
+    assert world.serving.cancelled()
+    assert ended.is_set()

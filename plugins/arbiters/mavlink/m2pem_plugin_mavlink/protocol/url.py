@@ -69,6 +69,11 @@ _PLACE = re.compile(
 _DEVICE = re.compile(r"(?P<path>/dev/[^,:\s]+|COM\d+)(?:[,:](?P<baudrate>\d+))?")
 
 
+def chooses_port(url: Url) -> bool:
+    """Whether the kernel chooses the port, another one for each process: it is 0."""
+    return isinstance(url, SocketUrl) and url.port == 0
+
+
 def parse_url(text: str) -> Url:
     """Read a URL.
 
