@@ -108,7 +108,9 @@ class BehaviorReport:
     `native_ref`: the arbiter's own name for it, handed back to `query` after a restart.
     `outputs`: of a terminal report: what the mission's data store gets, under names that the
     behavior's `BehaviorSpec.writes` declares, such as `picture.files`. `held`: of an answer to
-    `query`: the behavior goes on, but one of its resources is held.
+    `query`: the behavior goes on, but one of its resources is held. `not_begun`: of an answer
+    UNKNOWN to `query`: the resource shows that it has not begun the behavior, beyond being made
+    ready for it, so that starting it now is what its mission wants.
     """
 
     id: BehaviorId
@@ -119,6 +121,7 @@ class BehaviorReport:
     native_ref: str | None = None
     outputs: Mapping[str, Value] = field(default_factory=dict)
     held: bool = False
+    not_begun: bool = False
 
 
 class Arbiter(Protocol):

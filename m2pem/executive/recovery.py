@@ -66,21 +66,24 @@ async def take_over(
         runner.post(PauseRun(paused_by(loss)))
     max_outage_s = arbiters.fleet.max_outage_s
     too_long = max_outage_s is not None and outage_s > max_outage_s
+    # The run's inputs are decided after this; a paused one defers what is restarted.
+    paused = state.status is RunStatus.PAUSED
     known = list(state.behaviors.values())
     _recall(runner, arbiters, dispatcher)
     reports = await asyncio.gather(*(_query(arbiters, behavior) for behavior in known))
     resend: set[str] = set()
     for behavior, report in zip(known, reports, strict=True):
         number = max(report.number if report is not None else 0, behavior.number)
-        unseen = behavior.state is None and behavior.phase is BehaviorPhase.ACTIVE
-        if report is not None and report.state is BehaviorState.UNKNOWN and unseen and not loss:
+        not_begun = report is not None and _is_not_begun(behavior, report) and not too_long
+        if not_begun and behavior.state is None and not loss and not paused:
             resend.add(behavior.id)
             continue
         arbiter = _arbiter(arbiters, behavior)
         dispatcher.adopt(behavior.id, behavior.resources, number, arbiter)
         with suppress(ParameterError):
             dispatcher.occupy(_as_commanded(runner, behavior))
-        item = _what_to_post(arbiters, behavior, report)
+        policy = ResumePolicy.RESTART if not_begun else _policy(arbiters, behavior, too_long)
+        item = _what_to_post(arbiters, behavior, report, policy)
         if item is None and behavior.phase is BehaviorPhase.ACTIVE:
             reason = _why_ask(state.status, report, outage_s if too_long else None)
             if reason:
@@ -154,17 +157,29 @@ async def _query(arbiters: FleetArbiters, behavior: Behavior) -> BehaviorReport 
     return None
 
 
+def _is_not_begun(behavior: Behavior, report: BehaviorReport) -> bool:
+    """Whether starting it now is what the mission wants: the journal has no sign that it began, and
+    its arbiter neither."""
+    if behavior.phase is not BehaviorPhase.ACTIVE or report.state is not BehaviorState.UNKNOWN:
+        return False
+    return behavior.state is None or (behavior.state is BehaviorState.ACCEPTED and report.not_begun)
+
+
 def _what_to_post(
-    arbiters: FleetArbiters, behavior: Behavior, report: BehaviorReport | None
+    arbiters: FleetArbiters,
+    behavior: Behavior,
+    report: BehaviorReport | None,
+    policy: ResumePolicy,
 ) -> Input | None:
-    """The input that what was seen amounts to; None: it is as the journal says."""
+    """The input that what was seen amounts to; None: it is as the journal says. `policy`: for what
+    the arbiter does not know."""
     if report is None:
         return ResourceFault(behavior.resources[0], "LINK_LOST", UNASKED, reachable=False)
     if report.state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING):
         return None
     if report.state is BehaviorState.UNKNOWN:
         reason = report.reason or "its arbiter no longer knows it"
-        return BehaviorMissing(behavior.id, _policy(arbiters, behavior), report.state, reason)
+        return BehaviorMissing(behavior.id, policy, report.state, reason)
     return reported(report, behavior, arbiters, behavior.number + 1)
 
 
@@ -182,6 +197,6 @@ def _why_ask(status: RunStatus, report: BehaviorReport | None, outage_s: float |
     return ""
 
 
-def _policy(arbiters: FleetArbiters, behavior: Behavior) -> ResumePolicy:
+def _policy(arbiters: FleetArbiters, behavior: Behavior, too_long: bool) -> ResumePolicy:
     spec = spec_of(behavior, arbiters)
-    return spec.resume if spec is not None else ResumePolicy.HOLD
+    return ResumePolicy.HOLD if spec is None or too_long else spec.resume

@@ -161,6 +161,7 @@ def _vehicle_behaviors() -> tuple[BehaviorSpec, ...]:
             "set_speed",
             "Change the speed of what follows.",
             ParameterSpec("speed", ParameterKind.SPEED, required=True, minimum=_SLOWEST_M_S),
+            resume=ResumePolicy.RESTART,
         ),
         _behavior(
             vehicle,

@@ -114,6 +114,51 @@ def test_a_request_that_never_reached_its_arbiter_is_sent(play):
     assert calls == ["query", "start"]
 
 
+NOT_BEGUN = BehaviorReport("r1.b1", 0, BehaviorState.UNKNOWN, not_begun=True)
+
+
+def test_what_a_vehicle_shows_not_to_have_begun_is_started_and_nobody_is_asked(play):
+    async def story(world: World):
+        await world.fake.until_called("start", "r1.b1")
+        world.fake.report("r1.b1", BehaviorState.RUNNING)
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        summary = await world.executive.control.wait("r1")
+        return summary.status, [call.what for call in world.fake.calls], world.seen
+
+    journal, known = left_behind(GOTO, ACCEPTED), {"r1.b1": NOT_BEGUN}
+    status, calls, seen = resumed(play, journal, story, known=known)
+    assert (status, calls) == (RunStatus.COMPLETED, ["query", "start"])
+    assert any(isinstance(each, BehaviorRestarted) for each in seen)
+    assert not any(isinstance(each, PromptOpened) for each in seen)
+
+
+@pytest.mark.parametrize(("inputs", "bound_s"), [((ACCEPTED, RUNNING), None), ((), 10.0)])
+def test_what_was_running_or_is_long_ago_is_not_started_unasked(play, monkeypatch, inputs, bound_s):
+    monkeypatch.setattr("tests.executive.conftest.MAX_OUTAGE_S", bound_s)
+
+    async def story(world: World):
+        await world.fake.until_called("hold", "ugv1")
+        return len(world.executive.control.prompts()), world.fake.count("start")
+
+    journal, known = left_behind(GOTO, *inputs), {"r1.b1": NOT_BEGUN}
+    assert resumed(play, journal, story, known=known) == (1, 0)
+
+
+@pytest.mark.parametrize("inputs", [(), (ACCEPTED,)])
+def test_what_was_not_begun_in_a_paused_run_begins_when_the_run_goes_on(play, inputs):
+    async def story(world: World):
+        await world.fake.until_called("hold", "ugv1")
+        await world.clock.sleep(60)
+        starts = world.fake.count("start")
+        await world.executive.control.resume("r1", by="anna")
+        await world.fake.until_called("start", "r1.b1")
+        await world.clock.sleep(1)
+        return starts, world.fake.count("start"), world.fake.count("resume")
+
+    journal = left_behind(GOTO, *inputs, PauseRun("anna"))
+    assert resumed(play, journal, story, known={"r1.b1": NOT_BEGUN}) == (0, 1, 0)
+
+
 @pytest.mark.parametrize(
     ("decision", "status", "starts"),
     [

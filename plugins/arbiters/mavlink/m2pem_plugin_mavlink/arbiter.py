@@ -311,11 +311,15 @@ class MavlinkArbiter:
         return BEHAVIORS[kept.behavior](job)
 
     def _native_ref(self, request: BehaviorRequest) -> str:
+        from m2pem_plugin_mavlink.beginning import before  # noqa: PLC0415
+
         memory = self._pending[request.id].memory()
         resource = _vehicles(request)[0]
-        return native_ref(Kept(resource, request.behavior, request.parameters, memory))
+        was = before(self._helms[resource].vehicle, self._context.clock.now_us() / 1e6)
+        return native_ref(Kept(resource, request.behavior, request.parameters, memory, was))
 
     async def _look(self, id_: BehaviorId, kept: Kept, reference: str) -> BehaviorReport:
+        from m2pem_plugin_mavlink.beginning import has_not_begun  # noqa: PLC0415
         from m2pem_plugin_mavlink.behaviors import BEHAVIORS  # noqa: PLC0415
         from m2pem_plugin_mavlink.behaviors.behavior import (  # noqa: PLC0415
             BehaviorFailedError,
@@ -342,6 +346,10 @@ class MavlinkArbiter:
             return self._ledger.last(id_)
         if state is BehaviorState.SUCCEEDED:
             return replace(unknown, number=3, state=state)
+        if has_not_begun(behavior, kept.before, self._context.clock.now_us() / 1e6):
+            self._asked.add(id_)
+            reason = f"{kept.resource} is as it was before, and has not begun it"
+            return replace(unknown, reason=reason, not_begun=True)
         mode = vehicle.state().mode or "an unknown mode"
         return replace(unknown, reason=f"{kept.resource} is in {mode}, and does not do it")
 

@@ -1,0 +1,49 @@
+"""After a restart: does a vehicle show that it has not begun what was accepted for it?
+
+Only what no person beside the vehicle could have meant otherwise counts: the vehicle stands where
+it stood, a short while later, as it stood or as m2pem makes it ready: in the behavior's mode and
+armed. Another mode, motors that were disarmed or a step aside may be somebody's wish, and an
+operator is asked.
+"""
+
+from m2pem_plugin_mavlink.behaviors.behavior import Behavior
+from m2pem_plugin_mavlink.behaviors.looking import accepts, away_m, stands
+from m2pem_plugin_mavlink.native_ref import Before
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+SOON_S = 60.0
+"""Whoever walks up to a vehicle later than that does not expect it to go on by itself."""
+
+SAME_PLACE_M = 3.0
+"""Positions of a vehicle that stands drift so far within that time."""
+
+
+def before(vehicle: Vehicle, now_s: float) -> Before | None:
+    """How a vehicle is now; None if something of it was not received yet."""
+    heard = vehicle.heard
+    position, height_m = heard.position, heard.altitude_above_home_m
+    if heard.armed is None or heard.landed is None or heard.custom_mode is None:
+        return None
+    if position is None or height_m is None:
+        return None
+    place = (position.latitude_deg, position.longitude_deg)
+    return Before(now_s, heard.armed, heard.landed, heard.custom_mode, *place, height_m)
+
+
+def has_not_begun(behavior: Behavior, was: Before | None, now_s: float) -> bool:
+    """Whether its vehicle shows that it has not begun it. What moves nothing, such as an actuator's
+    work, leaves nothing to see."""
+    vehicle = behavior.vehicle
+    now = before(vehicle, now_s)
+    if was is None or now is None or not behavior.steers:
+        return False
+    as_it_was = (now.armed, now.custom_mode) == (was.armed, was.custom_mode)
+    is_ready = now.armed >= was.armed and accepts(behavior, vehicle.heard.mode)
+    return (
+        0.0 <= now_s - was.at_s <= SOON_S
+        and (as_it_was or is_ready)
+        and now.landed == was.landed
+        and stands(vehicle)
+        and away_m(vehicle, (was.latitude_deg, was.longitude_deg)) <= SAME_PLACE_M
+        and abs(now.altitude_m - was.altitude_m) <= SAME_PLACE_M
+    )
