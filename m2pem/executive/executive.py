@@ -121,6 +121,8 @@ class Executive:
         self._max_steps = max_steps
         self.handed_over: dict[str, HandedOver] = {}
         self._tasks: dict[RunId, asyncio.Task[None]] = {}
+        # Of two starts at once the second must see what the first one takes.
+        self._starting = asyncio.Lock()
         self._listeners: list[asyncio.Task[None]] = []
         self._stack = AsyncExitStack()
         context = ArbiterContext(
@@ -320,12 +322,14 @@ class Executive:
         """
         # Reading and checking take a while, and a URL may take longer: not in the event loop.
         loaded, process_id = await asyncio.to_thread(self.load, mission, process, data)
-        if not even_if_busy:
+        if even_if_busy:
+            return await self.begin(loaded, process_id, data, by)
+        async with self._starting:
             ended = RunStatus.ENDED
             over = {run for run, one in self.runners.items() if one.run.state.status is ended}
             taken, holder = self.handover.taken, self.availability.holder
             refuse_busy(loaded, self.fleet, taken, holder, over)
-        return await self.begin(loaded, process_id, data, by)
+            return await self.begin(loaded, process_id, data, by)
 
     async def begin(
         self, loaded: Mission, process_id: str, data: Mapping[str, Value] | None, by: str

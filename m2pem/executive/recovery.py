@@ -74,8 +74,9 @@ async def take_over(
     resend: set[str] = set()
     for behavior, report in zip(known, reports, strict=True):
         number = max(report.number if report is not None else 0, behavior.number)
-        not_begun = report is not None and _is_not_begun(behavior, report) and not too_long
-        if not_begun and behavior.state is None and not loss and not paused:
+        not_begun = report is not None and _is_not_begun(behavior, report)
+        not_begun = not_begun and not too_long and loss is None
+        if not_begun and behavior.state is None and not paused:
             resend.add(behavior.id)
             continue
         arbiter = _arbiter(arbiters, behavior)

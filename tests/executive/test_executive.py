@@ -1,5 +1,7 @@
 """The executive as a whole: runs on a fake arbiter, in virtual time."""
 
+import asyncio
+
 import pytest
 
 from m2pem.api.control import OpenPrompt, RunStatus, StampedRecord
@@ -311,6 +313,16 @@ def test_a_start_is_refused_while_another_run_has_a_vehicle_of_the_mission(play)
     assert refused.holders == {"ugv1": "r1"}
     assert "run r1 uses ugv1" in str(refused)
     assert "wait until run r1 is done with ugv1, or stop it" in str(refused)
+
+
+def test_of_two_starts_at_the_same_moment_for_one_vehicle_one_is_refused(play):
+    async def story(world: World):
+        control = world.executive.control
+        both = control.start(DRIVE), control.start(DRIVE)
+        return await asyncio.gather(*both, return_exceptions=True)
+
+    kinds = [type(each) for each in play(story, "ugv1")]
+    assert sorted(kinds, key=str) == sorted([str, BusyError], key=str)
 
 
 def test_a_start_is_refused_while_a_vehicle_comes_to_a_stand_for_a_run_that_has_ended(play):

@@ -74,11 +74,12 @@ def test_only_open_ended_behaviors_do_not_end_by_themselves() -> None:
     }
 
 
-def test_what_moves_holds_after_a_restart_and_what_stands_or_looks_begins_again() -> None:
+def test_what_moves_holds_after_a_restart_and_what_does_not_begins_again() -> None:
     still = {key for key, spec in SHARED.items() if spec.resume is ResumePolicy.RESTART}
     assert still == {
         ("hold", VEHICLE),
         ("drive_stop", VEHICLE),
+        ("set_speed", VEHICLE),
         *(key for key in SHARED if key[1] is PAYLOAD),
     }
     assert {s.resume for k, s in SHARED.items() if k not in still} == {ResumePolicy.HOLD}
