@@ -11,6 +11,8 @@ class Ocu(Protocol):
 
     A class attribute `takes_terminal = True` says that it draws on the whole terminal: then the
     command line prints nothing while it serves, and uses `plain` instead where there is none.
+    A class attribute `imports` names modules that take long to import: they are imported before an
+    executive exists, as an import in its event loop would delay STOP.
     """
 
     def __init__(self, control: "MissionControl") -> None: ...

@@ -1,6 +1,7 @@
 """Chooses operator control units, and serves them beside the runs."""
 
 import asyncio
+import importlib
 import logging
 import sys
 from collections.abc import Awaitable, Callable, Sequence
@@ -60,6 +61,9 @@ class Operators:
     def __init__(self, names: Sequence[str], plugins: PluginManager) -> None:
         self.names = tuple(names)
         self._factories = {name: plugins.ocu(name) for name in names}
+        for factory in self._factories.values():
+            for module in getattr(factory, "imports", ()):
+                importlib.import_module(module)
         self._tasks: list[asyncio.Task[None]] = []
 
     @property

@@ -87,6 +87,17 @@ class Broken(Unit):
         raise ValueError("no screen")
 
 
+def test_what_a_unit_imports_is_imported_before_it_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = "wave"  # any that nothing here needs
+
+    class Heavy(Unit):
+        imports = (module,)
+
+    monkeypatch.delitem(sys.modules, module, raising=False)
+    Operators(["heavy"], plugins(heavy=Heavy))
+    assert module in sys.modules
+
+
 async def test_a_unit_that_breaks_is_told_of_and_stops_nothing(
     caplog: pytest.LogCaptureFixture,
 ) -> None:

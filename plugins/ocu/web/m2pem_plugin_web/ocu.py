@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from m2pem_plugin_web.settings import Settings, read_settings
 
 if TYPE_CHECKING:
+    from starlette.types import ASGIApp
+
     from m2pem.api import MissionControl
     from m2pem_plugin_web.access.entry import Entry
 
@@ -21,6 +23,8 @@ class WebOcu:
         PluginError: a variable has a value that it may not have, the address is taken, or files
             of secrets are not what they ought to be.
     """
+
+    imports = ("m2pem_plugin_web.app",)
 
     def __init__(
         self, control: "MissionControl", *, environment: Mapping[str, str] = os.environ
@@ -44,8 +48,12 @@ class WebOcu:
             place = place_beside(control.journal_file())
             self._recorder = Recorder(control, self.hub.feed.pictures, self.hub.fleet, place)
             self._services = services_of(control, settings.missions)
-            routers = routers_of(self._services, settings, self.hub, entry, self._recorder)
-            self._app = create_app(routers, entry, settings, self._server.slots)
+
+            def app() -> "ASGIApp":
+                routers = routers_of(self._services, settings, self.hub, entry, self._recorder)
+                return create_app(routers, entry, settings, self._server.slots)
+
+            self._make_app = app
         except BaseException:
             self._server.close()
             raise
@@ -60,10 +68,12 @@ class WebOcu:
 
         click.echo(f"m2pem: the page is at {self.url}", err=True)
         try:
+            # In a thread, as it takes half a second of the processor, and STOP must not wait.
+            app = await asyncio.to_thread(self._make_app)
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self.hub.run(), name="web: hub")
                 tasks.create_task(self._recorder.run(), name="web: recorder")
-                tasks.create_task(self._server.serve(self._app), name="web: server")
+                tasks.create_task(self._server.serve(app), name="web: server")
         finally:
             self._server.close()
             places.withdraw(self._where, self._server.port)
