@@ -231,16 +231,23 @@ class Executive:
             await self._stack.aclose()
 
     def stop_at_once(self, by: str, reason: str) -> dict[RunId, "asyncio.Future[Step]"]:
-        """Send the cancels of every run that has not ended; by run: when its stop is recorded."""
+        """Send the cancels of every run that has not ended; by run: when its stop is recorded.
+
+        A run that the journal failed is one of them: its vehicles are held, or were to be.
+        """
         return {
             runner.id: self.immediate.stop(runner, by, reason)
             for runner in self.runners.values()
-            if not runner.done.is_set() and runner.run.state.status is not RunStatus.ENDED
+            if not runner.done.is_set() or runner.failure is not None
+            if runner.run.state.status is not RunStatus.ENDED
         }
 
     async def stop_all(self, reason: str) -> None:
-        """Stop what still runs and wait for it."""
-        self.stop_at_once("", reason)
+        """Stop what still runs and wait for it. What is held because its journal failed stays held:
+        it can be resumed."""
+        for runner in self.runners.values():
+            if not runner.done.is_set() and runner.run.state.status is not RunStatus.ENDED:
+                self.immediate.stop(runner, "", reason)
         await asyncio.gather(*self._tasks.values())
 
     def _listen(self, what: str, listening: Callable[[], Awaitable[None]]) -> None:

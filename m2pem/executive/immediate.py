@@ -36,18 +36,23 @@ class ImmediateCommands:
     def stop(self, runner: Runner, by: str, reason: str) -> "asyncio.Future[Step]":
         """Send the cancels of a run; the future is done when its stop is in the journal.
 
-        A run that the journal failed is stopped, too: its vehicles may still be held.
+        A run that the journal failed is stopped, too: its vehicles may still be held. The future
+        has that failure then.
 
         Raises:
             OperatorError: the run has ended.
-            M2pemError: the run can decide nothing any more; its cancels are sent.
         """
-        if not runner.done.is_set() or runner.failure is not None:
-            self._marks.put(runner.id, StopMark(by, reason))
-            orders = self._dispatcher.stop_at_once(runner.id, runner.epoch)
-            self._watch("STOP", runner.id, orders)
+        if runner.done.is_set() and runner.failure is None:
+            return runner.tell(i.StopRun(by, reason))
+        self._marks.put(runner.id, StopMark(by, reason))
+        orders = self._dispatcher.stop_at_once(runner.id, runner.epoch)
+        self._watch("STOP", runner.id, orders)
+        try:
             return runner.tell_stop(i.StopRun(by, reason), frozenset(orders))
-        return runner.tell(i.StopRun(by, reason))
+        except M2pemError as error:
+            failed: asyncio.Future[Step] = asyncio.get_running_loop().create_future()
+            failed.set_exception(error)
+            return failed
 
     def pause(self, runner: Runner, by: str) -> "asyncio.Future[Step]":
         """Send the holds of a run; the future is done when its pause is in the journal.

@@ -1,7 +1,9 @@
 """The disk of the journal is full while a vehicle drives: it is held, and the run can go on."""
 
 import shutil
+import signal
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -22,6 +24,16 @@ DRIVE = mission(
     f"{flow('Often', 'Noted')}{flow('Drive', 'E')}</process>"
 )
 """A drive of some 110 m, in which a timer has more written than a small disk takes."""
+
+WITHIN_S = 60.0
+
+
+def wait_until_recorded(state: Path, kind: EffectKind) -> None:
+    """Until the vehicles' file has it."""
+    ends = time.monotonic() + WITHIN_S
+    while kind not in {effect.kind for effect in recorded_effects(state)}:
+        assert time.monotonic() < ends, kind
+        time.sleep(0.05)
 
 
 class SmallDisk:
@@ -68,4 +80,30 @@ def test_a_full_disk_holds_the_vehicles_and_after_room_is_made_the_run_goes_on(
     program.type("resume")
     program.until_text("r1 completed")
     assert program.rest()[0] == 0
+    assert [effect.kind for effect in recorded_effects(state)].count(EffectKind.START) == 1
+
+
+def test_a_stop_of_a_service_on_a_full_disk_reaches_its_vehicles_and_the_run_stays_stopped(
+    m2pem: CommandLine, tmp_path: Path, small_disk: SmallDisk
+) -> None:
+    (tmp_path / "drive.bpmn").write_bytes(DRIVE)
+    fleet, state = fleet_with_state(tmp_path)
+    serve = ("serve", "--fleet", fleet, "--ocu", "plain")
+    serve += ("--journal", small_disk.folder / "journal.db")
+    program = m2pem.start(*serve, M2PEM_MIN_FREE_MB="0")
+    program.type("start drive.bpmn")
+    program.until_text("evsg1 begins goto")
+    wait_until_recorded(state, EffectKind.HOLD)
+    program.type("stop all")
+    program.until_text("r1: the stop went to its vehicles, but was not recorded")
+    wait_until_recorded(state, EffectKind.END)
+    program.type("start! drive.bpmn")
+    program.until_text("the disk is full; make room")
+    program.send(signal.SIGTERM)
+    assert program.rest()[0] == 0
+    assert small_disk.mount("16m", "remount")
+    again = m2pem.start(*serve)
+    again.until_text("r1 stopped")
+    again.send(signal.SIGTERM)
+    assert again.rest()[0] == 0
     assert [effect.kind for effect in recorded_effects(state)].count(EffectKind.START) == 1

@@ -458,6 +458,51 @@ def test_a_journal_that_fails_holds_the_vehicles_and_starts_nothing(play, monkey
     play(story, "ugv1")
 
 
+@pytest.mark.parametrize("all_runs", [True, False])
+def test_a_stop_reaches_the_vehicles_that_a_failed_journal_has_left_held(
+    play, monkeypatch, all_runs
+):
+    async def story(world: World):
+        control = world.executive.control
+        run = await control.start(DRIVE)
+        await world.fake.until_called("start", "r1.b1")
+
+        async def full(entries):
+            raise JournalError("the disk is full")
+
+        monkeypatch.setattr(world.journal, "append", full)
+        with pytest.raises(OperatorError, match="was not recorded: the disk is full"):
+            await control.pause(run)
+        await world.fake.until_called("hold", "ugv1")
+        assert world.fake.count("cancel") == 0
+        stop = control.stop_all(by="anna") if all_runs else control.stop(run, by="anna")
+        with pytest.raises(OperatorError) as refused:
+            await stop
+        await world.fake.until_called("cancel", "r1.b1")
+        return str(refused.value)
+
+    said = play(story, "ugv1")
+    assert said == "r1: the stop went to its vehicles, but was not recorded: the disk is full"
+
+
+def test_a_shutdown_leaves_held_what_a_failed_journal_has_left_held(play, monkeypatch):
+    async def story(world: World):
+        await world.executive.control.start(DRIVE)
+        await world.fake.until_called("start", "r1.b1")
+
+        async def full(entries):
+            raise JournalError("the disk is full")
+
+        monkeypatch.setattr(world.journal, "append", full)
+        with pytest.raises(OperatorError):
+            await world.executive.control.pause("r1")
+        await world.executive.stop_all("SIGTERM")
+        await world.clock.sleep(10)
+        return world.fake.count("cancel")
+
+    assert play(story, "ugv1") == 0
+
+
 def test_an_operator_takes_a_vehicle_and_gives_it_back(play):
     async def story(world: World):
         control = world.executive.control
