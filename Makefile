@@ -221,8 +221,8 @@ test: lint bench-quick ## check all but the long tests
 	@$(MAKE) --silent test-ros
 
 test-long: lint ros ## check everything: fuzzing, large random counts, foreign corpora too
-	@$(BIN)/pytest -n 2 --timeout 1800
-	@$(ROS_PYTHON) -m pytest -n 2 --timeout 1800 $(ROS_TESTS)
+	@$(BIN)/pytest -n 2 --timeout 1800 --hypothesis-profile random
+	@$(ROS_PYTHON) -m pytest -n 2 --timeout 1800 --hypothesis-profile random $(ROS_TESTS)
 
 FUZZ_S := 600
 

@@ -72,7 +72,7 @@ def never_claim(formula: Formula) -> Claim:
             claim[state].append((_python(found[1]), ALL))
         elif found := re.match(r"\s*:: (.*) -> goto (\w+)", line):
             claim[state].append((_python(found[1]), found[2]))
-        elif re.match(r"\s*false", line):
+        elif re.match(r"\s*(:: )?false", line):
             claim[state].append(("False", state))
         else:
             assert re.match(r"never|\s*(if|fi;|do|od;|skip|})", line), line
