@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from m2pem.cli.journals import existing_journal
+from m2pem.cli.journals import journal_to_read
 from m2pem.cli.standing import Standing
 from m2pem.journal import Journal, RunLine
 
@@ -29,7 +29,7 @@ class Interrupted:
 
 async def interrupted_runs(url: str | None) -> list[Interrupted]:
     """The interrupted runs of a journal, by what its records say."""
-    async with existing_journal(url) as journal:
+    async with journal_to_read(url) as journal:
         return [
             await _interrupted(journal, line)
             for line in await journal.runs()

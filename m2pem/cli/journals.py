@@ -1,10 +1,18 @@
 """Opens the journal that a command names, and finds runs in it."""
 
+import os
+import shutil
+import tempfile
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+import click
+
 from m2pem.cli.options import UnusableError
+from m2pem.errors import JournalError
+from m2pem.executive.runtime_folder import runtime_folder
 from m2pem.journal import Journal, MemoryJournal, RunLine, default_url, file_of, open_journal
 
 if TYPE_CHECKING:
@@ -26,9 +34,45 @@ async def journal_at(url: str) -> AsyncIterator[Journal]:
         await journal.close()
 
 
+FULL_BYTES = 1_000_000
+"""With less free space SQLite cannot even open a journal."""
+
+
+@asynccontextmanager
+async def journal_to_read(url: str | None) -> AsyncIterator[Journal]:
+    """As `existing_journal`, for a command that writes nothing: on a full disk, a copy of it.
+
+    What the vehicles were doing must be known then, too.
+    """
+    path = file_of(url_of(url))
+    if path is None or not path.exists() or not _is_full(path):
+        async with existing_journal(url) as journal:
+            yield journal
+        return
+    with tempfile.TemporaryDirectory(dir=runtime_folder()) as folder:
+        copy = Path(folder) / path.name
+        for what in ("", "-wal", "-mark"):
+            beside = path.with_name(path.name + what)
+            if beside.exists():
+                shutil.copyfile(beside, copy.with_name(copy.name + what))
+        # Whether an executive drives a run is known by the locks of the journal itself.
+        copy.with_name(f"{copy.name}-lock").symlink_to(f"{path.resolve()}-lock")
+        try:
+            async with journal_at(str(copy)) as journal:
+                click.echo(f"m2pem: {path}: the disk is full; a copy of it is read", err=True)
+                yield journal
+        except JournalError as error:
+            raise JournalError(str(error).replace(str(copy), str(path))) from error
+
+
+def _is_full(path: Path) -> bool:
+    disk = os.statvfs(path.parent)
+    return disk.f_bavail * disk.f_frsize < FULL_BYTES
+
+
 @asynccontextmanager
 async def existing_journal(url: str | None) -> AsyncIterator[Journal]:
-    """A journal that is to be read, open within the block.
+    """A journal that is there already, open within the block.
 
     The user's own may be missing yet; it is then an empty one.
 

@@ -73,10 +73,10 @@ def replay(
 
 
 async def _replay(run_id: str, url: str | None, verify: bool, state_only: bool, output: str) -> int:
-    from m2pem.cli.journals import existing_journal, find_run
+    from m2pem.cli.journals import find_run, journal_to_read
     from m2pem.cli.progress import progress
 
-    async with existing_journal(url) as journal:
+    async with journal_to_read(url) as journal:
         line = await find_run(journal, run_id)
         # On a terminal the records themselves are the progress.
         shown = verify or state_only or not sys.stdout.isatty()

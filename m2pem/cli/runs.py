@@ -50,10 +50,10 @@ def runs(journal: str | None, accept_loss: str | None, output: str) -> None:
 
 
 async def _runs(url: str | None, accept_loss: str | None) -> "list[RunSummary]":
-    from m2pem.cli.journals import accept, existing_journal
+    from m2pem.cli.journals import accept, existing_journal, journal_to_read
     from m2pem.executive.control import summary
 
-    async with existing_journal(url) as journal:
+    async with journal_to_read(url) if accept_loss is None else existing_journal(url) as journal:
         if accept_loss is not None:
             await accept(journal, accept_loss)
         return [summary(line) for line in await journal.runs()]

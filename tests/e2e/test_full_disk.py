@@ -74,6 +74,13 @@ def test_a_full_disk_holds_the_vehicles_and_after_room_is_made_the_run_goes_on(
     assert [effect.kind for effect in recorded_effects(state)][-1] is EffectKind.HOLD
     status, _, errors = m2pem.run("resume", "r1", "--journal", journal, "--ocu", "none")
     assert (status, "the disk is full; make room" in errors) == (1, True), errors
+    status, printed, errors = m2pem.run("fleet", fleet, "--journal", journal)
+    assert (status, "it has evsg1 (goto), which may go on or stand held" in printed) == (0, True)
+    assert f"{journal}: the disk is full; a copy of it is read" in errors
+    assert "r1   interrupted" in m2pem.run("runs", "--journal", journal)[1]
+    assert "evsg1 begins goto" in m2pem.run("replay", "r1", "--journal", journal)[1]
+    status, _, errors = m2pem.run("stop", "r1", "--journal", journal)
+    assert "`m2pem resume r1 --stop`" in errors
     assert small_disk.mount("16m", "remount")
     program = m2pem.start("resume", "r1", "--journal", journal, "--ocu", "plain")
     program.until_text("held, and the journal does not say why")
