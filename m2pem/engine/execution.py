@@ -63,7 +63,6 @@ class Execution:
         "_reach",
         "_receivable",
         "_triggered_starts",
-        "_waits",
         "changed",
         "ended_instances",
         "entered",
@@ -75,6 +74,7 @@ class Execution:
         "queue",
         "records",
         "state",
+        "waits",
     )
 
     def __init__(self, state: RunState, fleet: Fleet | None) -> None:
@@ -89,7 +89,7 @@ class Execution:
         self.moved: set[int] = set()  # scopes whose inclusive joins must be looked at
         self.changed = False  # whether conditions must be looked at before the next step
         self.process_ids = [node.container.process.id for node in self.mission.nodes]
-        self._waits = {
+        self.waits = {
             node: waits
             for node in self.mission.nodes
             if (type(node) in _MAY_WAIT or (isinstance(node, Activity) and node.boundary))
@@ -170,7 +170,7 @@ class Execution:
             )
         )
         entered = self.state.tokens[token]
-        if instance is None and node not in self._waits:
+        if instance is None and node not in self.waits:
             self.queue.append(entered)
         else:
             self.execute_later(entered)
@@ -180,7 +180,7 @@ class Execution:
     def execute_later(self, token: Token) -> None:
         """Have a token executed in its turn, or at once if its node waits."""
         node = token.node
-        waits = self._waits.get(node, Waits.NOTHING)
+        waits = self.waits.get(node, Waits.NOTHING)
         if token.instance is not None:
             waits = waits_when_entered(node, instance=True)
         elif type(node) is StartEvent and self.has_been_triggered(token):

@@ -80,14 +80,18 @@ class Steps(Execution):
         return records
 
     def _yield(self) -> None:
-        steps = tuple(
-            item.id if isinstance(item, Token) else -item.id
-            for item in dict.fromkeys((*self.queue, *self.entered))
-            if self._is_there(item)
-        )
+        # Written out, as there may be many thousands at each of many batches.
+        tokens, scopes = self.state.tokens, self.state.scopes
+        steps = []
+        for item in dict.fromkeys((*self.queue, *self.entered)):
+            if type(item) is Token:
+                if tokens.get(item.id) is item:
+                    steps.append(item.id)
+            elif scopes.get(item.id) is item:
+                steps.append(-item.id)
         self.queue.clear()
         self.entered.clear()
-        self.emit(r.RunYielded(steps))
+        self.emit(r.RunYielded(tuple(steps)))
 
     def reload_queue(self) -> None:
         """Take up the steps that a yield left over."""
@@ -97,10 +101,15 @@ class Steps(Execution):
             # The batch before may have been another process.
             self.moved.update(self.state.scopes)
             self.changed = True
+        tokens, queue, waits = self.state.tokens, self.queue, self.waits
         for number in steps:
             if number > 0:
-                token = self.state.tokens.get(number)
-                if token is not None:
+                token = tokens.get(number)
+                if token is None:
+                    continue
+                if token.instance is None and token.node not in waits:
+                    queue.append(token)
+                else:
                     self.execute_later(token)
             else:
                 scope = self.state.scopes.get(-number)

@@ -325,7 +325,7 @@ class Runner:
         outside = self._outside
         outside.observe(self.id, step.records)
         for record in step.records:
-            if isinstance(record, r.BehaviorEnded):
+            if type(record) is r.BehaviorEnded:
                 outside.dispatcher.ended(record.behavior)
         if outside.notices.anybody:
             t_s = step.t_us / 1_000_000

@@ -22,9 +22,10 @@ from m2pem.model.elements import (
 
 
 def _is_join(node: FlowNode) -> bool:
-    if isinstance(node, ComplexGateway):
-        return True
-    return isinstance(node, (ParallelGateway, InclusiveGateway)) and len(node.incoming) > 1
+    kind = type(node)
+    if kind is ParallelGateway or kind is InclusiveGateway:
+        return len(node.incoming) > 1
+    return kind is ComplexGateway
 
 
 def _is_choice(scope: Scope, node: FlowNode) -> bool:
