@@ -1,4 +1,4 @@
-"""Reading and checking without Python's cyclic garbage collector: it would look for garbage again and again."""
+"""Reading and checking without Python's cyclic garbage collector: it would look again and again."""
 
 import gc
 from collections.abc import Iterator
