@@ -10,7 +10,7 @@ from m2pem.api.authoring import Draft, MissionSource
 from m2pem.errors import MissionError
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.findings import Finding, Severity, has_errors, lines, unreadable_remedy
-from m2pem.model.bpmn import collector, parse_mission
+from m2pem.model.bpmn import parse_mission
 from m2pem.model.bpmn.rules.registry import code
 from m2pem.model.bpmn.search_path import SearchPath
 from m2pem.model.bpmn.size import max_bytes, too_large
@@ -90,7 +90,6 @@ def _unreadable(name: str, why: str, remedy: str = "check the path") -> MissionE
     return MissionError(f"{name} cannot be read", [finding])
 
 
-@collector.paused()
 def findings_for(
     mission: Mission,
     arbiters: FleetArbiters | None,

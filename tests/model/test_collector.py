@@ -13,6 +13,7 @@ def _on_again() -> Iterator[None]:
     yield
     gc.unfreeze()
     gc.enable()
+    gc.collect()
 
 
 def test_it_is_off_meanwhile_and_on_again_after_an_error() -> None:
@@ -34,3 +35,30 @@ def test_what_a_program_has_frozen_stays_frozen() -> None:
     with collector.paused():
         pass
     assert gc.get_freeze_count() > 0
+
+
+class Circle:
+    """Garbage that only the collector finds."""
+
+    alive = 0
+
+    def __init__(self) -> None:
+        self.itself = self
+        Circle.alive += 1
+
+    def __del__(self) -> None:
+        Circle.alive -= 1
+
+
+@pytest.mark.parametrize(("circles", "times"), [(20, 500), (60, 50)])
+def test_what_is_read_and_dropped_again_and_again_does_not_stay(
+    monkeypatch: pytest.MonkeyPatch, circles: int, times: int
+) -> None:
+    monkeypatch.setattr(collector, "MANY", 50)  # the larger ones are many
+    monkeypatch.setattr(collector, "AT_MOST_UNSEARCHED", 500)
+    gc.collect()
+    for _ in range(times):
+        with collector.paused():
+            read = [Circle() for _ in range(circles)]
+        del read
+    assert Circle.alive < circles * times / 2
