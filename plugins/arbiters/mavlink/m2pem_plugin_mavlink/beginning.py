@@ -1,9 +1,8 @@
 """After a restart: does a vehicle show that it has not begun what was accepted for it?
 
-Only what no person beside the vehicle could have meant otherwise counts: the vehicle stands where
-it stood, a short while later, as it stood or as m2pem makes it ready: in the behavior's mode and
-armed. Another mode, motors that were disarmed or a step aside may be somebody's wish, and an
-operator is asked.
+The vehicle shows it when it stands at the same place a short time later, in the same state or in
+the state into which m2pem brings it before the start: in the behavior's mode and armed. Another
+mode, disarmed motors or another place may be what a person has intended: an operator is asked.
 """
 
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior
@@ -12,7 +11,7 @@ from m2pem_plugin_mavlink.native_ref import Before
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 SOON_S = 60.0
-"""Whoever walks up to a vehicle later than that does not expect it to go on by itself."""
+"""A person who walks up to the vehicle later than that does not expect it to move by itself."""
 
 SAME_PLACE_M = 3.0
 """Positions of a vehicle that stands drift so far within that time."""
