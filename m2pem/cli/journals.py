@@ -4,7 +4,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -49,20 +49,32 @@ async def journal_to_read(url: str | None) -> AsyncIterator[Journal]:
         async with existing_journal(url) as journal:
             yield journal
         return
-    with tempfile.TemporaryDirectory(dir=runtime_folder()) as folder:
-        copy = Path(folder) / path.name
-        for what in ("", "-wal", "-mark"):
-            beside = path.with_name(path.name + what)
-            if beside.exists():
-                shutil.copyfile(beside, copy.with_name(copy.name + what))
-        # Whether an executive drives a run is known by the locks of the journal itself.
-        copy.with_name(f"{copy.name}-lock").symlink_to(f"{path.resolve()}-lock")
+    with ExitStack() as stack:
+        try:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(dir=runtime_folder()))
+            copy = _copied(path.resolve(), Path(folder))
+        except OSError as error:
+            raise JournalError(
+                f"{path}: the disk is full, and {runtime_folder()} cannot take a copy of it: "
+                f"{error.strerror}; make room on one of them"
+            ) from error
         try:
             async with journal_at(str(copy)) as journal:
                 click.echo(f"m2pem: {path}: the disk is full; a copy of it is read", err=True)
                 yield journal
         except JournalError as error:
             raise JournalError(str(error).replace(str(copy), str(path))) from error
+
+
+def _copied(path: Path, folder: Path) -> Path:
+    """Copy a journal's files into a folder. The locks stay its own: they say what is driven."""
+    copy = folder / path.name
+    for what in ("", "-wal", "-mark"):
+        beside = path.with_name(path.name + what)
+        if beside.exists():
+            shutil.copyfile(beside, copy.with_name(copy.name + what))
+    copy.with_name(f"{copy.name}-lock").symlink_to(f"{path}-lock")
+    return copy
 
 
 def _is_full(path: Path) -> bool:
