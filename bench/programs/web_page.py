@@ -45,8 +45,8 @@ COUNT_FRAMES = """(seconds) => new Promise((resolve) => {
 })"""
 
 
-async def look(page: Page, base: str, run: str, seconds: float) -> dict[str, Any]:
-    """Open the run's page, and count while it is drawn."""
+async def look(page: Page, address: str, seconds: float) -> dict[str, Any]:
+    """Open the run's page by an address that signs in, and count while it is drawn."""
     told = 0
 
     def received(text: str | bytes) -> None:
@@ -54,7 +54,7 @@ async def look(page: Page, base: str, run: str, seconds: float) -> dict[str, Any
         told += str(text).startswith('{"type":"frame"')
 
     page.on("websocket", lambda socket: socket.on("framereceived", received))
-    await page.goto(f"{base}/runs/{run}")
+    await page.goto(address)
     await page.locator(".drawing .djs-shape").first.wait_for()
     await asyncio.sleep(WARM_S)
     before = told
@@ -82,10 +82,9 @@ async def measure(seconds: float, folder: Path) -> dict[str, Any]:
         page.set_default_timeout(WITHIN_MS)
         run = await running.control.start(MISSION)
         async with watched(running, run, folder) as (said, url):
-            await page.goto(url())
             state = running.runners[run].run.state
             before, began = state.seq, asyncio.get_running_loop().time()
-            answer = await look(page, url().partition("/?")[0], run, seconds)
+            answer = await look(page, url().replace("/?", f"/runs/{run}?"), seconds)
             records = state.seq - before
             took_s = asyncio.get_running_loop().time() - began
             await running.control.stop(run)
