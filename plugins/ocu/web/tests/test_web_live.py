@@ -6,8 +6,10 @@ from typing import Any
 import pytest
 from m2pem_plugin_web.live import feed
 from m2pem_plugin_web.live.hub import FRAME_S, MOST_VIEWERS
-from m2pem_plugin_web.live.socket import FULL, SILENT
+from m2pem_plugin_web.live.socket import FULL, SILENT, _converse
 from m2pem_plugin_web.live.viewer import URGENT, WINDOW, Viewer
+from starlette.types import Message
+from starlette.websockets import WebSocket
 from web_world import VEHICLE, Live, MakeWorld, World, serving
 
 from m2pem.api import RunId, RunStatus, StampedRecord
@@ -350,6 +352,27 @@ async def test_only_so_many_pages_are_served(
         first, second = await browser.live(), await browser.live()
         assert await second.until_closed() == FULL
         assert await first.watch(None)
+
+
+async def test_a_browser_that_goes_while_it_speaks_and_is_spoken_to_leaves_no_error(
+    world: MakeWorld,
+) -> None:
+    async with world() as here:
+        said: list[Message] = [{"type": "websocket.connect"}]
+
+        async def receive() -> Message:
+            await asyncio.sleep(0)
+            text = '{"type": "watch", "run": null}'
+            return said.pop() if said else {"type": "websocket.receive", "text": text}
+
+        async def send(message: Message) -> None:
+            if message["type"] == "websocket.send":
+                raise OSError("the browser is gone")
+
+        socket, viewer = WebSocket({"type": "websocket"}, receive, send), Viewer()
+        await socket.accept()
+        here.ocu.hub.viewers.add(viewer)
+        await _converse(socket, here.ocu.hub, viewer, lambda: True)
 
 
 async def test_two_units_tell_the_same(world: MakeWorld) -> None:

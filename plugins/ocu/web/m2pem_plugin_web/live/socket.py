@@ -7,7 +7,7 @@ from contextlib import suppress
 
 import msgspec
 from fastapi import APIRouter, WebSocket
-from starlette.websockets import WebSocketDisconnect
+from starlette.websockets import WebSocketDisconnect, WebSocketDisconnected
 
 from m2pem.errors import M2pemError
 from m2pem_plugin_web.access.entry import SUBPROTOCOL, Entry, key_of
@@ -102,8 +102,8 @@ async def _converse(
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in done:
             task.result()
-    except WebSocketDisconnect:
-        return
+    except (WebSocketDisconnect, WebSocketDisconnected):
+        return  # the second: one task asked after the other had found that the browser is gone
     finally:
         for task in tasks:
             task.cancel()
