@@ -39,9 +39,6 @@ HOLD_WITHIN_S = 6.0
 """BRAKE stops a copter from 10 m/s within 4 s; a command that is lost is sent again after 1.5 s."""
 
 CANCEL_TIMEOUT_S = 10.0
-SILENT_SHARE = 0.8
-"""Of `lost_after_s`: after so much of it a vehicle is lost, as it takes a while to notice."""
-
 HEARD_WITHIN_S = 5.0
 """Vehicles that are there say so every second; `connect` waits for them no longer."""
 
@@ -179,6 +176,8 @@ class MavlinkArbiter:
                 self._fences[resource] = fences.setdefault(id(area), Fence(area))
             self._tasks.append(create(self._attend(resource)))
         heard = await asyncio.gather(*(helm.knows(HEARD_WITHIN_S) for helm in self._helms.values()))
+        for vehicle in vehicles.values():  # who is commanded first may be told to follow another
+            self._states.put(vehicle.state())
         self._tasks += [create(self._check(vehicle)) for vehicle in vehicles.values()]
         for resource, is_heard in zip(vehicles, heard, strict=True):
             if not is_heard:
@@ -364,7 +363,7 @@ class MavlinkArbiter:
         """Tell how a vehicle is, and notice when it falls silent."""
         helm, clock = self._helms[resource], self._context.clock
         vehicle = helm.vehicle
-        bound_s = self.limits(resource).lost_after_s * SILENT_SHARE
+        bound_s = self.limits(resource).lost_after_s
         began_us = looked_us = clock.now_us()
         told, link, was_late = -1, LinkState.CONNECTED, False
         while True:
@@ -381,7 +380,8 @@ class MavlinkArbiter:
             if vehicle.heard.changes != told or vehicle.link_state != link:
                 told, link = vehicle.heard.changes, vehicle.link_state
                 self._states.put(replace(vehicle.state(), behavior=helm.behavior))
-            await clock.sleep(TELEMETRY_EVERY_S)
+            left_s = bound_s - silent_s
+            await clock.sleep(min(TELEMETRY_EVERY_S, left_s) if left_s > 0 else TELEMETRY_EVERY_S)
 
 
 def _vehicles(request: BehaviorRequest) -> list[ResourceId]:

@@ -24,6 +24,10 @@ from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 SETTLES_S = 1.5
 """A change is judged so long after it was seen: the text that explains it may come after it."""
 
+RESTART_SHOWS_WITHIN_S = 12.0
+"""A vehicle that is suddenly disarmed may have restarted, which shows when it tells its clock: its
+streams are asked for again after 5 s of silence."""
+
 TEXTS_BEFORE_S = 3.0
 """A text that came so long before a change may explain it."""
 
@@ -53,6 +57,7 @@ class Cause(StrEnum):
     FAILSAFE = "failsafe"
     PILOT = "pilot"
     STATION = "station"
+    RESTART = "restart"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +84,7 @@ class TakeoverWatch:
         self._before: int | None = None
         self._armed: bool | None = None
         self._disarmed: tuple[float, FlightMode] | None = None
+        self._boots = vehicle.heard.boots
         self._settled: tuple[int | None, int | None] = (None, None)
         self._mission: tuple[MissionItem, ...] | None = None
         self._mission_s = 0.0
@@ -106,7 +112,17 @@ class TakeoverWatch:
     def begin(self) -> None:
         """Something new is about to be asked of it: how it is by now is not a takeover."""
         self._disarmed = None
+        self._boots = self.vehicle.heard.boots
         self._settled = (self.vehicle.heard.custom_mode, self.vehicle.ours.custom_mode)
+
+    def restarted(self) -> Takeover | None:
+        """Whether the autopilot has restarted since `begin`: its clock has gone back."""
+        if self.vehicle.heard.boots <= max(self._boots, 1):
+            return None
+        was = "" if self._disarmed is None else f", in {self._disarmed[1]} before"
+        return Takeover(
+            Cause.RESTART, f"its autopilot has restarted{was}: it is disarmed, and does nothing"
+        )
 
     def taken_over(self, modes: Collection[FlightMode]) -> Takeover | None:
         """Whether somebody else has taken over a vehicle that is to be in one of these modes.
@@ -116,21 +132,22 @@ class TakeoverWatch:
         """
         return self._disarmed_by(modes) or self._mode_by(modes) or self._mission_by(modes)
 
+    def mode_is_ours(self, modes: Collection[FlightMode]) -> bool:
+        """Whether the vehicle is in the mode that was asked for here, or in one of these modes that
+        it goes over to by itself."""
+        heard, asked_for = self.vehicle.heard, self.vehicle.ours.custom_mode
+        if asked_for is None or heard.custom_mode == asked_for:
+            return asked_for is not None or heard.mode in modes
+        asked = self.vehicle.driver.flight_mode(asked_for)
+        follows = heard.mode in modes and heard.mode in _FOLLOWS.get(asked, ())
+        return follows and (asked is not FlightMode.MISSION or self._mission_is_over())
+
     def _mode_by(self, modes: Collection[FlightMode]) -> Takeover | None:
         heard, ours = self.vehicle.heard, self.vehicle.ours
         number = heard.custom_mode
         if number is None or not heard.armed or ours.changing:
             return None
-        if number == ours.custom_mode or (number, ours.custom_mode) == self._settled:
-            return None
-        if ours.custom_mode is None:
-            natural = heard.mode in modes
-        else:
-            asked = self.vehicle.driver.flight_mode(ours.custom_mode)
-            natural = heard.mode in modes and heard.mode in _FOLLOWS.get(asked, ())
-            if asked is FlightMode.MISSION:
-                natural = natural and self._mission_is_over()
-        if natural:
+        if (number, ours.custom_mode) == self._settled or self.mode_is_ours(modes):
             return None
         name = self.vehicle.driver.mode_name(number)
         before = "" if self._before is None else self.vehicle.driver.mode_name(self._before)
@@ -151,6 +168,10 @@ class TakeoverWatch:
             return None
         at_s, mode = self._disarmed
         if self.vehicle.heard.landed and mode in _STANDS_AFTER:
+            return None
+        clock_s = self.vehicle.heard.clock_s
+        waits = self.vehicle.link.now_s() - at_s < RESTART_SHOWS_WITHIN_S
+        if clock_s is not None and clock_s <= at_s and waits:
             return None
         changed = f"it was disarmed in {mode}"
         return self._explained(

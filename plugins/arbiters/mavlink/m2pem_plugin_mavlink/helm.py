@@ -13,8 +13,13 @@ from dataclasses import dataclass
 from m2pem.api import BehaviorId, BehaviorState, Ledger, Limits
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError
 from m2pem_plugin_mavlink.behaviors.flight import SetSpeed
-from m2pem_plugin_mavlink.behaviors.looking import STANDS_BELOW_M_S, modes_of, on_the_ground
-from m2pem_plugin_mavlink.foreign import Cause, TakeoverWatch
+from m2pem_plugin_mavlink.behaviors.looking import (
+    STANDS_BELOW_M_S,
+    Standing,
+    modes_of,
+    on_the_ground,
+)
+from m2pem_plugin_mavlink.foreign import TEXTS_BEFORE_S, Cause, TakeoverWatch
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
@@ -258,11 +263,14 @@ class Helm:
     async def _until_finished(self, flight: _Flight) -> None:
         create = asyncio.get_running_loop().create_task
         steps, telling = create(flight.behavior.steps()), create(self._tell_speeds(flight))
+        standing = Standing(flight.behavior.job)
         try:
-            while not flight.behavior.finished():
+            # A restart comes first: one that fell from the air looks like one that has landed.
+            while not self._has_restarted() and not flight.behavior.finished():
                 if steps.done():
                     steps.result()
                 self._look(modes_of(flight.behavior))
+                self._look_whether_it_moves(flight.behavior, standing)
                 await self.vehicle.sleep(LOOK_EVERY_S)
         finally:
             for task in (steps, telling):
@@ -287,10 +295,32 @@ class Helm:
                 code = "BATTERY_LOW" if "batt" in takeover.reason.lower() else "FAILED"
             raise _TakenOverError(takeover.reason, code)
 
+    def _has_restarted(self) -> bool:
+        """False.
+
+        Raises:
+            _TakenOverError: it has.
+        """
+        if restart := self._watch.restarted():
+            raise _TakenOverError(restart.reason, "FAILED")
+        return False
+
+    def _look_whether_it_moves(self, behavior: Behavior, standing: Standing) -> None:
+        bound_s = behavior.still_s
+        if bound_s is None or standing.seconds() < bound_s:
+            return
+        vehicle = self.vehicle
+        mode = vehicle.driver.mode_name(vehicle.heard.custom_mode or 0)
+        said = "; ".join(vehicle.recent_texts(bound_s + TEXTS_BEFORE_S))
+        raise BehaviorFailedError(
+            f"it should be on its way, and has not moved for {bound_s:g} s, in {mode}"
+            + (f"; it said: {said}" if said else "")
+        )
+
     async def _stand(self, flight: _Flight | None) -> None:
         try:
             await self._stop()
-            while flight is not None:
+            while flight is not None and not self._has_restarted():
                 # One that is held before it has left the ground disarms itself after a while.
                 if not on_the_ground(self.vehicle):
                     self._look(_HELD)
@@ -312,6 +342,9 @@ class Helm:
                 self._over(flight, BehaviorState.FAILED, "TIMEOUT", reason)
             elif (error := stop.exception()) is not None:
                 self._over(flight, BehaviorState.FAILED, "", f"it would not stop: {error}")
+            elif self._fails_safe:
+                reason = "it returns or lands by itself, and was not interrupted"
+                self._over(flight, BehaviorState.FAILED, "TAKEN_OVER", reason)
             else:
                 self._over(flight, BehaviorState.CANCELLED)
         finally:
@@ -323,13 +356,23 @@ class Helm:
     def _fails_safe(self) -> bool:
         """Whether it returns or lands, and was not asked for that here: a failsafe, or a person.
         After a restart it is held when its behavior is not recognised."""
-        heard = self.vehicle.heard
-        own = heard.custom_mode == self.vehicle.ours.custom_mode
-        return bool(heard.armed) and heard.mode in _FAIL_SAFE and not own
+        heard, flight = self.vehicle.heard, self._flight
+        if not heard.armed or heard.mode not in _FAIL_SAFE:
+            return False
+        return not self._watch.mode_is_ours(modes_of(flight.behavior) if flight else ())
 
     async def _stop(self) -> None:
-        if await self.vehicle.identified(0.0):
-            await self.vehicle.driver.stop()
+        """Have it stand; a failsafe of its own goes on, whatever ends here."""
+        if not await self.vehicle.identified(0.0):
+            return
+        if self._fails_safe:
+            heard = self.vehicle.heard
+            mode = self.vehicle.driver.mode_name(heard.custom_mode or 0)
+            self._logger.warning(
+                "%s: not stopped: it is in %s, not asked for here", self.vehicle.resource, mode
+            )
+            return
+        await self.vehicle.driver.stop()
 
     async def _fail(self, flight: _Flight, reason: str, code: str = "") -> None:
         """What has failed half-way must not go on; a vehicle that stands is left as it is."""

@@ -38,6 +38,8 @@ class Body:
     refuses: dict = field(default_factory=dict)
     circles: bool = False
     findings: list = field(default_factory=list)
+    rally: list = field(default_factory=list)
+    boots: int = 1
     firmware: Firmware = Firmware.ARDUPILOT
 
     @property

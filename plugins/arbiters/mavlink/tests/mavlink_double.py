@@ -125,6 +125,9 @@ class DoubleDriver:
         await self._tell("downloaded")
         return self.body.mission
 
+    async def rally_points(self):
+        return self.body.rally
+
     async def start_mission(self, first: int = 0) -> None:
         await self._tell("start_mission", first)
         self.body.armed, self.body.begun = True, self.body.begun + 1
@@ -198,6 +201,7 @@ class DoubleVehicle:
             mode = FlightMode.HOLD
         heard.mode, heard.custom_mode = mode, MODES.index(mode)
         heard.armed, heard.landed = body.armed, body.landed
+        heard.boots, heard.clock_s = body.boots, self.link.now_s()
         heard.at_s = heard.heartbeat_s = self.link.now_s()
         heard.changes += 1
         self._waiters.look()

@@ -32,6 +32,7 @@ Run = Callable[[Callable[[Clock], Any]], Any]
 
 ARM, SET_MODE = dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_DO_SET_MODE
 TAKEOFF, REPOSITION = dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_DO_REPOSITION
+SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
 THERE = Place(47.4, 8.55, 20.0)
 
 
@@ -272,8 +273,21 @@ def test_a_place_is_told_in_its_altitude_frame(virtual: Run, frame: str, number:
             assert (there.frame, there.x, there.y, there.z) == (
                 number, 474_000_000, 85_500_000, 20.0,
             )  # fmt: skip
-            assert (there.param1, there.param2) == (5.0, 1.0)
-            assert commands(link) == [SET_MODE, dialect.MAV_CMD_DO_CHANGE_SPEED, REPOSITION]
+            assert (there.param1, there.param2) == (-1.0, 1.0)
+            (speed,) = link.of("COMMAND_LONG", SPEED)
+            assert speed.param2 == 5.0
+            assert commands(link) == [SET_MODE, REPOSITION, SPEED]
+
+    virtual(main)
+
+
+def test_a_rover_gets_its_speed_after_its_target_as_it_takes_none_without(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(rover(clock)) as (link, vehicle):
+            link.obey[SPEED] = lambda _: ACCEPTED if REPOSITION in commands(link) else FAILED
+            link.obey[REPOSITION] = lambda message: FAILED if message.param1 > 0 else ACCEPTED
+            await vehicle.driver.go_to(THERE, 2.0)
+            assert commands(link)[-2:] == [REPOSITION, SPEED]
 
     virtual(main)
 
@@ -395,6 +409,37 @@ def test_a_plane_is_armed_last_since_it_sets_out_then(virtual: Run) -> None:
             await vehicle.driver.start_mission()
             assert commands(link)[-1] == ARM
             assert link.custom_mode == 10
+
+    virtual(main)
+
+
+def test_a_second_mission_is_begun_by_leaving_auto_first(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        async with Playing((link, vehicle)):
+            await in_the_air(link, vehicle)
+            link.custom_mode = AUTO
+            assert await vehicle.until(lambda: vehicle.heard.custom_mode == AUTO, 3.0)
+            await vehicle.driver.start_mission()
+            modes = [int(each.param2) for each in link.of("COMMAND_LONG", SET_MODE)]
+            assert modes == [GUIDED, AUTO]
+
+    virtual(main)
+
+
+@pytest.mark.parametrize(("state", "words"), [(2, "not started"), (4, "paused"), (1, "has none")])
+def test_a_mission_that_does_not_begin_is_a_failure(virtual: Run, state: int, words: str) -> None:
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        async with Playing((link, vehicle)):
+            await in_the_air(link, vehicle)
+            link.says["MISSION_CURRENT"] = {"seq": 1, "total": 3, "mission_state": state}
+            with pytest.raises(NoAnswerError, match=f"its mission does not begin: .*{words}.*AUTO"):
+                await vehicle.driver.start_mission()
+            link.says["MISSION_CURRENT"] = {"seq": 1, "total": 3, "mission_state": 3}
+            await vehicle.driver.start_mission()
+            link.says["MISSION_CURRENT"] = {"seq": 1, "total": 3}  # it does not say it
+            await vehicle.driver.start_mission()
 
     virtual(main)
 

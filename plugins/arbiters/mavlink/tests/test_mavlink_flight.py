@@ -1,7 +1,7 @@
 import pytest
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
-from mavlink_double import Body
-from mavlink_play import after_a_restart, play
+from mavlink_double import Body, at
+from mavlink_play import V, after_a_restart, play
 
 from m2pem.api import BehaviorState
 
@@ -98,6 +98,55 @@ def test_return_to_launch_ends_at_home_on_the_ground() -> None:
     play(Body(east=50.0).fly(), main)
 
 
+@pytest.mark.parametrize(
+    ("text", "code"), [("Battery 1 is low 10.4V", "BATTERY_LOW"), ("Mode LAND", "TAKEN_OVER")]
+)
+def test_a_landing_far_from_home_is_not_the_end_of_a_return(text, code) -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "return_to_launch", V)
+        await bench.running("r1.b1")
+        await bench.clock.sleep(2)
+        said = "Battery 1 low voltage failsafe" if code == "BATTERY_LOW" else text
+        bench.body.texts.append((bench.clock.now_us() / 1e6, said))
+        bench.body.mode = FlightMode.LAND
+        end = await bench.ended("r1.b1", 10)
+        assert (end.state, end.code) == (BehaviorState.FAILED, code)
+        assert "from RETURN to LAND" in end.reason
+        assert "stop" not in bench.told, "it lands, whatever made it"
+
+    play(Body(east=117.0).fly(), main)
+
+
+@pytest.mark.parametrize("rally", [(), (at(110.0, 0.0),)])
+def test_a_return_ends_at_home_or_at_a_rally_point_and_nowhere_else(rally) -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "return_to_launch", V)
+        await bench.running("r1.b1")
+        await bench.clock.sleep(1)
+        bench.body.texts.append((bench.clock.now_us() / 1e6, "Crash: Disarming"))
+        bench.body.up, bench.body.armed = 0.0, False
+        end = await bench.ended("r1.b1", 20)
+        assert end.state is (SUCCEEDED if rally else BehaviorState.FAILED)
+        where = "" if rally else "it stands on the ground, 11"
+        assert end.reason.startswith(where)
+        assert rally or "Crash: Disarming" in end.reason
+
+    play(Body(east=117.0, rally=list(rally)).fly(), main)
+
+
+def test_a_speed_that_is_refused_where_it_stands_is_that_of_what_follows() -> None:
+    """A copter in BRAKE and a rover in HOLD acknowledge FAILED."""
+
+    async def main(bench) -> None:
+        bench.body.refuses["set_speed"] = "failed"
+        assert (await bench.do("set_speed", speed=2.5)).state is SUCCEEDED
+        await bench.start("r1.b2", "goto", V, target=_point())
+        await bench.running("r1.b2")
+        assert bench.body.calls[-1][2] == 2.5
+
+    play(Body().fly(), main)
+
+
 def test_a_rover_returns_and_stands_at_home() -> None:
     async def main(bench) -> None:
         assert (await bench.do("return_to_launch")).state is SUCCEEDED
@@ -127,7 +176,6 @@ def test_a_speed_that_was_set_is_that_of_what_follows() -> None:
 
 
 def _point():
-    from mavlink_double import at
 
     from m2pem.api import Point
 

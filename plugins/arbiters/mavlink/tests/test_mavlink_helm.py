@@ -160,6 +160,92 @@ def test_a_mission_that_somebody_else_disarms_fails() -> None:
     play(Body("ground"), main)
 
 
+@pytest.mark.parametrize("mode", [FlightMode.RETURN, FlightMode.LAND])
+def test_a_failsafe_that_has_just_begun_is_interrupted_by_no_cancel_and_no_hold(mode) -> None:
+    """A change of mode is judged only when there was time for the text that explains it."""
+
+    async def main(bench) -> None:
+        await flying(bench)
+        await bench.clock.sleep(2)
+        told = list(bench.told)
+        bench.body.mode = mode
+        await bench.clock.sleep(0.2)
+        await bench.arbiter.hold(V)
+        await bench.clock.sleep(0.2)
+        await bench.arbiter.cancel("r1.b1", 1)
+        end = await bench.ended("r1.b1", 10)
+        assert (end.state, end.code) == (FAILED, "TAKEN_OVER")
+        await bench.arbiter.hold(V)
+        await bench.clock.sleep(5)
+        assert (bench.body.mode, bench.told) == (mode, told)
+
+    play(Body().fly(), main)
+
+
+def test_a_behavior_that_fails_does_not_interrupt_a_failsafe() -> None:
+    async def main(bench) -> None:
+        bench.body.refuses["start_mission"] = "no"
+        bench.body.mode = FlightMode.RETURN
+        await bench.clock.sleep(1)
+        await bench.start("r1.b1", "single_vehicle_routing", V, route=WAY)
+        assert (await bench.ended("r1.b1", 20)).state is FAILED
+        assert bench.body.mode is FlightMode.RETURN
+        assert "stop" not in bench.told
+
+    play(Body().fly(), main)
+
+
+def test_an_autopilot_that_restarts_in_flight_has_not_been_taken_over() -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "land", V)
+        await bench.running("r1.b1")
+        bench.body.armed = False
+        await bench.clock.sleep(1)
+        bench.body.boots += 1
+        end = await bench.ended("r1.b1", 10)
+        assert (end.state, end.code) == (FAILED, "FAILED")
+        assert "its autopilot has restarted, in land before" in end.reason
+
+    play(Body().fly(40), main)
+
+
+@pytest.mark.parametrize(
+    ("behavior", "parameters"),
+    [("goto", {"target": FAR}), ("single_vehicle_routing", {"route": WAY})],
+)
+def test_a_vehicle_that_should_move_and_does_not_is_a_failure(behavior, parameters) -> None:
+    async def main(bench) -> None:
+        await flying(bench, behavior, **parameters)
+        await bench.clock.sleep(10)
+        bench.body.speed = 0.0
+        bench.body.texts.append((bench.clock.now_us() / 1e6, "Motor failure"))
+        await bench.clock.sleep(30)
+        await bench.arbiter.hold(V)
+        await bench.clock.sleep(300)
+        assert bench.states_of("r1.b1")[-1] is RUNNING, "who is held may stand"
+        await bench.arbiter.resume(V)
+        await bench.clock.sleep(1)
+        bench.body.speed = 0.0
+        bench.body.texts.append((bench.clock.now_us() / 1e6, "Motor failure"))
+        end = await bench.ended("r1.b1", 70)
+        assert end.state is FAILED
+        assert "has not moved for 60 s" in end.reason
+        assert "Motor failure" in end.reason
+
+    play(Body().fly(), main)
+
+
+def test_a_vehicle_is_lost_after_the_time_that_was_set_and_not_before() -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        bench.body.heard_by_us = False
+        await bench.clock.sleep(9.7)
+        assert bench.states_of("r1.b1")[-1] is RUNNING
+        assert (await bench.ended("r1.b1", 0.5)).state is BehaviorState.LOST
+
+    play(Body().fly(), main, lost_after_s=10.0)
+
+
 def test_a_silent_vehicle_is_lost_and_its_state_says_so() -> None:
     async def main(bench) -> None:
         await flying(bench)
@@ -209,7 +295,6 @@ def test_a_lost_vehicle_that_comes_back_in_a_failsafe_is_not_interrupted(mode) -
         while await bench.arbiter.reclaim(V):
             await bench.clock.sleep(1)
         assert bench.body.landed
-        assert not bench.body.armed
         assert bench.told == told
 
     play(Body().fly(), main)

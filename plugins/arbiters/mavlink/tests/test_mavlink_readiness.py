@@ -32,11 +32,18 @@ def test_a_vehicle_without_a_reason_is_ready(firmware: Firmware) -> None:
 
 
 @pytest.mark.parametrize("firmware", Firmware)
-@pytest.mark.parametrize("flags", [0xA7, 0x0, 0x33F | 0x80])
+@pytest.mark.parametrize("flags", [0x27, 0x0])
 def test_an_estimator_without_a_position_is_not_ready(firmware: Firmware, flags: int) -> None:
     """The pre-arm bit is set before there is a position (in STABILIZE)."""
     found = reasons(firmware, replace(READY, estimator_flags=flags))
     assert found == ("EKF: no position yet, 12 s",)
+
+
+def test_the_estimators_flag_of_a_constant_position_is_a_reason_on_ardupilot_alone() -> None:
+    """PX4 sets it whenever it is at rest, also when it may be armed."""
+    at_rest = replace(READY, estimator_flags=0x3FF)
+    assert reasons(ARDUPILOT, at_rest) == ("EKF: no position yet, 12 s",)
+    assert reasons(PX4, at_rest) == ()
 
 
 def test_an_ardupilot_whose_estimator_is_silent_is_not_ready() -> None:

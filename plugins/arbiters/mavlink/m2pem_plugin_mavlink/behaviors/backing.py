@@ -5,7 +5,13 @@ import math
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import BehaviorState
-from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError, Job, Memory
+from m2pem_plugin_mavlink.behaviors.behavior import (
+    MOVES_WITHIN_S,
+    Behavior,
+    BehaviorFailedError,
+    Job,
+    Memory,
+)
 from m2pem_plugin_mavlink.behaviors.looking import away_m, stands, where
 from m2pem_plugin_mavlink.behaviors.wishes import Wishes
 from m2pem_plugin_mavlink.plane import LatLon, offset
@@ -24,6 +30,7 @@ class Reverse(Behavior):
 
     name = "reverse"
     modes = frozenset({FlightMode.GUIDED, FlightMode.HOLD})
+    still_s = MOVES_WITHIN_S
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)

@@ -16,6 +16,11 @@ text of JSON."""
 ANY_MODE: frozenset[FlightMode] = frozenset(FlightMode)
 
 
+MOVES_WITHIN_S = 60.0
+"""`Behavior.still_s` of what is on its way somewhere. It may be slow to set out, or wait for what
+is in its way; no autopilot needs that long."""
+
+
 class BehaviorFailedError(Exception):
     """It cannot be done, or not any more. `code`: an error code of docs/missions.md."""
 
@@ -58,6 +63,8 @@ class Behavior(ABC):
     name: ClassVar[str]
     modes: frozenset[FlightMode]
     steers: ClassVar[bool] = True
+    still_s: ClassVar[float | None] = None
+    """For how long its vehicle may stand still before it has failed, in s; None: for ever."""
 
     def __init__(self, job: Job) -> None:
         self.job = job

@@ -1,9 +1,19 @@
 """Up, down and home."""
 
+import contextlib
+import math
+from collections.abc import Sequence
+
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import BehaviorState
-from m2pem_plugin_mavlink.behaviors.behavior import ANY_MODE, Behavior, BehaviorFailedError, Job
+from m2pem_plugin_mavlink.behaviors.behavior import (
+    ANY_MODE,
+    MOVES_WITHIN_S,
+    Behavior,
+    BehaviorFailedError,
+    Job,
+)
 from m2pem_plugin_mavlink.behaviors.going import TOLERANCES_M
 from m2pem_plugin_mavlink.behaviors.looking import (
     Standing,
@@ -19,9 +29,13 @@ from m2pem_plugin_mavlink.behaviors.looking import (
     where,
 )
 from m2pem_plugin_mavlink.behaviors.wishes import AMSL, Wishes
+from m2pem_plugin_mavlink.plane import LatLon
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 from m2pem_plugin_mavlink.vehicle.landing import landing_begins
+from m2pem_plugin_mavlink.vehicle.readiness import TEXTS_WITHIN_S
 
+_RETURNS = frozenset({FlightMode.RETURN})
 TAKEOFFS = (dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_VTOL_TAKEOFF)
 LEAST_TAKEOFF_M = 0.5
 LEVEL_M_S = 0.5
@@ -29,6 +43,9 @@ LEVEL_M_S = 0.5
 
 DISARMS_WITHIN_S = 10.0
 """An autopilot disarms by itself so soon after landing; one that doesn't is told to."""
+
+LANDS_WITHIN_M = 15.0
+"""An aircraft that returns lands so near to its home, or to a rally point."""
 
 HOVERS_AT_HOME_S = 30.0
 """An aircraft that is set up not to land at home hovers there; before landing it waits a little."""
@@ -39,6 +56,7 @@ class ChangeAltitude(Behavior):
 
     name = "change_altitude"
     modes = frozenset({FlightMode.GUIDED})
+    still_s = MOVES_WITHIN_S
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
@@ -214,12 +232,13 @@ class ReturnToLaunch(Behavior):
     """Go home; an aircraft lands there, unless it is set up to hover or circle."""
 
     name = "return_to_launch"
-    modes = frozenset({FlightMode.RETURN, FlightMode.LAND})
+    modes = _RETURNS | {FlightMode.LAND}
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
         self._near_m = 2 * TOLERANCES_M.get(self.vehicle.domain, 2.5)
         self._standing = Standing(job)
+        self._rally: Sequence[LatLon] = ()
 
     def refusal(self) -> str:
         """What stands on the ground away from home must take off first."""
@@ -240,9 +259,18 @@ class ReturnToLaunch(Behavior):
         await self.begin()
 
     async def steps(self) -> None:
-        """As `Land`."""
+        """As `Land`; before, find out where else than at home it may land."""
         if self.vehicle.domain == "air" and self.modes is not ANY_MODE:
+            with contextlib.suppress(ExchangeError):  # most have no rally points
+                self._rally = await self.vehicle.driver.rally_points()
             await disarm_when_down(self)
+
+    def _off_m(self) -> float:
+        """How far it is from where it should land; 0 where that is not known, or the landing is one
+        of its own (a plane's, which may begin anywhere)."""
+        if self.vehicle.heard.circle_m is not None or where(self.vehicle) is None:
+            return 0.0
+        return min(self._home_m(), *(away_m(self.vehicle, each) for each in self._rally), math.inf)
 
     def _home_m(self) -> float:
         home = self.vehicle.heard.home
@@ -258,8 +286,21 @@ class ReturnToLaunch(Behavior):
 
     def finished(self) -> bool:
         """At home: an aircraft down and disarmed (or hovering, or circling, for long), others
-        standing."""
+        standing.
+
+        Raises:
+            BehaviorFailedError: an aircraft stands somewhere else.
+        """
+        air = self.vehicle.domain == "air" and self.modes is not ANY_MODE
+        if air:
+            # A LAND far from there is not the end of this return: its battery, or somebody else.
+            lands = self._off_m() <= LANDS_WITHIN_M
+            self.modes = _RETURNS | {FlightMode.LAND} if lands else _RETURNS
         if self._is_there_already():
+            if air and self._off_m() > LANDS_WITHIN_M:
+                said = "; ".join(self.vehicle.recent_texts(TEXTS_WITHIN_S))
+                reason = f"it stands on the ground, {self._home_m():.0f} m from its home"
+                raise BehaviorFailedError(f"{reason}; it said: {said}" if said else reason)
             return True
         home, radius_m = self.vehicle.heard.home, self.vehicle.heard.home_circle_m
         place = (home.latitude_deg, home.longitude_deg) if home is not None else None
@@ -290,8 +331,13 @@ class SetSpeed(Behavior):
         self.speed_m_s = Wishes(job).number("speed") or 0.0
 
     async def begin(self) -> None:
-        """Tell it the speed."""
-        await self.vehicle.driver.set_speed(self.speed_m_s)
+        """Tell it the speed. A mode in which it goes nowhere may refuse it (BRAKE, HOLD); what
+        follows is told the speed in any case."""
+        try:
+            await self.vehicle.driver.set_speed(self.speed_m_s)
+        except RefusedError as refused:
+            if refused.result != dialect.MAV_RESULT_FAILED:
+                raise
 
     async def go_on(self) -> None:
         """Tell it again."""

@@ -4,7 +4,13 @@ import math
 from dataclasses import replace
 
 from m2pem.api import BehaviorState
-from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError, Job, Memory
+from m2pem_plugin_mavlink.behaviors.behavior import (
+    MOVES_WITHIN_S,
+    Behavior,
+    BehaviorFailedError,
+    Job,
+    Memory,
+)
 from m2pem_plugin_mavlink.behaviors.looking import (
     HEIGHT_TOLERANCE_M,
     Standing,
@@ -49,6 +55,7 @@ class Goto(Behavior):
 
     name = "goto"
     modes = frozenset({FlightMode.GUIDED})
+    still_s = MOVES_WITHIN_S
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)

@@ -7,7 +7,13 @@ from dataclasses import replace
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import BehaviorState
-from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError, Job, Memory
+from m2pem_plugin_mavlink.behaviors.behavior import (
+    MOVES_WITHIN_S,
+    Behavior,
+    BehaviorFailedError,
+    Job,
+    Memory,
+)
 from m2pem_plugin_mavlink.behaviors.fingerprint import Fingerprint, fingerprint
 from m2pem_plugin_mavlink.behaviors.going import TOLERANCES_M
 from m2pem_plugin_mavlink.behaviors.looking import (
@@ -59,6 +65,7 @@ class MissionFlight(Behavior):
     """Uploads a way and has it flown; `loop`: over and over. A subclass says the `items`."""
 
     modes = frozenset({FlightMode.MISSION})
+    still_s = MOVES_WITHIN_S
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)

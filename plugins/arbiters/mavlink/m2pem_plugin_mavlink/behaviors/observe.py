@@ -37,6 +37,7 @@ class ObserveFromTheEdge(Goto):
 
     name = "area_observe"
     modes = frozenset({FlightMode.GUIDED, FlightMode.HOLD})
+    still_s = None
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)

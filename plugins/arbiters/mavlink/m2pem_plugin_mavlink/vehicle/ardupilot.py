@@ -21,6 +21,7 @@ STOP_WITHIN_S = 3.0
 
 TAKEOFF_ATTEMPTS = 3
 PLANE_PITCH_DEG = 15.0
+AS_IT_IS = -1.0
 
 _FRAMES = {
     "relative": dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
@@ -156,13 +157,14 @@ class ArdupilotDriver(Autopilot):
     # --- to places ------------------------------------------------------------------------------
 
     async def go_to(self, place: Place, speed_m_s: float | None = None) -> None:
-        """Go to a place in GUIDED. The speed is set before, since GUIDED begins with its own."""
+        """Go to a place in GUIDED. The speed is set after it: a rover that has no target refuses
+        a speed, also that of the command for the target."""
         await self._arm_to_drive()
         await self.set_mode(FlightMode.GUIDED)
+        # Unless it is told, a plane circles as far from there as from the place before.
+        await self._reposition(place, self.heard.circle_m or 0.0)
         if speed_m_s is not None:
             await self.set_speed(speed_m_s)
-        # Unless it is told, a plane circles as far from there as from the place before.
-        await self._reposition(place, speed_m_s, self.heard.circle_m or 0.0)
         if place.heading_rad is not None and self.kind is Kind.COPTER:
             await exchanges.command(
                 self.link,
@@ -170,13 +172,13 @@ class ArdupilotDriver(Autopilot):
                 math.degrees(place.heading_rad) % 360.0,
             )
 
-    async def _reposition(self, place: Place, speed_m_s: float | None, radius_m: float) -> None:
+    async def _reposition(self, place: Place, radius_m: float) -> None:
         frame, altitude_m = self._altitude(place)
         await exchanges.command_at(
             self.link,
             dialect.MAV_CMD_DO_REPOSITION,
             (
-                -1.0 if speed_m_s is None else speed_m_s,
+                AS_IT_IS,
                 float(dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE),
                 radius_m,
                 math.nan,
@@ -201,9 +203,9 @@ class ArdupilotDriver(Autopilot):
             return False
         await self._arm_to_drive()
         await self.set_mode(FlightMode.GUIDED)
+        await self._reposition(center, radius_m)
         if speed_m_s is not None:
             await self.set_speed(speed_m_s)
-        await self._reposition(center, speed_m_s, radius_m)
         return True
 
     async def move(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
@@ -240,13 +242,20 @@ class ArdupilotDriver(Autopilot):
     async def start_mission(self, first: int = 0) -> None:
         """Fly the stored mission from an item on, arming where needed. From the ground a copter
         wants a mission that begins with a takeoff, and MISSION_START; a plane sets out when it is
-        armed, and so is armed last."""
+        armed, and so is armed last.
+
+        AUTO in AUTO changes nothing: a mission that is complete stays complete, and one that was
+        stored since does not begin. So it leaves AUTO first.
+        """
         if self.kind not in WINGED:
             await self.arm()
         self.heard.reached_sequence = None
+        if self.heard.mode is FlightMode.MISSION:
+            await self.set_mode(FlightMode.GUIDED)
         await exchanges.set_current(self.link, first + self.home_items)
         await self.set_mode(FlightMode.MISSION)
         if self.kind in WINGED:
             await self.arm()
         elif self.kind is Kind.COPTER and not self.in_the_air:
             await exchanges.command(self.link, dialect.MAV_CMD_MISSION_START)
+        await self._mission_begins()

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType
+from m2pem_plugin_mavlink.plane import LatLon
 from m2pem_plugin_mavlink.protocol.messages import message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges
@@ -29,6 +30,9 @@ ARM_WITHIN_S = 20.0
 SHOWS_WITHIN_S = 2.5
 """A heartbeat comes every second, and one of them may be lost."""
 
+BEGINS_WITHIN_S = 5.0
+"""A mission that is started is flown; MISSION_CURRENT comes every second."""
+
 RETRY_S = 1.0
 
 _SET_POSITION_TARGET = message_type("SET_POSITION_TARGET_LOCAL_NED")
@@ -42,6 +46,12 @@ _VELOCITY_ONLY = (
     | dialect.POSITION_TARGET_TYPEMASK_YAW_IGNORE
     | dialect.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
 )
+_BEGUN = (dialect.MISSION_STATE_ACTIVE, dialect.MISSION_STATE_COMPLETE)
+_MISSION_STATES = {
+    dialect.MISSION_STATE_NO_MISSION: "it has none",
+    dialect.MISSION_STATE_NOT_STARTED: "not started",
+    dialect.MISSION_STATE_PAUSED: "paused",
+}
 _UNSUPPORTED: int = dialect.MAV_RESULT_UNSUPPORTED
 _LATER: int = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 
@@ -301,6 +311,28 @@ class Autopilot(ABC):
             return (await exchanges.download(self.link))[self.home_items :]
         finally:
             self.ours.exchanging -= 1
+
+    async def rally_points(self) -> Sequence[LatLon]:
+        """Where it may land instead of at home when it returns."""
+        found = await exchanges.download(self.link, MissionType.RALLY)
+        return [(each.latitude_deg, each.longitude_deg) for each in found]
+
+    async def _mission_begins(self) -> None:
+        """Wait until MISSION_CURRENT shows that the mission is flown, or was to its end. One that
+        does not say it is believed.
+
+        Raises:
+            ExchangeError: it is not.
+        """
+        self.heard.mission_state = None  # what was said before may be of the mission before
+        begun = lambda: self.heard.mission_state in _BEGUN  # noqa: E731
+        if not await self.vehicle.until(begun, BEGINS_WITHIN_S):
+            state = self.heard.mission_state
+            if state is not None:
+                raise NoAnswerError(
+                    f"its mission does not begin: {_MISSION_STATES.get(state, state)} for "
+                    f"{BEGINS_WITHIN_S:g} s in {self.modes.name(self.heard.custom_mode or 0)}"
+                )
 
     # --- speed ----------------------------------------------------------------------------------
 

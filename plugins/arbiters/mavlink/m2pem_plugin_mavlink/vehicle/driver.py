@@ -6,6 +6,7 @@ from enum import StrEnum
 from typing import Protocol
 
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.plane import LatLon
 
 
 class FlightMode(StrEnum):
@@ -109,6 +110,10 @@ class Driver(Protocol):
 
     async def downloaded(self) -> tuple[MissionItem, ...]:
         """The mission that the vehicle has, as `upload` takes it."""
+        ...
+
+    async def rally_points(self) -> Sequence[LatLon]:
+        """Where it may land instead of at home when it returns: latitudes and longitudes in deg."""
         ...
 
     async def start_mission(self, first: int = 0) -> None:

@@ -9,7 +9,7 @@ from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
 from m2pem_plugin_mavlink.microservices.commands import Command, CommandPlace
 from m2pem_plugin_mavlink.microservices.intervals import RequestMessage, SetMessageInterval
 from m2pem_plugin_mavlink.microservices.mission_download import DownloadMission
-from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType
 from m2pem_plugin_mavlink.microservices.mission_upload import UploadMission
 from m2pem_plugin_mavlink.microservices.missions import (
     ClearMission,
@@ -53,9 +53,11 @@ async def upload(link: VehicleLink, items: Sequence[MissionItem]) -> None:
     await link.perform(UploadMission(link.address, items))
 
 
-async def download(link: VehicleLink) -> tuple[MissionItem, ...]:
-    """The mission that is stored, as it is stored."""
-    return await link.perform(DownloadMission(link.address))
+async def download(
+    link: VehicleLink, kind: MissionType = MissionType.MISSION
+) -> tuple[MissionItem, ...]:
+    """The mission, the fence or the rally points that are stored, as they are stored."""
+    return await link.perform(DownloadMission(link.address, kind))
 
 
 async def clear(link: VehicleLink) -> None:

@@ -33,6 +33,8 @@ class Heard:
     armed: bool | None = None
     mission_sequence: int | None = None
     mission_total: int | None = None
+    mission_state: int | None = None
+    """MISSION_STATE of MISSION_CURRENT; None also of an autopilot that does not say it."""
     reached_sequence: int | None = None
     # How far it circles from a place where it is to stay, and from home; None: it can stand still
     circle_m: float | None = None
@@ -48,6 +50,8 @@ class Heard:
     heartbeat_s: float | None = None
     boot_s: float | None = None
     boots: int = 0
+    clock_s: float | None = None
+    """When it told its own clock last (`time_boot_ms`)."""
     messages_s: dict[int, float] = field(default_factory=dict)
     """When each kind of message came last, by its id."""
 

@@ -102,6 +102,7 @@ class Intake:
         boot_ms: int = message.time_boot_ms
         if boot_ms + BOOT_TIME_BACK_MS < self._boot_ms and self.heard.at_s is not None:
             self._booted(self.heard.at_s)
+        self.heard.clock_s = self.heard.at_s
         self._boot_ms = max(boot_ms, self._boot_ms)
 
     def _heartbeat(self, message: Any) -> None:
@@ -160,6 +161,7 @@ class Intake:
         heard.mission_sequence = message.seq
         if message.total:  # 0: an autopilot that does not say it
             heard.mission_total = 0 if message.total == _UNKNOWN_UINT16 else message.total
+        heard.mission_state = message.mission_state or None
 
     def _mission_item_reached(self, message: Any) -> None:
         self.heard.reached_sequence = message.seq

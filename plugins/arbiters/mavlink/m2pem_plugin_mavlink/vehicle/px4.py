@@ -195,3 +195,4 @@ class Px4Driver(Autopilot):
         self.heard.reached_sequence = None
         await exchanges.set_current(self.link, first)
         await self.set_mode(FlightMode.MISSION)
+        await self._mission_begins()

@@ -58,13 +58,14 @@ def _reasons(firmware: Firmware, heard: Heard, texts: Iterable[str]) -> Iterator
 
 
 def _position_reasons(firmware: Firmware, heard: Heard, now_s: float) -> Iterator[str]:
-    """A PX4 that sends no ESTIMATOR_STATUS is believed on its pre-arm bit."""
+    """A PX4 that sends no ESTIMATOR_STATUS is believed on its pre-arm bit. PX4 sets
+    ESTIMATOR_CONST_POS_MODE whenever it is at rest; on ArduPilot the bit means: no position."""
     waited_s = 0.0 if heard.boot_s is None else now_s - heard.boot_s
     flags = heard.estimator_flags
     if flags is None:
         if firmware is Firmware.ARDUPILOT or heard.prearm_passed is None:
             yield f"EKF: nothing heard of it yet, {waited_s:.0f} s"
-    elif not flags & _HAS_POSITION or flags & _NO_POSITION:
+    elif not flags & _HAS_POSITION or (flags & _NO_POSITION and firmware is Firmware.ARDUPILOT):
         yield f"EKF: no position yet, {waited_s:.0f} s"
     if firmware is Firmware.PX4 and heard.home is None:
         yield f"home: not set yet, {waited_s:.0f} s"
