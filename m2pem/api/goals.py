@@ -22,8 +22,6 @@ from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
 STATES_WAITING = 1000
 CONNECT_WITHIN_S = 2.0
 RETRY_AFTER_S = 0.5
-SILENT_SHARE = 0.8
-"""Of `lost_after_s`: after so much of it a resource is lost, as it takes a while to notice."""
 
 
 class GoalArbiter:
@@ -186,7 +184,7 @@ class GoalArbiter:
 
     async def _watch(self, resource: ResourceId) -> None:
         # A whole number: of less than a microsecond no clock would wait to the end.
-        bound_us = round(self.limits(resource).lost_after_s * SILENT_SHARE * 1_000_000)
+        bound_us = round(self.limits(resource).lost_after_s * 1_000_000)
         heard_us = self.context.clock.now_us()
         while True:
             heard_us = self._heard_us.get(resource, heard_us)

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 LOST_AFTER_S = 3.0
 HOLD_WITHIN_S = 1.0
 CANCEL_TIMEOUT_S = 10.0
-SILENT_SHARE = 0.8
-"""Of `lost_after_s`: after so much of it a camera is lost, as it takes a while to notice."""
 
 HEARD_WITHIN_S = 5.0
 """`connect` waits no longer for cameras to be heard."""
@@ -234,7 +232,7 @@ class PtzArbiter:
     async def _attend(self, resource: ResourceId) -> None:
         """Tell where a camera looks, and notice when it falls silent."""
         camera, clock = self._cameras[resource], self._context.clock
-        bound_us = self.limits(resource).lost_after_s * SILENT_SHARE * 1e6
+        bound_us = self.limits(resource).lost_after_s * 1e6
         began_us = looked_us = clock.now_us()
         was_late = False
         while True:

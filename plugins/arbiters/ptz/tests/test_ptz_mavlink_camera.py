@@ -21,6 +21,26 @@ async def test_a_picture_is_what_the_camera_calls_it() -> None:
         assert it.camera.pictures == 2
 
 
+async def test_a_camera_that_never_answers_is_asked_for_seldom_and_still_found() -> None:
+    """An autopilot without a camera acknowledges the question, and answers nothing."""
+    async with world() as it:
+        pilot, withheld = it.real.autopilot, []
+        real, answers = pilot.send, False
+
+        def send(message, *to):
+            if message.get_type() == "CAMERA_INFORMATION" and not answers:
+                withheld.append(pilot.now_s)
+            else:
+                real(message, *to)
+
+        pilot.send = send
+        await until(lambda: withheld and pilot.now_s > withheld[-1] + 20.0)
+        often = len(withheld)
+        answers = True
+        await until(lambda: it.driver.refusal("take_picture") == "")
+        assert often < 40, "each of five questions is asked a few times"
+
+
 async def test_pictures_that_are_asked_for_at_once_are_taken_one_after_another() -> None:
     async with world() as it:
         await it.ready("take_picture")

@@ -6,16 +6,13 @@ from m2pem.api import LinkState, ResourceId, VehicleState
 from m2pem_plugin_ros.drivers.driver import Health
 from m2pem_plugin_ros.instruments import Senses
 
-SILENT_SHARE = 0.8
-"""Of `lost_after_s`: after so much of it a vehicle is lost, as it takes a while to notice."""
-
 DEGRADED_SHARE = 0.5
 """Of `lost_after_s`: a vehicle that is silent for longer has a bad link."""
 
 
 def link_state(silent_s: float, lost_after_s: float) -> LinkState:
     """How well a vehicle is heard that was heard so many seconds ago."""
-    if silent_s >= SILENT_SHARE * lost_after_s:
+    if silent_s >= lost_after_s:
         return LinkState.LOST
     if silent_s >= DEGRADED_SHARE * lost_after_s:
         return LinkState.DEGRADED

@@ -29,7 +29,7 @@ from m2pem_plugin_ros.drivers.driver import Driver, Health, Order, Outcome, Seat
 from m2pem_plugin_ros.goal_ids import goal_id, run_id
 from m2pem_plugin_ros.instruments import Instruments
 from m2pem_plugin_ros.settings import DriverName, Settings
-from m2pem_plugin_ros.telemetry import SILENT_SHARE, link_state, vehicle_state
+from m2pem_plugin_ros.telemetry import link_state, vehicle_state
 
 LOOK_WITHIN_S = 3.0
 """In real time: so long may a vehicle take to say how it stands to a goal."""
@@ -294,7 +294,7 @@ class Vehicle:
         now_us = self._context.clock.now_us()
         silent_s = (now_us - self._heard_us) / 1e6
         bound_s = self._limits.lost_after_s
-        is_silent = silent_s >= SILENT_SHARE * bound_s
+        is_silent = silent_s >= bound_s
         holder = self.doing
         if not self._heard:
             self.link = LinkState.LOST

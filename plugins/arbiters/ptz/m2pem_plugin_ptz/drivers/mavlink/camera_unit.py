@@ -23,6 +23,10 @@ from m2pem_plugin_ptz.head import Picture
 
 ATTEND_S = 5.0
 FIND_EVERY_S = 1.0
+FIND_SELDOM_S = 60.0
+FIND_OFTEN = 5
+"""After so many questions in vain a camera is asked for seldom: an autopilot that has none
+acknowledges each question and never answers it."""
 TOLD_WITHIN_S = 2.0
 """So long after a picture was asked for a camera should have told of it; then it is asked."""
 
@@ -294,6 +298,7 @@ class CameraUnit:
             self._news.set()
 
     async def _attend(self) -> None:
+        asked = 0
         while True:
             try:
                 if self._found is None:
@@ -303,7 +308,12 @@ class CameraUnit:
             except ExchangeError as error:
                 self._why = f" ({error})"
                 self._post.logger.debug("%s: camera: %s", self._post.resource, error)
-            await self._post.clock.sleep(FIND_EVERY_S if self._found is None else ATTEND_S)
+            if self._found is not None:
+                await self._post.clock.sleep(ATTEND_S)
+            else:
+                asked += 1
+                seldom = asked >= FIND_OFTEN
+                await self._post.clock.sleep(FIND_SELDOM_S if seldom else FIND_EVERY_S)
 
     async def _find(self) -> camera.Camera:
         settings = self._post.settings
