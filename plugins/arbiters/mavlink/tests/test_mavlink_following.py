@@ -79,10 +79,12 @@ def test_a_target_that_falls_silent_stops_it_and_is_a_failure() -> None:
     play(Body().fly(), main)
 
 
-def test_a_target_that_is_lost_or_was_never_heard_is_rejected() -> None:
+def test_a_target_that_is_lost_or_never_heard_is_a_failure() -> None:
     async def never(bench) -> None:
-        end = await bench.do("follow", target=VehiclePosition("w"))
-        assert end.state is BehaviorState.REJECTED
+        end = await bench.do("follow", 6.0, target=VehiclePosition("w"))
+        assert end.state is BehaviorState.FAILED
+        assert "w has not been heard" in end.reason
+        assert "go_to" not in bench.told
 
     async def lost(bench) -> None:
         says(bench, 50.0, 0.0, link=LinkState.LOST)
@@ -90,6 +92,19 @@ def test_a_target_that_is_lost_or_was_never_heard_is_rejected() -> None:
 
     play(Body().fly(), never)
     play(Body().fly(), lost)
+
+
+def test_a_target_that_is_heard_a_little_later_is_followed() -> None:
+    """As the first task of a mission: another vehicle's telemetry is not there yet."""
+
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "follow", "v", target=VehiclePosition("w"))
+        await bench.clock.sleep(2)
+        says(bench, 50.0, 0.0)
+        await bench.running("r1.b1", 2.0)
+        assert bench.told == ["go_to"]
+
+    play(Body().fly(), main)
 
 
 def test_it_cannot_follow_itself() -> None:

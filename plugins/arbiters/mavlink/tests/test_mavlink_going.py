@@ -104,11 +104,12 @@ def test_a_vehicle_that_moves_is_gone_after() -> None:
     play(Body().fly(), main)
 
 
-def test_going_to_a_vehicle_that_was_never_heard_is_rejected() -> None:
+def test_going_to_a_vehicle_that_is_not_heard_is_a_failure() -> None:
     async def main(bench) -> None:
-        end = await bench.do("goto", target=VehiclePosition("w"))
-        assert end.state is BehaviorState.REJECTED
-        assert "position of w is not known" in end.reason
+        end = await bench.do("goto", 6.0, target=VehiclePosition("w"))
+        assert end.state is BehaviorState.FAILED
+        assert "w has not been heard" in end.reason
+        assert bench.told == []
 
     play(Body().fly(), main)
 

@@ -39,17 +39,16 @@ class Follow(Behavior):
         self._course_rad: float | None = None
 
     def refusal(self) -> str:
-        """Another vehicle is needed that is heard, with its station within the fence."""
+        """Another vehicle is needed, with its station within the fence."""
         if reason := unless_airborne(self.vehicle):
             return reason
         if self._target in ("", self.vehicle.resource):
             return "parameter 'target': another vehicle is expected"
-        if self._state() is None:
-            return f"parameter 'target': {self._target} has not been heard"
-        return self._breach(self._station())
+        return "" if self._state() is None else self._breach(self._station())
 
     async def begin(self) -> None:
         """Send it to its station."""
+        await self._wishes.hear_target()
         self._told = None
         await self._tell()
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import ClassVar
 
 from m2pem.api import BehaviorState
 from m2pem_plugin_mavlink.behaviors.behavior import (
@@ -55,7 +56,7 @@ class Goto(Behavior):
 
     name = "goto"
     modes = frozenset({FlightMode.GUIDED})
-    still_s = MOVES_WITHIN_S
+    still_s: ClassVar[float | None] = MOVES_WITHIN_S
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
@@ -75,7 +76,9 @@ class Goto(Behavior):
         """What flies must be in the air, and the way within the fence."""
         if reason := unless_airborne(self.vehicle):
             return reason
-        place = self.target()
+        return "" if self.wishes.target_is_unheard else self._breach(self.target())
+
+    def _breach(self, place: Place) -> str:
         if self.job.fence is None:
             return ""
         way = [(place.latitude_deg, place.longitude_deg)]
@@ -84,6 +87,10 @@ class Goto(Behavior):
     async def begin(self) -> None:
         """Send it there."""
         self._standing.forget()
+        if self.wishes.target_is_unheard:
+            await self.wishes.hear_target()
+            if reason := self._breach(self.target()):
+                raise BehaviorFailedError(reason)
         self._place = self.target()
         await self.vehicle.driver.go_to(self._place, self.wishes.speed_m_s)
 

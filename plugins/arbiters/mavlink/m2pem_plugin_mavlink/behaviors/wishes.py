@@ -7,6 +7,8 @@ from m2pem_plugin_mavlink.vehicle.driver import Place
 
 RELATIVE, AMSL, TERRAIN = "relative", "amsl", "terrain"
 
+HEARD_WITHIN_S = 5.0
+
 _WITH_HEIGHT = frozenset({"air", "subsurface"})
 
 
@@ -102,6 +104,28 @@ class Wishes:
         if isinstance(value, VehiclePosition):
             return Place(*self.whereabouts(value.vehicle), *self.altitude())
         raise BehaviorFailedError("it has no target")
+
+    @property
+    def target_is_unheard(self) -> bool:
+        """Whether `target` is a vehicle whose position is not known, not yet or not any more."""
+        name = self.target_vehicle
+        if name is None:
+            return False
+        state = state_of(self._job, name)
+        return state is None or state.position is None
+
+    async def hear_target(self) -> None:
+        """Wait a little for a target that is not heard yet: at the beginning of a mission some
+        vehicles are heard before others.
+
+        Raises:
+            BehaviorFailedError: it is not heard.
+        """
+        vehicle = self._job.vehicle
+        if not await vehicle.until(lambda: not self.target_is_unheard, HEARD_WITHIN_S):
+            raise BehaviorFailedError(
+                f"parameter 'target': {self.target_vehicle} has not been heard"
+            )
 
     def whereabouts(self, vehicle: str) -> LatLon:
         """Where another vehicle was heard last.
