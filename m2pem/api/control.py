@@ -124,9 +124,14 @@ class TakeEffect:
         return f"{ends}. TAKEN_OVER is not handled: the mission will fail"
 
 
+LOGGED = "LOGGED"
+"""The code of alerts that are also logged: what an arbiter warns of, for instance. Who shows the
+log to an operator need not show them again."""
+
+
 @dataclass(frozen=True, slots=True)
 class Alert:
-    """A warning about the executive itself, which no record has: a vehicle that did not take STOP,
+    """A warning which no record has: a vehicle that did not take STOP, what an autopilot warns of,
     a journal that does not write, a plugin that blocks. `run` "": it concerns all of them."""
 
     run: RunId

@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from m2pem.api.control import Alert, Notice, RunId, StampedRecord
+from m2pem.api.control import LOGGED, Alert, Notice, RunId, StampedRecord
 from m2pem.cli.story import Story, printable
 from m2pem.cli.writer import LineWriter, writer_for
 from m2pem.engine.records import RunEnded
@@ -79,7 +79,7 @@ class Output:
                     await self.drain()
             if isinstance(notice, StampedRecord):
                 self.show(notice)
-            elif isinstance(notice, Alert) and not self._covered:
+            elif isinstance(notice, Alert) and notice.code != LOGGED and not self._covered:
                 where = f"{notice.run}: " if notice.run else ""
                 writer_for(sys.stderr).put(f"m2pem: {where}{printable(notice.text)}")
 

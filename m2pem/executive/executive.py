@@ -20,7 +20,7 @@ from typing import Any, Self
 from m2pem.api.arbiter import Arbiter, ArbiterContext, BehaviorReport
 from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import Clock
-from m2pem.api.control import HandedOver, RunId, SimulationResult
+from m2pem.api.control import Alert, HandedOver, RunId, SimulationResult
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import TeamState
 from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
@@ -36,7 +36,9 @@ from m2pem.executive.control import Control
 from m2pem.executive.dispatch import Dispatcher
 from m2pem.executive.handover import Handover
 from m2pem.executive.immediate import ImmediateCommands
+from m2pem.executive.left_armed import left_armed
 from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
+from m2pem.executive.logged_alerts import LoggedAlerts
 from m2pem.executive.loss import Losses
 from m2pem.executive.notices import Notices
 from m2pem.executive.observers import Observers
@@ -175,6 +177,7 @@ class Executive:
         except BaseException:
             self._locks.release()
             raise
+        self._stack.enter_context(LoggedAlerts(self.notices))
         if self._observers is not None and isinstance(self.clock, SystemClock):
             self._observers.start()
         self._group = await self._stack.enter_async_context(asyncio.TaskGroup())
@@ -417,6 +420,10 @@ class Executive:
         await runner.drive()
         await self.journal.release(runner.id)
         del self._tasks[runner.id]
+        busy, taken = self.availability.holder, self.handover.taken
+        free = [each for each in self.fleet.vehicles if not busy(each) and each not in taken]
+        if not self.simulated and (text := left_armed(free, self.bus)):
+            self.notices.publish(Alert(runner.id, "LEFT_ARMED", text))
         over = [each for each in self.runners.values() if each.done.is_set()]
         for oldest in over[:-REMEMBERED_RUNS]:
             del self.runners[oldest.id]

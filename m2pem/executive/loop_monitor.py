@@ -18,7 +18,7 @@ from typing import Self
 from m2pem.api.control import Alert
 from m2pem.executive.notices import Notices
 
-log = logging.getLogger("m2pem.executive")
+log = logging.getLogger("m2pem.loop")
 
 TICK_S = 0.1
 LATE_AFTER_S = 0.5

@@ -1,3 +1,4 @@
+import asyncio
 import logging
 from collections.abc import Callable
 from typing import Any
@@ -275,3 +276,46 @@ def test_its_last_texts_are_kept_for_a_while(virtual: Run) -> None:
             assert len(vehicle.recent_texts(5.0)) == 2
 
     virtual(main)
+
+
+def test_operators_read_what_an_autopilot_warns_of_and_not_every_half_minute(
+    virtual: Run, caplog: pytest.LogCaptureFixture
+) -> None:
+    def says(text: str, severity: int) -> Any:
+        return make("STATUSTEXT", text=text.encode(), severity=severity)
+
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, _):
+            for _ in range(12):
+                link.hear(says("Battery 1 is low 10.2V", dialect.MAV_SEVERITY_WARNING))
+                link.hear(says("Mission: 2 WP", dialect.MAV_SEVERITY_NOTICE))
+                await clock.sleep(30.0)
+
+    virtual(main)
+    warned = [each.getMessage() for each in caplog.records if each.levelno == logging.WARNING]
+    assert warned == ["uav1 says: Battery 1 is low 10.2V"] * 2
+
+
+def test_operators_read_what_a_vehicle_waits_for_before_it_is_armed(
+    virtual: Run, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        ready = link.says["EKF_STATUS_REPORT"]
+        link.says["EKF_STATUS_REPORT"] = {"flags": 0xA7}
+        link.says["GPS_RAW_INT"] = {"fix_type": 1}
+        async with Playing((link, vehicle)):
+            arming = asyncio.get_running_loop().create_task(vehicle.driver.arm())
+            await clock.sleep(10.0)
+            link.says["GPS_RAW_INT"] = {"fix_type": 6}
+            await clock.sleep(20.0)
+            link.says["EKF_STATUS_REPORT"] = ready
+            await arming
+
+    virtual(main)
+    warned = [each.getMessage() for each in caplog.records if each.levelno == logging.WARNING]
+    assert warned == [
+        "uav1 waits until it is ready: GPS: no 3D fix; EKF: no position yet",
+        "uav1 waits until it is ready: EKF: no position yet",
+        "uav1 is ready",
+    ]

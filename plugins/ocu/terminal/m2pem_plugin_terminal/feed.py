@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from m2pem.api.control import (
+    LOGGED,
     Alert,
     MissionControl,
     Notice,
@@ -114,7 +115,7 @@ class Feed:
                     self._listener.logged(run, line)
                 if board.status.ended and not was_over:
                     self._listener.ended(run)
-            case Alert():
+            case Alert(code=code) if code != LOGGED:  # the log is shown, too
                 self._listener.alerted(notice)
             case OpenPrompt(run=run, prompt=prompt):
                 self.prompts[run, prompt] = notice

@@ -5,6 +5,7 @@ is not whole after `GIVE_UP_S` is shown with "..." where something is missing.
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
 
@@ -62,9 +63,11 @@ class _Pieces:
 
 
 class StatusTexts:
-    """Collects the texts of one vehicle. Give it each STATUSTEXT that is heard."""
+    """Collects the texts of one vehicle. Give it each STATUSTEXT that is heard; `read` is called
+    with each text that is whole, or given up."""
 
-    def __init__(self) -> None:
+    def __init__(self, read: Callable[[Text], None] = lambda _: None) -> None:
+        self._read = read
         self._texts: deque[Text] = deque(maxlen=KEPT)
         self._coming: dict[tuple[Address, int], _Pieces] = {}
         self._closed_s: dict[tuple[Address, int], float] = {}
@@ -73,7 +76,7 @@ class StatusTexts:
         """A STATUSTEXT has come."""
         self.give_up(now_s - GIVE_UP_S)
         if message.id == 0:
-            self._texts.append(Text(_decoded(message.text), message.severity, sender, now_s))
+            self._add(Text(_decoded(message.text), message.severity, sender, now_s))
             return
         key = sender, message.id
         if message.chunk_seq >= MOST_CHUNKS or now_s - self._closed_s.get(key, -inf) < LATE_S:
@@ -107,9 +110,13 @@ class StatusTexts:
         )
         return tuple(sorted(found, key=lambda each: each.at_s))
 
+    def _add(self, text: Text) -> None:
+        self._texts.append(text)
+        self._read(text)
+
     def _close(self, key: tuple[Address, int]) -> None:
         pieces = self._coming.pop(key)
-        self._texts.append(Text(pieces.text(), pieces.severity, key[0], pieces.at_s))
+        self._add(Text(pieces.text(), pieces.severity, key[0], pieces.at_s))
         self._closed_s.pop(key, None)
         self._closed_s[key] = pieces.at_s
         if len(self._closed_s) > KEPT:

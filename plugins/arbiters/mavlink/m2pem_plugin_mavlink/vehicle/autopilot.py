@@ -1,5 +1,6 @@
 """What the drivers of all autopilots share: to command, and to believe what is then heard."""
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable, Sequence
 from typing import TYPE_CHECKING
@@ -35,6 +36,7 @@ BEGINS_WITHIN_S = 5.0
 
 RETRY_S = 1.0
 
+_SECONDS = re.compile(r", \d+ s(?=;|$)")
 _SET_POSITION_TARGET = message_type("SET_POSITION_TARGET_LOCAL_NED")
 _VELOCITY_ONLY = (
     dialect.POSITION_TARGET_TYPEMASK_X_IGNORE
@@ -214,14 +216,31 @@ class Autopilot(ABC):
         await self._enter_arming_mode()
         if not self.readiness().ready:
             await self._have_it_checked()
-        if not await self.vehicle.until(lambda: self.readiness().ready, CHECKED_WITHIN_S):
-            raise self._not_ready()
+        await self._until(lambda: self.readiness().ready, CHECKED_WITHIN_S)
         await self._arm()
 
     async def _locate(self) -> None:
         """Wait until it knows where it is."""
-        if not await self.vehicle.until(self._is_located, LOCATED_WITHIN_S):
-            raise self._not_ready()
+        await self._until(self._is_located, LOCATED_WITHIN_S)
+
+    async def _until(self, ready: Callable[[], bool], within_s: float) -> None:
+        """Wait; operators read what for, and when that changes."""
+        end_s = self.link.now_s() + within_s
+        told = ""
+
+        def reasons() -> str:
+            return _SECONDS.sub("", "; ".join(self.readiness().reasons))
+
+        while not ready():
+            left_s = end_s - self.link.now_s()
+            if left_s <= 0:
+                raise self._not_ready()
+            if (now := reasons()) and now != told:
+                told = now
+                self.vehicle.warn(f"waits until it is ready: {told}")
+            await self.vehicle.until(lambda told=told: ready() or reasons() != told, left_s)  # type: ignore[misc]
+        if told:
+            self.vehicle.warn("is ready")
 
     def _is_located(self) -> bool:
         return not unlocated(self.identity.firmware, self.heard, self.link.now_s())

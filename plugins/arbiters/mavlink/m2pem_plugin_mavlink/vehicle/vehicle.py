@@ -6,9 +6,11 @@ import math
 from collections.abc import Callable, Coroutine
 from typing import Any
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from m2pem.api import Clock, LinkState, ResourceId, VehicleState
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
-from m2pem_plugin_mavlink.microservices.texts import StatusTexts
+from m2pem_plugin_mavlink.microservices.texts import StatusTexts, Text
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
 from m2pem_plugin_mavlink.vehicle import circling, exchanges
@@ -26,6 +28,11 @@ from m2pem_plugin_mavlink.vehicle.waiters import Waiters
 _HEARTBEAT = message_type("HEARTBEAT").id
 _STATUSTEXT = message_type("STATUSTEXT").id
 _HOME = message_type("HOME_POSITION").id
+
+_WARNING: int = dialect.MAV_SEVERITY_WARNING
+
+SAID_AGAIN_S = 300.0
+"""A warning of the autopilot that comes again within this time is not shown again."""
 
 RADII_EVERY_S = 10.0
 """A vehicle that does not tell how far it circles is asked again so often."""
@@ -58,7 +65,8 @@ class Vehicle:
         self.link = link
         self.heard = Heard()
         self.ours = Ours()
-        self.texts = StatusTexts()
+        self.texts = StatusTexts(self._warn_of)
+        self._warned_s: dict[str, float] = {}
         self.identity: Identity | None = None
         self.lost_after_s = lost_after_s
         self._clock = clock
@@ -216,6 +224,23 @@ class Vehicle:
         if sender == self.link.address:
             self.texts.take(message, sender, self.link.now_s())
             self._tell()
+
+    def _warn_of(self, text: Text) -> None:
+        """Operators see what an autopilot itself warns of. It repeats what it cannot be armed for
+        every 30 s."""
+        now_s = self.link.now_s()
+        said_s = self._warned_s.get(text.text)
+        if text.severity > _WARNING or (said_s is not None and now_s - said_s < SAID_AGAIN_S):
+            return
+        self._warned_s = {
+            each: at_s for each, at_s in self._warned_s.items() if now_s - at_s < SAID_AGAIN_S
+        }
+        self._warned_s[text.text] = now_s
+        self.warn(f"says: {text.text}")
+
+    def warn(self, text: str) -> None:
+        """Tell operators something about it."""
+        self._logger.warning("%s %s", self.resource, text)
 
     def _tell(self) -> None:
         self._waiters.look()
