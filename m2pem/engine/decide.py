@@ -33,6 +33,8 @@ from m2pem.engine.triggering import (
 from m2pem.engine.waiting import next_timer
 from m2pem.model.elements import Activity, AdHocSubProcess
 
+_THROW_NOTHING = (i.Continue, i.StopRun, i.PauseRun, i.ClaimRun, i.GeometrySet)
+
 
 def decide(x: Steps, item: i.Input) -> None:
     """Emit what an input means; steps that it causes are left in the queue."""
@@ -46,6 +48,8 @@ def decide(x: Steps, item: i.Input) -> None:
             if number in x.state.seen:
                 x.ignore(f"{type(item).__name__} {number} was taken before")
                 return
+            if not isinstance(item, _THROW_NOTHING):
+                arm_entered(x)  # what a batch left over waits for what is thrown now
             _DECIDERS[type(item)](x, item)
 
 

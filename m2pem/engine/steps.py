@@ -1,14 +1,15 @@
 """Doing the steps that an input causes, one after the other: the engine's only loop."""
 
 from m2pem.engine import records as r
-from m2pem.engine.arming import arm_entered, arm_next
+from m2pem.engine.arming import arm_next
+from m2pem.engine.conditions import comes_true
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.interruption import end_run
 from m2pem.engine.nodes import EXECUTE, look_at
 from m2pem.engine.nodes.joins import fire_joins
 from m2pem.engine.records import Record, RunOutcome
 from m2pem.engine.state import RunState, RunStatus, Scope, Token
-from m2pem.engine.triggering import look_at_conditions
+from m2pem.engine.triggering import trigger
 from m2pem.model.events import MessageEventDefinition, SignalEventDefinition
 from m2pem.resources.fleet import Fleet
 
@@ -30,29 +31,26 @@ class Steps(Execution):
         self.left = self.batch
         if self.state.yielded and self.state.status is RunStatus.RUNNING:
             self.reload_queue()
-            arm_entered(self)
 
     def run_steps(self) -> None:
         """Execute tokens until none can move, or the batch is used up."""
         state, queue, entered = self.state, self.queue, self.entered
         while state.status is RunStatus.RUNNING:
             while queue or entered or self.changed:
+                # Of what comes at once, too, each takes its part: tokens may double at each turn.
+                if self.left <= 0 and (queue or entered):
+                    return
                 if entered:
-                    self.left -= 1  # also beyond the batch: what is left over waits already
+                    self.left -= 1
                     arm_next(self)
                     continue
                 if self.changed:
                     self.changed = False
-                    look_at_conditions(self)
-                    if entered and self.left <= 0:
-                        return  # conditions in a circle; `begin` arms them before all else
+                    self._fire_conditions()
                     continue
                 item = queue.popleft()
                 if not self._is_there(item):
                     continue
-                if self.left <= 0:
-                    queue.appendleft(item)
-                    return
                 self.left -= 1
                 if type(item) is Token:
                     EXECUTE[type(item.node)](self, item)
@@ -61,6 +59,18 @@ class Steps(Execution):
                     look_at(self, item)
             if not fire_joins(self):
                 return
+
+    def _fire_conditions(self) -> None:
+        """Those that have become true, in the order in which they were armed; as far as the batch
+        goes, and one at least."""
+        conditions, waits = self.state.conditions, self.state.waits
+        for number in list(conditions):
+            if self.left <= 0 and (self.queue or self.entered):
+                self.changed = True
+                return
+            if number in conditions and comes_true(self, waits[number]):
+                self.left -= 1
+                trigger(self, waits[number], {})
 
     def _is_there(self, item: Token | Scope) -> bool:
         """Whether it is still where it was when it was queued, and not ended before its turn."""

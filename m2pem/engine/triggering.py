@@ -118,15 +118,13 @@ def arm_conditional_starts(x: Execution, root: Scope) -> None:
                 arm(x, root, start, definition)
 
 
-def look_at_conditions(x: Execution, only: Token | None = None) -> bool:
-    """Fire the conditions that have become true, in the order in which they were armed.
-
-    `only`: those that this token waits for. False: it has left with one.
-    """
-    for number in list(x.state.conditions if only is None else only.waits or ()):
+def look_at_conditions(x: Execution, token: Token) -> bool:
+    """Fire the conditions that a token waits for and that are true, in the order in which they were
+    armed. False: it has left with one."""
+    for number in list(token.waits or ()):
         if number in x.state.conditions and comes_true(x, x.state.waits[number]):
             trigger(x, x.state.waits[number], {})
-    return only is None or x.state.tokens.get(only.id) is only
+    return x.state.tokens.get(token.id) is token
 
 
 # --- triggering ---------------------------------------------------------------------------------

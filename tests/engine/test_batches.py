@@ -153,6 +153,27 @@ def test_events_whose_conditions_are_true_leave_the_batch_its_bound() -> None:
     assert play.stop().ended == "stopped"
 
 
+def test_tokens_that_double_at_each_turn_leave_the_batch_its_bound() -> None:
+    """Else a mission of three elements blocks its executive, and takes all of its memory."""
+    play = Play(
+        """
+        <startEvent id="start"/>
+        <intermediateCatchEvent id="n">conditional c == null</intermediateCatchEvent>
+        start -> n
+        n -> n
+        n -> n
+    """,
+        batch=20,
+    )
+    play.goes_on = False
+    play.start()
+    for _ in range(100):
+        assert len(play.give(Continue()).steps[-1].records) < 200
+    assert play.run.wants_continue
+    assert len(play.run.state.tokens) < 2_000
+    assert play.stop().ended == "stopped"
+
+
 @pytest.mark.parametrize("batch", range(1, 9))
 def test_what_has_been_entered_misses_no_signal_that_comes_between_batches(batch: int) -> None:
     play = Play(
