@@ -119,10 +119,7 @@ class TakeoverWatch:
         """Whether the autopilot has restarted since `begin`: its clock has gone back."""
         if self.vehicle.heard.boots <= max(self._boots, 1):
             return None
-        was = "" if self._disarmed is None else f", in {self._disarmed[1]} before"
-        return Takeover(
-            Cause.RESTART, f"its autopilot has restarted{was}: it is disarmed, and does nothing"
-        )
+        return Takeover(Cause.RESTART, "its autopilot has restarted, and its motors have stopped")
 
     def taken_over(self, modes: Collection[FlightMode]) -> Takeover | None:
         """Whether somebody else has taken over a vehicle that is to be in one of these modes.

@@ -204,7 +204,7 @@ def test_an_autopilot_that_restarts_in_flight_has_not_been_taken_over() -> None:
         bench.body.boots += 1
         end = await bench.ended("r1.b1", 10)
         assert (end.state, end.code) == (FAILED, "FAILED")
-        assert "its autopilot has restarted, in land before" in end.reason
+        assert "its autopilot has restarted" in end.reason
 
     play(Body().fly(40), main)
 
