@@ -116,8 +116,10 @@ class TakeoverWatch:
         self._settled = (self.vehicle.heard.custom_mode, self.vehicle.ours.custom_mode)
 
     def restarted(self) -> Takeover | None:
-        """Whether the autopilot has restarted since `begin`: its clock has gone back."""
-        if self.vehicle.heard.boots <= max(self._boots, 1):
+        """Whether the autopilot has restarted since `begin`: its clock has gone back, and it
+        is not armed."""
+        heard = self.vehicle.heard
+        if heard.armed is not False or heard.boots <= max(self._boots, 1):
             return None
         return Takeover(Cause.RESTART, "its autopilot has restarted, and its motors have stopped")
 

@@ -11,8 +11,9 @@ from m2pem_plugin_mavlink.protocol.messages import Message, message_type
 from m2pem_plugin_mavlink.vehicle.heard import Heard
 from m2pem_plugin_mavlink.vehicle.modes import Modes
 
-BOOT_TIME_BACK_MS = 2000
-"""Messages overtake each other by less than this."""
+BOOT_TIME_BACK_MS = 10_000
+"""Messages overtake each other by less than this, also in simulated time that passes ten times as
+fast. No autopilot is ready so soon after it was switched on."""
 
 STANDS_BELOW_M, STANDS_BELOW_M_S = 0.5, 0.3
 
