@@ -133,7 +133,7 @@ demo-web: python-packages page ## draw, prove and run missions in a browser, on 
 	@M2PEM_WEB_MISSIONS=$(DEMO_WEB)/missions $(BIN)/m2pem serve --fleet fleet_configs/vignette1.yaml --simulate \
 	  --ocu web --journal $(DEMO_WEB)/journal.db
 
-AUTOPILOTS := $(BIN)/m2pem sim mavlink --copters 2 --rovers 1 --speed 10 --home 38.1075,-77.3192,60 \
+AUTOPILOTS := $(BIN)/m2pem sim mavlink --copters 2 --rovers 1 --speed 10 --ekf 6s --home 38.1075,-77.3192,60 \
   --set FS_GCS_ENABLE=1 --set FS_GCS_TIMEOUT=10 --set BATT_FS_LOW_ACT=2
 LINK_LOST := 1: cut link at 80 s for 600 s
 
@@ -175,7 +175,7 @@ TEAM_SPEED := 1
 TEAM_FLEET := fleet_configs/mehds_mixed.yaml
 # Where the fleet expects the copter.
 TEAM_PORT := 14550
-TEAM_AUTOPILOT = --copters 1 --home 38.107162,-77.319941,60 --to udp://127.0.0.1:$(TEAM_PORT) \
+TEAM_AUTOPILOT = --copters 1 --ekf 6s --home 38.107162,-77.319941,60 --to udp://127.0.0.1:$(TEAM_PORT) \
   --set FS_GCS_ENABLE=1 --set FS_GCS_TIMEOUT=10 --set BATT_FS_LOW_ACT=2 --set LAND_SPEED=100 --set WPNAV_SPEED_DN=250
 TEAM_POINTING_DEG := 1
 TEAM_END := EndBypassed

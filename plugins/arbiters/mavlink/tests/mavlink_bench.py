@@ -21,7 +21,8 @@ class Bench:
 
     def __init__(self, kind: Kind = Kind.COPTER, **options: Any) -> None:
         self.kind = kind
-        self.autopilot = Autopilot(VehicleSpec(kind, **options), step_s=0.05)
+        spec = VehicleSpec(kind, **{"estimator_s": 6.0, **options})
+        self.autopilot = Autopilot(spec, step_s=0.05)
         self.heard: list[Any] = []
         self.autopilot.meet(GCS)
         self.guided, self.auto, self.rtl = MODES[kind]

@@ -43,7 +43,7 @@ def test_the_second_copter_takes_over_what_the_first_one_leaves(
 ) -> None:
     autopilots = subprocess.Popen(
         m2pem(
-            *("sim", "mavlink", "--copters", 2, "--rovers", 1, "--speed", SPEED),
+            *("sim", "mavlink", "--copters", 2, "--rovers", 1, "--speed", SPEED, "--ekf", "6s"),
             *("--home", "38.1075,-77.3192,60", "--to", f"udp://127.0.0.1:{port}"),
             *("--set", "FS_GCS_ENABLE=1", "--set", "FS_GCS_TIMEOUT=20"),
             *("--fault", "1: cut link at 60 s for 900 s"),

@@ -15,7 +15,7 @@ from mavsdk.vehicle import Vehicle
 
 HOME = Location(47.397742, 8.545594, 488.0)
 NORTH = (HOME.latitude_deg + 0.0002, HOME.longitude_deg)
-ROVER = VehicleSpec(Kind.ROVER, home=HOME)
+ROVER = VehicleSpec(Kind.ROVER, home=HOME, estimator_s=6.0)
 
 
 @pytest.fixture
@@ -101,7 +101,11 @@ async def test_offboard_drives_by_velocity(rover):
 
 
 async def test_several_vehicles_at_one_port_are_each_commanded_alone():
-    specs = (VehicleSpec(home=HOME), VehicleSpec(system=2), VehicleSpec(Kind.ROVER, system=3))
+    specs = (
+        VehicleSpec(home=HOME, estimator_s=6.0),
+        VehicleSpec(system=2, estimator_s=6.0),
+        VehicleSpec(Kind.ROVER, system=3, estimator_s=6.0),
+    )
     async with flying(*specs) as found:
         await asyncio.gather(*(each.ready() for each in found.values()))
         await asyncio.gather(*(each.guided() for each in found.values()))

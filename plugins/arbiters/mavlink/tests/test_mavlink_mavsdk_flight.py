@@ -14,7 +14,7 @@ from mavsdk.plugins.telemetry import FlightMode, LandedState, TelemetryError
 from mavsdk.vehicle import Vehicle
 
 HOME = Location(47.397742, 8.545594, 488.0)
-COPTER = VehicleSpec(home=HOME, heading_deg=90.0)
+COPTER = VehicleSpec(home=HOME, heading_deg=90.0, estimator_s=6.0)
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from mavsdk.plugins.gimbal import ControlMode, GimbalMode, SendMode
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 HOME = Location(47.397742, 8.545594, 488.0)
-COPTER = VehicleSpec(home=HOME, heading_deg=90.0)
+COPTER = VehicleSpec(home=HOME, heading_deg=90.0, estimator_s=6.0)
 ATTITUDE = dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS
 
 
@@ -100,7 +100,7 @@ async def test_it_watches_a_place(copter):
 
 
 async def test_a_rover_has_no_gimbal():
-    async with flying(VehicleSpec(Kind.ROVER)) as found:
+    async with flying(VehicleSpec(Kind.ROVER, estimator_s=6.0)) as found:
         rover = found[1]
         denied = await rover.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, ATTITUDE, 200_000)
         assert denied == dialect.MAV_RESULT_DENIED

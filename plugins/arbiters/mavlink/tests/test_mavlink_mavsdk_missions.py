@@ -35,13 +35,13 @@ PATROL = mission((WAYPOINT, 10, 0, 0), (WAYPOINT, 10, 10, 0))
 
 @pytest.fixture
 async def copter():
-    async with flying(VehicleSpec(home=HOME)) as found:
+    async with flying(VehicleSpec(home=HOME, estimator_s=6.0)) as found:
         yield found[1]
 
 
 @pytest.fixture
 async def rover():
-    async with flying(VehicleSpec(Kind.ROVER, home=HOME)) as found:
+    async with flying(VehicleSpec(Kind.ROVER, home=HOME, estimator_s=6.0)) as found:
         yield found[1]
 
 

@@ -33,7 +33,7 @@ async def world():
     port = free_port()
     async with (
         linked(f"udpin://127.0.0.1:{port}") as (link,),
-        Simulator([VehicleSpec()], to=("127.0.0.1", port)) as simulator,
+        Simulator([VehicleSpec(estimator_s=6.0)], to=("127.0.0.1", port)) as simulator,
     ):
         await until(lambda: link.attached)
         yield link, simulator[1]

@@ -42,7 +42,9 @@ ITEMS = tuple(
 @asynccontextmanager
 async def linked(*sources: int) -> AsyncIterator[list[RoutedLink]]:
     """One link to a vehicle for each ground station, and it has been heard."""
-    async with Simulator([VehicleSpec(Kind.COPTER)], speed=SPEED, to=None) as simulator:
+    async with Simulator(
+        [VehicleSpec(Kind.COPTER, estimator_s=6.0)], speed=SPEED, to=None
+    ) as simulator:
         host, port = simulator[1].address
         links = []
         for source in sources or (245,):

@@ -45,7 +45,7 @@ async def test_all_parameters_are_listed_and_one_is_set(ground: Ground) -> None:
         ground.link.param_fetch_one("RTL_ALT")
         assert ground.wait("PARAM_VALUE").param_value == 3000
 
-    await at(ground, 10, scene, VehicleSpec())
+    await at(ground, 10, scene, VehicleSpec(estimator_s=6.0))
 
 
 async def test_arming_is_refused_with_the_reason_until_the_position_is_known(
@@ -87,7 +87,7 @@ async def test_a_copter_takes_off_goes_somewhere_and_stops_when_velocities_end(
         ground.wait("LOCAL_POSITION_NED", that=lambda m: m.vx > 4.5)
         ground.wait("LOCAL_POSITION_NED", that=lambda m: m.x > 45 and abs(m.vx) < 0.1)
 
-    sim = await at(ground, 20, scene, VehicleSpec())
+    sim = await at(ground, 20, scene, VehicleSpec(estimator_s=6.0))
     assert (sim[1].takeoffs, sim[1].motions) == (1, 2)
 
 
@@ -106,7 +106,7 @@ async def test_a_mission_is_uploaded_flown_and_told_of_until_the_motors_stop(
         ground.wait("HEARTBEAT", that=lambda m: not m.base_mode & 128)
         assert "Mission: 3 RTL" in ground.texts
 
-    sim = await at(ground, 20, scene, VehicleSpec())
+    sim = await at(ground, 20, scene, VehicleSpec(estimator_s=6.0))
     assert (sim[1].takeoffs, sim[1].missions_begun) == (1, 1)
     assert abs(sim[1].up_m) < 0.1
     assert sim[1].location[:2] == pytest.approx(ZURICH[:2], abs=1e-5)
@@ -126,15 +126,16 @@ async def test_a_copter_and_a_rover_share_a_port(ground: Ground) -> None:
         x, y = round(latitude * 1e7), round(longitude * 1e7)
         ground.link.mav.command_int_send(2, 1, 6, 192, 0, 0, -1, 1, 0, 0, x, y, 0)
         assert ground.wait("COMMAND_ACK", that=lambda m: m.command == 192).result == 0
-        ground.wait("STATUSTEXT", that=lambda m: m.text == "Reached destination")
+        ground.wait("MISSION_ITEM_REACHED", that=lambda m: m.seq == 0)
 
-    sim = await at(ground, 20, scene, VehicleSpec(), VehicleSpec(Kind.ROVER, system=2))
+    rover = VehicleSpec(Kind.ROVER, system=2, estimator_s=6.0)
+    sim = await at(ground, 20, scene, VehicleSpec(), rover)
     assert sim[2].location[:2] == pytest.approx((latitude, longitude), abs=3e-5)
     assert not sim[1].armed
 
 
 async def test_a_second_ground_station_is_learned_and_its_upload_denied() -> None:
-    async with Simulator([VehicleSpec()], speed=5, to=None) as sim:
+    async with Simulator([VehicleSpec(estimator_s=6.0)], speed=5, to=None) as sim:
         url = f"udpout:127.0.0.1:{sim[1].address[1]}"
 
         def scene() -> None:

@@ -4,7 +4,14 @@ from mavlink_bench import Bench, item
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 HOME = item(0, 16, frame=0)
-START = dialect.MAV_CMD_MISSION_START
+START, MODE = dialect.MAV_CMD_MISSION_START, dialect.MAV_CMD_DO_SET_MODE
+SET_CURRENT = dialect.MAV_CMD_DO_SET_MISSION_CURRENT
+
+
+def progress(bench: Bench) -> tuple[int, int, int]:
+    """Item, state and mode, as MISSION_CURRENT has them."""
+    current = bench.report(42)
+    return current.seq, current.mission_state, current.mission_mode
 
 
 def reached(bench: Bench) -> list[int]:
@@ -28,7 +35,7 @@ def test_a_copter_takes_off_flies_its_mission_and_comes_home() -> None:
     assert bench.autopilot.position.distance_m(bench.autopilot.home.point) < 1
     assert bench.autopilot.chronicle.counts["takeoff"] == 1
     assert bench.autopilot.chronicle.counts["mission"] == 1
-    assert bench.report(42).mission_state == 5
+    assert progress(bench) == (0, 5, 1)
 
 
 def test_auto_from_the_ground_needs_a_takeoff() -> None:
@@ -44,7 +51,7 @@ def test_auto_from_the_ground_needs_a_takeoff() -> None:
 def test_the_mode_alone_does_not_take_off_but_mission_start_does() -> None:
     bench = Bench().ready()
     bench.upload([HOME, item(1, 22, z=15.0), item(2, 17)])
-    assert bench.command(dialect.MAV_CMD_DO_SET_MODE, 1, 3) == 0
+    assert bench.command(MODE, 1, 3) == 0
     bench.run(5)
     assert bench.autopilot.body.on_ground
     assert bench.command(START) == 0
@@ -59,10 +66,111 @@ def test_progress_is_told_with_the_total_and_the_state() -> None:
     assert (bench.report(42).total, bench.report(42).mission_state) == (2, 2)
     bench.command(START)
     bench.run(2)
-    current = bench.report(42)
-    assert (current.seq, current.total, current.mission_state, current.mission_mode) == (1, 2, 3, 1)
-    bench.command(dialect.MAV_CMD_DO_SET_MODE, 1, 5)
-    assert bench.report(42).mission_state == 4
+    assert progress(bench) == (1, 3, 1)
+    assert bench.report(42).total == 2
+    bench.command(MODE, 1, 5)
+    assert progress(bench) == (1, 2, 0)
+
+
+def marked(bench: Bench) -> list[object]:
+    """Home, a speed, a waypoint, a speed, a servo, a waypoint, a speed, a servo."""
+    near, far = bench.offset(20, 0), bench.offset(40, 0)
+    return [
+        HOME,
+        item(1, 178, (0, 0), 0, 1, 5.0),
+        item(2, 16, near, 20.0),
+        item(3, 178, (0, 0), 0, 1, 4.0),
+        item(4, 183, (0, 0), 0, 9, 1700),
+        item(5, 16, far, 20.0),
+        item(6, 178, (0, 0), 0, 1, 3.0),
+        item(7, 183, (0, 0), 0, 9, 1800),
+    ]
+
+
+def test_actions_are_reported_but_servos_and_behind_the_last_item_one_is_begun() -> None:
+    bench = Bench().airborne()
+    bench.upload(marked(bench))
+    assert bench.command(START) == 0
+    bench.heard.clear()
+    bench.run_until(lambda: bench.autopilot.mission.complete)
+    assert reached(bench) == [1, 2, 3, 5]
+    assert bench.texts() == [
+        "Reached command #2",
+        "Mission: 3 ChangeSpeed",
+        "Mission: 5 WP",
+        "Mission: 4 SetServo",
+        "Reached command #5",
+        "Mission: 6 ChangeSpeed",
+    ]
+    assert bench.autopilot.payload.servos_us == {9: 1700}
+
+
+def test_an_action_that_is_set_is_answered_by_the_next_item_of_navigation() -> None:
+    bench = Bench().airborne()
+    bench.upload(marked(bench))
+    bench.heard.clear()
+    assert bench.command(SET_CURRENT, 1) == 0
+    bench.tell(dialect.MAVLink_mission_set_current_message(1, 1, 3))
+    assert [m.seq for m in bench.heard if m.get_type() == "MISSION_CURRENT"] == [2, 3]
+    assert progress(bench) == (5, 2, 0)
+    bench.heard.clear()
+    bench.command(START)
+    bench.run_until(lambda: bench.autopilot.mission.complete)
+    assert reached(bench) == [3, 5]
+    assert bench.command(SET_CURRENT, 6) == 4
+
+
+@pytest.mark.parametrize("kind", [Kind.COPTER, Kind.ROVER, Kind.BOAT])
+def test_a_completed_mission_is_not_begun_anew_before_the_mode_was_left(kind: Kind) -> None:
+    bench = Bench(kind).airborne() if kind is Kind.COPTER else Bench(kind).ready()
+    fly(bench, item(1, 16, bench.offset(12, 0), 20.0))
+    assert progress(bench) == (1, 5, 1)
+    assert bench.upload([HOME, item(1, 16, bench.offset(24, 0), 20.0)]) == 0
+    assert bench.command(MODE, 1, bench.auto) == 0
+    bench.run(5)
+    assert progress(bench) == (1, 5, 1)
+    assert bench.command(SET_CURRENT, 1) == 0
+    assert bench.command(MODE, 1, bench.auto) == 0
+    bench.run(5)
+    assert progress(bench) == (1, 2, 1)
+    if kind is not Kind.COPTER:
+        assert bench.command(START) == 0
+        bench.run(5)
+        assert progress(bench) == (1, 2, 1)
+    assert not bench.autopilot.body.moving
+    bench.command(MODE, 1, bench.guided)
+    bench.command(MODE, 1, bench.auto)
+    assert progress(bench) == (1, 3, 1)
+    bench.run_until(lambda: bench.autopilot.mission.complete)
+    assert bench.autopilot.body.north_m == pytest.approx(24, abs=3)
+
+
+def test_a_copters_start_begins_a_completed_mission() -> None:
+    bench = Bench().airborne()
+    fly(bench, item(1, 16, bench.offset(12, 0), 20.0))
+    bench.upload([HOME, item(1, 16, bench.offset(24, 0), 20.0)])
+    assert bench.command(START) == 0
+    assert progress(bench) == (1, 3, 1)
+
+
+def test_it_is_begun_in_its_mode_by_what_is_not_armed_too_and_forgotten_when_disarmed() -> None:
+    bench = Bench()
+    bench.run(10)
+    bench.upload([HOME, item(1, 22, z=15.0), item(2, 20)])
+    assert progress(bench) == (0, 2, 0)
+    assert bench.command(MODE, 1, bench.auto) == 0
+    assert progress(bench) == (1, 3, 1)
+    bench.ready()
+    assert progress(bench) == (1, 2, 0)
+    bench.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0)
+    assert progress(bench) == (0, 2, 0)
+
+
+def test_a_rover_enters_auto_with_a_mission_only() -> None:
+    bench = Bench(Kind.ROVER)
+    bench.run(10)
+    assert bench.command(MODE, 1, bench.auto) == 4
+    assert bench.texts() == ["No Mission. Can't set AUTO.", "Flight mode change failed"]
 
 
 def test_left_and_entered_again_it_goes_on_where_it_was() -> None:
@@ -72,9 +180,9 @@ def test_left_and_entered_again_it_goes_on_where_it_was() -> None:
     )
     bench.command(START)
     bench.run_until(lambda: reached(bench) == [1])
-    bench.command(dialect.MAV_CMD_DO_SET_MODE, 1, 5)
+    bench.command(MODE, 1, 5)
     bench.run(5)
-    bench.command(dialect.MAV_CMD_DO_SET_MODE, 1, 3)
+    bench.command(MODE, 1, 3)
     bench.run_until(lambda: len(reached(bench)) == 3)
     assert reached(bench) == [1, 2, 3]
     assert bench.autopilot.chronicle.counts["mission"] == 1
@@ -86,11 +194,11 @@ def test_in_a_new_plan_it_goes_on_at_the_same_number_or_if_there_is_none_at_the_
     bench.upload([HOME, *places])
     bench.command(START)
     bench.run_until(lambda: reached(bench) == [1, 2])
-    bench.command(dialect.MAV_CMD_DO_SET_MODE, 1, 5)
+    bench.command(MODE, 1, 5)
     bench.upload([HOME, *places])
     bench.command(START)
     bench.run_until(lambda: reached(bench) == [1, 2, 3])
-    bench.command(dialect.MAV_CMD_DO_SET_MODE, 1, 5)
+    bench.command(MODE, 1, 5)
     bench.upload([HOME, places[0]])
     bench.command(START)
     bench.run_until(lambda: bench.autopilot.mission.complete)
@@ -102,8 +210,8 @@ def test_set_up_so_it_begins_again() -> None:
     bench.upload([HOME, *(item(n, 16, bench.offset(30 * n, 0), 20.0) for n in (1, 2)), item(3, 17)])
     bench.command(START)
     bench.run_until(lambda: reached(bench) == [1])
-    bench.command(dialect.MAV_CMD_DO_SET_MODE, 1, 5)
-    bench.command(dialect.MAV_CMD_DO_SET_MODE, 1, 3)
+    bench.command(MODE, 1, 5)
+    bench.command(MODE, 1, 3)
     bench.run_until(lambda: len(reached(bench)) == 3)
     assert reached(bench) == [1, 1, 2]
     assert bench.autopilot.chronicle.counts["mission"] == 2
@@ -115,10 +223,10 @@ def test_the_current_item_can_be_set_before_and_on_the_way() -> None:
     bench.tell(dialect.MAVLink_mission_set_current_message(1, 1, 2))
     bench.command(START)
     bench.run_until(lambda: reached(bench) == [2])
-    assert bench.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, 5) == 0
+    assert bench.command(SET_CURRENT, 5) == 0
     bench.run_until(lambda: bench.autopilot.mission.complete)
     assert reached(bench) == [2, 5]
-    assert bench.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, 9) == 2
+    assert bench.command(SET_CURRENT, 9) == 2
 
 
 def test_a_mission_that_is_flown_is_not_cleared() -> None:
@@ -189,12 +297,15 @@ def test_turns_are_flown_around_the_place() -> None:
     assert max(distances) < 16
 
 
-def test_a_copter_lands_where_the_mission_says() -> None:
+def test_a_copter_lands_where_the_mission_says_and_is_then_at_its_beginning() -> None:
     bench = Bench().airborne()
-    fly(bench, item(1, 21, bench.offset(30, 10)))
-    bench.run(1)
-    assert not bench.autopilot.arming.armed
+    bench.upload([HOME, item(1, 16, bench.offset(20, 10), 20.0), item(2, 21, bench.offset(30, 10))])
+    bench.command(START)
+    bench.run_until(lambda: not bench.autopilot.arming.armed)
     assert bench.autopilot.body.north_m == pytest.approx(30, abs=0.5)
+    # As on real copters: the motors' stop comes before the item is done.
+    assert reached(bench) == [1]
+    assert progress(bench) == (1, 3, 1)
 
 
 def test_a_rover_drives_its_mission_and_comes_home() -> None:

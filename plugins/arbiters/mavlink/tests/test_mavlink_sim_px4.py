@@ -52,9 +52,12 @@ def test_readiness_is_in_the_estimator_status_the_prearm_bit_and_home() -> None:
     assert not heard(bench, 1)[-1].onboard_control_sensors_health & PREARM
     assert not heard(bench, 242)
     bench.run(15)
-    assert heard(bench, 230)[-1].flags & 0x3FF == 0x33F
+    # "Constant position" means also that it is at rest.
+    assert heard(bench, 230)[-1].flags == 0x3FF
     assert heard(bench, 1)[-1].onboard_control_sensors_health & PREARM
     assert heard(bench, 242)[-1].altitude == GROUND_M * 1000
+    bench.airborne()
+    assert heard(bench, 230)[-1].flags == 0x37F
 
 
 def test_arming_without_a_position_is_rejected_with_texts() -> None:

@@ -71,7 +71,7 @@ async def copter() -> AsyncIterator[Flown]:
     mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     await mavsdk.add_any_connection(f"udpin://127.0.0.1:{port}")
     # MAVSDK sends setpoints 20 times a second, but not of simulated ones.
-    spec = VehicleSpec(firmware="px4", parameters={"COM_OF_LOSS_T": 10})
+    spec = VehicleSpec(firmware="px4", parameters={"COM_OF_LOSS_T": 10}, estimator_s=6.0)
     async with Simulator([spec], speed=20, to=("127.0.0.1", port)) as sim:
         system = await mavsdk.first_autopilot(WITHIN_S)
         assert system is not None

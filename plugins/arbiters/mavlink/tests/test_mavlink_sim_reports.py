@@ -50,13 +50,15 @@ def test_before_the_estimator_is_ready_no_position_is_told() -> None:
     bench.run(20)
     assert (bench.report(33).lat, bench.report(33).lon) == (0, 0)
     assert bench.report(24).fix_type >= 3
-    assert bench.command(512, 32) == 4
-    assert bench.command(512, 242) == 4
+    for missing in (32, 242, 259):  # acknowledged all the same
+        assert bench.command(512, missing) == 0
+        assert missing not in {m.get_msgId() for m in bench.heard}
+    assert bench.command(512, 150) == 4
 
 
 def test_landed_or_in_the_air_is_told() -> None:
     bench = Bench().ready()
-    assert bench.report(245).landed_state == 1
+    assert (bench.report(245).landed_state, bench.report(245).vtol_state) == (1, 3)
     bench.command(22, *[0] * 6, 20)
     bench.run(4)
     assert bench.report(245).landed_state == 3
@@ -64,6 +66,32 @@ def test_landed_or_in_the_air_is_told() -> None:
     assert bench.report(245).landed_state == 2
     bench.command(21)
     assert bench.report(245).landed_state == 4
+
+
+def test_armed_on_the_ground_it_stands_by() -> None:
+    bench = Bench().ready()
+    assert (bench.report(0).system_status, bench.report(0).base_mode & 128) == (3, 128)
+    bench.command(22, *[0] * 6, 20)
+    bench.run(3)
+    assert bench.report(0).system_status == 4
+
+
+def test_a_rover_is_active_unless_it_holds() -> None:
+    bench = Bench(Kind.ROVER)
+    assert (bench.report(0).system_status, bench.report(0).base_mode) == (4, 0x41)
+    bench.command(176, 1, 4)
+    assert (bench.report(0).system_status, bench.report(0).base_mode) == (3, 0x01)
+    bench.ready()
+    assert (bench.report(0).system_status, bench.report(0).base_mode) == (4, 0x89)
+    assert bench.texts() == ["Throttle armed"]
+
+
+def test_without_terrain_data_the_height_is_that_above_the_sea() -> None:
+    bench = Bench().airborne(20)
+    report = bench.report(136)
+    assert (report.spacing, report.terrain_height, report.loaded) == (0, 0, 0)
+    assert report.current_height == pytest.approx(508, abs=0.3)
+    assert (report.lat, report.lon) == (bench.report(33).lat, bench.report(33).lon)
 
 
 def test_the_battery_drains_in_motion() -> None:
@@ -81,6 +109,10 @@ def test_it_says_who_it_is() -> None:
     bench.run(1.5)
     heartbeat = next(m for m in bench.heard if m.get_type() == "HEARTBEAT")
     assert (heartbeat.type, heartbeat.autopilot) == (11, 3)
+    assert (bench.report(245).vtol_state, bench.report(245).landed_state) == (0, 0)
+    assert bench.command(511, 136, 1e6) == 0
+    bench.run(2)
+    assert "TERRAIN_REPORT" not in {m.get_type() for m in bench.heard}
     assert bench.command(520) == 0
     version = next(m for m in bench.heard if m.get_type() == "AUTOPILOT_VERSION")
     assert version.flight_sw_version >> 16 == 4 << 8 | 7

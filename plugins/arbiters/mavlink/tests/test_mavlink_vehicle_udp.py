@@ -31,7 +31,7 @@ OWN = Address(245, 190)
 async def flying(
     kind: Kind = Kind.COPTER, firmware: str = "ardupilot"
 ) -> AsyncIterator[tuple[SimulatedVehicle, Vehicle]]:
-    spec = VehicleSpec(kind, firmware=firmware)
+    spec = VehicleSpec(kind, firmware=firmware, estimator_s=6.0)
     async with Simulator([spec], speed=SPEED, to=None) as simulator:
         host, port = simulator[1].address
         clock = SystemClock(SPEED)

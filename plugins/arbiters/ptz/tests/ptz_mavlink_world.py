@@ -108,7 +108,9 @@ async def world(
 ) -> AsyncIterator[World]:
     """A vehicle with gimbal and camera. `own`: of the connection; `more`: of its settings."""
     what = {"gimbal": True, "camera": True, "heading_deg": 90.0, **(spec or {})}
-    async with Simulator([VehicleSpec(kind, **what)], speed=SPEED, to=to) as simulator:
+    async with Simulator(
+        [VehicleSpec(kind, **what, estimator_s=6.0)], speed=SPEED, to=to
+    ) as simulator:
         real = simulator[1]
         host, port = real.address
         clock = SystemClock(SPEED)

@@ -55,7 +55,9 @@ class _Gimbals(ArbiterContract):
     @pytest.fixture
     def simulator(self):
         spec = {"gimbal": True, "camera": True, "firmware": self.firmware}
-        specs = [VehicleSpec(self.kind, system=number, **spec) for number in (1, 2)]
+        specs = [
+            VehicleSpec(self.kind, system=number, **spec, estimator_s=6.0) for number in (1, 2)
+        ]
         simulator = Simulator(specs, speed=SPEED, to=None)
         started, stop = threading.Event(), asyncio.Event()
         loop = asyncio.new_event_loop()

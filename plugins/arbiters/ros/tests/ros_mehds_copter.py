@@ -14,7 +14,7 @@ PARAMETERS = {"FS_GCS_ENABLE": 1.0, "FS_GCS_TIMEOUT": 20.0, "BATT_FS_LOW_ACT": 2
 
 
 async def main(port: int, speed: float) -> None:
-    spec = VehicleSpec(home=HOME, parameters=PARAMETERS)
+    spec = VehicleSpec(home=HOME, parameters=PARAMETERS, estimator_s=6.0)
     async with Simulator([spec], speed=speed, to=("127.0.0.1", port)) as vehicles:
         hear_lines(lambda line: parse(line).plan(vehicles[1].faults))
         print("ready", flush=True)

@@ -59,7 +59,7 @@ class Arming(Part):
         self.autopilot.note("armed")
         self.autopilot.home.set_at_arming()
         self.autopilot.modes.maneuver.begin()
-        self.autopilot.say("Arming motors")
+        self.autopilot.say(self.autopilot.firmware.armed_text)
         return True
 
     def disarm(self, *, force: bool = False) -> bool:
@@ -69,8 +69,9 @@ class Arming(Part):
         if not (force or self._may_disarm()):
             return False
         self.armed = False
+        self.autopilot.mission.disarmed()
         self.autopilot.note("disarmed")
-        self.autopilot.say("Disarming motors")
+        self.autopilot.say(self.autopilot.firmware.disarmed_text)
         return True
 
     def disarm_after_landing(self) -> None:

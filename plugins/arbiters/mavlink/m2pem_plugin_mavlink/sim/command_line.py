@@ -149,9 +149,9 @@ class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
     "--ekf",
     "estimator_s",
     type=Duration(),
-    default="6s",
+    default="41s",
     show_default=True,
-    help="Until vehicles know where they are, in simulated time (ArduPilot: 41s).",
+    help="Until vehicles know where they are, in simulated time.",
 )
 @click.option("--first-system", type=click.IntRange(1, MOST_SYSTEMS), default=1, show_default=True)
 @click.option(

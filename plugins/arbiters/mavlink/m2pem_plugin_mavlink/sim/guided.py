@@ -46,7 +46,7 @@ class GuidedSetpoints(Part):
             return z + self.autopilot.home.point.up_m
         return z - self.autopilot.frame.origin.altitude_amsl_m
 
-    def point_of(self, command: Command) -> Point | None:
+    def point_of(self, command: Command) -> Point:
         """The place in a command."""
         location = Location(command.latitude_deg, command.longitude_deg, 0.0)
         point = self.autopilot.frame.to_point(location)

@@ -38,7 +38,8 @@ class Identity(Part):
 
     def _heartbeat(self) -> Any:
         pilot = self.autopilot
-        status = dialect.MAV_STATE_ACTIVE if pilot.arming.armed else dialect.MAV_STATE_STANDBY
+        active = pilot.firmware.active(pilot)
+        status = dialect.MAV_STATE_ACTIVE if active else dialect.MAV_STATE_STANDBY
         return dialect.MAVLink_heartbeat_message(
             pilot.firmware.vehicle_type,
             pilot.firmware.autopilot_id,

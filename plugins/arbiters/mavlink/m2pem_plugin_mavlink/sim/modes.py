@@ -55,8 +55,8 @@ class ModeSwitch(Part):
             return self._speed_mps
         return self.autopilot.tuning.cruise_mps
 
-    def set_speed(self, speed_mps: float) -> None:
-        """Go that fast from now on in this mode."""
+    def set_speed(self, speed_mps: float | None) -> None:
+        """Go that fast from now on in this mode; None: as set up."""
         self._speed_mps = speed_mps
 
     def switch(self, number: int) -> bool:
@@ -70,7 +70,8 @@ class ModeSwitch(Part):
         maneuver = mode.maneuver(self.autopilot)
         reason = self._refusal(mode) or maneuver.refusal()
         if reason is not None:
-            self.autopilot.warn(self.autopilot.firmware.mode_text(mode, reason))
+            text = self.autopilot.firmware.mode_text(mode, reason)
+            self.autopilot.say(text, dialect.MAV_SEVERITY_WARNING)
             return False
         self._enter(mode, maneuver)
         return True

@@ -37,6 +37,7 @@ class Reports(Part):
             dialect.MAVLINK_MSG_ID_VFR_HUD: self._hud,
             dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._extended_state,
             dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: self._navigation,
+            dialect.MAVLINK_MSG_ID_TERRAIN_REPORT: self._terrain,
         }
 
     def _sys_status(self) -> Any:
@@ -140,13 +141,33 @@ class Reports(Part):
     def _extended_state(self) -> Any:
         pilot = self.autopilot
         state: int = dialect.MAV_LANDED_STATE_IN_AIR
-        if pilot.body.on_ground or pilot.spec.kind in (Kind.ROVER, Kind.BOAT):
+        if not pilot.firmware.tells_landed:
+            state = dialect.MAV_LANDED_STATE_UNDEFINED
+        elif pilot.body.on_ground or pilot.spec.kind in (Kind.ROVER, Kind.BOAT):
             state = dialect.MAV_LANDED_STATE_ON_GROUND
         elif getattr(pilot.modes.maneuver, "taking_off", False):
             state = dialect.MAV_LANDED_STATE_TAKEOFF
         elif pilot.modes.mode.number == pilot.firmware.roles.land:
             state = dialect.MAV_LANDED_STATE_LANDING
-        return dialect.MAVLink_extended_sys_state_message(dialect.MAV_VTOL_STATE_UNDEFINED, state)
+        return dialect.MAVLink_extended_sys_state_message(pilot.firmware.vtol_state, state)
+
+    def _terrain(self) -> Any:
+        """There are no terrain data, so that the height is that above the sea. What drives or
+        floats has none to tell."""
+        pilot = self.autopilot
+        if not pilot.firmware.tells_landed:
+            return None
+        place = pilot.frame.to_location(pilot.position)
+        known = pilot.estimator.ready or pilot.estimator.found
+        return dialect.MAVLink_terrain_report_message(
+            round(place.latitude_deg * 1e7) if known else 0,
+            round(place.longitude_deg * 1e7) if known else 0,
+            0,
+            0.0,
+            place.altitude_amsl_m if known else 0.0,
+            504,
+            0,
+        )
 
     def _navigation(self) -> Any:
         pilot, body = self.autopilot, self.autopilot.body

@@ -25,7 +25,7 @@ class VehicleSpec:
     """One simulated vehicle.
 
     `firmware`: a name in `sim.firmware.FIRMWARES`; `estimator_s`: for how long after its start
-    the vehicle does not know where it is, in seconds of simulated time (ArduPilot takes 41);
+    the vehicle does not know where it is, in seconds of simulated time;
     `parameters`: what differs from the firmware's defaults; `battery_s`: how long a full battery
     lasts in motion; `gimbal`: it has one (None: if it is a copter); `camera`: it has one, as a
     component of its own.
@@ -36,7 +36,7 @@ class VehicleSpec:
     home: Location = ZURICH
     heading_deg: float = 0.0
     firmware: str = "ardupilot"
-    estimator_s: float = 6.0
+    estimator_s: float = 41.0
     parameters: Mapping[str, float] = field(default_factory=dict)
     battery_s: float = 1800.0
     gimbal: bool | None = None

@@ -87,6 +87,8 @@ class Streams(Part):
     def _set_interval(self, command: Command) -> Result:
         id_, interval_us = int(command.param1), command.param2
         peer = command.sender.peer
+        if id_ in self.autopilot.firmware.silent_reports - self.makers.keys():
+            return Result.ACCEPTED
         if id_ not in self.makers:
             return Result.DENIED
         if interval_us < 0:
@@ -113,12 +115,15 @@ class Streams(Part):
         return Result.ACCEPTED
 
     def _request(self, command: Command) -> Result:
-        maker = self.makers.get(int(command.param1))
+        """ArduPilot acknowledges it even if there is nothing to send."""
+        id_, firmware = int(command.param1), self.autopilot.firmware
+        maker = self.makers.get(id_)
         message = maker() if maker else None
-        if message is None:
-            return Result.FAILED
-        self.autopilot.send(message, command.sender.peer)
-        return Result.ACCEPTED
+        if message is not None:
+            self.autopilot.send(message, command.sender.peer)
+        known = maker is not None or id_ in firmware.silent_reports
+        sent = known if firmware.is_ardupilot else message is not None
+        return Result.ACCEPTED if sent else Result.FAILED
 
     def _request_stream(self, message: Any, sender: Heard) -> None:
         group = message.req_stream_id

@@ -12,6 +12,9 @@ from m2pem_plugin_mavlink.sim.missions.execution import Auto
 from m2pem_plugin_mavlink.sim.part import CommandHandler, Part
 from m2pem_plugin_mavlink.sim.specification import Kind
 
+SURFACE = (Kind.ROVER, Kind.BOAT)
+LEAST_MPS = 0.05
+"""AR_WPNAV_SPEED_MIN."""
 CHANGE_MODE = 1
 """Parameter 2 of DO_REPOSITION: enter GUIDED if it is in another mode."""
 
@@ -67,32 +70,50 @@ class MotionCommands(Part):
         placed = command.frame in GLOBAL_FRAMES and command.has_position
         if not placed or not math.isfinite(command.z):
             return Result.DENIED
-        if self._guided() is None:
-            if not int(command.param2) & CHANGE_MODE:
-                return Result.DENIED
-            if not pilot.modes.switch(pilot.firmware.roles.guided):
-                return Result.FAILED
-        guided = self._guided()
+        kind = pilot.spec.kind
+        surface, plane = kind in SURFACE, kind is Kind.PLANE
+        if self._guided() is None and not int(command.param2) & CHANGE_MODE:
+            return Result.FAILED if plane else Result.DENIED
         point = pilot.guided.point_of(command)
-        if guided is None or point is None:
-            return Result.DENIED
         reason = pilot.guided.refusal(point)
         if reason is not None:
             pilot.warn(reason)
+            return Result.DENIED if plane else Result.FAILED
+        if not pilot.modes.switch(pilot.firmware.roles.guided):
             return Result.FAILED
-        if command.param1 > 0:
-            pilot.modes.set_speed(command.param1)
+        guided = self._guided()
+        assert guided is not None, "that is the mode"
+        # Only what drives looks at the speed, and is then in GUIDED already if it refuses.
+        if surface and command.param1 > 0 and not self._set_speed(command.param1):
+            return Result.FAILED
         if math.isfinite(command.param3) and command.param3 > 0:
             guided.radius_m = command.param3
         guided.go_to(point)
         return Result.ACCEPTED
 
+    def _set_speed(self, speed_mps: float) -> bool:
+        if speed_mps < LEAST_MPS or not self.autopilot.modes.maneuver.takes_speed:
+            return False
+        self.autopilot.modes.set_speed(speed_mps)
+        return True
+
     def _change_speed(self, command: Command) -> Result:
-        if not math.isfinite(command.param2) or command.param2 <= 0:
-            return Result.FAILED
-        if command.param1 in (0, 1):
-            self.autopilot.modes.set_speed(command.param2)
-        return Result.ACCEPTED
+        """Airspeed is ground speed but to planes, whose ground speed is the least one."""
+        pilot, kind, speed_mps = self.autopilot, self.autopilot.spec.kind, command.param2
+        vertical = command.param1 in (2, 3)
+        if kind is Kind.PLANE:
+            least_mps = pilot.parameters["AIRSPEED_MIN"]
+            if command.param1 == 1:
+                speed_mps = max(speed_mps, pilot.tuning.cruise_mps)
+            elif not least_mps <= speed_mps <= pilot.parameters["AIRSPEED_MAX"]:
+                return Result.FAILED
+        elif vertical if kind in SURFACE else not speed_mps > 0:
+            return Result.DENIED
+        if command.param1 not in (0, 1):
+            taken = vertical and kind is Kind.COPTER and pilot.modes.maneuver.takes_speed
+        else:
+            taken = self._set_speed(speed_mps)
+        return Result.ACCEPTED if taken else Result.FAILED
 
     def _yaw(self, command: Command) -> Result:
         guided = self._guided()
@@ -119,10 +140,12 @@ class MotionCommands(Part):
         return Result.ACCEPTED
 
     def _start_mission(self, command: Command) -> Result:
+        """Enter AUTO; a copter that is in it already begins a mission that is not on its way."""
         pilot = self.autopilot
         if command.param1 or command.param2:
             return Result.DENIED
         result = self._enter(pilot.firmware.roles.mission)
-        if result is Result.ACCEPTED:
-            pilot.mission.released = True
+        if result is Result.ACCEPTED and pilot.spec.kind is Kind.COPTER:
+            pilot.mission.released = pilot.arming.armed
+            pilot.modes.maneuver.begin()
         return result

@@ -25,6 +25,14 @@ TYPES = {
     Kind.PLANE: dialect.MAV_TYPE_FIXED_WING,
 }
 
+WAYPOINTS = {
+    Kind.COPTER: (16, 19, 82),
+    Kind.ROVER: (16, 19),
+    Kind.BOAT: (16, 19),
+    Kind.PLANE: (16,),
+}
+"""MAV_CMD of the items of which it says that they were reached."""
+
 
 class ArduPilot(Firmware):
     """ArduPilot on one kind of vehicle."""
@@ -42,7 +50,8 @@ class ArduPilot(Firmware):
         | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
         | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
     )
-    mission_has_home = True
+    is_ardupilot = True
+    silent_reports = frozenset({dialect.MAVLINK_MSG_ID_CAMERA_INFORMATION})
     capacity = "BATT_CAPACITY"
     asks_for_items_as_int = False
 
@@ -53,6 +62,11 @@ class ArduPilot(Firmware):
         self.reason_sensors = "Gyros not calibrated"
         self.loop_hz = 400.0 if copter else 50.0
         self.first_mode = 0
+        states = (dialect.MAV_VTOL_STATE_UNDEFINED, dialect.MAV_VTOL_STATE_MC)
+        self.vtol_state = states[copter]
+        self.tells_landed = plane or copter
+        if not copter:
+            self.armed_text, self.disarmed_text = "Throttle armed", "Throttle disarmed"
         self.roles = ROLES[spec.kind]
 
     @property
@@ -141,16 +155,34 @@ class ArduPilot(Firmware):
         flags: int = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         if autopilot.modes.mode.automatic:
             flags |= dialect.MAV_MODE_FLAG_GUIDED_ENABLED
-        flags |= dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
-        if self.spec.kind is Kind.COPTER:
+        if self.tells_landed:
+            flags |= dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
+        if self.spec.kind is Kind.COPTER or autopilot.modes.mode.name == "MANUAL":
             flags |= dialect.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
         if autopilot.arming.armed:
             flags |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
         return flags
 
+    def active(self, autopilot: "Autopilot") -> bool:
+        """What flies, in the air; what drives or floats, in all modes but HOLD, armed or not."""
+        if not self.tells_landed:
+            return autopilot.modes.mode.name != "HOLD"
+        return not autopilot.body.on_ground
+
+    def reached_text(self, autopilot: "Autopilot", index: int) -> str:
+        """Only of waypoints and the like."""
+        if autopilot.mission.items[index].command not in WAYPOINTS[self.spec.kind]:
+            return ""
+        what = "command" if self.spec.kind is Kind.COPTER else "waypoint"
+        return f"Reached {what} #{index}"
+
     def mode_number(self, base_mode: int, main: int, sub: int) -> int | None:
         """The second parameter is the mode."""
         return main if base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED else None
+
+    def mode_text(self, mode: Mode, reason: str) -> str:
+        """What drives or floats does not say which."""
+        return super().mode_text(mode, reason) if self.tells_landed else "Flight mode change failed"
 
     def checks_sensors(self, autopilot: "Autopilot") -> bool:
         """Unless the checks are switched off."""

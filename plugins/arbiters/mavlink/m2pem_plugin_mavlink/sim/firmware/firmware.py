@@ -47,8 +47,8 @@ class Firmware(ABC):
     """As in AUTOPILOT_VERSION.flight_sw_version."""
     capabilities: ClassVar[int]
     """MAV_PROTOCOL_CAPABILITY."""
-    mission_has_home: ClassVar[bool]
-    """Item 0 of a mission is the home position."""
+    is_ardupilot: ClassVar[bool]
+    """Its missions have the home position as item 0, and go on as ArduPilot's do."""
     asks_for_items_as_int: ClassVar[bool]
     """It asks with MISSION_REQUEST_INT rather than with MISSION_REQUEST."""
     unknown_reports: ClassVar[frozenset[int]] = frozenset()
@@ -61,6 +61,13 @@ class Firmware(ABC):
     reason_sensors: str
     loop_hz: float
     first_mode: int
+    vtol_state: int
+    """MAV_VTOL_STATE."""
+    tells_landed: bool
+    """EXTENDED_SYS_STATE says whether it is in the air."""
+    armed_text, disarmed_text = "Arming motors", "Disarming motors"
+    silent_reports: ClassVar[frozenset[int]] = frozenset()
+    """Ids of messages that it acknowledges to be asked for, and never sends."""
     roles: Roles
 
     def __init__(self, spec: VehicleSpec) -> None:
@@ -96,6 +103,10 @@ class Firmware(ABC):
         """MAV_MODE_FLAG, as HEARTBEAT has it."""
 
     @abstractmethod
+    def active(self, autopilot: "Autopilot") -> bool:
+        """HEARTBEAT says ACTIVE rather than STANDBY."""
+
+    @abstractmethod
     def mode_number(self, base_mode: int, main: int, sub: int) -> int | None:
         """The custom_mode that the parameters of DO_SET_MODE mean; None: no custom mode."""
 
@@ -118,6 +129,10 @@ class Firmware(ABC):
     def mode_text(self, mode: Mode, reason: str) -> str:
         """How it says that it does not enter a mode."""
         return f"Mode change to {mode.name} failed: {reason}"
+
+    def reached_text(self, autopilot: "Autopilot", index: int) -> str:
+        """What it says when an item of a mission is done; "": nothing."""
+        return ""
 
     def parameter_to_wire(self, name: str, value: float) -> float:
         """A parameter's value as the float in PARAM_VALUE."""

@@ -81,7 +81,8 @@ class Px4(Firmware):
         | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
         | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
     )
-    mission_has_home = False
+    is_ardupilot = False
+    tells_landed = True
     asks_for_items_as_int = True
     unknown_reports = frozenset({dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT})
     gimbal_needs_control = True
@@ -90,6 +91,7 @@ class Px4(Firmware):
     reason_sensors = "Sensors are still calibrating"
     loop_hz = 1000.0
     first_mode = HOLD
+    vtol_state = dialect.MAV_VTOL_STATE_UNDEFINED
     roles = ROLES
 
     def __init__(self, spec: VehicleSpec) -> None:
@@ -177,6 +179,10 @@ class Px4(Firmware):
         if autopilot.arming.armed:
             flags |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
         return flags
+
+    def active(self, autopilot: "Autopilot") -> bool:
+        """As long as it is armed."""
+        return autopilot.arming.armed
 
     def mode_number(self, base_mode: int, main: int, sub: int) -> int | None:
         """Parameters 2 and 3 are the main and the sub mode."""

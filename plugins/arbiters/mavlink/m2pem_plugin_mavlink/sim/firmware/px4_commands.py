@@ -42,6 +42,7 @@ class Px4Commands(Part):
             dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._arm,
             dialect.MAV_CMD_DO_SET_MODE: self._set_mode,
             dialect.MAV_CMD_DO_REPOSITION: self._reposition,
+            dialect.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
             dialect.MAV_CMD_MISSION_START: self._start_mission,
             dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _: self._enter(RETURN),
             dialect.MAV_CMD_NAV_LOITER_UNLIM: lambda _: self._enter(HOLD),
@@ -113,6 +114,11 @@ class Px4Commands(Part):
         yaw_rad = wrapped_rad(command.param4) if math.isfinite(command.param4) else None
         maneuver.go_to(point, yaw_rad)
         return result
+
+    def _change_speed(self, command: Command) -> Result:
+        """In any mode; without a speed, as it is set up."""
+        self.autopilot.modes.set_speed(command.param2 if command.param2 > 0 else None)
+        return Result.ACCEPTED
 
     def _orbit(self, command: Command) -> Result:
         pilot = self.autopilot

@@ -25,10 +25,13 @@ class Px4Reports(Part):
         return int(self.autopilot.since_boot_s * 1e6)
 
     def _estimator(self) -> Any:
-        """Its flags have the same numbers as those of ArduPilot's EKF_STATUS_REPORT."""
-        ready = self.autopilot.estimator.ready
+        """Its flags have the same numbers as those of ArduPilot's EKF_STATUS_REPORT, but "constant
+        position" means also that it is at rest (since July 2024)."""
+        ready, body = self.autopilot.estimator.ready, self.autopilot.body
         ratio, accuracy_m = (0.05, 0.3) if ready else (0.8, 50.0)
-        flags = self.autopilot.estimator.flags & 0x3FF
+        flags = 0x37F if ready else self.autopilot.estimator.flags & 0x3FF
+        if body.on_ground and not body.moving:
+            flags |= dialect.ESTIMATOR_CONST_POS_MODE
         return dialect.MAVLink_estimator_status_message(
             self._time_us, flags, ratio, ratio, ratio, 0.02, 0.0, 0.0, accuracy_m, 0.4
         )

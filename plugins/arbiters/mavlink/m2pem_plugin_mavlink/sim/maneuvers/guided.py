@@ -3,12 +3,18 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+from pymavlink.dialects.v20.ardupilotmega import (
+    MAV_SEVERITY_WARNING,
+    MAVLink_mission_item_reached_message,
+)
+
 from m2pem_plugin_mavlink.sim.demands import Circle, Demand, Drive, Go, Reach, Rest
 from m2pem_plugin_mavlink.sim.geometry import Point
 from m2pem_plugin_mavlink.sim.maneuvers.maneuver import Maneuver
 from m2pem_plugin_mavlink.sim.maneuvers.standing import Stay
 from m2pem_plugin_mavlink.sim.specification import Kind
 
+SURFACE = (Kind.ROVER, Kind.BOAT)
 TAKEN_OFF_M = 0.3
 """A takeoff is over when it is that near to its height."""
 
@@ -16,6 +22,9 @@ TAKEN_OFF_M = 0.3
 class Guided(Maneuver):
     """What was last asked for: a takeoff, a place, a velocity; without any, it stays.
 
+    `aimed`: it is on the way to a place, or (not boats, which then loiter) has arrived there. A
+    copter goes as fast as it is set up whenever that begins or ends; what drives takes no speed
+    before. (ArduPilot: ModeGuided::set_desired_speed of rovers, pva_control_start of copters.)
     `radius_m`: a plane circles the place so far away (0: WP_LOITER_RAD), until the mode is left.
     A velocity is forgotten after `tuning.setpoint_timeout_s` (ArduPilot: 3 s, GUID_TIMEOUT).
     """
@@ -25,6 +34,17 @@ class Guided(Maneuver):
     radius_m = 0.0
     destination: Point | None = None
     paused = False
+    aimed = False
+
+    @property
+    def takes_speed(self) -> bool:
+        """What drives does so on the way to a place only."""
+        return self.aimed or self.autopilot.spec.kind not in SURFACE
+
+    def _aim(self, aimed: bool) -> None:
+        if aimed != self.aimed and self.autopilot.spec.kind is Kind.COPTER:
+            self.autopilot.modes.set_speed(None)
+        self.aimed = aimed
 
     def begin(self) -> None:
         """Nothing has been asked for yet."""
@@ -35,6 +55,7 @@ class Guided(Maneuver):
 
     def take_off(self, up_m: float) -> None:
         """Climb to a height (metres above the frame's origin)."""
+        self._aim(False)
         self.takeoff_up_m, self.taking_off = up_m, True
         self._start = self.autopilot.position
         self.destination = self._velocity = None
@@ -49,6 +70,7 @@ class Guided(Maneuver):
         ):
             place = self.autopilot.frame.to_location(point)
             self.autopilot.note("motion", f"{place.latitude_deg:.7f},{place.longitude_deg:.7f}")
+        self._aim(True)
         self.taking_off, self._velocity, self.paused = False, None, False
         self.destination, self.yaw_rad = point, yaw_rad
 
@@ -56,6 +78,7 @@ class Guided(Maneuver):
         """Have a velocity, for a while."""
         if self._velocity is None:
             self.autopilot.note("motion", "velocity")
+        self._aim(False)
         self.taking_off, self.destination = False, None
         self._velocity = demand
         self._velocity_until_s = self.autopilot.now_s + self.autopilot.tuning.setpoint_timeout_s
@@ -86,6 +109,9 @@ class Guided(Maneuver):
             if pilot.now_s <= self._velocity_until_s:
                 return self._velocity()
             self.stop()
+            if pilot.spec.kind in SURFACE:
+                text = "target not received last 3secs, stopping"
+                pilot.say(text, MAV_SEVERITY_WARNING)
         if self.destination is not None and not self.paused:
             return self._towards(self.destination)
         return self._turned(self._stay.step(dt_s))
@@ -100,7 +126,8 @@ class Guided(Maneuver):
                 if pilot.position.distance_m(destination) <= pilot.tuning.acceptance_m:
                     self.destination = None
                     self._stay = Stay(pilot)
-                    pilot.say("Reached destination")
+                    self.aimed = pilot.spec.kind is Kind.ROVER
+                    pilot.send(MAVLink_mission_item_reached_message(0))
                     return Drive(0.0)
         return self.reach(destination, yaw_rad=self.yaw_rad)
 

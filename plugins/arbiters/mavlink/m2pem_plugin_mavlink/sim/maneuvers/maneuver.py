@@ -16,6 +16,12 @@ class Maneuver:
     def __init__(self, autopilot: "Autopilot") -> None:
         self.autopilot = autopilot
 
+    @property
+    def takes_speed(self) -> bool:
+        """Whether ArduPilot obeys DO_CHANGE_SPEED in it now (set_desired_speed of Rover's modes,
+        set_speed_xy_cms of Copter's)."""
+        return False
+
     def refusal(self) -> str | None:
         """Why it cannot be begun now, as ArduPilot words it; None: it can. Changes nothing."""
         return None

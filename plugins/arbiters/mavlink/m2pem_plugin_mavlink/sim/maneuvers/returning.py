@@ -14,6 +14,11 @@ WAIT_S = 5.0
 class ReturnToLaunch(Maneuver):
     """Home. `arrived`: it is there, or above."""
 
+    @property
+    def takes_speed(self) -> bool:
+        """Planes come home as fast as they are set up."""
+        return self.autopilot.spec.kind is not Kind.PLANE
+
     def begin(self) -> None:
         """At which height, is decided once."""
         pilot = self.autopilot

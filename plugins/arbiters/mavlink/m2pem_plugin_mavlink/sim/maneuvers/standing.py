@@ -42,6 +42,11 @@ class CircleHere(Maneuver):
 
     _center: Point | None = None
 
+    @property
+    def takes_speed(self) -> bool:
+        """What drives or floats does."""
+        return self.autopilot.spec.kind in (Kind.ROVER, Kind.BOAT)
+
     def step(self, dt_s: float) -> Demand:
         """Around it."""
         pilot = self.autopilot

@@ -1,5 +1,7 @@
 """AUTO: flying the mission, item by item."""
 
+from pymavlink.dialects.v20.ardupilotmega import MAV_SEVERITY_NOTICE
+
 from m2pem_plugin_mavlink.sim.demands import Demand
 from m2pem_plugin_mavlink.sim.maneuvers.maneuver import Maneuver
 from m2pem_plugin_mavlink.sim.maneuvers.standing import Stay
@@ -12,16 +14,28 @@ NAV_TAKEOFF = 22
 
 
 class Auto(Maneuver):
-    """Flies the mission from its current item on; complete, it begins anew when entered again."""
+    """Flies the mission from where it was; complete, it begins anew when the mode is left and
+    entered again, and not before (ArduPilot: AP_Mission::start_or_resume)."""
 
     paused = False
+    _leg: Leg | None = None
+    _index: int | None = None
+
+    @property
+    def takes_speed(self) -> bool:
+        """Always, but boats that keep their station."""
+        return self._leg is not None or self.autopilot.spec.kind is not Kind.BOAT
 
     def refusal(self) -> str | None:
-        """An armed copter on the ground needs a mission that begins with a takeoff."""
+        """An armed copter on the ground needs a mission that begins with a takeoff; what drives
+        needs one even while it is not armed."""
         pilot, progress = self.autopilot, self.autopilot.mission
-        if not pilot.arming.armed:
+        surface = pilot.spec.kind in (Kind.ROVER, Kind.BOAT)
+        if not (pilot.arming.armed or surface):
             return None
         if progress.empty:
+            if surface:
+                pilot.say("No Mission. Can't set AUTO.", MAV_SEVERITY_NOTICE)
             return "init failed"
         if pilot.spec.kind is Kind.COPTER and pilot.body.on_ground:
             ahead = progress.items[self._start() :]
@@ -39,14 +53,25 @@ class Auto(Maneuver):
         again = progress.complete or not known
         if again or pilot.parameters.get("MIS_RESTART") == 1:
             return progress.first
-        return progress.current
+        return progress.resume_at
 
     def begin(self) -> None:
-        """Go on with the current item, once armed."""
-        self._leg: Leg | None = None
-        self._index: int | None = None
-        self._actions = Actions(self.autopilot)
+        """Start or go on, armed or not; what goes on already does so when it is armed."""
         self._stay = Stay(self.autopilot)
+        if not self.autopilot.mission.running:
+            self.start()
+
+    def start(self) -> None:
+        """Begin the mission, or go on where it was."""
+        pilot, progress = self.autopilot, self.autopilot.mission
+        self._actions = Actions(pilot)
+        start = self._start()
+        if progress.complete or start == progress.first:
+            progress.restart()
+            pilot.note("mission", f"{len(progress.items)} items")
+        progress.running = progress.begun = True
+        progress.complete = False
+        self.go_on(start)
 
     def pause(self, *, on: bool) -> None:
         """Stop on the way, or go on."""
@@ -61,39 +86,19 @@ class Auto(Maneuver):
         """Fly the present leg, and go on to the next when it is done."""
         pilot, progress = self.autopilot, self.autopilot.mission
         waiting = pilot.spec.kind is Kind.COPTER and pilot.body.on_ground and not progress.released
-        if progress.empty or waiting:
+        if waiting or not progress.running:
             return self._stay.step(dt_s)
-        if not progress.running:
-            # Complete, and entered anew: it begins again.
-            progress.running, progress.redirected = True, False
-            if progress.complete:
-                progress.restart()
-        if progress.redirected:
-            progress.redirected = False
-            self._go_on(progress.current)
-        elif self._index is None and not progress.complete:
-            self._open()
         self._actions.step(dt_s)
         if self._leg is None or self._index is None or self.paused:
             return self._stay.step(dt_s)
         demand = self._leg.step(dt_s)
-        if self._leg.done:
+        if self._leg is not None and self._leg.done:
             done, self._leg = self._index, None
             progress.reached(done)
-            self._go_on(done + 1)
+            self.go_on(done + 1)
         return demand
 
-    def _open(self) -> None:
-        """Begin where the mission is to begin."""
-        pilot, progress = self.autopilot, self.autopilot.mission
-        start = self._start()
-        if start == progress.first:
-            progress.restart()
-            pilot.note("mission", f"{len(progress.items)} items")
-        progress.begun, progress.complete = True, False
-        self._go_on(start)
-
-    def _go_on(self, index: int) -> None:
+    def go_on(self, index: int) -> None:
         """Begin the next item of navigation from there on, and the actions on the way to it."""
         pilot, progress = self.autopilot, self.autopilot.mission
         actions, following = progress.advance(index)
@@ -101,18 +106,28 @@ class Auto(Maneuver):
         self._stay = Stay(pilot)
         self._index = following
         if following is None:
-            progress.complete = True
-            if pilot.spec.kind is Kind.PLANE:
-                pilot.say("Mission complete, changing mode to RTL")
-                pilot.modes.switch(pilot.firmware.roles.back)
-                return
-            pilot.say("Mission complete")
-            if pilot.body.on_ground and pilot.spec.kind is Kind.COPTER:
-                pilot.arming.disarm_after_landing()
+            self.complete()
             return
         item = progress.items[following]
-        progress.current = following
-        pilot.say(f"Mission: {following} {NAVIGATION[item.command]}")
+        progress.current = progress.resume_at = following
+        self.tell(f"Mission: {following} {NAVIGATION[item.command]}")
         self._leg = leg_of(pilot, item)
-        if item.command == NAV_TAKEOFF and pilot.body.on_ground:
-            pilot.note("takeoff", f"item {following}")
+
+    def tell(self, text: str) -> None:
+        """PX4 says nothing on the way."""
+        if self.autopilot.firmware.is_ardupilot:
+            self.autopilot.say(text)
+
+    def complete(self) -> None:
+        """The end: a plane goes home, a copter that has landed stops its motors."""
+        pilot, progress = self.autopilot, self.autopilot.mission
+        progress.complete, progress.running = True, False
+        match pilot.spec.kind:
+            case Kind.PLANE:
+                pilot.modes.switch(pilot.firmware.roles.back)
+                self.tell("Mission complete, changing mode to RTL")
+            case Kind.COPTER:
+                if pilot.body.on_ground:
+                    pilot.arming.disarm_after_landing()
+            case _:
+                self.tell("Mission Complete")

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from m2pem_plugin_mavlink.sim.demands import Circle, Demand, Drive, Reach
+from m2pem_plugin_mavlink.sim.demands import Circle, Demand, Drive, Reach, Rest
 from m2pem_plugin_mavlink.sim.geometry import Location, Point, wrapped_rad
 from m2pem_plugin_mavlink.sim.maneuvers.landing import come_down
 from m2pem_plugin_mavlink.sim.maneuvers.maneuver import Maneuver
@@ -75,8 +75,13 @@ class Takeoff(Leg):
             return pilot.position.moved(pilot.body.yaw_rad, 3000.0).at_height(up_m)
         return pilot.position.at_height(up_m)
 
+    _begun = False
+
     def step(self, dt_s: float) -> Demand:
         """Up."""
+        if not self._begun and self.autopilot.body.on_ground:
+            self.autopilot.note("takeoff", "mission")
+        self._begun = True
         near_m = 2.0 if self.autopilot.spec.kind is Kind.PLANE else 0.5
         self.done = self.place.up_m - self.autopilot.body.up_m <= near_m
         yaw_rad = None if self.autopilot.spec.kind is Kind.PLANE else self.autopilot.body.yaw_rad
@@ -139,12 +144,13 @@ class Return(Leg):
 
     def step(self, dt_s: float) -> Demand:
         """Home; a copter has then landed, a rover stands, a plane circles for ever."""
-        demand = self._return.step(dt_s)
         pilot = self.autopilot
-        if pilot.spec.kind in SURFACE:
-            self.done = self._return.arrived
-        elif pilot.spec.kind is Kind.COPTER:
-            self.done = not pilot.arming.armed
+        if pilot.spec.kind is Kind.COPTER and self._return.arrived and pilot.body.on_ground:
+            # Its motors stop when that was reported.
+            self.done = True
+            return Rest()
+        demand = self._return.step(dt_s)
+        self.done = self._return.arrived and pilot.spec.kind in SURFACE
         return demand
 
 

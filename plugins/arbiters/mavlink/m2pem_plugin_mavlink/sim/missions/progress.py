@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.sim.command import Command, Result
+from m2pem_plugin_mavlink.sim.missions.execution import Auto
 from m2pem_plugin_mavlink.sim.missions.items import NAVIGATION
 from m2pem_plugin_mavlink.sim.missions.plan import MISSION, Item
 from m2pem_plugin_mavlink.sim.part import CommandHandler, MessageHandler, Part, ReportMaker
 from m2pem_plugin_mavlink.sim.peers import Heard
+from m2pem_plugin_mavlink.sim.specification import Kind
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.sim.autopilot import Autopilot
@@ -32,16 +34,16 @@ class MissionState(IntEnum):
 class MissionProgress(Part):
     """`current`: the item of navigation that it is at, or where it would begin.
 
-    `begun`: the mission was started since it was last at its beginning; `complete`: it was flown to
-    its end; `released`: a ground station said MISSION_START, so that it may leave the ground;
-    `running`: a maneuver flies it now; `redirected`: `current` was set, and it is to go on there.
+    Of ArduPilot's, 0 is none. `resume_at`: where it goes on, an item of navigation or an action
+    before it; `begun`: the mission was started since it was last at its beginning; `complete`: it
+    was flown to its end; `released`: a ground station said MISSION_START, so that it may leave the
+    ground; `running`: the mode that flies it is on, and it is not complete.
     """
 
     def __init__(self, autopilot: "Autopilot") -> None:
         super().__init__(autopilot)
-        self.current = 0
+        self.current = self.resume_at = 0
         self.begun = self.complete = self.released = self.running = False
-        self.redirected = False
         self._jumps: dict[int, int] = {}
 
     @property
@@ -52,7 +54,7 @@ class MissionProgress(Part):
     @property
     def first(self) -> int:
         """Where a mission begins: behind the home position, if it has that."""
-        return 1 if self.autopilot.firmware.mission_has_home else 0
+        return 1 if self.autopilot.firmware.is_ardupilot else 0
 
     @property
     def empty(self) -> bool:
@@ -61,20 +63,42 @@ class MissionProgress(Part):
 
     @property
     def state(self) -> MissionState:
-        """As MISSION_CURRENT has it."""
+        """As MISSION_CURRENT has it; ArduPilot has no pause."""
         if self.empty:
             return MissionState.NO_MISSION
         if self.complete:
             return MissionState.COMPLETE
-        if self.running and self.begun:
+        if self.running:
             return MissionState.ACTIVE
-        return MissionState.PAUSED if self.begun else MissionState.NOT_STARTED
+        paused = self.begun and not self.autopilot.firmware.is_ardupilot
+        return MissionState.PAUSED if paused else MissionState.NOT_STARTED
 
     def restart(self) -> None:
         """Be at the beginning."""
-        self.current = self.first
+        self.current = self.resume_at = self.first
         self.begun = self.complete = False
         self._jumps.clear()
+
+    def clear(self) -> None:
+        """There is no mission any more."""
+        self.current = self.resume_at = 0
+        self.begun = self.complete = self.running = False
+
+    def disarmed(self) -> None:
+        """ArduPilot forgets where it was; in AUTO only copters do, which begin the mission anew
+        that they had not completed."""
+        self.released = False
+        pilot = self.autopilot
+        if not pilot.firmware.is_ardupilot:
+            self.running = False
+            return
+        flies_it = isinstance(pilot.modes.maneuver, Auto)
+        if flies_it and pilot.spec.kind is not Kind.COPTER:
+            return
+        self.current = self.resume_at = 0
+        self._jumps.clear()
+        if self.running and isinstance(pilot.modes.maneuver, Auto):
+            pilot.modes.maneuver.go_on(self.first)
 
     def advance(self, index: int) -> tuple[list[int], int | None]:
         """What comes from an item on: indices of actions on the way, and of the next navigation.
@@ -103,27 +127,33 @@ class MissionProgress(Part):
         return actions, None
 
     def set_current(self, index: int) -> bool:
-        """Go on from an item."""
-        if not self.first <= index < len(self.items):
-            # Item 0, home, means the beginning.
-            if index != 0 or self.empty:
-                return False
-            index = self.first
-        self.current, self.complete = index, False
-        self.autopilot.send(self._current())
-        self.redirected = self.running
-        return True
+        """Go on from an item, now or when the mission is flown; ArduPilot's is then at the next
+        item of navigation, and a completed mission has not been started."""
+        # Item 0, home, means the beginning.
+        index = max(index, self.first)
+        if index >= len(self.items):
+            return False
+        if index == self.first or self.complete:
+            self._jumps.clear()
+        maneuver = self.autopilot.modes.maneuver
+        if self.running and isinstance(maneuver, Auto):
+            maneuver.go_on(index)
+            return not self.complete
+        self.current = self.resume_at = index
+        if self.autopilot.firmware.is_ardupilot:
+            actions, following = self.advance(index)
+            self.current = following or 0
+            self.resume_at = actions[0] if actions else self.current
+        self.complete = False
+        return self.current >= self.first
 
     def reached(self, index: int) -> None:
         """All are told."""
         self.autopilot.send(dialect.MAVLink_mission_item_reached_message(index))
         self.autopilot.note("reached", str(index))
-
-    def step(self, dt_s: float) -> None:
-        """The permission to take off ends with the motors' stop."""
-        landed = not self.autopilot.arming.armed and self.autopilot.body.on_ground
-        if landed and self.running:
-            self.released = self.running = False
+        text = self.autopilot.firmware.reached_text(self.autopilot, index)
+        if text:
+            self.autopilot.say(text)
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """The old way to set it."""
@@ -138,17 +168,28 @@ class MissionProgress(Part):
         return {dialect.MAVLINK_MSG_ID_MISSION_CURRENT: self._current}
 
     def _set(self, message: Any, sender: Heard) -> None:
-        self.set_current(message.seq)
+        """ArduPilot answers with the number that was asked for, whatever it made of it."""
+        if self.set_current(message.seq):
+            self.autopilot.send(self._current(message.seq))
 
     def _command(self, command: Command) -> Result:
+        index = int(command.param1)
+        if index >= len(self.items):
+            return Result.DENIED
         if command.param2 == 1:
             self.restart()
-        index = int(command.param1)
-        return Result.ACCEPTED if index < 0 or self.set_current(index) else Result.DENIED
+        if index >= 0 and not self.set_current(index):
+            return Result.FAILED
+        self.autopilot.send(self._current())
+        return Result.ACCEPTED
 
-    def _current(self) -> Any:
-        total = max(0, len(self.items) - self.first)
-        mode = 1 if self.running else 2
+    def _current(self, seq: int | None = None) -> Any:
+        """`mission_mode`: ArduPilot says 0, unknown, where PX4 says 2, suspended."""
+        home = self.autopilot.firmware.is_ardupilot
+        flies_it = isinstance(self.autopilot.modes.maneuver, Auto)
         return dialect.MAVLink_mission_current_message(
-            min(self.current, 0xFFFF), total, self.state, mode
+            self.current if seq is None else seq,
+            max(0, len(self.items) - self.first),
+            self.state,
+            1 if flies_it else 0 if home else 2,
         )

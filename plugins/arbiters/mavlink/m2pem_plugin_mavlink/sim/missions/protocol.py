@@ -170,7 +170,7 @@ class MissionServer(Part):
             self._acknowledge(sender, kind, INVALID_SEQUENCE)
             return
         item = pilot.plans[kind][seq]
-        if kind == MISSION and seq == 0 and pilot.firmware.mission_has_home:
+        if kind == MISSION and seq == 0 and pilot.firmware.is_ardupilot:
             item = self._home()
         current = kind == MISSION and seq == pilot.mission.current
         whole = message.get_type() == "MISSION_REQUEST_INT"
@@ -193,12 +193,14 @@ class MissionServer(Part):
             self._acknowledge(sender, kind, UNSUPPORTED)
         elif self.upload is not None:
             self._acknowledge(sender, kind, DENIED)
-        elif MISSION in kinds and pilot.mission.running:
+        elif MISSION in kinds and pilot.mission.running and pilot.arming.armed:
             self._acknowledge(sender, kind, ERROR)
         else:
             for each in kinds:
                 pilot.plans[each] = ()
                 self._counted(each)
+            if MISSION in kinds:
+                pilot.mission.clear()
             self._acknowledge(sender, kind, ACCEPTED)
 
     def _acknowledged(self, message: Any, sender: Heard) -> None:

@@ -16,8 +16,14 @@ class Px4Mission(Auto):
 
     def begin(self) -> None:
         """Armed, it begins."""
-        super().begin()
-        self.autopilot.mission.released = self.autopilot.arming.armed
+        if self.autopilot.arming.armed:
+            self.autopilot.mission.released = True
+            super().begin()
+
+    def complete(self) -> None:
+        """It is over when the actions behind the last item have been done."""
+        self._actions.finish()
+        super().complete()
 
     def step(self, dt_s: float) -> Demand:
         """Fly it; at its end, hold."""
