@@ -134,6 +134,6 @@ async def test_messages_are_had_once_and_regularly() -> None:
             try:
                 home = await link.perform(ReadHome(VEHICLE))
                 break
-            except RefusedError:
+            except NoAnswerError:
                 continue
         assert (round(home.latitude_deg), round(home.longitude_deg)) == (47, 9)
