@@ -200,6 +200,7 @@ def test_a_plane_takes_speeds_between_its_limits_in_guided_and_auto() -> None:
     # Over the ground it is never slower than its airspeed makes it.
     assert bench.command(178, 1, 5, -1) == 0
     assert bench.autopilot.modes.speed_mps == bench.autopilot.tuning.cruise_mps
+    assert bench.texts()[-2:] == ["Set airspeed 15 m/s", "Set groundspeed 5"]
     bench.command(176, 1, 12)
     assert bench.command(178, 0, 15, -1) == 4
     assert bench.command_int(192, -1, 0, at=(*bench.offset(30, 0), 50)) == 4

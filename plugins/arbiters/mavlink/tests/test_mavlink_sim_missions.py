@@ -311,8 +311,20 @@ def test_a_copter_lands_where_the_mission_says_and_is_then_at_its_beginning() ->
 def test_a_rover_drives_its_mission_and_comes_home() -> None:
     bench = Bench(Kind.ROVER).ready()
     places = [bench.offset(20, 0), bench.offset(20, 20)]
-    fly(bench, item(1, 16, places[0]), item(2, 16, places[1]), item(3, 20))
-    assert reached(bench) == [1, 2, 3]
+    speed = item(1, 178, (0, 0), 0, 1, 3.0)
+    fly(bench, speed, item(2, 16, places[0]), item(3, 16, places[1]), item(4, 20))
+    assert reached(bench) == [1, 2, 3, 4]
+    assert bench.texts()[-9:] == [
+        "Mission: 1 ChangeSpeed",
+        "speed: 3.0 m/s",
+        "Mission: 2 WP",
+        "Reached waypoint #2",
+        "Mission: 3 WP",
+        "Reached waypoint #3",
+        "Mission: 4 RTL",
+        "Reached destination",
+        "Mission Complete",
+    ]
     assert bench.autopilot.position.distance_m(bench.autopilot.home.point) < 2.5
     assert bench.autopilot.body.up_m == 0
 
@@ -343,4 +355,5 @@ def test_a_plane_takes_off_flies_and_lands() -> None:
     bench.run_until(lambda: bench.autopilot.mission.complete, 600)
     assert reached(bench) == [1, 2, 3, 4, 5]
     assert not bench.autopilot.arming.armed
+    assert any(text.startswith("Reached waypoint #2 dist ") for text in bench.texts())
     assert bench.autopilot.position.distance_m(bench.autopilot.home.point) < 120

@@ -28,7 +28,8 @@ class Arming(Part):
         """Why it would not arm in its present mode, best first."""
         mode = self.autopilot.modes.mode
         if not mode.armable:
-            yield f"{mode.name} mode not armable"
+            named = self.autopilot.spec.kind not in (Kind.ROVER, Kind.BOAT)
+            yield f"{mode.name} mode not armable" if named else "Mode not armable"
         for part in self.autopilot.parts:
             yield from part.refusals()
 

@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from m2pem_plugin_mavlink.sim.command import GLOBAL_FRAMES, Command, Result
 from m2pem_plugin_mavlink.sim.geometry import wrapped_rad
 from m2pem_plugin_mavlink.sim.maneuvers.guided import Guided
+from m2pem_plugin_mavlink.sim.missions.actions import ITSELF
 from m2pem_plugin_mavlink.sim.missions.execution import Auto
 from m2pem_plugin_mavlink.sim.part import CommandHandler, Part
 from m2pem_plugin_mavlink.sim.specification import Kind
@@ -113,6 +114,11 @@ class MotionCommands(Part):
             taken = vertical and kind is Kind.COPTER and pilot.modes.maneuver.takes_speed
         else:
             taken = self._set_speed(speed_mps)
+        if taken and kind is Kind.PLANE:
+            unit = "groundspeed {:.0f}" if command.param1 == 1 else "airspeed {:.0f} m/s"
+            pilot.say("Set " + unit.format(command.param2))
+        elif taken and kind in SURFACE and command.sender == ITSELF:
+            pilot.say(f"speed: {speed_mps:.1f} m/s")
         return Result.ACCEPTED if taken else Result.FAILED
 
     def _yaw(self, command: Command) -> Result:

@@ -10,6 +10,7 @@ from m2pem_plugin_mavlink.sim.fence.rules import FenceRules
 from m2pem_plugin_mavlink.sim.firmware.ardupilot_modes import FENCE_ACTIONS, MODES, ROLES
 from m2pem_plugin_mavlink.sim.firmware.ardupilot_parameters import PARAMETERS, WHOLE_NUMBERS
 from m2pem_plugin_mavlink.sim.firmware.firmware import Firmware, Tuning
+from m2pem_plugin_mavlink.sim.geometry import Location
 from m2pem_plugin_mavlink.sim.modes import Mode
 from m2pem_plugin_mavlink.sim.parameters import Parameters
 from m2pem_plugin_mavlink.sim.part import Part
@@ -171,10 +172,14 @@ class ArduPilot(Firmware):
 
     def reached_text(self, autopilot: "Autopilot", index: int) -> str:
         """Only of waypoints and the like."""
-        if autopilot.mission.items[index].command not in WAYPOINTS[self.spec.kind]:
+        item = autopilot.mission.items[index]
+        if item.command not in WAYPOINTS[self.spec.kind]:
             return ""
-        what = "command" if self.spec.kind is Kind.COPTER else "waypoint"
-        return f"Reached {what} #{index}"
+        if self.spec.kind is Kind.COPTER:
+            return f"Reached command #{index}"
+        place = autopilot.frame.to_point(Location(item.latitude_deg, item.longitude_deg, 0.0))
+        away = f" dist {autopilot.position.distance_m(place):.0f}m"
+        return f"Reached waypoint #{index}" + (away if self.spec.kind is Kind.PLANE else "")
 
     def mode_number(self, base_mode: int, main: int, sub: int) -> int | None:
         """The second parameter is the mode."""
