@@ -72,7 +72,7 @@ def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], N
 
 @hookimpl
 def m2pem_register_commands(cli: "click.Group") -> None:
-    """Add `sim mavlink`."""
+    """Add what commands.py has."""
     from m2pem_plugin_mavlink.commands import add_to  # noqa: PLC0415  # starting up must be fast
 
     add_to(cli.commands)

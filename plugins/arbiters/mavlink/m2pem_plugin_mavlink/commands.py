@@ -1,13 +1,18 @@
-"""The commands of this plugin. What simulates autopilots is loaded only when it is called."""
+"""The commands of this plugin. What they need is loaded only when one is called."""
 
 from collections.abc import MutableMapping
+from importlib import import_module
 from typing import Any
 
 import click
 
 
-class Mavlink(click.Command):
-    """Stands for `sim.command_line.mavlink` in the list of commands."""
+class Later(click.Command):
+    """Stands for a command of another module in the list of commands."""
+
+    def __init__(self, name: str, module: str, summary: str) -> None:
+        super().__init__(name, help=summary)
+        self._module = module
 
     def make_context(
         self,
@@ -17,15 +22,25 @@ class Mavlink(click.Command):
         **extra: Any,
     ) -> click.Context:
         """That of the command itself, which then is what is invoked."""
-        from m2pem_plugin_mavlink.sim.command_line import mavlink  # noqa: PLC0415
-
-        return mavlink.make_context(info_name, args, parent, **extra)
+        command: click.Command = getattr(import_module(self._module), str(self.name))
+        return command.make_context(info_name, args, parent, **extra)
 
 
 def add_to(commands: MutableMapping[str, click.Command]) -> None:
-    """Add `sim mavlink`; the group `sim` may have commands of other plugins, too."""
+    """Add `sitl` and `sim mavlink`; the group `sim` may have commands of other plugins, too."""
+    commands["sitl"] = Later(
+        "sitl",
+        "m2pem_plugin_mavlink.sitl.command_line",
+        "Start the real autopilots of a fleet, as software in the loop.",
+    )
     group = commands.get("sim")
     if not isinstance(group, click.Group):
         group = click.Group("sim", help="Simulate vehicles that speak as real ones do.")
         commands["sim"] = group
-    group.add_command(Mavlink("mavlink", help="Simulate MAVLink vehicles over UDP."))
+    group.add_command(
+        Later(
+            "mavlink",
+            "m2pem_plugin_mavlink.sim.command_line",
+            "Simulate MAVLink vehicles over UDP.",
+        )
+    )

@@ -136,6 +136,22 @@ def parameters_of_interest(identity: Identity) -> tuple[str, ...]:
     return (*link, battery, *rest)
 
 
+def link_parameters(word: str, identity: Identity, own_system: int) -> dict[str, float]:
+    """What to set so that a vehicle does what its fleet's `failsafe` says when its link is lost;
+    nothing for a word that a vehicle of this kind cannot be set to. ArduPilot ignores a name that
+    it does not have. `own_system`: the system id of the ground station whose loss counts."""
+    parameters: dict[str, float] = {}
+    for setting in _LINK[identity.firmware, identity.kind]:
+        if word not in setting.fits:
+            return {}
+        parameters.update(dict.fromkeys(setting.names, float(setting.fits[word][0])))
+        if word == CONTINUE:  # it is off: what it would do does not matter
+            break
+    if parameters and identity.firmware is Firmware.ARDUPILOT:
+        parameters.update(dict.fromkeys(_OUR_STATION, float(own_system)))
+    return parameters
+
+
 def findings(
     resource: ResourceId,
     word: str,

@@ -26,7 +26,10 @@ class Settings:
     actuators: Mapping[str, str] = field(default_factory=dict)
 
 
-_KEYS = ("url", "system_id", "component_id", "driver", "gcs_system_id", "actuators")
+SITL = "sitl"
+"""What `m2pem sitl` reads, and nothing else."""
+
+_KEYS = ("url", "system_id", "component_id", "driver", "gcs_system_id", "actuators", SITL)
 
 
 def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[ResourceId, Settings]:

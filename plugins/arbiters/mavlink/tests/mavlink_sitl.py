@@ -1,21 +1,22 @@
 """Real autopilots, simulated in the loop by their own makers' programs (docs/mavlink.md).
 
 The programs are named by M2PEM_ARDUCOPTER, M2PEM_ARDUROVER and M2PEM_PX4. Each is started in a
-folder of its own and speaks to a UDP port of this machine.
+folder of its own, as `m2pem sitl` starts it, and speaks to a UDP port of this machine.
 """
 
 import os
-import shutil
-import signal
 import socket
-import subprocess
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
+
+from m2pem_plugin_mavlink.sitl.frames import FRAMES
+from m2pem_plugin_mavlink.sitl.launch import Launch, Start, ardupilot_launch, px4_launch
+from m2pem_plugin_mavlink.sitl.processes import running
+from m2pem_plugin_mavlink.sitl.programs import ardupilot_program, find_px4
+
+__all__ = ["HOME", "SPEED", "Launch", "ardupilot", "free_port", "program", "px4", "running"]
 
 HOME = (47.397742, 8.545594, 488.0)
 SPEED = 5
-ENDED_WITHIN_S = 30
 
 
 def free_port() -> int:
@@ -27,70 +28,39 @@ def free_port() -> int:
 
 
 def program(variable: str) -> Path | None:
-    """The program that an environment variable names."""
+    """The program that an environment variable names, or a link to it."""
     named = os.environ.get(variable)
-    return Path(named).resolve() if named else None
+    return Path(named).absolute() if named else None
 
 
-def ardupilot(binary: Path, model: str, instance: int, port: int) -> list[str]:
-    """A command. Parameters are in `<binary>.parm`, if there is such a file."""
+def ardupilot(binary: Path, model: str, instance: int, port: int) -> Launch:
+    """Of a frame of ArduPilot, with system id `instance` + 1."""
+    frame = FRAMES[model]
+    return ardupilot_launch(
+        f"{model}{instance}",
+        ardupilot_program(binary, frame),
+        frame,
+        _start(instance),
+        instance=instance,
+        system_id=instance + 1,
+        ports=[port],
+    )
+
+
+def px4(binary: Path, instance: int, folder: Path) -> Launch:
+    """A copter of PX4's own simulation, to be run in `folder`; the `etc` folder of its build is
+    beside the `bin` folder of the program."""
+    name = f"px4-{instance}"
+    return px4_launch(
+        name,
+        find_px4(binary.parent.parent),
+        "sihsim_quadx",
+        _start(instance),
+        instance=instance,
+        folder=folder / name,
+    )
+
+
+def _start(instance: int) -> Start:
     latitude, longitude, altitude = HOME
-    home = f"{latitude},{longitude + 0.0003 * instance},{altitude},0"
-    command = [
-        *(str(binary), "-w", "--model", model, "--speedup", str(SPEED), f"-I{instance}"),
-        *("--sysid", str(instance + 1), "--home", home),
-        *("--serial0", f"udpclient:127.0.0.1:{port}"),
-    ]
-    for other in (1, 2, 5, 6, 7, 8):
-        command += [f"--serial{other}", "none:1"]
-    parameters = binary.with_name(f"{binary.name}.parm")
-    return [*command, "--defaults", str(parameters)] if parameters.exists() else command
-
-
-def px4(binary: Path, instance: int, folder: Path) -> list[str]:
-    """A command; the `etc` folder of its build stands beside the `bin` folder of the program."""
-    etc = binary.parent.parent / "etc"
-    return [str(binary), "-d", "-i", str(instance), "-w", str(folder), str(etc)]
-
-
-PX4_ENVIRONMENT = {
-    "PX4_SIMULATOR": "sihsim",
-    "PX4_SIM_MODEL": "sihsim_quadx",
-    "PX4_SIM_SPEED_FACTOR": str(SPEED),
-}
-
-
-@contextmanager
-def running(
-    commands: Sequence[Sequence[str]], folder: Path
-) -> Iterator[list[subprocess.Popen[str]]]:
-    """The programs, each in a folder of its own, with what they print in `output` there."""
-    started: list[subprocess.Popen[str]] = []
-    try:
-        for number, command in enumerate(commands, 1):
-            place = folder / str(number)
-            shutil.rmtree(place, ignore_errors=True)
-            place.mkdir(parents=True)
-            with (place / "output").open("w", encoding="utf-8") as output:
-                started.append(
-                    subprocess.Popen(
-                        command,
-                        cwd=place,
-                        env={**os.environ, **PX4_ENVIRONMENT},
-                        stdin=subprocess.DEVNULL,
-                        stdout=output,
-                        stderr=subprocess.STDOUT,
-                        text=True,
-                    )
-                )
-        yield started
-    finally:
-        for each in started:
-            each.send_signal(signal.SIGCONT)  # one that was stopped does not end otherwise
-            each.terminate()
-        for each in started:
-            try:
-                each.wait(ENDED_WITHIN_S)
-            except subprocess.TimeoutExpired:
-                each.kill()
-                each.wait()
+    return Start(latitude, longitude + 0.0003 * instance, altitude, speed=SPEED)

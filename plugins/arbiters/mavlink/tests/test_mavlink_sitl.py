@@ -32,7 +32,7 @@ class _RealAutopilot(ArbiterContract):
     domain = "air"
     variable = ""
 
-    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[list[str]]:
+    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
         raise NotImplementedError
 
     def urls(self, ports: list[int]) -> list[str]:
@@ -49,7 +49,7 @@ class _RealAutopilot(ArbiterContract):
         with sitl.running(self.commands(binary, ports, tmp_path), tmp_path) as programs:
             urls = self.urls(ports)
             asyncio.run(self.prepared(urls))
-            yield list(zip(programs, urls, strict=True))
+            yield list(zip([each.process for each in programs], urls, strict=True))
 
     async def prepared(self, urls: list[str]) -> None:
         """Both are ready, and what flies is in the air."""
@@ -111,7 +111,7 @@ class _RealAutopilot(ArbiterContract):
 class TestArduCopter(_RealAutopilot):
     variable = "M2PEM_ARDUCOPTER"
 
-    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[list[str]]:
+    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
         return [sitl.ardupilot(binary, "quad", n, port) for n, port in enumerate(ports)]
 
 
@@ -120,7 +120,7 @@ class TestArduRover(_RealAutopilot):
     variable = "M2PEM_ARDUROVER"
     domain = "ground"
 
-    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[list[str]]:
+    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
         return [sitl.ardupilot(binary, "rover", n, port) for n, port in enumerate(ports)]
 
 
@@ -128,8 +128,8 @@ class TestArduRover(_RealAutopilot):
 class TestPx4(_RealAutopilot):
     variable = "M2PEM_PX4"
 
-    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[list[str]]:
-        return [sitl.px4(binary, instance, folder / f"px4-{instance}") for instance in (0, 1)]
+    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
+        return [sitl.px4(binary, instance, folder) for instance in (0, 1)]
 
     def ports(self) -> list[int]:
         # PX4 sends to 14540 and its instance's number, wherever else somebody would like it to.

@@ -1,0 +1,105 @@
+"""Whether the vehicles of a fleet may be armed, seen where the executive will hear them."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
+
+from m2pem.errors import M2pemError, PluginError
+from m2pem_plugin_mavlink.link.routed_link import GROUND_STATION, open_link
+from m2pem_plugin_mavlink.protocol.messages import Address
+from m2pem_plugin_mavlink.sitl import fleet
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+READY_WITHIN_S = 300.0
+REPORT_EVERY_S = 5.0
+LOOK_EVERY_S = 0.2
+HIGHEST_SYSTEM = 255
+
+
+class NotReadyError(M2pemError):
+    """Vehicles that were started do not become ready; the text says why not."""
+
+
+class SimulatedClock:
+    """A clock of `m2pem.api` that runs `speed` times as fast as a real one, from 0."""
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+
+    def now_us(self) -> int:
+        """Microseconds; never goes back."""
+        return int(time.monotonic() * self._speed * 1e6)
+
+    async def sleep(self, seconds: float) -> None:
+        """Wait for so many simulated seconds."""
+        await asyncio.sleep(max(seconds, 0.0) / self._speed)
+
+    async def sleep_until(self, time_us: int) -> None:
+        """Wait until `now_us()` is at least `time_us`."""
+        while (remaining_us := time_us - self.now_us()) > 0:
+            await self.sleep(remaining_us / 1e6)
+
+
+@asynccontextmanager
+async def heard(vehicles: Sequence[fleet.Vehicle], speed: float) -> AsyncIterator[list[Vehicle]]:
+    """Listen on the ports of the fleet, as the executive will, until the end of the block.
+
+    m2pem speaks here as another ground station than the executive does: ArduPilot's failsafe counts
+    the heartbeats of that one alone, and must not take it for lost before it is there.
+
+    Raises:
+        PluginError: a port is in use.
+    """
+    taken = {each.settings.system_id for each in vehicles}
+    taken |= {each.settings.gcs_system_id for each in vehicles}
+    own = max(set(range(1, HIGHEST_SYSTEM + 1)) - taken)
+    source = Address(own, GROUND_STATION.component)
+    clock = SimulatedClock(speed)
+    async with AsyncExitStack() as opened:
+        listened: list[Vehicle] = []
+        for each in vehicles:
+            address = Address(each.settings.system_id, each.settings.component_id)
+            try:
+                link = await open_link(address, each.settings.urls, clock, source)
+            except PluginError as error:
+                raise PluginError(
+                    f"{each.resource}: connection.url: {error}; an executive is started after "
+                    "`m2pem sitl` has printed ready"
+                ) from error
+            opened.push_async_callback(link.close)
+            vehicle = Vehicle(each.resource, each.domain, link, clock)
+            opened.push_async_callback(vehicle.close)
+            vehicle.open()
+            listened.append(vehicle)
+        yield listened
+
+
+async def ready(vehicles: Sequence[Vehicle], report: Callable[[str], None]) -> None:
+    """Wait until all vehicles may be armed; `report` is told now and then what is waited for.
+
+    Raises:
+        NotReadyError: they may not for too long.
+    """
+    began_s = reported_s = time.monotonic()
+    while waiting := _waiting(vehicles):
+        now_s = time.monotonic()
+        if now_s - began_s > READY_WITHIN_S:
+            raise NotReadyError(f"not ready after {READY_WITHIN_S:.0f} s: {waiting}")
+        if now_s - reported_s > REPORT_EVERY_S:
+            reported_s = now_s
+            report(f"waiting for {waiting}")
+        await asyncio.sleep(LOOK_EVERY_S)
+
+
+def _waiting(vehicles: Sequence[Vehicle]) -> str:
+    """Which vehicles may not be armed, and why not; "" if all may."""
+    reasons = {each.resource: _reasons(each) for each in vehicles}
+    return "; ".join(f"{name}: {why}" for name, why in reasons.items() if why)
+
+
+def _reasons(vehicle: Vehicle) -> str:
+    if vehicle.identity is None:
+        return "no heartbeat yet"
+    readiness = vehicle.driver.readiness()
+    return "" if readiness.ready else ", ".join(readiness.reasons)
