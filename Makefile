@@ -22,7 +22,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages page demo demo-web demo-air demo-ros demo-ros-vehicle demo-ros-team demo-team
+.PHONY: help setup python-packages npm-packages page demo demo-web demo-air demo-sitl demo-ros demo-ros-vehicle demo-ros-team demo-team
 .PHONY: test test-long test-ros fuzz lint format docs pictures
 .PHONY: bench bench-quick conformance clean ros
 
@@ -141,6 +141,18 @@ demo-air: python-packages ## survey a field with simulated MAVLink vehicles, one
 	@echo "Two copters and a rover over MAVLink, ten times as fast as real ones. uav1 will fall silent."
 	@$(AUTOPILOTS) --fault "$(LINK_LOST)" & autopilots=$$!; trap 'kill $$autopilots' EXIT; \
 	$(BIN)/m2pem run missions/survey_pair.bpmn --fleet fleet_configs/survey_pair.yaml --speed 10
+
+SITL_FLEET := fleet_configs/survey_pair.yaml
+# Nothing of ArduPilot comes with m2pem: docs/mavlink.md says how it is built.
+SITL_SPEED := 5
+
+demo-sitl: python-packages ## survey a field with real autopilots in the loop: FOLDER=~/ardupilot
+	@[ -n "$(FOLDER)" ] || { echo "Say where ArduPilot's programs are: make demo-sitl FOLDER=~/ardupilot" >&2; exit 1; }
+	@echo "Two ArduCopters and an ArduRover, $(SITL_SPEED) times as fast as real ones, when they are ready."
+	@autopilots=; trap 'for each in $$autopilots; do kill $$each 2>/dev/null || true; $(call TEAM_GONE,$$each); done' EXIT; \
+	exec 3< <(exec $(BIN)/m2pem sitl --ardupilot "$(FOLDER)" --fleet $(SITL_FLEET) --speed $(SITL_SPEED) </dev/null); autopilots=$$!; \
+	$(call TEAM_READY,3,ready); \
+	$(BIN)/m2pem run missions/survey_pair.bpmn --fleet $(SITL_FLEET) --speed $(SITL_SPEED)
 
 ROS_SPEED := 10
 # None of those that tests reserve, so that nobody else is met.

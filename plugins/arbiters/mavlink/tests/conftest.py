@@ -8,7 +8,7 @@ PROGRAMS = ("M2PEM_ARDUCOPTER", "M2PEM_ARDUROVER", "M2PEM_PX4")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    absent = [item for item in items if _program_of(item) and _program_of(item) not in os.environ]
+    absent = [item for item in items if not _programs_of(item) <= os.environ.keys()]
     if absent:
         config.hook.pytest_deselected(items=absent)
         items[:] = [item for item in items if item not in set(absent)]
@@ -22,6 +22,6 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         )
 
 
-def _program_of(item: pytest.Item) -> str:
+def _programs_of(item: pytest.Item) -> set[str]:
     marker = item.get_closest_marker("sitl")
-    return str(marker.args[0]) if marker is not None else ""
+    return set() if marker is None else set(marker.args)

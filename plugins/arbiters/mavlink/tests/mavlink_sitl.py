@@ -6,6 +6,7 @@ folder of its own, as `m2pem sitl` starts it, and speaks to a UDP port of this m
 
 import os
 import socket
+import subprocess
 from pathlib import Path
 
 from m2pem_plugin_mavlink.sitl.frames import FRAMES
@@ -13,7 +14,17 @@ from m2pem_plugin_mavlink.sitl.launch import Launch, Start, ardupilot_launch, px
 from m2pem_plugin_mavlink.sitl.processes import running
 from m2pem_plugin_mavlink.sitl.programs import ardupilot_program, find_px4
 
-__all__ = ["HOME", "SPEED", "Launch", "ardupilot", "free_port", "program", "px4", "running"]
+__all__ = [
+    "HOME",
+    "SPEED",
+    "Launch",
+    "ardupilot",
+    "free_port",
+    "program",
+    "px4",
+    "running",
+    "until_ready",
+]
 
 HOME = (47.397742, 8.545594, 488.0)
 SPEED = 5
@@ -59,6 +70,17 @@ def px4(binary: Path, instance: int, folder: Path) -> Launch:
         instance=instance,
         folder=folder / name,
     )
+
+
+def until_ready(process: subprocess.Popen[str]) -> list[str]:
+    """What `m2pem sitl` prints until its vehicles are ready, line by line."""
+    assert process.stdout is not None
+    lines: list[str] = []
+    for line in process.stdout:
+        lines.append(line.rstrip("\n"))
+        if lines[-1] == "ready":
+            return lines
+    raise AssertionError((lines, process.communicate()))
 
 
 def _start(instance: int) -> Start:

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-import mavlink_sitl
 import pytest
+from mavlink_sitl import free_port, until_ready
 from mavlink_standin import write_standin
 
 WITHIN_S = 60
@@ -27,7 +27,7 @@ vehicles:
 
 @pytest.fixture
 def port() -> int:
-    return mavlink_sitl.free_port()
+    return free_port()
 
 
 @pytest.fixture
@@ -68,16 +68,6 @@ def _sitl(fleet: Path, programs: Path, *words: object) -> Iterator[subprocess.Po
     finally:
         process.kill()
         process.communicate()
-
-
-def until_ready(process: subprocess.Popen[str]) -> list[str]:
-    assert process.stdout is not None
-    lines: list[str] = []
-    for line in process.stdout:
-        lines.append(line.rstrip("\n"))
-        if lines[-1] == "ready":
-            return lines
-    raise AssertionError((lines, process.communicate()))
 
 
 def pids(lines: list[str]) -> list[int]:
