@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -83,6 +83,15 @@ def runs(pid: int) -> bool:
     return state != "Z"
 
 
+def any_runs_in(folder: Path) -> bool:
+    """Whether a process has `folder` as its own."""
+    for process in Path("/proc").glob("[0-9]*/cwd"):
+        with suppress(OSError):
+            if process.readlink() == folder:
+                return True
+    return False
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_vehicles_are_named_ready_and_ended_with_the_command(
     sitl: Sitl, port: int, tmp_path: Path, number: signal.Signals
@@ -132,6 +141,18 @@ def test_one_that_dies_at_its_start_says_why(sitl: Sitl, programs: Path) -> None
     assert not any(map(runs, pids(output.splitlines())))
 
 
+def test_a_program_that_cannot_be_started_leaves_none_running(
+    sitl: Sitl, programs: Path, tmp_path: Path
+) -> None:
+    (programs / "ardurover").chmod(0o644)
+    process = sitl("--keep", tmp_path / "kept")
+    _, errors = process.communicate(timeout=WITHIN_S)
+    assert process.returncode == 1
+    assert re.search(r"cannot start a program: .*Permission denied.*ardurover", errors)
+    assert (tmp_path / "kept/uav1").is_dir()
+    assert not any_runs_in(tmp_path / "kept/uav1")
+
+
 def test_what_is_waited_for_is_said(sitl: Sitl, programs: Path) -> None:
     write_standin(programs / "arducopter", "EKF_READY_S 100000\n")
     process = sitl()
@@ -142,8 +163,8 @@ def test_what_is_waited_for_is_said(sitl: Sitl, programs: Path) -> None:
     assert process.wait(WITHIN_S) == 0
 
 
-def test_vehicles_do_not_outlive_a_command_that_is_killed(sitl: Sitl) -> None:
-    process = sitl()
+def test_vehicles_do_not_outlive_a_command_that_is_killed(sitl: Sitl, tmp_path: Path) -> None:
+    process = sitl("--keep", tmp_path / "kept")  # else its own folder would be left behind
     with ExitStack() as opened:
         ends = [os.pidfd_open(pid) for pid in pids(until_ready(process))]
         for end in ends:

@@ -66,7 +66,9 @@ def sitl(
     """
     fleet = load_fleet(fleet_file)
     with ExitStack() as opened:
-        folder = keep or Path(opened.enter_context(tempfile.TemporaryDirectory(prefix="m2pem-")))
+        folder = keep or Path(
+            opened.enter_context(tempfile.TemporaryDirectory(prefix="m2pem-sitl-"))
+        )
         folder = folder.absolute()
         try:
             vehicles = read_vehicles(fleet, speed)
@@ -84,10 +86,7 @@ def sitl(
                     f"--keep {keep}: it has a folder {start.name} of an earlier start; name a new "
                     "one"
                 )
-        try:
-            asyncio.run(_run(vehicles, starts, folder, speed))
-        except OSError as error:
-            raise click.ClickException(f"cannot start a program: {error}") from error
+        asyncio.run(_run(vehicles, starts, folder, speed))
 
 
 async def _run(
@@ -99,7 +98,11 @@ async def _run(
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
     async with AsyncExitStack() as ports:
         listened = await ports.enter_async_context(heard(vehicles, speed))
-        with running(starts, folder) as programs:
+        with ExitStack() as started:
+            try:
+                programs = started.enter_context(running(starts, folder))
+            except OSError as error:
+                raise click.ClickException(f"cannot start a program: {error}") from error
             for vehicle, program in zip(vehicles, programs, strict=True):
                 click.echo(f"{vehicle}, pid {program.process.pid}")
 
