@@ -156,11 +156,16 @@ def test_a_program_that_cannot_be_started_leaves_none_running(
 def test_what_is_waited_for_is_said(sitl: Sitl, programs: Path) -> None:
     write_standin(programs / "arducopter", "EKF_READY_S 100000\n")
     process = sitl()
+    assert process.stdout is not None
     assert process.stderr is not None
-    said = next(line for line in process.stderr if "EKF" in line)
+    _, rover1 = pids([process.stdout.readline().rstrip(), process.stdout.readline().rstrip()])
+    said = next(line for line in process.stderr if "EKF" in line and "rover1" not in line)
     assert re.match(r"waiting for uav1: .*EKF: no position yet, \d+ s", said)
+    os.kill(rover1, signal.SIGSTOP)  # a program that hangs is not ready any more
+    assert any("rover1: silent for" in line for line in process.stderr)
     process.terminate()
     assert process.wait(WITHIN_S) == 0
+    assert not runs(rover1)
 
 
 def test_vehicles_do_not_outlive_a_command_that_is_killed(sitl: Sitl, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from m2pem.errors import M2pemError, PluginError
 from m2pem_plugin_mavlink.sitl.fleet import ARBITER, Vehicle, launches, read_vehicles
 from m2pem_plugin_mavlink.sitl.launch import Launch
 from m2pem_plugin_mavlink.sitl.processes import Program, first_to_end, running
-from m2pem_plugin_mavlink.sitl.readiness import heard, ready
+from m2pem_plugin_mavlink.sitl.readiness import connected, ready
 
 _FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
 
@@ -97,7 +97,7 @@ async def _run(
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
     async with AsyncExitStack() as ports:
-        listened = await ports.enter_async_context(heard(vehicles, speed))
+        watched = await ports.enter_async_context(connected(vehicles, speed))
         with ExitStack() as started:
             try:
                 programs = started.enter_context(running(starts, folder))
@@ -107,7 +107,7 @@ async def _run(
                 click.echo(f"{vehicle}, pid {program.process.pid}")
 
             async def become_ready() -> None:
-                await ready(listened, lambda text: click.echo(text, err=True))
+                await ready(watched, lambda text: click.echo(text, err=True))
                 await ports.aclose()
                 click.echo("ready")
                 await stop.wait()

@@ -197,7 +197,7 @@ def _start(fleet: Fleet, sitl: SitlSettings, number: int, speed: float) -> Start
 
 
 def _refuse_same_systems(vehicles: list[Vehicle]) -> None:
-    """Every PX4 is heard on the port for ground stations, too."""
+    """Every PX4 sends to the port for ground stations, too."""
     px4 = {each.settings.system_id: each for each in vehicles if isinstance(each.frame, str)}
     for each in vehicles:
         other = px4.get(each.settings.system_id)

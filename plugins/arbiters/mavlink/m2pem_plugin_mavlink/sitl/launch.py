@@ -11,8 +11,8 @@ from m2pem_plugin_mavlink.sitl.frames import Frame
 from m2pem_plugin_mavlink.sitl.programs import ArduPilotProgram, Px4Program
 
 SERIALS = (0, 1, 2, 5, 6, 7, 8)
-"""The serial ports of ArduPilot that would wait for connections from everywhere, if not told
-otherwise: SERIAL3 and SERIAL4 have the simulated GPS receivers. The first ones speak MAVLink."""
+"""The serial ports of ArduPilot that would wait for connections from everywhere without an option
+of their own: SERIAL3 and SERIAL4 have the simulated GPS receivers. The first ones speak MAVLink."""
 
 MAVLINK_SERIALS = 3
 OWN_PARAMETERS = "m2pem.parm"

@@ -1,10 +1,11 @@
-"""Whether the vehicles of a fleet may be armed, seen where the executive will hear them."""
+"""Whether the vehicles of a fleet may be armed, seen on the ports that the executive will use."""
 
 import asyncio
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 
+from m2pem.api import LinkState
 from m2pem.errors import M2pemError, PluginError
 from m2pem_plugin_mavlink.link.routed_link import GROUND_STATION, open_link
 from m2pem_plugin_mavlink.protocol.messages import Address
@@ -14,6 +15,9 @@ from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 READY_WITHIN_S = 300.0
 REPORT_EVERY_S = 5.0
 LOOK_EVERY_S = 0.2
+LOST_AFTER_S = 10.0
+"""Of simulated time: a program that hangs is not ready, whatever it said before."""
+
 HIGHEST_SYSTEM = 255
 
 
@@ -42,7 +46,9 @@ class SimulatedClock:
 
 
 @asynccontextmanager
-async def heard(vehicles: Sequence[fleet.Vehicle], speed: float) -> AsyncIterator[list[Vehicle]]:
+async def connected(
+    vehicles: Sequence[fleet.Vehicle], speed: float
+) -> AsyncIterator[list[Vehicle]]:
     """Listen on the ports of the fleet, as the executive will, until the end of the block.
 
     m2pem speaks here as another ground station than the executive does: ArduPilot's failsafe counts
@@ -57,7 +63,7 @@ async def heard(vehicles: Sequence[fleet.Vehicle], speed: float) -> AsyncIterato
     source = Address(own, GROUND_STATION.component)
     clock = SimulatedClock(speed)
     async with AsyncExitStack() as opened:
-        listened: list[Vehicle] = []
+        found: list[Vehicle] = []
         for each in vehicles:
             address = Address(each.settings.system_id, each.settings.component_id)
             try:
@@ -68,15 +74,16 @@ async def heard(vehicles: Sequence[fleet.Vehicle], speed: float) -> AsyncIterato
                     "`m2pem sitl` has printed ready"
                 ) from error
             opened.push_async_callback(link.close)
-            vehicle = Vehicle(each.resource, each.domain, link, clock)
+            vehicle = Vehicle(each.resource, each.domain, link, clock, lost_after_s=LOST_AFTER_S)
             opened.push_async_callback(vehicle.close)
             vehicle.open()
-            listened.append(vehicle)
-        yield listened
+            found.append(vehicle)
+        yield found
 
 
 async def ready(vehicles: Sequence[Vehicle], report: Callable[[str], None]) -> None:
-    """Wait until all vehicles may be armed; `report` is told now and then what is waited for.
+    """Wait until all vehicles may be armed; `report` is called every few seconds with what is
+    waited for.
 
     Raises:
         NotReadyError: they may not for too long.
@@ -101,5 +108,7 @@ def _waiting(vehicles: Sequence[Vehicle]) -> str:
 def _reasons(vehicle: Vehicle) -> str:
     if vehicle.identity is None:
         return "no heartbeat yet"
+    if vehicle.link_state is LinkState.LOST:
+        return f"silent for {vehicle.silent_s or 0.0:.0f} s"
     readiness = vehicle.driver.readiness()
     return "" if readiness.ready else ", ".join(readiness.reasons)
