@@ -94,6 +94,13 @@ class _RealAutopilot(ArbiterContract):
         return cut
 
     @pytest.fixture
+    def mend_link(self, autopilots: list) -> Callable[[Arbiter, ResourceId], None]:
+        def mend(_arbiter: Arbiter, vehicle: ResourceId) -> None:
+            autopilots[0 if vehicle == A else 1][0].send_signal(signal.SIGCONT)
+
+        return mend
+
+    @pytest.fixture
     def case(self) -> ArbiterCase:
         def at(east_m: float, north_m: float) -> Point:
             return Point((*offset(sitl.HOME[:2], east_m, north_m), None))
