@@ -64,7 +64,7 @@ def test_a_silent_camera_is_lost_with_what_it_does_and_can_be_used_when_it_is_ba
         await world.bench.start("r1.b1", "ptz_track", CAMERA, target=point(30, 40))
         await world.clock.sleep(2)
         world.head.audible = False
-        end = await world.bench.ended("r1.b1", 3.0)
+        end = await world.bench.ended("r1.b1", 4.0)
         assert (end.state, end.code) == (BehaviorState.LOST, "LINK_LOST")
         await world.clock.sleep(1)
         assert world.bench.latest(CAMERA).link is LinkState.LOST

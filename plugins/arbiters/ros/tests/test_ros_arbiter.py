@@ -131,7 +131,7 @@ def test_a_vehicle_that_is_heard_again_is_usable_and_gives_its_old_goal_up() -> 
             await bench.start("r1.b1", "goto", A, target=FAR)
             await bench.running("r1.b1")
             body.linked = False
-            assert (await bench.ended("r1.b1", 3.0)).state is LOST
+            assert (await bench.ended("r1.b1", 4.0)).state is LOST
             assert body.called("forget")
             assert bench.latest(A).link is LinkState.LOST
             body.linked = True
@@ -151,7 +151,7 @@ def test_a_vehicle_that_returns_is_not_free_until_it_has_acknowledged() -> None:
             await bench.start("r1.b1", "goto", A, target=FAR)
             await bench.running("r1.b1")
             body.linked, body.stops = False, False
-            assert (await bench.ended("r1.b1", 3.0)).state is LOST
+            assert (await bench.ended("r1.b1", 4.0)).state is LOST
             body.linked = True
             await bench.until(lambda: bench.latest(A).link is LinkState.CONNECTED, 2)
             why = await bench.arbiter.reclaim(A)
@@ -198,7 +198,7 @@ def test_a_vehicle_that_was_never_heard_is_lost_and_does_not_hold_up_the_others(
             assert "a: it was not heard yet" in caplog.text
             await bench.start("r1.b1", "goto", A, target=FAR)
             await bench.start("r1.b2", "goto", B, target=NEAR)
-            assert (await bench.ended("r1.b1", 3.0)).state is LOST
+            assert (await bench.ended("r1.b1", 4.0)).state is LOST
             assert (await bench.ended("r1.b2", 10)).state is SUCCEEDED
             assert bench.latest(A).link is LinkState.LOST
 
@@ -309,7 +309,7 @@ def test_a_driver_that_breaks_in_everything_else_stops_nobody() -> None:
             await bench.arbiter.resume(A)
             await bench.arbiter.adjust("r1.b1", 1, {"speed": 2.0})
             body.linked = False
-            assert (await bench.ended("r1.b1", 3)).state is LOST
+            assert (await bench.ended("r1.b1", 4)).state is LOST
             before = len(bench.states)
             await bench.clock.sleep(2)
             assert any(state.resource == B for state in bench.states[before:])
