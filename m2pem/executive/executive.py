@@ -421,7 +421,8 @@ class Executive:
         await self.journal.release(runner.id)
         del self._tasks[runner.id]
         busy, taken = self.availability.holder, self.handover.taken
-        free = [each for each in self.fleet.vehicles if not busy(each) and each not in taken]
+        every = self.fleet.vehicles.values()
+        free = [each for each in every if not busy(each.id) and each.id not in taken]
         if not self.simulated and (text := left_armed(free, self.bus)):
             self.notices.publish(Alert(runner.id, "LEFT_ARMED", text))
         over = [each for each in self.runners.values() if each.done.is_set()]

@@ -5,20 +5,21 @@ from collections.abc import Iterable
 from m2pem.api.bus import FleetBus
 from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.model.catalogue import ResourceId
+from m2pem.resources.fleet import Domain, Vehicle
 
 ALOFT_M = 1.0
 """Higher above its home, an aircraft flies."""
 
 
-def left_armed(free: Iterable[ResourceId], bus: FleetBus) -> str:
+def left_armed(free: Iterable[Vehicle], bus: FleetBus) -> str:
     """A sentence about those of some vehicles that say that they are armed; "": there are none."""
-    armed = [state for each in free if (state := _armed(bus, each))]
+    armed = [(state, each.domain) for each in free if (state := _armed(bus, each.id))]
     if not armed:
         return ""
-    flying = any(_height(state) for state in armed)
+    flying = any(_height(*each) for each in armed)
     ways = "land, return to launch or disarm" if flying else "disarm"
     return (
-        f"{'; '.join(map(_how, armed))}. Nothing commands "
+        f"{'; '.join(_how(*each) for each in armed)}. Nothing commands "
         f"{'it' if len(armed) == 1 else 'them'} now: {ways} by another mission, or by the "
         "vehicle's own ground station or remote control"
     )
@@ -30,12 +31,12 @@ def _armed(bus: FleetBus, resource: ResourceId) -> VehicleState | None:
     return state if isinstance(state, VehicleState) and known and state.armed else None
 
 
-def _how(state: VehicleState) -> str:
+def _how(state: VehicleState, domain: Domain) -> str:
     mode = f" in {state.mode}" if state.mode else ""
-    return f"{state.resource} stays armed{mode}{_height(state)}"
+    return f"{state.resource} stays armed{mode}{_height(state, domain)}"
 
 
-def _height(state: VehicleState) -> str:
+def _height(state: VehicleState, domain: Domain) -> str:
     height_m = state.altitude_above_home_m
-    aloft = height_m is not None and height_m > ALOFT_M
+    aloft = domain is Domain.AIR and height_m is not None and height_m > ALOFT_M
     return f", {height_m:.0f} m above its home" if aloft else ""

@@ -59,11 +59,12 @@ def sequence(*elements: tuple[str, str]) -> str:
 
 
 def fleet(*names: str) -> Fleet:
-    """Ground vehicles of the fake arbiter."""
+    """Vehicles of the fake arbiter: those called uav1, uav2 fly, others drive."""
+    domains = {name: Domain.AIR if name.startswith("uav") else Domain.GROUND for name in names}
     return Fleet(
         "test",
         "test.yaml",
-        {ResourceId(name): Vehicle(ResourceId(name), Domain.GROUND, "fake", {}) for name in names},
+        {ResourceId(name): Vehicle(ResourceId(name), domains[name], "fake", {}) for name in names},
         max_outage_s=MAX_OUTAGE_S,
     )
 

@@ -10,6 +10,7 @@ from m2pem.model.catalogue import BehaviorState, ResourceId
 from .conftest import World, behavior, mission, sequence
 
 DRIVE = mission(sequence(("B", behavior("B", "drive_stop", "ugv1"))))
+UAV1 = ResourceId("uav1")
 UGV1, UGV2, UGV3 = (ResourceId(f"ugv{number}") for number in (1, 2, 3))
 
 
@@ -50,10 +51,14 @@ def test_a_run_that_ends_says_what_stays_armed_and_what_may_be_done(play):
     async def story(world: World):
         told = asyncio.create_task(alerts(world, "LEFT_ARMED"))
         control, now_us = world.executive.control, world.clock.now_us()
-        run = await control.start(DRIVE)
+        fly = mission(sequence(("B", behavior("B", "drive_stop", "uav1"))))
+        run = await control.start(fly)
         await world.fake.until_called("start", f"{run}.b1")
         world.fake.say(
-            VehicleState(UGV1, now_us, armed=True, mode="BRAKE", altitude_above_home_m=20.4)
+            VehicleState(UAV1, now_us, armed=True, mode="BRAKE", altitude_above_home_m=20.4)
+        )
+        world.fake.say(
+            VehicleState(UGV1, now_us, armed=True, mode="HOLD", altitude_above_home_m=60.0)
         )
         world.fake.say(VehicleState(UGV2, now_us, armed=False, mode="HOLD"))
         world.fake.say(VehicleState(UGV3, now_us, armed=True, link=LinkState.LOST))
@@ -64,12 +69,12 @@ def test_a_run_that_ends_says_what_stays_armed_and_what_may_be_done(play):
         await stopping
         return (await asyncio.wait_for(told, 10))[-1]
 
-    alert = play(story, "ugv1", "ugv2", "ugv3")
+    alert = play(story, "uav1", "ugv1", "ugv2", "ugv3")
     assert alert.run == "r1"
     assert alert.text == (
-        "ugv1 stays armed in BRAKE, 20 m above its home. Nothing commands it now: land, return to "
-        "launch or disarm by another mission, or by the vehicle's own ground station or remote "
-        "control"
+        "uav1 stays armed in BRAKE, 20 m above its home; ugv1 stays armed in HOLD. Nothing "
+        "commands them now: land, return to launch or disarm by another mission, or by the "
+        "vehicle's own ground station or remote control"
     )
 
 

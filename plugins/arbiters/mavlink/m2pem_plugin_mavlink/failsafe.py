@@ -70,6 +70,17 @@ _COPTER_GCS = _Setting(
     {RETURN: (1, 3, 6), LAND: (5,), HOLD: (7,), CONTINUE: (0,)},
     {0: "disabled", **_COPTER_ACTIONS},
 )
+_COPTER_RC = _Setting(
+    ("FS_THR_ENABLE",),
+    {RETURN: (1, 4, 6), LAND: (3,), HOLD: (7,)},
+    {
+        **_COPTER_ACTIONS,
+        3: "land",
+        4: "SmartRTL, else return to launch",
+        5: "SmartRTL, else land",
+    },
+)
+"""On loss of the remote control. Its numbers are not those of FS_GCS_ENABLE."""
 _PLANE_ENABLE = _Setting(
     ("FS_GCS_ENABL",),
     {RETURN: (1, 2), LAND: (1, 2), CONTINUE: (0,)},
@@ -120,7 +131,7 @@ _LINK: Mapping[tuple[Firmware, Kind], tuple[_Setting, ...]] = {
 _BATTERY = {Firmware.ARDUPILOT: "BATT_FS_LOW_ACT", Firmware.PX4: "COM_LOW_BAT_ACT"}
 _OUR_STATION = ("MAV_GCS_SYSID", "SYSID_MYGCS")
 _RETURN_HEIGHT = ("RTL_ALT_M", "RTL_ALT")
-_PILOT = "FS_THR_ENABLE"
+_PILOT = _COPTER_RC.names[0]
 _GOES_ON_IN_AUTO = 1 << 1
 
 
@@ -228,13 +239,13 @@ def _copter_findings(word: str, values: Values) -> _Found:
             f"set it to {options & ~_GOES_ON_IN_AUTO}",
         )
     pilot = values.get(_PILOT)
-    if word != CONTINUE and pilot is not None and round(pilot) in _COPTER_ACTIONS:
+    if word != CONTINUE and pilot is not None and round(pilot) in _COPTER_RC.meanings:
         value = round(pilot)
-        if value not in _COPTER_GCS.fits[word]:
+        if value not in _COPTER_RC.fits[word]:
             yield (
                 _PILOT,
                 f"fleet says {word} on loss of link, on loss of its remote control {_PILOT} is "
-                f"{value} ({_COPTER_ACTIONS[value]})",
+                f"{value} ({_COPTER_RC.meanings[value]})",
             )
     if word != RETURN:
         return
