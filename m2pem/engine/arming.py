@@ -23,6 +23,12 @@ def arm_next(x: Execution) -> None:
 
 
 def arm_entered(x: Execution) -> None:
-    """Arm what every token that entered waits for: something is about to be thrown."""
-    while x.entered:
+    """Arm what every token that entered waits for: something is about to be thrown.
+
+    Conditions that are true may let ever more tokens enter: those go as far as the batch.
+    """
+    there = len(x.entered)
+    while x.entered and (there > 0 or x.left > 0):
+        there -= 1
+        x.left -= 1
         arm_next(x)

@@ -103,7 +103,6 @@ def _resume(x: Steps, item: i.ResumeRun) -> None:
     x.reload_queue()
     for late in deferred:
         x.run_steps()
-        arm_entered(x)
         decide(x, late)
 
 

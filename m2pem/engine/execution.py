@@ -67,6 +67,7 @@ class Execution:
         "ended_instances",
         "entered",
         "fleet",
+        "left",
         "mission",
         "moved",
         "now_us",
@@ -87,6 +88,7 @@ class Execution:
         self.entered: deque[Token] = deque()  # at what waits: they come before the queue
         self.ended_instances: deque[tuple[Token, TokenOutcome]] | None = None
         self.moved: set[int] = set()  # scopes whose inclusive joins must be looked at
+        self.left = 0  # steps that the batch still allows
         self.changed = False  # whether conditions must be looked at before the next step
         self.process_ids = [node.container.process.id for node in self.mission.nodes]
         self.waits = {

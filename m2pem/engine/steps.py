@@ -1,11 +1,15 @@
 """Doing the steps that an input causes, one after the other: the engine's only loop."""
 
+from collections import deque
+from collections.abc import Iterator
+
 from m2pem.engine import records as r
 from m2pem.engine.arming import arm_next
 from m2pem.engine.conditions import comes_true
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.interruption import end_run
 from m2pem.engine.nodes import EXECUTE, look_at
+from m2pem.engine.nodes.beginning import has_entered
 from m2pem.engine.nodes.joins import fire_joins
 from m2pem.engine.records import Record, RunOutcome
 from m2pem.engine.state import RunState, RunStatus, Scope, Token
@@ -17,7 +21,7 @@ from m2pem.resources.fleet import Fleet
 class Steps(Execution):
     """An execution that can work its queue off."""
 
-    __slots__ = ("batch", "done", "left")
+    __slots__ = ("batch", "done")
 
     def __init__(self, state: RunState, fleet: Fleet | None, batch: int) -> None:
         super().__init__(state, fleet)
@@ -38,7 +42,7 @@ class Steps(Execution):
         while state.status is RunStatus.RUNNING:
             while queue or entered or self.changed:
                 # Of what comes at once, too, each takes its part: tokens may double at each turn.
-                if self.left <= 0 and (queue or entered):
+                if self.left <= 0 and self._has_steps():
                     return
                 if entered:
                     self.left -= 1
@@ -48,6 +52,8 @@ class Steps(Execution):
                     self.changed = False
                     self._fire_conditions()
                     continue
+                if not queue:
+                    break
                 item = queue.popleft()
                 if not self._is_there(item):
                     continue
@@ -59,6 +65,15 @@ class Steps(Execution):
                     look_at(self, item)
             if not fire_joins(self):
                 return
+
+    def _has_steps(self) -> bool:
+        """Whether anything of what came next is still there; what has gone is forgotten."""
+        queue, entered = self.queue, self.entered
+        while queue and not self._is_there(queue[0]):
+            queue.popleft()
+        while entered and not self._is_there(entered[0]):
+            entered.popleft()
+        return bool(queue or entered)
 
     def _fire_conditions(self) -> None:
         """Those that have become true, in the order in which they were armed; as far as the batch
@@ -93,7 +108,7 @@ class Steps(Execution):
         # Written out, as there may be many thousands at each of many batches.
         tokens, scopes = self.state.tokens, self.state.scopes
         steps = []
-        for item in dict.fromkeys((*self.queue, *self.entered)):
+        for item in dict.fromkeys(self._in_order()):
             if type(item) is Token:
                 if tokens.get(item.id) is item:
                     steps.append(item.id)
@@ -102,6 +117,16 @@ class Steps(Execution):
         self.queue.clear()
         self.entered.clear()
         self.emit(r.RunYielded(tuple(steps)))
+
+    def _in_order(self) -> Iterator[Token | Scope]:
+        """What is queued and what has entered, each in its order; a token may be in both."""
+        entered = deque(self.entered)
+        in_both = set(entered) & set(self.queue) if entered else ()
+        for item in self.queue:
+            while item in in_both and entered and entered[0] is not item:
+                yield entered.popleft()
+            yield item
+        yield from entered
 
     def reload_queue(self) -> None:
         """Take up the steps that a yield left over."""
@@ -117,7 +142,7 @@ class Steps(Execution):
                 token = tokens.get(number)
                 if token is None:
                     continue
-                if token.instance is None and token.node not in waits:
+                if (token.instance is None and token.node not in waits) or has_entered(token):
                     queue.append(token)
                 else:
                     self.execute_later(token)

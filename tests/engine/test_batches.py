@@ -199,3 +199,46 @@ def test_what_has_been_entered_misses_no_signal_that_comes_between_batches(batch
     assert play.trace().count("triggered") >= len(entered)
     if len(entered) == 3:
         assert play.ended == "completed"
+
+
+def test_a_signal_that_meets_tokens_that_double_at_each_turn_ends() -> None:
+    play = Play(
+        """
+        <startEvent id="start"/>
+        <intermediateCatchEvent id="n">conditional c == null</intermediateCatchEvent>
+        <intermediateCatchEvent id="s">signal S</intermediateCatchEvent> <userTask id="u"/>
+        start -> n
+        start -> s -> u
+        n -> n
+        n -> n
+    """,
+        batch=20,
+    )
+    play.goes_on = False
+    play.start().give(Continue())
+    assert play.run.wants_continue
+    play.trace()
+    assert len(play.signal("S").steps[-1].records) < 400
+    assert "enter u" in play.trace()
+    assert play.stop().ended == "stopped"
+
+
+@pytest.mark.parametrize("batch", range(1, 9))
+def test_tokens_that_gather_before_an_activity_with_a_boundary_event_go_on_in_batches(
+    batch: int,
+) -> None:
+    text = """
+        <startEvent id="start"/> <userTask id="v"/>
+        <task id="t" startQuantity="2"/> <userTask id="u" startQuantity="2"/>
+        <boundaryEvent id="tick" attachedToRef="u" cancelActivity="false">timer PT1S</boundaryEvent>
+        start -> u
+        start -> v -> u
+        start -> t -> u
+        start -> t
+    """
+    traces = []
+    for size in (10_000, batch):
+        play = Play(text, batch=size).start()
+        assert not play.run.wants_continue
+        traces.append(without_yields(play))
+    assert traces[0] == traces[1]

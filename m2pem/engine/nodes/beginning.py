@@ -56,6 +56,14 @@ def enter_activity(x: Execution, token: Token) -> None:
         arm_boundary(x, token, node)
 
 
+def has_entered(token: Token) -> bool:
+    """Whether a token that waits for its turn has done what `enter_activity` does before it."""
+    node = token.node
+    if not isinstance(node, Activity):
+        return False
+    return token.armed or len(token.scope.gathered.get(node, ())) in range(1, node.start_quantity)
+
+
 def begin_activity(x: Execution, token: Token) -> None:
     """Begin the work of an activity, whose boundary events are armed.
 
