@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
+from m2pem_plugin_mavlink.sitl.readiness import ready
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from mavlink_vehicle_world import (
@@ -455,5 +456,31 @@ def test_home_is_not_counted_among_the_items(virtual: Run) -> None:
             link.says["MISSION_CURRENT"] = {"seq": 3, "total": 3}
             await vehicle.until(lambda: vehicle.heard.mission_sequence == 3, 3.0)
             assert driver.current_item == 2
+
+    virtual(main)
+
+
+def test_a_plane_that_waits_in_rtl_for_its_ground_station_is_ready_when_it_has_a_position(
+    virtual: Run,
+) -> None:
+    """It cannot be armed in RTL, and takes off in another mode."""
+
+    async def main(clock: Clock) -> None:
+        link, vehicle = plane(clock)
+        bit = dialect.MAV_SYS_STATUS_PREARM_CHECK
+        link.says["SYS_STATUS"] = {
+            "onboard_control_sensors_present": bit,
+            "onboard_control_sensors_enabled": bit,
+        }
+        link.says["EKF_STATUS_REPORT"] = {"flags": WAITING_FLAGS}
+        link.custom_mode = 11
+        async with Playing((link, vehicle)):
+            waits = asyncio.get_running_loop().create_task(ready([vehicle], print))
+            await clock.sleep(5.0)
+            assert not waits.done()
+            link.says["EKF_STATUS_REPORT"] = {"flags": READY_FLAGS}
+            await clock.sleep(5.0)
+            assert waits.done()
+            await waits
 
     virtual(main)

@@ -10,6 +10,8 @@ from m2pem.errors import M2pemError, PluginError
 from m2pem_plugin_mavlink.link.routed_link import GROUND_STATION, open_link
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.sitl import fleet
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode
+from m2pem_plugin_mavlink.vehicle.readiness import unlocated
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 READY_WITHIN_S = 300.0
@@ -110,5 +112,9 @@ def _reasons(vehicle: Vehicle) -> str:
         return "no heartbeat yet"
     if vehicle.link_state is LinkState.LOST:
         return f"silent for {vehicle.silent_s or 0.0:.0f} s"
+    if vehicle.heard.mode is FlightMode.RETURN:
+        # A plane counts its ground station as lost from the start, and waits in RTL, in which it
+        # cannot be armed. The executive's takeoff leaves that mode.
+        return ", ".join(unlocated(vehicle.identity.firmware, vehicle.heard, vehicle.link.now_s()))
     readiness = vehicle.driver.readiness()
     return "" if readiness.ready else ", ".join(readiness.reasons)
