@@ -26,13 +26,14 @@ def test_a_takeoff_needs_guided_and_motors() -> None:
     assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 0
 
 
-def test_a_takeoff_that_is_repeated_is_accepted_and_begun_once() -> None:
+def test_a_takeoff_that_is_repeated_in_the_air_fails() -> None:
     bench = Bench().ready()
     for _ in range(3):
         assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 0
-        bench.run(1)
+    bench.run(1)
+    assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 4
     bench.run(10)
-    assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 0
+    assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 4
     assert bench.autopilot.chronicle.counts["takeoff"] == 1
     assert abs(bench.autopilot.body.up_m - 10) < 0.5
 

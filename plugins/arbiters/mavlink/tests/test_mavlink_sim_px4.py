@@ -65,7 +65,7 @@ def test_arming_without_a_position_is_rejected_with_texts() -> None:
     bench.run(5)
     assert bench.command(ARM, 1) == LATER
     # Its last text is longer than a message.
-    assert bench.texts()[-3] == "Preflight Fail: Sensors are still calibrating"
+    assert "Preflight Fail: Sensors are still calibrating" in bench.texts()
     assert "".join(bench.texts()[-2:]) == "Arming denied: Resolve system health failures first"
     bench.run(10)
     assert bench.command(ARM, 1) == LATER

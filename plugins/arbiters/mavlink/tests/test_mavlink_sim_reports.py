@@ -65,6 +65,7 @@ def test_landed_or_in_the_air_is_told() -> None:
     bench.run(20)
     assert bench.report(245).landed_state == 2
     bench.command(21)
+    bench.run(0.1)
     assert bench.report(245).landed_state == 4
 
 

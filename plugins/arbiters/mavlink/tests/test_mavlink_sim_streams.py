@@ -74,6 +74,6 @@ def test_the_old_request_asks_for_a_group() -> None:
 
 
 def test_every_report_can_be_requested() -> None:
-    bench = Bench().airborne()
+    bench = Bench(parameters={"FENCE_ENABLE": 1}).airborne()
     for id_ in bench.autopilot.streams.makers:
         assert bench.report(id_).get_msgId() == id_

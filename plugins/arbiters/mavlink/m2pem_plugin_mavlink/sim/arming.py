@@ -41,7 +41,8 @@ class Arming(Part):
         if not estimator.sensors_well and self.autopilot.firmware.checks_sensors(self.autopilot):
             yield self.autopilot.firmware.reason_sensors
         if mode.needs_position and not estimator.ready:
-            yield self.autopilot.firmware.reason_position
+            firmware = self.autopilot.firmware
+            yield firmware.reason_position if estimator.sensors_well else firmware.reason_home
 
     @property
     def healthy(self) -> bool:
@@ -52,9 +53,10 @@ class Arming(Part):
         """Arm; says why if it will not. To be armed already is well."""
         if self.armed:
             return True
-        reason = None if force else next(self.reasons(), None)
-        if reason is not None:
+        reasons = [] if force else list(self.reasons())
+        for reason in reasons:
             self.autopilot.warn(self.autopilot.firmware.arming_text(reason))
+        if reasons:
             return False
         self.armed, self._idle_s = True, 0.0
         self.autopilot.note("armed")

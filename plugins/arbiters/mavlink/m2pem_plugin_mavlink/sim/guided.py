@@ -32,13 +32,9 @@ class GuidedSetpoints(Part):
             "SET_POSITION_TARGET_LOCAL_NED": self._local,
         }
 
-    def refusal(self, point: Point) -> str | None:
-        """Why it must not go there."""
-        for part in self.autopilot.parts:
-            reason = part.forbids(point)
-            if reason is not None:
-                return reason
-        return None
+    def forbidden(self, point: Point) -> bool:
+        """Whether it must not go there; ArduPilot does not say why."""
+        return any(part.forbids(point) for part in self.autopilot.parts)
 
     def up_m(self, z: float, frame: int) -> float:
         """A height in a global frame, above the origin of the vehicle's frame."""
@@ -91,11 +87,8 @@ class GuidedSetpoints(Part):
             yaw = wrapped_rad(yaw + self.autopilot.body.yaw_rad)
         if mask & IGNORE_POSITION != IGNORE_POSITION:
             point = self._on_surface(point)
-            reason = self.refusal(point)
-            if reason is None:
+            if not self.forbidden(point):
                 guided.go_to(point, yaw)
-            else:
-                self.autopilot.warn(reason)
         elif mask & IGNORE_VELOCITY != IGNORE_VELOCITY and self.autopilot.spec.kind != Kind.PLANE:
             rate = None if mask & IGNORE_YAW_RATE else message.yaw_rate
             guided.move(self._velocity(message.vx, message.vy, -message.vz, yaw, rate, of_body))

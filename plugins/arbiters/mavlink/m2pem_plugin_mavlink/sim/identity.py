@@ -40,6 +40,8 @@ class Identity(Part):
         pilot = self.autopilot
         active = pilot.firmware.active(pilot)
         status = dialect.MAV_STATE_ACTIVE if active else dialect.MAV_STATE_STANDBY
+        if any(part.failsafe for part in pilot.parts):
+            status = dialect.MAV_STATE_CRITICAL
         return dialect.MAVLink_heartbeat_message(
             pilot.firmware.vehicle_type,
             pilot.firmware.autopilot_id,

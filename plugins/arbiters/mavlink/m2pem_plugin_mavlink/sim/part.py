@@ -45,10 +45,15 @@ class Part:
     def step(self, dt_s: float) -> None:
         """Let `dt_s` of simulated time pass."""
 
+    @property
+    def failsafe(self) -> bool:
+        """It does something against what has gone wrong (MAV_STATE_CRITICAL)."""
+        return False
+
     def refusals(self) -> Iterable[str]:
         """Why the vehicle must not be armed, as ArduPilot words it."""
         return ()
 
-    def forbids(self, point: Point) -> str | None:
-        """Why the vehicle must not go to a point (a fence), as ArduPilot words it."""
-        return None
+    def forbids(self, point: Point) -> bool:
+        """Whether the vehicle must not go to a point (a fence)."""
+        return False

@@ -145,9 +145,9 @@ class Reports(Part):
             state = dialect.MAV_LANDED_STATE_UNDEFINED
         elif pilot.body.on_ground or pilot.spec.kind in (Kind.ROVER, Kind.BOAT):
             state = dialect.MAV_LANDED_STATE_ON_GROUND
-        elif getattr(pilot.modes.maneuver, "taking_off", False):
+        elif pilot.modes.maneuver.taking_off:
             state = dialect.MAV_LANDED_STATE_TAKEOFF
-        elif pilot.modes.mode.number == pilot.firmware.roles.land:
+        elif pilot.modes.maneuver.landing:
             state = dialect.MAV_LANDED_STATE_LANDING
         return dialect.MAVLink_extended_sys_state_message(pilot.firmware.vtol_state, state)
 

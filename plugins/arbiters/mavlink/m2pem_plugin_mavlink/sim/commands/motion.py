@@ -52,15 +52,13 @@ class MotionCommands(Part):
         return maneuver if isinstance(maneuver, Guided) else None
 
     def _take_off(self, command: Command) -> Result:
-        """In GUIDED only, and armed; while it climbs already, or has, nothing is begun anew."""
+        """In GUIDED only, armed and on the ground."""
         pilot, guided = self.autopilot, self._guided()
         up_m = pilot.home.point.up_m + command.z
         if guided is None or not pilot.arming.armed or not math.isfinite(command.z):
             return Result.FAILED
-        if not pilot.body.on_ground:
-            again = guided.takeoff_up_m is not None and guided.destination is None
-            return Result.ACCEPTED if again else Result.FAILED
-        if up_m <= pilot.body.up_m + 0.1 or not pilot.estimator.ready:
+        on_ground, down = pilot.body.on_ground, up_m <= pilot.body.up_m + 0.1
+        if not on_ground or down or not pilot.estimator.ready:
             return Result.FAILED
         if not guided.taking_off:
             guided.take_off(up_m)
@@ -76,9 +74,7 @@ class MotionCommands(Part):
         if self._guided() is None and not int(command.param2) & CHANGE_MODE:
             return Result.FAILED if plane else Result.DENIED
         point = pilot.guided.point_of(command)
-        reason = pilot.guided.refusal(point)
-        if reason is not None:
-            pilot.warn(reason)
+        if pilot.guided.forbidden(point):
             return Result.DENIED if plane else Result.FAILED
         if not pilot.modes.switch(pilot.firmware.roles.guided):
             return Result.FAILED

@@ -36,7 +36,13 @@ class ArduPilotFailsafes(Part):
         self._heartbeats = Heartbeats()
         self._link = Watch()
         self._position = Lasting()
-        self._battery = {"LOW": Lasting(), "CRT": Lasting()}
+        self._battery = {"CRT": Lasting(), "LOW": Lasting()}
+
+    @property
+    def failsafe(self) -> bool:
+        """One of them is not well."""
+        watches = (self._link, self._position, *self._battery.values())
+        return any(watch.wrong for watch in watches)
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """Heartbeats of the one ground station that counts."""
@@ -51,6 +57,8 @@ class ArduPilotFailsafes(Part):
         self._look_at_link()
         for level, watch in self._battery.items():
             self._look_at_battery(level, watch)
+            if watch.wrong:
+                break
         self._look_at_position()
 
     # --- the ground station -----------------------------------------------------------------------
@@ -114,7 +122,7 @@ class ArduPilotFailsafes(Part):
         actions = {Kind.COPTER: COPTER_BATTERY, Kind.PLANE: PLANE_ACTIONS}
         action = int(p[f"BATT_FS_{level}_ACT"])
         mode = actions.get(pilot.spec.kind, ROVER_ACTIONS).get(action)
-        if mode is not None:
+        if mode is not None or pilot.spec.kind is Kind.COPTER:
             self._act("Battery", mode)
 
     def _empty(self, level: str) -> bool:
@@ -135,9 +143,12 @@ class ArduPilotFailsafes(Part):
     def _look_at_position(self) -> None:
         pilot = self.autopilot
         needs = pilot.arming.armed and pilot.modes.mode.needs_position
-        lost = needs and not pilot.estimator.ready
+        lost = (needs or self._position.wrong) and not pilot.estimator.ready
         action = int(pilot.parameters["FS_EKF_ACTION"])
-        if self._position.look_for(lost, EKF_S, pilot.now_s) is not Change.WRONG or not action:
+        change = self._position.look_for(lost, EKF_S, pilot.now_s)
+        if change is Change.WELL and action:
+            pilot.warn("EKF Failsafe Cleared")
+        if change is not Change.WRONG or not action:
             return
         pilot.note("failsafe", "EKF")
         kind = pilot.spec.kind

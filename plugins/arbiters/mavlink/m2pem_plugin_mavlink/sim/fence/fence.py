@@ -96,12 +96,10 @@ class Fence(Part):
         if rules.mode is not None:
             pilot.modes.switch(rules.mode)
 
-    def forbids(self, point: Point) -> str | None:
+    def forbids(self, point: Point) -> bool:
         """It does not go beyond the fence."""
         rules = self.rules
-        if not rules.enabled or self.at(point, rules) in (None, Breach.LOWEST):
-            return None
-        return "Destination is outside of the fence"
+        return rules.enabled and self.at(point, rules) not in (None, Breach.LOWEST)
 
     def refusals(self) -> Iterator[str]:
         """It is not armed beyond the fence."""
@@ -124,8 +122,9 @@ class Fence(Part):
         return Result.ACCEPTED
 
     def reports(self) -> Mapping[int, ReportMaker]:
-        """FENCE_STATUS."""
-        return {dialect.MAVLINK_MSG_ID_FENCE_STATUS: self._status}
+        """FENCE_STATUS, while there is a fence."""
+        status = dialect.MAVLINK_MSG_ID_FENCE_STATUS
+        return {status: lambda: self._status() if self.rules.enabled else None}
 
     def _status(self) -> Any:
         kind = dialect.FENCE_BREACH_NONE if self.breach is None else TYPES[self.breach]

@@ -55,6 +55,22 @@ def zones_of(items: Sequence[Item], frame: LocalFrame) -> tuple[Zone, ...]:
     return tuple(_zones(items, frame))
 
 
+def is_whole(items: Sequence[Item]) -> bool:
+    """Whether every polygon has as many corners as each of them says, three at least."""
+    index = 0
+    while index < len(items):
+        first = items[index]
+        count = 1
+        if first.command in (POLYGON_IN, POLYGON_OUT):
+            count = int(first.param1) if math.isfinite(first.param1) else 0
+            corners = items[index : index + count]
+            said = {(each.command, each.param1) for each in corners}
+            if not len(corners) == count >= 3 or said != {(first.command, first.param1)}:
+                return False
+        index += count
+    return True
+
+
 def _zones(items: Sequence[Item], frame: LocalFrame) -> Iterator[Zone]:
     index = 0
     while index < len(items):

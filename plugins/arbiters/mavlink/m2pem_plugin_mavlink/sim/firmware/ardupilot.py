@@ -59,8 +59,9 @@ class ArduPilot(Firmware):
     def __init__(self, spec: VehicleSpec) -> None:
         super().__init__(spec)
         plane, copter = spec.kind is Kind.PLANE, spec.kind is Kind.COPTER
-        self.reason_position = "AHRS: waiting for home" if plane else "Need Position Estimate"
-        self.reason_sensors = "Gyros not calibrated"
+        self.reason_home = "AHRS: waiting for home"
+        self.reason_position = self.reason_home if plane else "Need Position Estimate"
+        self.reason_sensors = "Gyros inconsistent"
         self.loop_hz = 400.0 if copter else 50.0
         self.first_mode = 0
         states = (dialect.MAV_VTOL_STATE_UNDEFINED, dialect.MAV_VTOL_STATE_MC)

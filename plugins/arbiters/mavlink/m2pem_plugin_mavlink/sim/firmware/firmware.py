@@ -57,6 +57,7 @@ class Firmware(ABC):
     """The parameter that has the battery's capacity in mAh."""
     gimbal_needs_control: ClassVar[bool] = False
     """Only a ground station that has taken control of the gimbal may move it."""
+    reason_home: str
     reason_position: str
     reason_sensors: str
     loop_hz: float

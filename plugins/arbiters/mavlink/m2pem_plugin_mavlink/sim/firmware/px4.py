@@ -88,6 +88,7 @@ class Px4(Firmware):
     gimbal_needs_control = True
     capacity = "BAT1_CAPACITY"
     reason_position = "No valid position estimate"
+    reason_home = reason_position
     reason_sensors = "Sensors are still calibrating"
     loop_hz = 1000.0
     first_mode = HOLD

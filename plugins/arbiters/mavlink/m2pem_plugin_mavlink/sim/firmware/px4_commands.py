@@ -106,7 +106,7 @@ class Px4Commands(Part):
             maneuver.pause()
             return result
         point = self._place(command, maneuver.destination)
-        if pilot.guided.refusal(point) is not None:
+        if pilot.guided.forbidden(point):
             pilot.warn("Reposition is outside geofence")
             return result
         if command.param1 > 0:

@@ -15,7 +15,6 @@ class TakeOff(Maneuver):
     """
 
     up_m: float | None = None
-    taking_off = False
 
     def begin(self) -> None:
         """From where it is. Armed on the ground, it takes off."""

@@ -30,7 +30,6 @@ class Guided(Maneuver):
     """
 
     takeoff_up_m: float | None = None
-    taking_off = False
     radius_m = 0.0
     destination: Point | None = None
     paused = False

@@ -23,6 +23,7 @@ class Land(Maneuver):
 def come_down(maneuver: Maneuver, point: Point) -> Demand:
     """Descend to the ground at a point; landed, the motors stop."""
     pilot = maneuver.autopilot
+    pilot.modes.maneuver.landing = True
     if pilot.body.on_ground:
         pilot.arming.disarm_after_landing()
     tuning = pilot.tuning

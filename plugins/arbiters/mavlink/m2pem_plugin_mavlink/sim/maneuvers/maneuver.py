@@ -11,7 +11,11 @@ if TYPE_CHECKING:
 
 
 class Maneuver:
-    """Made when its mode is entered, gone when it is left."""
+    """Made when its mode is entered, gone when it is left. `taking_off`, `landing`: it goes up from
+    or down to the ground."""
+
+    taking_off = False
+    landing = False
 
     def __init__(self, autopilot: "Autopilot") -> None:
         self.autopilot = autopilot

@@ -8,9 +8,12 @@ from m2pem_plugin_mavlink.sim.maneuvers.standing import Stay
 from m2pem_plugin_mavlink.sim.missions.actions import Actions
 from m2pem_plugin_mavlink.sim.missions.items import NAVIGATION
 from m2pem_plugin_mavlink.sim.missions.legs import Leg, leg_of
+from m2pem_plugin_mavlink.sim.missions.plan import Item
 from m2pem_plugin_mavlink.sim.specification import Kind
 
 NAV_TAKEOFF = 22
+LOOKS_AHEAD = 3
+"""So many items are watched for changes (Mission_Change_Detector)."""
 
 
 class Auto(Maneuver):
@@ -20,6 +23,7 @@ class Auto(Maneuver):
     paused = False
     _leg: Leg | None = None
     _index: int | None = None
+    _ahead: tuple[Item, ...] = ()
 
     @property
     def takes_speed(self) -> bool:
@@ -85,9 +89,11 @@ class Auto(Maneuver):
     def step(self, dt_s: float) -> Demand:
         """Fly the present leg, and go on to the next when it is done."""
         pilot, progress = self.autopilot, self.autopilot.mission
-        waiting = pilot.spec.kind is Kind.COPTER and pilot.body.on_ground and not progress.released
+        progress.released |= not pilot.body.on_ground
+        waiting = pilot.spec.kind is Kind.COPTER and not progress.released
         if waiting or not progress.running:
             return self._stay.step(dt_s)
+        self._notice_a_change()
         self._actions.step(dt_s)
         if self._leg is None or self._index is None or self.paused:
             return self._stay.step(dt_s)
@@ -112,6 +118,20 @@ class Auto(Maneuver):
         progress.current = progress.resume_at = following
         self.tell(f"Mission: {following} {NAVIGATION[item.command]}")
         self._leg = leg_of(pilot, item)
+        self._ahead = self._next_items(following)
+
+    def _notice_a_change(self) -> None:
+        """ArduPilot begins a waypoint again when it or the next ones are replaced (ModeAuto)."""
+        pilot = self.autopilot
+        looks = pilot.firmware.is_ardupilot and pilot.spec.kind is not Kind.PLANE
+        if not looks or type(self._leg) is not Leg or self._index is None:
+            return
+        if self._ahead != self._next_items(self._index):
+            pilot.warn("Auto mission changed, restarted command")
+            self.go_on(self._index)
+
+    def _next_items(self, index: int) -> tuple[Item, ...]:
+        return self.autopilot.mission.items[index : index + LOOKS_AHEAD]
 
     def tell(self, text: str) -> None:
         """PX4 says nothing on the way."""

@@ -84,6 +84,7 @@ class Takeoff(Leg):
         self._begun = True
         near_m = 2.0 if self.autopilot.spec.kind is Kind.PLANE else 0.5
         self.done = self.place.up_m - self.autopilot.body.up_m <= near_m
+        self.autopilot.modes.maneuver.taking_off = not self.done
         yaw_rad = None if self.autopilot.spec.kind is Kind.PLANE else self.autopilot.body.yaw_rad
         return self.reach(self.place, yaw_rad=yaw_rad)
 

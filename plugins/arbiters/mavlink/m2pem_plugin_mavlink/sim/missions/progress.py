@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 MOST_JUMPS = 64
 """So many items without navigation in a row are a mission that goes around in circles."""
 
+A_MOMENT_S = 0.1
+
 
 class MissionState(IntEnum):
     """MISSION_STATE."""
@@ -36,8 +38,9 @@ class MissionProgress(Part):
 
     Of ArduPilot's, 0 is none. `resume_at`: where it goes on, an item of navigation or an action
     before it; `begun`: the mission was started since it was last at its beginning; `complete`: it
-    was flown to its end; `released`: a ground station said MISSION_START, so that it may leave the
-    ground; `running`: the mode that flies it is on, and it is not complete.
+    was flown to its end; `released`: a ground station said MISSION_START, or it is in the air, so
+    that it need not wait on the ground; `running`: the mode that flies it is on, and it is not
+    complete.
     """
 
     def __init__(self, autopilot: "Autopilot") -> None:
@@ -45,6 +48,7 @@ class MissionProgress(Part):
         self.current = self.resume_at = 0
         self.begun = self.complete = self.released = self.running = False
         self._jumps: dict[int, int] = {}
+        self._reached: list[tuple[float, int]] = []  # when, and which item
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -148,12 +152,21 @@ class MissionProgress(Part):
         return self.current >= self.first
 
     def reached(self, index: int) -> None:
-        """All are told."""
-        self.autopilot.send(dialect.MAVLink_mission_item_reached_message(index))
+        """All are told; of items in a moment ArduPilot tells the last one."""
+        if self.autopilot.firmware.is_ardupilot:
+            self._reached.append((self.autopilot.now_s, index))
+        else:
+            self.autopilot.send(dialect.MAVLink_mission_item_reached_message(index))
         self.autopilot.note("reached", str(index))
         text = self.autopilot.firmware.reached_text(self.autopilot, index)
         if text:
             self.autopilot.say(text)
+
+    def step(self, dt_s: float) -> None:
+        """Tell what was reached a moment ago."""
+        if self._reached and self.autopilot.now_s - self._reached[0][0] >= A_MOMENT_S:
+            self.autopilot.send(dialect.MAVLink_mission_item_reached_message(self._reached[-1][1]))
+            self._reached.clear()
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """The old way to set it."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem_plugin_mavlink.sim.fence.zones import is_whole
 from m2pem_plugin_mavlink.sim.missions.items import ACCEPTED, fault_of, item_of, message_of
 from m2pem_plugin_mavlink.sim.missions.plan import FENCE, MISSION, RALLY, Item
 from m2pem_plugin_mavlink.sim.missions.upload import Upload
@@ -23,6 +24,8 @@ ALL = 255
 MOST_ITEMS: Mapping[int, int] = {MISSION: 724, FENCE: 200, RALLY: 30}
 NAMES: Mapping[int, str] = {MISSION: "Mission", FENCE: "Fence", RALLY: "Rally"}
 RECEIVED: Mapping[int, str] = {MISSION: "Flight plan received", RALLY: "Rally points received"}
+KEPT_FRAMES: Mapping[int, int] = {5: 0, 6: 3, 11: 10}
+"""ArduPilot keeps no difference between a MAV_FRAME and its _INT."""
 TOTALS: Mapping[int, str] = {MISSION: "MIS_TOTAL", FENCE: "FENCE_TOTAL", RALLY: "RALLY_TOTAL"}
 """Parameters that count the items."""
 
@@ -139,6 +142,11 @@ class MissionServer(Part):
             self._complete(sender, kind)
 
     def _complete(self, sender: Heard, kind: int) -> None:
+        pilot = self.autopilot
+        if kind == FENCE and pilot.firmware.is_ardupilot and not is_whole(pilot.plans[kind]):
+            pilot.warn("Fence validation failed")
+            self._acknowledge(sender, kind, ERROR)
+            return
         self._acknowledge(sender, kind, ACCEPTED)
         if kind in RECEIVED:
             self.autopilot.say(RECEIVED[kind])
@@ -172,6 +180,8 @@ class MissionServer(Part):
         item = pilot.plans[kind][seq]
         if kind == MISSION and seq == 0 and pilot.firmware.is_ardupilot:
             item = self._home()
+        if pilot.firmware.is_ardupilot:
+            item = item._replace(frame=KEPT_FRAMES.get(item.frame, item.frame))
         current = kind == MISSION and seq == pilot.mission.current
         whole = message.get_type() == "MISSION_REQUEST_INT"
         to = (sender.system, sender.component)
