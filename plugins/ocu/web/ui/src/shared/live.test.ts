@@ -5,6 +5,7 @@ import type { ServerMessage } from "./types";
 class FakeSocket implements Socket {
   sent: unknown[] = [];
   closed = false;
+  readyState = 1;
   onopen: (() => void) | null = null;
   onmessage: ((event: { data: unknown }) => void) | null = null;
   onclose: ((event: { code: number }) => void) | null = null;
@@ -87,6 +88,15 @@ beforeEach(() => {
 });
 
 describe("live client", () => {
+  it("says nothing on a connection that the server is closing", () => {
+    newest().onopen?.();
+    newest().tell(frame(1));
+    newest().readyState = 2;
+    const before = newest().sent.length;
+    draw();
+    expect(newest().sent.length).toBe(before);
+  });
+
   it("says what it watches, first of all", () => {
     expect(newest().sent).toEqual([{ type: "watch", run: "r1" }]);
     expect(states).toEqual(["connecting", "open"]);

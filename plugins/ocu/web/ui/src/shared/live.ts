@@ -7,6 +7,8 @@ export type Connection = "connecting" | "open" | "lost" | "refused";
 
 /** The part of a WebSocket that is used. */
 export interface Socket {
+  /** `OPEN`, or it is being made or closed. */
+  readonly readyState: number;
   send(text: string): void;
   close(): void;
   onopen: (() => void) | null;
@@ -41,6 +43,8 @@ export const SILENT_MS = 3000;
 const OPENING_MS = 5000;
 const LOOK_MS = 250;
 const NO_CLOSE = 1006;
+/** `WebSocket.OPEN` */
+const OPEN = 1;
 /** Not signed in (any more): to ask again is of no use. 1008 is a policy violation. */
 const REFUSED = new Set([1008, 4001, 4401, 4403]);
 
@@ -141,7 +145,8 @@ export class LiveClient {
   }
 
   private say(message: object): void {
-    if (this.isOpen) this.socket?.send(JSON.stringify(message));
+    // The server may be closing it, of which `onclose` tells only when that is done.
+    if (this.isOpen && this.socket?.readyState === OPEN) this.socket.send(JSON.stringify(message));
   }
 
   private forget(): void {
