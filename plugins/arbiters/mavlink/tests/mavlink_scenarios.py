@@ -162,8 +162,8 @@ def return_of_a_plane(s: Station) -> None:
     s.airborne()
     s.set_mode("RTL")
     s.begin("circle")
-    s.until("home", lambda: s.distance_m() < 150.0)
-    s.watch(20.0)
+    s.watch(40.0)
+    s.note("near", s.distance_m() < 300.0)
 
 
 @of(*COPTERS)
@@ -366,8 +366,8 @@ def mission_of_a_plane(s: Station) -> None:
         "upload",
         [
             s.item(SPEED, params=(0.0, 18.0, -1.0)),
-            s.item(WAYPOINT, (300.0, 0.0, 60.0)),
-            s.item(WAYPOINT, (300.0, 300.0, 60.0)),
+            s.item(WAYPOINT, (900.0, 0.0, 60.0)),
+            s.item(WAYPOINT, (900.0, 300.0, 60.0)),
         ],
     )
     _start(s)
@@ -519,9 +519,9 @@ def second_station_takes_a_mission_over(s: Station) -> None:
     s.mission("upload", _leg(s, 80.0))
     _start(s)
     s.until("on its way", lambda: s.distance_m() > 15.0)
-    s.mission("second station: upload", _leg(s, 20.0), SECOND)
+    s.mission("second station: upload", _leg(s, 60.0), SECOND)
     s.begin("go on")
-    s.watch(10.0)
+    s.watch(5.0)
 
 
 # --- failsafes ----------------------------------------------------------------------------------

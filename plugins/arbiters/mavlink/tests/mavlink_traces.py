@@ -5,10 +5,11 @@ differences that are left, each with its reason.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import yaml
@@ -26,16 +27,20 @@ NEAR_S, NEAR_SHARE = 4.0, 0.4
 
 
 class Vehicle(NamedTuple):
-    """`model`: of the program's own simulation."""
+    """`model`: of the program's own simulation; `parameters`: what the file of parameters that
+    belongs to it sets."""
 
     kind: Kind
     firmware: str
     model: str
+    parameters: Mapping[str, float] = MappingProxyType({})
 
 
 VEHICLES = {
     "arducopter": Vehicle(Kind.COPTER, "ardupilot", "quad"),
-    "ardurover": Vehicle(Kind.ROVER, "ardupilot", "rover"),
+    "ardurover": Vehicle(
+        Kind.ROVER, "ardupilot", "rover", {"WP_SPEED": 5.0, "CRUISE_SPEED": 5.0, "WP_RADIUS": 3.0}
+    ),
     "arduplane": Vehicle(Kind.PLANE, "ardupilot", "plane"),
     "px4copter": Vehicle(Kind.COPTER, "px4", "sihsim_quadx"),
 }
@@ -76,8 +81,8 @@ def reasons(vehicle: str, scenario: str) -> dict[str, str]:
 
 def play_simulated(vehicle: str, scenario: Scenario) -> Trace:
     """The trace of the simulated autopilot."""
-    kind, firmware, _ = VEHICLES[vehicle]
-    station = Station(SimulatedWire(VehicleSpec(kind, firmware=firmware)))
+    kind, firmware, _, parameters = VEHICLES[vehicle]
+    station = Station(SimulatedWire(VehicleSpec(kind, firmware=firmware, parameters=parameters)))
     station.connect()
     scenario.play(station)
     return station.trace
@@ -94,7 +99,7 @@ def play_real(vehicle: str, binary: Path, scenario: Scenario, instance: int) -> 
 
 @contextmanager
 def _real(vehicle: str, binary: Path, instance: int) -> Iterator[Station]:
-    kind, firmware, model = VEHICLES[vehicle]
+    kind, firmware, model, _ = VEHICLES[vehicle]
     wire = UdpWire(kind, firmware, px4_port(instance) if firmware == "px4" else 0)
     with TemporaryDirectory() as folder:
         if firmware == "px4":

@@ -77,7 +77,7 @@ def test_a_rover_does_what_its_action_says(action: int, then: str) -> None:
     beat(bench, 2)
     bench.run(8)
     assert mode(bench) == then
-    assert "GCS Failsafe" in bench.texts()
+    assert "Radio Failsafe" in bench.texts()
 
 
 # --- ArduPilot, battery and estimator -------------------------------------------------------------

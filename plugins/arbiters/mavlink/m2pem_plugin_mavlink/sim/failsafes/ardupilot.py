@@ -71,7 +71,9 @@ class ArduPilotFailsafes(Part):
         timeout_s = p["FS_LONG_TIMEOUT" if plane else "FS_GCS_TIMEOUT"]
         missed = enabled > 0 and self._heartbeats.missed(timeout_s, pilot.now_s)
         change = self._link.look(missed)
-        if change is Change.WELL:
+        if change is Change.WELL and kind in SURFACE:
+            pilot.say("GCS Failsafe Cleared")
+        elif change is Change.WELL:
             pilot.warn("GCS Failsafe Cleared")
         if change is not Change.WRONG:
             return
@@ -80,8 +82,10 @@ class ArduPilotFailsafes(Part):
             goes_on = int(p["FS_OPTIONS"]) & CONTINUE_AUTO_WITHOUT_GCS and auto
             self._act("GCS", COPTER_GCS.get(enabled), "Continuing Auto Mode" if goes_on else "")
         elif kind in SURFACE:
+            # Rovers look after radio and ground station together, and name the radio
+            # (Rover::failsafe_trigger).
             goes_on = enabled == 2 and auto
-            self._act("GCS", None if goes_on else ROVER_ACTIONS.get(int(p["FS_ACTION"])))
+            self._act("Radio", None if goes_on else ROVER_ACTIONS.get(int(p["FS_ACTION"])))
         else:
             self._act("GCS", PLANE_ACTIONS.get(int(p["FS_LONG_ACTN"])))
 
@@ -146,8 +150,9 @@ class ArduPilotFailsafes(Part):
         lost = (needs or self._position.wrong) and not pilot.estimator.ready
         action = int(pilot.parameters["FS_EKF_ACTION"])
         change = self._position.look_for(lost, EKF_S, pilot.now_s)
+        surface = pilot.spec.kind in SURFACE
         if change is Change.WELL and action:
-            pilot.warn("EKF Failsafe Cleared")
+            pilot.warn("EKF failsafe cleared" if surface else "EKF Failsafe Cleared")
         if change is not Change.WRONG or not action:
             return
         pilot.note("failsafe", "EKF")
@@ -158,4 +163,5 @@ class ArduPilotFailsafes(Part):
             self._enter("ALT_HOLD" if action == 2 else "LAND")
         elif kind is Kind.PLANE:
             self._enter("CIRCLE")
-        pilot.warn(f"EKF Failsafe: changed to {pilot.modes.mode.name} Mode")
+        mode = pilot.modes.mode.name
+        pilot.warn("EKF failsafe" if surface else f"EKF Failsafe: changed to {mode} Mode")

@@ -61,6 +61,8 @@ class ArduPilot(Firmware):
         plane, copter = spec.kind is Kind.PLANE, spec.kind is Kind.COPTER
         self.reason_home = "AHRS: waiting for home"
         self.reason_position = self.reason_home if plane else "Need Position Estimate"
+        if spec.kind in (Kind.ROVER, Kind.BOAT):
+            self.reason_home = "AHRS: not using configured AHRS type"
         self.reason_sensors = "Gyros inconsistent"
         self.loop_hz = 400.0 if copter else 50.0
         self.first_mode = 0

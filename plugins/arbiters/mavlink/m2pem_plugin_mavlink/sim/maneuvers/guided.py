@@ -33,6 +33,7 @@ class Guided(Maneuver):
     radius_m = 0.0
     destination: Point | None = None
     paused = False
+    _entered = False
     aimed = False
 
     @property
@@ -51,6 +52,15 @@ class Guided(Maneuver):
         self._velocity: Callable[[], Demand] | None = None
         self._velocity_until_s = 0.0
         self.yaw_rad: float | None = None
+        if not self._entered:
+            self._say_reached()
+        self._entered = True
+
+    def _say_reached(self) -> None:
+        """A plane takes its last circle for that around the new place, and says at once, and only
+        then, that it is there (Plane::update_loiter)."""
+        if self.autopilot.spec.kind is Kind.PLANE:
+            self.autopilot.send(MAVLink_mission_item_reached_message(0))
 
     def take_off(self, up_m: float) -> None:
         """Climb to a height (metres above the frame's origin)."""
@@ -69,6 +79,7 @@ class Guided(Maneuver):
         ):
             place = self.autopilot.frame.to_location(point)
             self.autopilot.note("motion", f"{place.latitude_deg:.7f},{place.longitude_deg:.7f}")
+            self._say_reached()
         self._aim(True)
         self.taking_off, self._velocity, self.paused = False, None, False
         self.destination, self.yaw_rad = point, yaw_rad
