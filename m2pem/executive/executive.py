@@ -420,14 +420,22 @@ class Executive:
         await runner.drive()
         await self.journal.release(runner.id)
         del self._tasks[runner.id]
-        busy, taken = self.availability.holder, self.handover.taken
-        every = self.fleet.vehicles.values()
-        free = [each for each in every if not busy(each.id) and each.id not in taken]
+        every, taken = self.fleet.vehicles.values(), self.handover.taken
+        free = [
+            each
+            for each in every
+            if each.id not in taken and not self._is_held_by_another(runner.id, each.id)
+        ]
         if not self.simulated and (text := left_armed(free, self.bus)):
             self.notices.publish(Alert(runner.id, "LEFT_ARMED", text))
         over = [each for each in self.runners.values() if each.done.is_set()]
         for oldest in over[:-REMEMBERED_RUNS]:
             del self.runners[oldest.id]
+
+    def _is_held_by_another(self, run: RunId, vehicle: ResourceId) -> bool:
+        """A vehicle whose link was lost is held by the behavior that it had then."""
+        holder = self.availability.holder(vehicle)
+        return holder is not None and not holder.startswith(f"{run}.")
 
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
         self.losses.seen(run, records)

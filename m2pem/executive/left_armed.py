@@ -12,7 +12,8 @@ ALOFT_M = 1.0
 
 
 def left_armed(free: Iterable[Vehicle], bus: FleetBus) -> str:
-    """A sentence about those of some vehicles that say that they are armed; "": there are none."""
+    """A sentence about those of some vehicles that say that they are armed, or said so before their
+    links were lost; "": there are none."""
     armed = [(state, each.domain) for each in free if (state := _armed(bus, each.id))]
     if not armed:
         return ""
@@ -27,13 +28,17 @@ def left_armed(free: Iterable[Vehicle], bus: FleetBus) -> str:
 
 def _armed(bus: FleetBus, resource: ResourceId) -> VehicleState | None:
     state = bus.latest(resource)
-    known = isinstance(state, VehicleState) and state.link is not LinkState.LOST
-    return state if isinstance(state, VehicleState) and known and state.armed else None
+    return state if isinstance(state, VehicleState) and state.armed else None
 
 
 def _how(state: VehicleState, domain: Domain) -> str:
-    mode = f" in {state.mode}" if state.mode else ""
-    return f"{state.resource} stays armed{mode}{_height(state, domain)}"
+    how = f"{f' in {state.mode}' if state.mode else ''}{_height(state, domain)}"
+    if state.link is LinkState.LOST:
+        return (
+            f"{state.resource} was armed{how}, when its link was lost; what it does now is not "
+            "known, its own failsafe may bring it down"
+        )
+    return f"{state.resource} stays armed{how}"
 
 
 def _height(state: VehicleState, domain: Domain) -> str:

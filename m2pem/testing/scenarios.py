@@ -48,10 +48,15 @@ def one_behavior(behavior: str, resource: str, **parameters: object) -> bytes:
 
 def in_sequence(behavior: str, resource: str, *each: Mapping[str, object]) -> bytes:
     """Start, Task1, Task2, ..., End: the same behavior with other parameters."""
-    names = [f"Task{number}" for number in range(1, len(each) + 1)]
+    return one_after_another(resource, *((behavior, parameters) for parameters in each))
+
+
+def one_after_another(resource: str, *steps: tuple[str, Mapping[str, object]]) -> bytes:
+    """Start, Task1, Task2, ..., End: behaviors with their parameters."""
+    names = [f"Task{number}" for number in range(1, len(steps) + 1)]
     tasks = [
         _behavior(name, behavior, resource, parameters)
-        for name, parameters in zip(names, each, strict=True)
+        for name, (behavior, parameters) in zip(names, steps, strict=True)
     ]
     return _mission("".join(tasks), " ".join(["Start", *names, "End"]))
 

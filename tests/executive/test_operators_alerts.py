@@ -72,9 +72,36 @@ def test_a_run_that_ends_says_what_stays_armed_and_what_may_be_done(play):
     alert = play(story, "uav1", "ugv1", "ugv2", "ugv3")
     assert alert.run == "r1"
     assert alert.text == (
-        "uav1 stays armed in BRAKE, 20 m above its home; ugv1 stays armed in HOLD. Nothing "
-        "commands them now: land, return to launch or disarm by another mission, or by the "
-        "vehicle's own ground station or remote control"
+        "uav1 stays armed in BRAKE, 20 m above its home; ugv1 stays armed in HOLD; ugv3 was armed, "
+        "when its link was lost; what it does now is not known, its own failsafe may bring it "
+        "down. Nothing commands them now: land, return to launch or disarm by another mission, or "
+        "by the vehicle's own ground station or remote control"
+    )
+
+
+def test_a_run_that_a_lost_link_ends_says_what_the_vehicle_did_then(play):
+    async def story(world: World):
+        told = asyncio.create_task(alerts(world, "LEFT_ARMED"))
+        run = await world.executive.control.start(
+            mission(sequence(("B", behavior("B", "drive_stop", "uav1"))))
+        )
+        await world.fake.until_called("start", f"{run}.b1")
+        world.fake.say(
+            VehicleState(
+                UAV1,
+                world.clock.now_us(),
+                armed=True,
+                mode="GUIDED",
+                altitude_above_home_m=40.0,
+                link=LinkState.LOST,
+            )
+        )
+        world.fake.report(f"{run}.b1", BehaviorState.LOST, "LINK_LOST")
+        return (await asyncio.wait_for(told, 10))[-1]
+
+    alert = play(story, "uav1")
+    assert alert.text.startswith(
+        "uav1 was armed in GUIDED, 40 m above its home, when its link was lost; what it does now"
     )
 
 
