@@ -17,8 +17,6 @@ from m2pem.testing.contracts.bench import ArbiterBench, context
 from m2pem.testing.contracts.contract import Contract
 
 START_US = 1_767_225_600_000_000  # 2026-01-01T00:00:00Z
-STANDING_M_S = 0.1
-
 MakeArbiter = Callable[[ArbiterContext], Arbiter]
 CutLink = Callable[[Arbiter, ResourceId], None]
 Effects = Callable[[Arbiter, ResourceId], int]
@@ -32,8 +30,9 @@ class ArbiterCase:
     `vehicle`, `other`: two vehicles that stand, ready to move (the same one, if a second vehicle is
     not supported). `watch_s`: for how long a test watches that nothing happens that must not.
     `long`: a behavior of both that moves for at least five times as long. `short`: one that ends
-    well within `short_s`. `bad`: a parameter of `long` with a value that it cannot have. Seconds
-    are those of the clock that the arbiter is lent.
+    well within `short_s`. `bad`: a parameter of `long` with a value that it cannot have. Slower than
+    `standing_m_s` a vehicle stands (a boat drifts). Seconds are those of the clock that the
+    arbiter is lent.
     """
 
     vehicle: ResourceId
@@ -43,6 +42,7 @@ class ArbiterCase:
     bad: tuple[str, ResolvedValue]
     short_s: float = 60.0
     watch_s: float = 6.0
+    standing_m_s: float = 0.1
 
 
 class ArbiterFixtures(Contract):
@@ -146,3 +146,13 @@ def speed(bench: ArbiterBench, vehicle: ResourceId) -> float:
     if not isinstance(state, VehicleState) or state.velocity_enu_m_s is None:
         return 0.0
     return math.hypot(*state.velocity_enu_m_s)
+
+
+def is_standing(bench: ArbiterBench, case: ArbiterCase) -> bool:
+    """Whether the vehicle stands."""
+    return speed(bench, case.vehicle) < case.standing_m_s
+
+
+def is_moving(bench: ArbiterBench, case: ArbiterCase) -> bool:
+    """Whether the vehicle clearly moves."""
+    return speed(bench, case.vehicle) > 2 * case.standing_m_s

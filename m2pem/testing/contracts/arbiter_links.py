@@ -10,13 +10,14 @@ from m2pem.api.arbiter import ReclaimingArbiter
 from m2pem.api.clock import Clock
 from m2pem.model.catalogue import BehaviorState
 from m2pem.testing.contracts.arbiter_case import (
-    STANDING_M_S,
     ArbiterCase,
     ArbiterFixtures,
     CutLink,
     Main,
     MakeArbiter,
     heard,
+    is_moving,
+    is_standing,
     on_bench,
     speed,
     start,
@@ -144,14 +145,14 @@ class ArbiterLinks(ArbiterFixtures):
 
         async def main(bench: ArbiterBench) -> None:
             await start(bench, "r1.b1", case.long, case.vehicle)
-            moving = await bench.until(lambda: speed(bench, case.vehicle) > 2 * STANDING_M_S, 30)
+            moving = await bench.until(lambda: is_moving(bench, case), 30)
             assert moving, "the long behavior must move the vehicle"
             await bench.arbiter.hold(case.vehicle)
             bound_s = bench.arbiter.limits(case.vehicle).hold_within_s
-            stands = await bench.until(lambda: speed(bench, case.vehicle) < STANDING_M_S, bound_s)
+            stands = await bench.until(lambda: is_standing(bench, case), bound_s)
             assert stands, f"still at {speed(bench, case.vehicle):.1f} m/s after {bound_s:g} s"
             await bench.clock.sleep(case.watch_s)
-            assert speed(bench, case.vehicle) < STANDING_M_S, "it does not move by itself"
+            assert is_standing(bench, case), "it does not move by itself"
             assert not terminal(bench, "r1.b1"), "it keeps its behavior"
 
         on_bench(make_arbiter, run, main)
@@ -231,7 +232,7 @@ class ArbiterLinks(ArbiterFixtures):
 
         async def main(bench: ArbiterBench) -> None:
             await start(bench, "r1.b1", case.long, case.vehicle)
-            moving = await bench.until(lambda: speed(bench, case.vehicle) > 2 * STANDING_M_S, 30)
+            moving = await bench.until(lambda: is_moving(bench, case), 30)
             assert moving, "the long behavior must move the vehicle"
             cut_link(bench.arbiter, case.vehicle)
             limits = bench.arbiter.limits(case.vehicle)
@@ -247,14 +248,12 @@ class ArbiterLinks(ArbiterFixtures):
                     await bench.clock.sleep(1)
             else:
                 await arbiter.hold(case.vehicle)
-            stands = await bench.until(
-                lambda: speed(bench, case.vehicle) < STANDING_M_S, limits.hold_within_s
-            )
+            stands = await bench.until(lambda: is_standing(bench, case), limits.hold_within_s)
             assert stands, f"still at {speed(bench, case.vehicle):.1f} m/s, though it is free"
             await bench.clock.sleep(case.watch_s)
-            assert speed(bench, case.vehicle) < STANDING_M_S, "it does not move by itself"
+            assert is_standing(bench, case), "it does not move by itself"
             await start(bench, "r1.b2", case.long, case.vehicle)
-            moving = await bench.until(lambda: speed(bench, case.vehicle) > 2 * STANDING_M_S, 30)
+            moving = await bench.until(lambda: is_moving(bench, case), 30)
             assert moving, f"it must do what it is given: {bench.of('r1.b2')}"
 
         on_bench(make_arbiter, run, main)
@@ -289,8 +288,8 @@ class ArbiterLinks(ArbiterFixtures):
             await bench.running("r1.b2")
             await bench.arbiter.hold(case.vehicle)
             await bench.clock.sleep(case.watch_s)
-            assert speed(bench, case.vehicle) < STANDING_M_S
-            assert speed(bench, case.other) > STANDING_M_S, "the other was not held"
+            assert is_standing(bench, case)
+            assert speed(bench, case.other) > case.standing_m_s, "the other was not held"
 
         on_bench(make_arbiter, run, main)
 

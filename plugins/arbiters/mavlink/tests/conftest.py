@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-PROGRAMS = ("M2PEM_ARDUCOPTER", "M2PEM_ARDUROVER", "M2PEM_PX4")
+PROGRAMS = ("M2PEM_ARDUCOPTER", "M2PEM_ARDUROVER", "M2PEM_ARDUPLANE", "M2PEM_PX4")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

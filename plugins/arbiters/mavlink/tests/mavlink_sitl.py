@@ -58,14 +58,14 @@ def ardupilot(binary: Path, model: str, instance: int, port: int) -> Launch:
     )
 
 
-def px4(binary: Path, instance: int, folder: Path) -> Launch:
-    """A copter of PX4's own simulation, to be run in `folder`; the `etc` folder of its build is
+def px4(binary: Path, instance: int, folder: Path, model: str = "sihsim_quadx") -> Launch:
+    """A model of PX4's own simulation, to be run in `folder`; the `etc` folder of its build is
     beside the `bin` folder of the program."""
     name = f"px4-{instance}"
     return px4_launch(
         name,
         find_px4(binary.parent.parent),
-        "sihsim_quadx",
+        model,
         _start(instance),
         instance=instance,
         folder=folder / name,

@@ -342,6 +342,17 @@ class Station(Recording):
 
     # --- plans ------------------------------------------------------------------------------------
 
+    def set_quietly(self, parameter: str, value: float) -> None:
+        """No step: PARAM_SET of the second station, without waiting."""
+        kind = dialect.MAV_PARAM_TYPE_REAL32
+        name = parameter.encode()
+        self.send(dialect.MAVLink_param_set_message(self.system, 1, name, value, kind), SECOND)
+
+    def command_quietly(self, command: int, *params: float) -> None:
+        """No step: COMMAND_LONG of the second station, without waiting."""
+        padded = [*params, *[0.0] * (7 - len(params))]
+        self.send(dialect.MAVLink_command_long_message(self.system, 1, command, 0, *padded), SECOND)
+
     def item(
         self, command: int, at: At | None = None, params: Sequence[float] = (), plan: int = 0
     ) -> Any:

@@ -20,7 +20,11 @@ from m2pem.testing import ArbiterCase, ArbiterContract
 
 A, B = ResourceId("a"), ResourceId("b")
 READY_WITHIN_S = 120.0
-HEIGHT_M = 20.0
+
+
+def at(east_m: float, north_m: float) -> Point:
+    """A place so far from where the first vehicle starts, m."""
+    return Point((*offset(sitl.HOME[:2], east_m, north_m), None))
 
 
 class _RealAutopilot(ArbiterContract):
@@ -31,6 +35,10 @@ class _RealAutopilot(ArbiterContract):
     speed = float(sitl.SPEED)
     domain = "air"
     variable = ""
+    height_m = 20.0
+    standing_m_s = 0.1
+    long: ClassVar[dict[str, object]] = {"target": at(400.0, 0.0), "speed": 3.0}
+    short: ClassVar[dict[str, object]] = {"target": at(15.0, 15.0), "speed": 3.0}
 
     def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
         raise NotImplementedError
@@ -63,9 +71,10 @@ class _RealAutopilot(ArbiterContract):
         assert await vehicle.identified(READY_WITHIN_S)
         assert await vehicle.until(lambda: vehicle.driver.readiness().ready, READY_WITHIN_S)
         if self.domain == "air":
-            await vehicle.driver.take_off(HEIGHT_M)
+            await vehicle.driver.take_off(self.height_m)
             high = await vehicle.until(
-                lambda: (vehicle.heard.altitude_above_home_m or 0.0) > HEIGHT_M - 2, READY_WITHIN_S
+                lambda: (vehicle.heard.altitude_above_home_m or 0.0) > self.height_m - 2,
+                READY_WITHIN_S,
             )
             assert high, vehicle.recent_texts(60.0)
         else:
@@ -102,15 +111,13 @@ class _RealAutopilot(ArbiterContract):
 
     @pytest.fixture
     def case(self) -> ArbiterCase:
-        def at(east_m: float, north_m: float) -> Point:
-            return Point((*offset(sitl.HOME[:2], east_m, north_m), None))
-
         return ArbiterCase(
             vehicle=A,
             other=B,
-            long=("goto", {"target": at(400.0, 0.0), "speed": 3.0}),
-            short=("goto", {"target": at(15.0, 15.0), "speed": 3.0}),
+            long=("goto", dict(self.long)),
+            short=("goto", dict(self.short)),
             bad=("speed", -1.0),
+            standing_m_s=self.standing_m_s,
         )
 
 
@@ -131,13 +138,59 @@ class TestArduRover(_RealAutopilot):
         return [sitl.ardupilot(binary, "rover", n, port) for n, port in enumerate(ports)]
 
 
+@pytest.mark.sitl("M2PEM_ARDUROVER")
+class TestMotorboat(_RealAutopilot):
+    variable = "M2PEM_ARDUROVER"
+    domain = "surface"
+    standing_m_s = 0.3  # waves and wind move it
+
+    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
+        return [sitl.ardupilot(binary, "motorboat", n, port) for n, port in enumerate(ports)]
+
+
+class _RealPlane(_RealAutopilot):
+    """Planes are fast, turn in wide circles, and do not stop."""
+
+    variable = "M2PEM_ARDUPLANE"
+    long: ClassVar[dict[str, object]] = {"target": at(3000.0, 0.0)}
+    short: ClassVar[dict[str, object]] = {"target": at(150.0, 150.0)}
+    height_m = 60.0
+
+
+@pytest.mark.sitl("M2PEM_ARDUPLANE")
+class TestArduPlane(_RealPlane):
+    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
+        return [sitl.ardupilot(binary, "plane", n, port) for n, port in enumerate(ports)]
+
+
+@pytest.mark.sitl("M2PEM_ARDUPLANE")
+class TestQuadPlane(_RealPlane):
+    def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
+        return [sitl.ardupilot(binary, "quadplane", n, port) for n, port in enumerate(ports)]
+
+
 @pytest.mark.sitl("M2PEM_PX4")
 class TestPx4(_RealAutopilot):
     variable = "M2PEM_PX4"
+    model = "sihsim_quadx"
 
     def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
-        return [sitl.px4(binary, instance, folder) for instance in (0, 1)]
+        return [sitl.px4(binary, instance, folder, self.model) for instance in (0, 1)]
 
     def ports(self) -> list[int]:
         # PX4 sends to 14540 and its instance's number, wherever else somebody would like it to.
         return [14540, 14541]
+
+
+@pytest.mark.sitl("M2PEM_PX4")
+class TestPx4Rover(TestPx4):
+    model = "sihsim_rover_ackermann"
+    domain = "ground"
+
+
+@pytest.mark.sitl("M2PEM_PX4")
+class TestPx4Plane(TestPx4):
+    model = "sihsim_airplane"
+    long = _RealPlane.long
+    short = _RealPlane.short
+    height_m = _RealPlane.height_m
