@@ -30,8 +30,8 @@ class ArbiterCase:
     `vehicle`, `other`: two vehicles that stand, ready to move (the same one, if a second vehicle is
     not supported). `watch_s`: for how long a test watches that nothing happens that must not.
     `long`: a behavior of both that moves for at least five times as long. `short`: one that ends
-    well within `short_s`. `bad`: a parameter of `long` with a value that it cannot have. Slower than
-    `standing_m_s` a vehicle stands (a boat drifts). Seconds are those of the clock that the
+    well within `short_s`. `bad`: a parameter of `long` with a value that it cannot have. Slower
+    than `standing_m_s` a vehicle stands (a boat drifts). Seconds are those of the clock that the
     arbiter is lent.
     """
 

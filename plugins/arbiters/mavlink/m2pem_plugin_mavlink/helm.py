@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from m2pem.api import BehaviorId, BehaviorState, Ledger, Limits
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError
-from m2pem_plugin_mavlink.behaviors.flight import SetSpeed
+from m2pem_plugin_mavlink.behaviors.flight import Land, ReturnToLaunch, SetSpeed
 from m2pem_plugin_mavlink.behaviors.looking import (
     STANDS_BELOW_M_S,
     Standing,
@@ -375,9 +375,12 @@ class Helm:
         await self.vehicle.driver.stop()
 
     async def _fail(self, flight: _Flight, reason: str, code: str = "") -> None:
-        """What has failed half-way must not go on; a vehicle that stands is left as it is."""
+        """What has failed half-way must not go on, but a return or a landing; a vehicle that stands
+        is left as it is."""
+        heard = self.vehicle.heard
+        comes_down = isinstance(flight.behavior, Land | ReturnToLaunch) and heard.mode in _FAIL_SAFE
         try:
-            if flight.behavior.steers and self.vehicle.heard.landed is not True:
+            if flight.behavior.steers and heard.landed is not True and not comes_down:
                 await self._stop()
         except ExchangeError as error:
             self._logger.error("%s: does not stop: %s", self.vehicle.resource, error)

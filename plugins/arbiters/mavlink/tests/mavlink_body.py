@@ -79,7 +79,7 @@ class Body:
                 self._sink(dt)
 
     def _sink(self, dt: float) -> None:
-        self.up = max(0.0, self.up - 2.0 * dt)
+        self.up = max(0.0, self.up - min(2.0, self.speed) * dt)
         if self.up == 0.0:
             self.armed = False
 

@@ -111,6 +111,13 @@ def _clear(play: "Play") -> None:
     play.station.send(dialect.MAVLink_mission_clear_all_message(1, 1, 0), SECOND)
 
 
+def _restart(play: "Play") -> None:
+    """Forced, as it is in flight."""
+    reboot = dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+    play.station.command_quietly(reboot, 1, 0, 0, 0, 0, 20190226)
+    play.station.start_anew()
+
+
 MODE = dialect.MAV_CMD_DO_SET_MODE
 VOLTS = "SIM_BATT_VOLTAGE"
 FAILSAFES = {
@@ -135,7 +142,7 @@ FAILSAFES = {
         Failsafe(
             "the autopilot restarts",
             {},
-            _second(dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1, 0, 0, 0, 0, 20190226),
+            _restart,
         ),
         Failsafe("a second ground station: mode LOITER", {}, _second(MODE, 1, 5)),
         Failsafe("a second ground station: mode RTL", {}, _second(MODE, 1, 6)),

@@ -235,6 +235,27 @@ def test_a_vehicle_that_should_move_and_does_not_is_a_failure(behavior, paramete
     play(Body().fly(), main)
 
 
+@pytest.mark.parametrize(("behavior", "after_s"), [("land", 60), ("return_to_launch", 120)])
+def test_a_landing_that_hangs_is_a_failure_and_goes_on(behavior: str, after_s: int) -> None:
+    """A tree, or a motor: to leave that mode would make it no better."""
+
+    async def main(bench) -> None:
+        bench.body.east = 200.0
+        await bench.start("r1.b1", behavior, V)
+        await bench.running("r1.b1")
+        await bench.clock.sleep(2)
+        bench.body.speed = 0.0
+        before = len(bench.told)
+        end = await bench.ended("r1.b1", after_s + 10)
+        assert end.state is FAILED
+        assert f"has not moved for {after_s} s" in end.reason
+        assert "stop" not in bench.told[before:]
+        assert bench.body.mode in (FlightMode.LAND, FlightMode.RETURN)
+
+    play(Body().fly(40), main)
+
+
+
 def test_a_vehicle_is_lost_after_the_time_that_was_set_and_not_before() -> None:
     async def main(bench) -> None:
         await flying(bench)

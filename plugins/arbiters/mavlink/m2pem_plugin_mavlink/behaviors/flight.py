@@ -182,6 +182,7 @@ class Land(Behavior):
 
     name = "land"
     modes = frozenset({FlightMode.LAND})
+    still_s = MOVES_WITHIN_S
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
@@ -233,6 +234,7 @@ class ReturnToLaunch(Behavior):
 
     name = "return_to_launch"
     modes = _RETURNS | {FlightMode.LAND}
+    still_s = 2 * MOVES_WITHIN_S  # it may wait above its home for a minute (RTL_LOIT_TIME)
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
