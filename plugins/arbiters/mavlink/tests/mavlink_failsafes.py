@@ -247,6 +247,7 @@ def _played(failsafe: Failsafe, phase: Phase, cell: Play, folder: Path) -> dict[
             if not s.until("phase", lambda: phase.now(s), 200.0):
                 process.kill()
                 raise RuntimeError(f"the phase did not come: {s.mode}, {list(lines)}")
+            s.watch(2.0)  # m2pem has then seen the mode that it asked for
             del lines[:-1]
             s.forget()
             s.begin(failsafe.name)

@@ -255,7 +255,6 @@ def test_a_landing_that_hangs_is_a_failure_and_goes_on(behavior: str, after_s: i
     play(Body().fly(40), main)
 
 
-
 def test_a_vehicle_is_lost_after_the_time_that_was_set_and_not_before() -> None:
     async def main(bench) -> None:
         await flying(bench)

@@ -151,6 +151,10 @@ class TestMotorboat(_RealAutopilot):
 class _RealPlane(_RealAutopilot):
     """Planes are fast, turn in wide circles, and do not stop."""
 
+    unsupported: ClassVar[dict[str, str]] = {
+        **_RealAutopilot.unsupported,
+        "telemetry": "a plane does not stand: it circles where it is held",
+    }
     variable = "M2PEM_ARDUPLANE"
     long: ClassVar[dict[str, object]] = {"target": at(3000.0, 0.0)}
     short: ClassVar[dict[str, object]] = {"target": at(150.0, 150.0)}
@@ -191,6 +195,7 @@ class TestPx4Rover(TestPx4):
 @pytest.mark.sitl("M2PEM_PX4")
 class TestPx4Plane(TestPx4):
     model = "sihsim_airplane"
+    unsupported = _RealPlane.unsupported
     long = _RealPlane.long
     short = _RealPlane.short
     height_m = _RealPlane.height_m
