@@ -77,4 +77,7 @@ def _mission(seen: dict[str, Any]) -> str:
 def _read(seen: dict[str, Any]) -> str:
     lines = (line for line in seen["said"] if not ROUTINE.match(line))
     plain = (re.sub(r"^(WARNING m2pem\.\w+: |m2pem: r1: )", "", line) for line in lines)
+    plain = (
+        re.sub(r"\. Nothing commands it now: .*", "; what may be done", line) for line in plain
+    )
     return "<br>".join(dict.fromkeys(line for line in plain if "ends" not in line)) or "-"
