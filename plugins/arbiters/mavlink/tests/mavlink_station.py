@@ -395,7 +395,9 @@ class Station(Recording):
             return ""
         number = message.flight_sw_version
         digits = ".".join(str(number >> shift & 0xFF) for shift in (24, 16, 8))
-        return f"{digits} {bytes(message.flight_custom_version[::-1]).hex()[:8]}"
+        custom = bytes(message.flight_custom_version)
+        # ArduPilot gives the characters, PX4 the number, its last byte first.
+        return f"{digits} {custom[::-1].hex()[:8] if self.px4 else custom.decode('ascii')}"
 
     # --- common beginnings ------------------------------------------------------------------------
 

@@ -45,6 +45,9 @@ VEHICLES = {
     "px4copter": Vehicle(Kind.COPTER, "px4", "sihsim_quadx"),
 }
 
+HELD = ("arducopter", "ardurover", "arduplane")
+"""Those whose simulation is held to the traces; the simulated PX4 is not yet."""
+
 
 class Difference(NamedTuple):
     """What differs in a step. `channel`: see `mavlink_recording`, or "took WHAT", "facts WHAT"."""
