@@ -50,6 +50,9 @@ def decide(x: Steps, item: i.Input) -> None:
                 return
             if not isinstance(item, _THROW_NOTHING):
                 arm_entered(x)  # what a batch left over waits for what is thrown now
+                if welcome(x.state.status, item) is not Welcome.DECIDE:  # a condition was wrong
+                    x.ignore(f"{type(item).__name__} while the run is {x.state.status.value}")
+                    return
             _DECIDERS[type(item)](x, item)
 
 

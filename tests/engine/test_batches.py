@@ -242,3 +242,26 @@ def test_tokens_that_gather_before_an_activity_with_a_boundary_event_go_on_in_ba
         assert not play.run.wants_continue
         traces.append(without_yields(play))
     assert traces[0] == traces[1]
+
+
+@pytest.mark.parametrize("batch", range(1, 5))
+@pytest.mark.parametrize("length", range(1, 6))
+def test_a_signal_that_comes_while_the_run_is_paused_finds_it_ended_by_a_wrong_condition(
+    batch: int, length: int
+) -> None:
+    tasks = [f"x{number}" for number in range(length)]
+    play = Play(
+        "\n".join(f'<task id="{task}"/>' for task in tasks)
+        + """
+        <startEvent id="start"/> <userTask id="u"/>
+        <boundaryEvent id="wrong" attachedToRef="u">conditional 1 / b > 0</boundaryEvent>
+        """
+        + f"start -> {' -> '.join(tasks)} -> u",
+        batch=batch,
+    )
+    play.goes_on = False
+    play.start({"b": 0}).pause().signal("S")
+    play.goes_on = True
+    play.resume()
+    assert play.ended == "failed"
+    assert "divides the number 1 by zero" in play.detail

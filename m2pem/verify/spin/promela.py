@@ -231,7 +231,8 @@ class Writer:
             effects.append(f"{self._clears[rule.kill]}()")
         else:
             effects += [f"{places[p]} = 0" for p in rule.kill]
-        emptied = {p for p, _ in rule.consume if most[p] == 1} | set(rule.kill)
+        refilled = {target for _, target in (*rule.moves, *rule.copies)}
+        emptied = {p for p, _ in rule.consume if most[p] == 1} - refilled | set(rule.kill)
         for p, n in rule.produce:
             if p in self.asks.full and not (p in emptied and n <= most[p]):
                 effects.append(f"assert({places[p]} <= {most[p] - n})")
