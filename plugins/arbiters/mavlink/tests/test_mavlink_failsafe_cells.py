@@ -28,7 +28,7 @@ def test_nothing_made_it_worse_and_operators_were_not_left_without_a_word(
     failsafe: str, phase: str
 ) -> None:
     seen = KEPT[failsafe][phase]
-    # No mode comes after RTL or LAND but one of them: nobody interrupted a failsafe.
+    # No mode comes after RTL or LAND but one of them: m2pem interrupts no failsafe.
     returning = [mode in RETURNS for mode in seen["modes"]]
     assert returning == sorted(returning)
     assert seen["status"] is not None, "the mission waits for what cannot come"

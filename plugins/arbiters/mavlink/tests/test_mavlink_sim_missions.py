@@ -18,8 +18,8 @@ def reached(bench: Bench) -> list[int]:
     return [m.seq for m in bench.heard if m.get_type() == "MISSION_ITEM_REACHED"]
 
 
-def told_at_last(bench: Bench) -> list[int]:
-    """The same, with the last one, which is told a moment later."""
+def reached_at_last(bench: Bench) -> list[int]:
+    """The same, with the last one, which comes a moment later."""
     bench.run(0.2)
     return reached(bench)
 
@@ -36,7 +36,7 @@ def test_a_copter_takes_off_flies_its_mission_and_comes_home() -> None:
     bench = Bench().ready()
     ahead, aside = bench.offset(60, 0), bench.offset(60, 60)
     fly(bench, item(1, 22, z=15.0), item(2, 16, ahead, 15.0), item(3, 16, aside, 25.0), item(4, 20))
-    assert told_at_last(bench) == [1, 2, 3, 4]
+    assert reached_at_last(bench) == [1, 2, 3, 4]
     assert not bench.autopilot.arming.armed
     assert bench.autopilot.position.distance_m(bench.autopilot.home.point) < 1
     assert bench.autopilot.chronicle.counts["takeoff"] == 1
@@ -99,7 +99,7 @@ def test_actions_are_reported_but_servos_and_behind_the_last_item_one_is_begun()
     assert bench.command(START) == 0
     bench.heard.clear()
     bench.run_until(lambda: bench.autopilot.mission.complete)
-    assert told_at_last(bench) == [1, 3, 5]
+    assert reached_at_last(bench) == [1, 3, 5]
     assert bench.texts() == [
         "Reached command #2",
         "Mission: 3 ChangeSpeed",
@@ -122,7 +122,7 @@ def test_an_action_that_is_set_is_answered_by_the_next_item_of_navigation() -> N
     bench.heard.clear()
     bench.command(START)
     bench.run_until(lambda: bench.autopilot.mission.complete)
-    assert told_at_last(bench) == [3, 5]
+    assert reached_at_last(bench) == [3, 5]
     assert bench.command(SET_CURRENT, 6) == 4
 
 
@@ -190,7 +190,7 @@ def test_left_and_entered_again_it_goes_on_where_it_was() -> None:
     bench.run(5)
     bench.command(MODE, 1, 3)
     bench.run_until(lambda: len(reached(bench)) == 3)
-    assert told_at_last(bench) == [1, 2, 3]
+    assert reached_at_last(bench) == [1, 2, 3]
     assert bench.autopilot.chronicle.counts["mission"] == 1
 
 
@@ -208,7 +208,7 @@ def test_in_a_new_plan_it_goes_on_at_the_same_number_or_if_there_is_none_at_the_
     bench.upload([HOME, places[0]])
     bench.command(START)
     bench.run_until(lambda: bench.autopilot.mission.complete)
-    assert told_at_last(bench) == [1, 2, 3, 1]
+    assert reached_at_last(bench) == [1, 2, 3, 1]
 
 
 def test_set_up_so_it_begins_again() -> None:
@@ -219,7 +219,7 @@ def test_set_up_so_it_begins_again() -> None:
     bench.command(MODE, 1, 5)
     bench.command(MODE, 1, 3)
     bench.run_until(lambda: len(reached(bench)) == 3)
-    assert told_at_last(bench) == [1, 1, 2]
+    assert reached_at_last(bench) == [1, 1, 2]
     assert bench.autopilot.chronicle.counts["mission"] == 2
 
 
@@ -231,7 +231,7 @@ def test_the_current_item_can_be_set_before_and_on_the_way() -> None:
     bench.run_until(lambda: reached(bench) == [2])
     assert bench.command(SET_CURRENT, 5) == 0
     bench.run_until(lambda: bench.autopilot.mission.complete)
-    assert told_at_last(bench) == [2, 5]
+    assert reached_at_last(bench) == [2, 5]
     assert bench.command(SET_CURRENT, 9) == 2
 
 
@@ -249,13 +249,13 @@ def test_jumps_are_counted() -> None:
     bench = Bench().airborne()
     near, far = bench.offset(10, 0), bench.offset(20, 0)
     fly(bench, item(1, 16, near, 20.0), item(2, 16, far, 20.0), item(3, 177, (0, 0), 0, 1, 2))
-    assert told_at_last(bench) == [1, 2, 1, 2, 1, 2]
+    assert reached_at_last(bench) == [1, 2, 1, 2, 1, 2]
 
 
 def test_jumps_in_a_circle_without_navigation_end() -> None:
     bench = Bench().airborne()
     fly(bench, item(1, 178, (0, 0), 0, 1, 5), item(2, 177, (0, 0), 0, 1, -1))
-    assert told_at_last(bench) == []
+    assert reached_at_last(bench) == []
 
 
 def test_actions_are_done_on_the_way() -> None:
@@ -310,7 +310,7 @@ def test_a_copter_lands_where_the_mission_says_and_is_then_at_its_beginning() ->
     bench.run_until(lambda: not bench.autopilot.arming.armed)
     assert bench.autopilot.body.north_m == pytest.approx(30, abs=0.5)
     # As on real copters: the motors' stop comes before the item is done.
-    assert told_at_last(bench) == [1]
+    assert reached_at_last(bench) == [1]
     assert progress(bench) == (1, 3, 1)
 
 
@@ -319,7 +319,7 @@ def test_a_rover_drives_its_mission_and_comes_home() -> None:
     places = [bench.offset(20, 0), bench.offset(20, 20)]
     speed = item(1, 178, (0, 0), 0, 1, 3.0)
     fly(bench, speed, item(2, 16, places[0]), item(3, 16, places[1]), item(4, 20))
-    assert told_at_last(bench) == [1, 2, 3, 4]
+    assert reached_at_last(bench) == [1, 2, 3, 4]
     assert bench.texts()[-9:] == [
         "Mission: 1 ChangeSpeed",
         "speed: 3.0 m/s",
@@ -359,7 +359,7 @@ def test_a_plane_takes_off_flies_and_lands() -> None:
     assert bench.command(START) == 0
     assert bench.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1) == 0
     bench.run_until(lambda: bench.autopilot.mission.complete, 600)
-    assert told_at_last(bench) == [1, 2, 3, 4, 5]
+    assert reached_at_last(bench) == [1, 2, 3, 4, 5]
     assert not bench.autopilot.arming.armed
     assert any(text.startswith("Reached waypoint #2 dist ") for text in bench.texts())
     assert bench.autopilot.position.distance_m(bench.autopilot.home.point) < 120

@@ -152,7 +152,7 @@ class MissionProgress(Part):
         return self.current >= self.first
 
     def reached(self, index: int) -> None:
-        """All are told; of items in a moment ArduPilot tells the last one."""
+        """Every ground station gets it; of items in a moment ArduPilot sends the last one."""
         if self.autopilot.firmware.is_ardupilot:
             self._reached.append((self.autopilot.now_s, index))
         else:
@@ -163,7 +163,7 @@ class MissionProgress(Part):
             self.autopilot.say(text)
 
     def step(self, dt_s: float) -> None:
-        """Tell what was reached a moment ago."""
+        """Send what was reached a moment ago."""
         if self._reached and self.autopilot.now_s - self._reached[0][0] >= A_MOMENT_S:
             self.autopilot.send(dialect.MAVLink_mission_item_reached_message(self._reached[-1][1]))
             self._reached.clear()
