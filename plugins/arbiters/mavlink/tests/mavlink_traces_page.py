@@ -21,7 +21,7 @@ simulated autopilots through the same conversations and compares, step by step:
 - how long things take: within 4 s, or 40 %.
 
 `tools/record_autopilot` records again; it needs a program of an autopilot and no mission (see
-`tools/record_autopilot --help`). `tools/record_autopilot arducopter` prints the differences.
+`.venv/bin/python tools/record_autopilot --help`); `... arducopter` prints the differences.
 
 | Vehicle | Firmware | Scenarios | Steps | Differences left |
 |---|---|---|---|---|
