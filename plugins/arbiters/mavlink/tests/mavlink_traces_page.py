@@ -10,7 +10,7 @@ PAGE = """# What simulated autopilots are held to
 
 `m2pem sim mavlink` simulates autopilots. It answers as real ones do: real ArduPilots and a real
 PX4, which simulate themselves, were led through scripted conversations, and what they said was
-written down as data ([traces](../plugins/arbiters/mavlink/tests/traces)). Every test run leads the
+written down as data (`plugins/arbiters/mavlink/tests/traces`). Every test run leads the
 simulated autopilots through the same conversations and compares, step by step:
 
 - results of commands and of uploads, modes, whether it is armed, `MAV_STATE`, the landed state,
