@@ -213,16 +213,21 @@ async def test_odometry_in_a_frame_that_is_not_the_declared_one_is_refused_by_na
     with Peer(PEER, ros_domain, ["/ugv1", kind, frame]):
         async with connected(ros_domain, **settings) as (bench, truth):
             await until(lambda: says in reasons(bench) or settings)
-            reason = NAMELESS
-            for number in itertools.count(1):
-                if NAMELESS not in reason:
-                    break
-                await bench.start(f"r1.b{number}", "goto", UGV1, target=ahead())
-                end = await bench.ended(f"r1.b{number}", AMPLE_S)
-                assert end.state is BehaviorState.REJECTED
-                reason = end.reason
-            assert says in reason
+            assert says in await reason_with_a_name(bench)
             assert truth.begun() == 0
+
+
+async def reason_with_a_name(bench: Any) -> str:
+    """Why a behavior is rejected, once the names of all nodes are known."""
+    reason = NAMELESS
+    for number in itertools.count(1):
+        if NAMELESS not in reason:
+            break
+        await bench.start(f"r1.b{number}", "goto", UGV1, target=ahead())
+        end = await bench.ended(f"r1.b{number}", AMPLE_S)
+        assert end.state is BehaviorState.REJECTED
+        reason = end.reason
+    return reason
 
 
 @pytest.mark.parametrize(
@@ -238,10 +243,7 @@ async def test_a_type_that_does_not_match_is_named_before_anything_moves(
 ) -> None:
     with Peer(PEER, ros_domain, ["/ugv1", "base", "map", type_]):
         async with connected(ros_domain, driver="base", **settings) as (bench, truth):
-            await bench.start("r1.b1", "goto", UGV1, target=ahead())
-            end = await bench.ended("r1.b1", AMPLE_S)
-            assert end.state is BehaviorState.REJECTED
-            assert says in end.reason
+            assert says in await reason_with_a_name(bench)
             assert truth.begun() == 0
 
 
