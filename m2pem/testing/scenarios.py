@@ -6,6 +6,7 @@ the ids that its docstring names; values of parameters are written as in a missi
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from string import ascii_uppercase
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -67,6 +68,19 @@ def in_parallel(behavior: str, first: str, second: str, **parameters: object) ->
     tasks += _behavior("Task2", behavior, second, parameters)
     gateways = '<parallelGateway id="Fork"/><parallelGateway id="Join"/>'
     return _mission(tasks + gateways, "Start Fork Task1 Join End", "Fork Task2 Join")
+
+
+def side_by_side(*branches: tuple[str, Sequence[tuple[str, Mapping[str, object]]]]) -> bytes:
+    """Start, Fork, branches, Join, End. A branch is a resource and its behaviors, one after another:
+    A1, A2, ... in the first branch, B1, B2, ... in the second."""
+    elements = '<parallelGateway id="Fork"/><parallelGateway id="Join"/>'
+    paths = ["Start Fork", "Join End"]
+    for letter, (resource, steps) in zip(ascii_uppercase, branches, strict=False):
+        names = [f"{letter}{number}" for number in range(1, len(steps) + 1)]
+        for name, (behavior, parameters) in zip(names, steps, strict=True):
+            elements += _behavior(name, behavior, resource, parameters)
+        paths.append(" ".join(["Fork", *names, "Join"]))
+    return _mission(elements, *paths)
 
 
 def caught_error(behavior: str, resource: str, code: str, **parameters: object) -> bytes:
