@@ -1,6 +1,8 @@
 """Planes that are found again after a restart of the arbiter, over real UDP."""
 
+import pytest
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
+from m2pem_plugin_mavlink.behaviors import looking
 from m2pem_plugin_mavlink.sim.specification import Kind
 from mavlink_simulated import Bench, at, connections, fly
 
@@ -38,5 +40,27 @@ def test_an_orbit_is_found_again() -> None:
         await bench.clock.sleep(30)
         await bench.arbiter.close()
         await found(bench, "r1.b1")
+
+    fly(main, Kind.PLANE)
+
+
+def test_a_goto_is_found_again_while_the_plane_still_flies_away_from_its_target(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # It turns more quickly than real ones do: only what it names as its target counts here.
+    monkeypatch.setattr(looking, "LOOKS_FOR_S", 0.0)
+
+    async def main(bench) -> None:
+        await bench.do("r1.up", "takeoff", altitude=60.0)
+        ahead = Point((*at(3000, 0), 60.0))
+        await bench.start("r1.b1", "goto", "v1", target=ahead)
+        assert await bench.until(lambda: bench.level()[0] > 400, 120)
+        await bench.arbiter.cancel("r1.b1", 1)
+        await bench.ended("r1.b1", 60)
+        behind = Point((*at(-3000, 0), 60.0))
+        await bench.start("r1.b2", "goto", "v1", target=behind)
+        await bench.running("r1.b2")
+        await bench.arbiter.close()
+        await found(bench, "r1.b2")
 
     fly(main, Kind.PLANE)

@@ -5,7 +5,9 @@ import math
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, Job
 from m2pem_plugin_mavlink.behaviors.wishes import AMSL, RELATIVE
 from m2pem_plugin_mavlink.plane import LatLon, Plane, distance_m
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.exchanges import position_target
 from m2pem_plugin_mavlink.vehicle.vehicle import Heard, Vehicle
 
 STANDS_BELOW_M_S = 0.3
@@ -22,6 +24,8 @@ NEAR_THE_CIRCLE_M = 5.0
 
 LOOKS_FOR_S = 4.0
 """After a restart: a vehicle that is on its way has turned and moves by then."""
+
+SAME_TARGET_M = 2.0
 
 _TOWARDS = math.cos(math.radians(60.0))
 
@@ -142,20 +146,41 @@ def accepts(behavior: Behavior, mode: FlightMode) -> bool:
 
 
 async def heads_for(vehicle: Vehicle, place: Place) -> bool:
-    """Whether it moves towards a place; waits a little for that to be seen."""
-    target = (place.latitude_deg, place.longitude_deg)
+    """Whether it moves towards a place, or names that as its target; waits a little for the former
+    to be seen."""
 
     def towards() -> bool:
-        here, velocity = where(vehicle), vehicle.heard.velocity_enu_m_s
-        if here is None or velocity is None or vehicle.heard.speed_m_s < STANDS_BELOW_M_S:
-            return False
-        east, north = Plane(here).level(target)
-        height = height_m(vehicle.heard, place.altitude_frame)
-        up = 0.0
-        if place.altitude_m is not None and height is not None:
-            up = place.altitude_m - height
-        ahead = math.hypot(east, north, up)
-        along = (east * velocity[0] + north * velocity[1] + up * velocity[2]) if ahead else 0.0
-        return along > _TOWARDS * ahead * vehicle.heard.speed_m_s
+        return _towards(vehicle, place)
 
-    return await vehicle.until(towards, LOOKS_FOR_S)
+    return (
+        towards() or await _has_target(vehicle, place) or await vehicle.until(towards, LOOKS_FOR_S)
+    )
+
+
+def _towards(vehicle: Vehicle, place: Place) -> bool:
+    here, velocity = where(vehicle), vehicle.heard.velocity_enu_m_s
+    if here is None or velocity is None or vehicle.heard.speed_m_s < STANDS_BELOW_M_S:
+        return False
+    east, north = Plane(here).level((place.latitude_deg, place.longitude_deg))
+    height = height_m(vehicle.heard, place.altitude_frame)
+    up = 0.0
+    if place.altitude_m is not None and height is not None:
+        up = place.altitude_m - height
+    ahead = math.hypot(east, north, up)
+    along = (east * velocity[0] + north * velocity[1] + up * velocity[2]) if ahead else 0.0
+    return along > _TOWARDS * ahead * vehicle.heard.speed_m_s
+
+
+async def _has_target(vehicle: Vehicle, place: Place) -> bool:
+    """By what its autopilot says when it is asked: a plane may fly away from its target for a while
+    until it has turned. Heights in its answer are above the sea."""
+    try:
+        target = await position_target(vehicle.link)
+    except ExchangeError:
+        return False  # it has no target, or does not say
+    if distance_m((place.latitude_deg, place.longitude_deg), target[:2]) > SAME_TARGET_M:
+        return False
+    height, here = height_m(vehicle.heard, place.altitude_frame), vehicle.heard.position
+    if place.altitude_m is None or height is None or here is None:
+        return True
+    return abs(target[2] - here.altitude_m - (place.altitude_m - height)) < HEIGHT_TOLERANCE_M

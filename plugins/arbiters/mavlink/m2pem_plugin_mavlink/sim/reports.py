@@ -23,6 +23,10 @@ SENSORS = (
 )
 
 
+PLACE_ALONE = 0xFFF8
+"""POSITION_TARGET_TYPEMASK."""
+
+
 class Reports(Part):
     """What ground stations show."""
 
@@ -38,6 +42,7 @@ class Reports(Part):
             dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._extended_state,
             dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: self._navigation,
             dialect.MAVLINK_MSG_ID_TERRAIN_REPORT: self._terrain,
+            dialect.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: self._target,
         }
 
     def _sys_status(self) -> Any:
@@ -64,6 +69,22 @@ class Reports(Part):
             0,
             0,
             0,
+        )
+
+    def _target(self) -> Any:
+        """Nothing but a place, with its height above the sea; none where there is no target."""
+        pilot, point = self.autopilot, self.autopilot.target_point
+        if point is None:
+            return None
+        place = pilot.frame.to_location(point)
+        return dialect.MAVLink_position_target_global_int_message(
+            pilot.boot_ms,
+            dialect.MAV_FRAME_GLOBAL,
+            PLACE_ALONE,
+            round(place.latitude_deg * 1e7),
+            round(place.longitude_deg * 1e7),
+            place.altitude_amsl_m,
+            *[0.0] * 8,
         )
 
     def _global_position(self) -> Any:

@@ -18,12 +18,19 @@ from m2pem_plugin_mavlink.microservices.missions import (
 )
 from m2pem_plugin_mavlink.microservices.parameter_values import ParameterEncoding
 from m2pem_plugin_mavlink.microservices.parameters import ReadParameter
+from m2pem_plugin_mavlink.microservices.patience import Patience
+from m2pem_plugin_mavlink.protocol.messages import Message
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
 
 _ENCODINGS = {
     Firmware.ARDUPILOT: ParameterEncoding.C_CAST,
     Firmware.PX4: ParameterEncoding.BYTEWISE,
 }
+
+
+_SHORT = Patience(tries=2, answer_s=1.0)
+_IGNORES_POSITION = 0b111
+"""POSITION_TARGET_TYPEMASK."""
 
 
 async def command(link: VehicleLink, command_id: int, *params: float) -> None:
@@ -46,6 +53,20 @@ async def message_interval(link: VehicleLink, message_id: int, interval_s: float
 async def request_message(link: VehicleLink, name: str) -> None:
     """Have a message sent once; who listens to it hears it."""
     await link.perform(RequestMessage(link.address, name, lambda message: message))
+
+
+async def position_target(link: VehicleLink) -> tuple[float, float, float]:
+    """Where an autopilot is on its way to: latitude and longitude in degrees, metres above mean sea
+    level (POSITION_TARGET_GLOBAL_INT in MAV_FRAME_GLOBAL). One without a target does not answer."""
+    request = RequestMessage(link.address, "POSITION_TARGET_GLOBAL_INT", _target, patience=_SHORT)
+    return await link.perform(request)
+
+
+def _target(message: Message) -> tuple[float, float, float] | None:
+    """None: it says nothing of a position."""
+    if message.type_mask & _IGNORES_POSITION:
+        return None
+    return message.lat_int / 1e7, message.lon_int / 1e7, message.alt
 
 
 async def upload(link: VehicleLink, items: Sequence[MissionItem]) -> None:
