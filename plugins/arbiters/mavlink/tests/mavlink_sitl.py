@@ -44,16 +44,19 @@ def program(variable: str) -> Path | None:
     return Path(named).absolute() if named else None
 
 
-def ardupilot(binary: Path, model: str, instance: int, port: int) -> Launch:
-    """Of a frame of ArduPilot, with system id `instance` + 1."""
+def ardupilot(
+    binary: Path, model: str, instance: int, port: int, system_id: int | None = None
+) -> Launch:
+    """Of a frame of ArduPilot; `system_id` is `instance` + 1 if left out."""
     frame = FRAMES[model]
+    system = system_id or instance + 1
     return ardupilot_launch(
         f"{model}{instance}",
         ardupilot_program(binary, frame),
         frame,
-        _start(instance),
+        _start(system - 1),
         instance=instance,
-        system_id=instance + 1,
+        system_id=system,
         ports=[port],
     )
 

@@ -1,6 +1,7 @@
 """The contract of arbiters on real autopilots, in the loop with their makers' simulations."""
 
 import asyncio
+import os
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,6 +21,16 @@ from m2pem.testing import ArbiterCase, ArbiterContract
 
 A, B = ResourceId("a"), ResourceId("b")
 READY_WITHIN_S = 120.0
+
+
+def ardupilots(binary: Path, model: str, ports: list[int]) -> list[sitl.Launch]:
+    """Vehicles with system ids from 1 on; tests run side by side (pytest -n)."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    first = len(ports) * worker
+    return [
+        sitl.ardupilot(binary, model, first + number, port, number + 1)
+        for number, port in enumerate(ports)
+    ]
 
 
 def at(east_m: float, north_m: float) -> Point:
@@ -82,15 +93,15 @@ class _RealAutopilot(ArbiterContract):
         await vehicle.close()
         await link.close()
 
-    @pytest.fixture
-    def make_arbiter(self, autopilots: list) -> Callable[[ArbiterContext], Arbiter]:
+    @pytest.fixture(params=["pymavlink", "mavsdk"])
+    def make_arbiter(
+        self, request: pytest.FixtureRequest, autopilots: list
+    ) -> Callable[[ArbiterContext], Arbiter]:
         def make(context: ArbiterContext) -> Arbiter:
-            connections = {
-                resource: Connection(resource, self.domain, {"url": url, "system_id": number})
-                for number, (resource, (_, url)) in enumerate(
-                    zip((A, B), autopilots, strict=True), 1
-                )
-            }
+            connections = {}
+            for number, (resource, (_, url)) in enumerate(zip((A, B), autopilots, strict=True), 1):
+                settings = {"url": url, "system_id": number, "driver": request.param}
+                connections[resource] = Connection(resource, self.domain, settings)
             return MavlinkArbiter(connections, context)
 
         return make
@@ -126,7 +137,7 @@ class TestArduCopter(_RealAutopilot):
     variable = "M2PEM_ARDUCOPTER"
 
     def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
-        return [sitl.ardupilot(binary, "quad", n, port) for n, port in enumerate(ports)]
+        return ardupilots(binary, "quad", ports)
 
 
 @pytest.mark.sitl("M2PEM_ARDUROVER")
@@ -135,7 +146,7 @@ class TestArduRover(_RealAutopilot):
     domain = "ground"
 
     def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
-        return [sitl.ardupilot(binary, "rover", n, port) for n, port in enumerate(ports)]
+        return ardupilots(binary, "rover", ports)
 
 
 @pytest.mark.sitl("M2PEM_ARDUROVER")
@@ -145,7 +156,7 @@ class TestMotorboat(_RealAutopilot):
     standing_m_s = 0.3  # waves and wind move it
 
     def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
-        return [sitl.ardupilot(binary, "motorboat", n, port) for n, port in enumerate(ports)]
+        return ardupilots(binary, "motorboat", ports)
 
 
 class _RealPlane(_RealAutopilot):
@@ -164,13 +175,13 @@ class _RealPlane(_RealAutopilot):
 @pytest.mark.sitl("M2PEM_ARDUPLANE")
 class TestArduPlane(_RealPlane):
     def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
-        return [sitl.ardupilot(binary, "plane", n, port) for n, port in enumerate(ports)]
+        return ardupilots(binary, "plane", ports)
 
 
 @pytest.mark.sitl("M2PEM_ARDUPLANE")
 class TestQuadPlane(_RealPlane):
     def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
-        return [sitl.ardupilot(binary, "quadplane", n, port) for n, port in enumerate(ports)]
+        return ardupilots(binary, "quadplane", ports)
 
 
 @pytest.mark.sitl("M2PEM_PX4")
