@@ -189,6 +189,13 @@ TEAM_FLEET := fleet_configs/mehds_mixed.yaml
 TEAM_PORT := 14550
 TEAM_AUTOPILOT = --copters 1 --ekf 6s --home 38.107162,-77.319941,60 --to udp://127.0.0.1:$(TEAM_PORT) \
   --set FS_GCS_ENABLE=1 --set FS_GCS_TIMEOUT=10 --set BATT_FS_LOW_ACT=2 --set LAND_SPEED=100 --set WPNAV_SPEED_DN=250
+# A simulated autopilot, or with FOLDER=~/ardupilot a real one that simulates itself (docs/mavlink.md).
+ifdef FOLDER
+TEAM_COPTER = exec 6< <(exec $(ROS_PYTHON) -m m2pem sitl --ardupilot "$(FOLDER)" --fleet $(TEAM_FLEET) --speed $(TEAM_SPEED) </dev/null); \
+  others+=" $$!"; $(call TEAM_READY,6,ready);
+else
+TEAM_COPTER = $(ROS_PYTHON) -m m2pem sim mavlink $(TEAM_AUTOPILOT) --speed $(TEAM_SPEED) </dev/null & others+=" $$!";
+endif
 TEAM_POINTING_DEG := 1
 TEAM_END := EndBypassed
 TEAM_ANSWERS := missions/answers/team_column_bypassed.yaml
@@ -206,7 +213,7 @@ demo-team: ros ## march in a column with a camera and a copter, over ROS 2 and M
 	trap 'for each in $$executive $$others; do kill $$each 2>/dev/null || true; $(call TEAM_GONE,$$each); done' EXIT; \
 	exec 3< <(exec $(ROS_PYTHON) -m m2pem sim ros --fleet $(TEAM_FLEET) --speed $(TEAM_SPEED) </dev/null); others+=" $$!"; \
 	exec 4< <(exec $(ROS_PYTHON) -m m2pem sim ros-cameras --fleet $(TEAM_FLEET) --speed $(TEAM_SPEED) </dev/null); others+=" $$!"; \
-	$(ROS_PYTHON) -m m2pem sim mavlink $(TEAM_AUTOPILOT) --speed $(TEAM_SPEED) </dev/null & others+=" $$!"; \
+	$(TEAM_COPTER) \
 	$(call TEAM_READY,3,ready); $(call TEAM_READY,4,ready); \
 	$(ROS_PYTHON) -m m2pem serve --fleet $(TEAM_FLEET) --ocu mocu --speed $(TEAM_SPEED) --journal memory: >/dev/null & executive=$$!; \
 	exec 5< <(exec $(ROS_PYTHON) -m bench.column --fleet $(TEAM_FLEET) --team camera_last --camera evsg2/ptz \

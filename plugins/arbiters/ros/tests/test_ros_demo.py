@@ -18,6 +18,9 @@ from ros_e2e_programs import SOURCES, until
 REPOSITORY = Path(__file__).parents[4]
 FLEETS = REPOSITORY / "fleet_configs"
 ENDED_WITHIN_S = 170.0
+SITL_WITHIN_S = 400.0
+"""A real autopilot takes 41 s to know where it is, and lands slowly."""
+
 POINTING_DEG = 3.0
 """What is asked of the camera here, where other tests have the processor, too."""
 
@@ -52,9 +55,9 @@ class Demo:
     def until(self, line: str) -> None:
         until(lambda: line in self.lines, lambda: self.lines[-20:], ENDED_WITHIN_S)
 
-    def rest(self) -> int:
+    def rest(self, within_s: float = ENDED_WITHIN_S) -> int:
         """Its exit status, when all that it has started has ended, too."""
-        status = self.process.wait(ENDED_WITHIN_S)
+        status = self.process.wait(within_s)
         self._reader.join(ENDED_WITHIN_S)
         until(lambda: not self.members(), self.members)  # who has closed its output ends soon
         return status
@@ -157,6 +160,22 @@ def test_a_column_marches_with_its_camera_on_the_target_and_drives_round_a_mine(
     assert found is not None
     assert float(found[1]) < POINTING_DEG
     assert int(found[2]) > 500
+
+
+@pytest.mark.sitl("M2PEM_ARDUCOPTER")
+@pytest.mark.timeout(SITL_WITHIN_S + 30)
+def test_a_column_of_ros_vehicles_marches_with_a_real_copter_behind_it(
+    domain: int, tmp_path: Path, team: list[str]
+) -> None:
+    (tmp_path / "programs").mkdir()
+    (tmp_path / "programs/arducopter").symlink_to(Path(os.environ["M2PEM_ARDUCOPTER"]).absolute())
+    demo = Demo("demo-team", domain, tmp_path, *team, f"FOLDER={tmp_path / 'programs'}")
+    try:
+        assert demo.rest(SITL_WITHIN_S) == 0, demo.lines[-20:]
+    finally:
+        demo.end()
+    assert "the run completed; EndBypassed reached" in demo.lines
+    assert any(line.startswith("uav1: ArduPilot quad") for line in demo.lines)
 
 
 @pytest.mark.long
