@@ -217,7 +217,7 @@ async def test_a_vehicle_without_a_gimbal_says_who_did_not_answer() -> None:
         await until(lambda: "(" in it.driver.refusal("ptz_track"))
         assert "component 1 of system 1 has not said" in it.driver.refusal("ptz_track")
         assert it.driver.look is None
-        assert it.heard  # by its camera
+        await until(lambda: it.heard)  # by its camera
 
 
 async def test_the_socket_is_that_of_the_vehicles_arbiter() -> None:
