@@ -17,10 +17,20 @@ GROUND_M = 488.0
 
 
 class Px4Bench(Bench):
-    """One vehicle with PX4; it is armed and taken off in PX4's way."""
+    """One vehicle with PX4; it is armed and taken off in PX4's way. `beats`: the ground station
+    sends heartbeats, without which it gets no texts."""
 
     def __init__(self, kind: Kind = Kind.COPTER, **options: Any) -> None:
         super().__init__(kind, firmware="px4", **options)
+        self.beats = True
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        while seconds > 0:
+            if self.beats:
+                self.tell(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+            super().run(min(seconds, 1.0))
+            seconds -= 1.0
 
     @property
     def mode(self) -> str:

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 FORCE_ARM, FORCE = 2989, 21196
 """Parameter 2 of MAV_CMD_COMPONENT_ARM_DISARM: do it in spite of everything."""
+COMMANDED = "external command"
+"""A reason to arm or to disarm, as PX4 words it."""
 
 
 class Arming(Part):
@@ -49,8 +51,8 @@ class Arming(Part):
         """Nothing is against arming it (the bit PREARM_CHECK of SYS_STATUS)."""
         return next(self.reasons(), None) is None
 
-    def arm(self, *, force: bool = False) -> bool:
-        """Arm; says why if it will not. To be armed already is well."""
+    def arm(self, *, force: bool = False, by: str = COMMANDED) -> bool:
+        """Arm; says why if it will not. To be armed already is well. `by`: the reason."""
         if self.armed:
             return True
         reasons = [] if force else list(self.reasons())
@@ -62,11 +64,11 @@ class Arming(Part):
         self.autopilot.note("armed")
         self.autopilot.home.set_at_arming()
         self.autopilot.modes.maneuver.begin()
-        self.autopilot.say(self.autopilot.firmware.armed_text)
+        self.autopilot.say(self.autopilot.firmware.armed_text.format(by))
         return True
 
-    def disarm(self, *, force: bool = False) -> bool:
-        """Stop the motors; not in flight, unless forced."""
+    def disarm(self, *, force: bool = False, by: str = COMMANDED) -> bool:
+        """Stop the motors; not in flight, unless forced. `by`: the reason."""
         if not self.armed:
             return True
         if not (force or self._may_disarm()):
@@ -74,14 +76,14 @@ class Arming(Part):
         self.armed = False
         self.autopilot.mission.disarmed()
         self.autopilot.note("disarmed")
-        self.autopilot.say(self.autopilot.firmware.disarmed_text)
+        self.autopilot.say(self.autopilot.firmware.disarmed_text.format(by))
         return True
 
     def disarm_after_landing(self) -> None:
         """It is on the ground, and was to land."""
         if self.armed:
             self.autopilot.note("landed")
-            self.disarm()
+            self.disarm(by="landing")
 
     def _may_disarm(self) -> bool:
         return self.autopilot.spec.kind in (Kind.ROVER, Kind.BOAT) or self.autopilot.body.on_ground
@@ -96,7 +98,7 @@ class Arming(Part):
             return
         self._idle_s += dt_s
         if self._idle_s >= delay_s:
-            self.disarm()
+            self.disarm(by="auto preflight disarming")
 
     def commands(self) -> Mapping[int, CommandHandler]:
         """Arm and disarm; ask what is against it."""

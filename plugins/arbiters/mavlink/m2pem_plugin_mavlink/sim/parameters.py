@@ -1,5 +1,5 @@
 """Parameters: named numbers that set the vehicle up, and their protocol (mavlink.io, "Parameter
-Protocol"). As with ArduPilot, an unknown name gets no answer at all."""
+Protocol"). An unknown name gets no answer from ArduPilot, and PARAM_ERROR from PX4."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -87,16 +87,30 @@ class ParameterServer(Part):
             name = parameters.name(message.param_index)
         if name is not None and name in parameters:
             self._send(name, sender.peer, parameters.index(name))
+        else:
+            self._unknown(message.param_id, message.param_index, sender)
 
     def _set(self, message: Any, sender: Heard) -> None:
         """Everybody is told of the new value."""
         name, parameters = message.param_id, self.autopilot.parameters
         if name not in parameters:
+            self._unknown(name, -1, sender)
             return
         value = self.autopilot.firmware.parameter_from_wire(name, message.param_value)
         if math.isfinite(value):
             parameters[name] = value
         self._send(name, None, 0xFFFF)
+
+    def _unknown(self, name: str, index: int, sender: Heard) -> None:
+        if self.autopilot.firmware.is_ardupilot:
+            return
+        self.autopilot.send(
+            dialect.MAVLink_param_error_message(
+                *(sender.system, sender.component, name.encode(), index),
+                dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST,
+            ),
+            sender.peer,
+        )
 
     def _send(self, name: str, to: Peer | None, index: int) -> None:
         parameters = self.autopilot.parameters

@@ -90,7 +90,7 @@ class Streams(Part):
         if id_ in self.autopilot.firmware.silent_reports - self.makers.keys():
             return Result.ACCEPTED
         if id_ not in self.makers:
-            return Result.DENIED
+            return Result.DENIED if self.autopilot.firmware.is_ardupilot else Result.FAILED
         if interval_us < 0:
             self._due[peer].pop(id_, None)
         elif interval_us == 0:
@@ -115,15 +115,16 @@ class Streams(Part):
         return Result.ACCEPTED
 
     def _request(self, command: Command) -> Result:
-        """ArduPilot acknowledges it even if there is nothing to send."""
+        """ArduPilot acknowledges it even if there is nothing to send; PX4 denies it."""
         id_, firmware = int(command.param1), self.autopilot.firmware
         maker = self.makers.get(id_)
         message = maker() if maker else None
         if message is not None:
             self.autopilot.send(message, command.sender.peer)
         known = maker is not None or id_ in firmware.silent_reports
-        sent = known if firmware.is_ardupilot else message is not None
-        return Result.ACCEPTED if sent else Result.FAILED
+        if not firmware.is_ardupilot:
+            return Result.DENIED if message is None else Result.ACCEPTED
+        return Result.ACCEPTED if known else Result.FAILED
 
     def _request_stream(self, message: Any, sender: Heard) -> None:
         group = message.req_stream_id

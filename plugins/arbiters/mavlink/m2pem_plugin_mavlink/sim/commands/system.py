@@ -24,7 +24,7 @@ class SystemCommands(Part):
         if command.param1 not in REBOOTS:
             return Result.UNSUPPORTED
         if self.autopilot.arming.armed:
-            return Result.FAILED
+            return Result.FAILED if self.autopilot.firmware.is_ardupilot else Result.DENIED
         self.rebooting = True
         return Result.ACCEPTED
 

@@ -39,6 +39,12 @@ class Px4Failsafes(Part):
         self._link = Watch()
         self._position = Lasting()
         self._low, self._critical, self._emergency = Watch(), Watch(), Watch()
+        self._acting_in: int | None = None
+
+    @property
+    def failsafe(self) -> bool:
+        """It acts until it is disarmed or another mode is entered."""
+        return self._acting_in is not None
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """Heartbeats of any ground station."""
@@ -50,12 +56,15 @@ class Px4Failsafes(Part):
 
     def step(self, dt_s: float) -> None:
         """Look after all three."""
+        pilot = self.autopilot
+        if not pilot.arming.armed or pilot.modes.mode.number != self._acting_in:
+            self._acting_in = None
         self._look_at_link()
         self._look_at_battery()
         self._look_at_position()
 
-    def _act(self, what: str, mode: int) -> None:
-        """In the air only, and never back to something milder."""
+    def act(self, what: str, mode: int) -> None:
+        """Enter a mode, in the air only, and never one that is milder than LAND once in that."""
         pilot = self.autopilot
         pilot.note("failsafe", what)
         if not pilot.arming.armed or pilot.modes.mode.number == LAND:
@@ -63,36 +72,36 @@ class Px4Failsafes(Part):
         last_resort = LAND if LAND in pilot.modes.by_number else custom_mode(1)
         for number in (mode, last_resort):
             if number in pilot.modes.by_number and pilot.modes.switch(number):
-                pilot.warn(f"Failsafe activated: {what}, now {pilot.modes.mode.name}")
+                self._acting_in = number
+                pilot.warn("Failsafe activated")
                 return
 
     def _look_at_link(self) -> None:
         pilot, p = self.autopilot, self.autopilot.parameters
         change = self._link.look(self._heartbeats.missed(p["COM_DL_LOSS_T"], pilot.now_s))
         if change is Change.WELL:
-            pilot.say("Connection to ground station regained")
+            pilot.say("GCS connection regained")
         if change is not Change.WRONG:
             return
-        pilot.warn("Connection to ground station lost")
+        pilot.say("Connection to ground station lost")
         mode = LINK_ACTIONS.get(int(p["NAV_DLL_ACT"]))
         excepted = EXCEPTIONS.get(pilot.modes.mode.number, 0) & int(p["COM_DLL_EXCEPT"])
         if mode is not None and not excepted:
-            self._act("no ground station", mode)
+            self.act("no ground station", mode)
 
     def _look_at_battery(self) -> None:
         pilot, p = self.autopilot, self.autopilot.parameters
         left, action = pilot.battery.left, int(p["COM_LOW_BAT_ACT"])
         if self._low.look(left < p["BAT_LOW_THR"]) is Change.WRONG:
-            pilot.warn("Low battery level! Return advised")
+            pilot.warn("Low battery")
         if self._critical.look(left < p["BAT_CRIT_THR"]) is Change.WRONG:
-            pilot.warn("Critical battery level! Return now")
+            pilot.warn("Critical battery")
             if action:
-                self._act("critical battery", RETURN if action == RETURN_THEN_LAND else LAND)
-        emergency = self._emergency.look(left < p["BAT_EMERGEN_THR"]) is Change.WRONG
-        if emergency:
-            pilot.warn("Dangerous battery level! Land now")
+                self.act("critical battery", RETURN if action == RETURN_THEN_LAND else LAND)
+        if self._emergency.look(left < p["BAT_EMERGEN_THR"]) is Change.WRONG:
+            pilot.say("Emergency battery level", dialect.MAV_SEVERITY_EMERGENCY)
             if action:
-                self._act("empty battery", LAND)
+                self.act("empty battery", LAND)
 
     def refusals(self) -> Iterator[str]:
         """It is not armed with an empty battery."""
@@ -105,4 +114,4 @@ class Px4Failsafes(Part):
         needs = pilot.arming.armed and pilot.modes.mode.needs_position
         lost = needs and not pilot.estimator.ready
         if self._position.look_for(lost, POSITION_S, pilot.now_s) is Change.WRONG:
-            self._act("no valid position estimate", LAND)
+            self.act("no valid position estimate", LAND)

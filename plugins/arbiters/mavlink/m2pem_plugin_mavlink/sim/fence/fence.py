@@ -86,13 +86,13 @@ class Fence(Part):
         if now is before:
             return
         if now is None:
-            pilot.send(self._status())
+            self._send_status()
             return
         self.count += 1
         self._breach_ms = pilot.boot_ms
         pilot.warn(rules.text.format(now))
         pilot.note("fence", now)
-        pilot.send(self._status())
+        self._send_status()
         if rules.mode is not None:
             pilot.modes.switch(rules.mode)
 
@@ -125,6 +125,10 @@ class Fence(Part):
         """FENCE_STATUS, while there is a fence."""
         status = dialect.MAVLINK_MSG_ID_FENCE_STATUS
         return {status: lambda: self._status() if self.rules.enabled else None}
+
+    def _send_status(self) -> None:
+        if dialect.MAVLINK_MSG_ID_FENCE_STATUS not in self.autopilot.firmware.unknown_reports:
+            self.autopilot.send(self._status())
 
     def _status(self) -> Any:
         kind = dialect.FENCE_BREACH_NONE if self.breach is None else TYPES[self.breach]

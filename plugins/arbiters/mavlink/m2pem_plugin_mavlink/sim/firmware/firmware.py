@@ -55,6 +55,8 @@ class Firmware(ABC):
     """Ids of messages that other firmwares make and this one does not."""
     capacity: ClassVar[str]
     """The parameter that has the battery's capacity in mAh."""
+    texts_need_heartbeats: ClassVar[bool] = False
+    """Only links on which a ground station has been heard a moment ago get texts."""
     gimbal_needs_control: ClassVar[bool] = False
     """Only a ground station that has taken control of the gimbal may move it."""
     reason_home: str
@@ -67,6 +69,7 @@ class Firmware(ABC):
     tells_landed: bool
     """EXTENDED_SYS_STATE says whether it is in the air."""
     armed_text, disarmed_text = "Arming motors", "Disarming motors"
+    """What it says then; "{}" is the reason."""
     silent_reports: ClassVar[frozenset[int]] = frozenset()
     """Ids of messages that it acknowledges to be asked for, and never sends."""
     roles: Roles

@@ -10,6 +10,7 @@ from m2pem_plugin_mavlink.sim.failsafes.px4 import Px4Failsafes
 from m2pem_plugin_mavlink.sim.fence.rules import FenceRules
 from m2pem_plugin_mavlink.sim.firmware.firmware import Firmware, Tuning
 from m2pem_plugin_mavlink.sim.firmware.px4_commands import Px4Commands
+from m2pem_plugin_mavlink.sim.firmware.px4_landing import LandingWatch
 from m2pem_plugin_mavlink.sim.firmware.px4_modes import (
     FENCE_ACTIONS,
     HOLD,
@@ -84,8 +85,12 @@ class Px4(Firmware):
     is_ardupilot = False
     tells_landed = True
     asks_for_items_as_int = True
-    unknown_reports = frozenset({dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT})
+    unknown_reports = frozenset(
+        {dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT, dialect.MAVLINK_MSG_ID_FENCE_STATUS}
+    )
     gimbal_needs_control = True
+    texts_need_heartbeats = True
+    armed_text, disarmed_text = "Armed by {}", "Disarmed by {}"
     capacity = "BAT1_CAPACITY"
     reason_position = "No valid position estimate"
     reason_home = reason_position
@@ -149,7 +154,7 @@ class Px4(Firmware):
             loiter_radius_m=p["NAV_LOITER_RAD"] if copter else p["NAV_ACC_RAD"],
             acceptance_m=p["NAV_ACC_RAD"],
             setpoint_timeout_s=p["COM_OF_LOSS_T"] + 1.0,
-            disarm_delay_s=p["COM_DISARM_PRFLT"],
+            disarm_delay_s=p["COM_DISARM_PRFLT"] + p["COM_SPOOLUP_TIME"],
         )
 
     def fence_rules(self, parameters: Parameters) -> FenceRules:
@@ -193,7 +198,18 @@ class Px4(Firmware):
 
     def parts(self) -> Sequence[type[Part]]:
         """What only PX4 has."""
-        return (OffboardWatch, MissionAvailability, Px4Commands, Px4Failsafes, Px4Reports)
+        return (
+            Px4Failsafes,
+            OffboardWatch,
+            MissionAvailability,
+            Px4Commands,
+            Px4Reports,
+            LandingWatch,
+        )
+
+    def mode_entered(self, autopilot: "Autopilot") -> None:
+        """It may be the one after disarming."""
+        autopilot.part(LandingWatch).entered(autopilot.modes.mode)
 
     def arming_text(self, reason: str) -> str:
         """The reason, which PX4 says by itself before."""

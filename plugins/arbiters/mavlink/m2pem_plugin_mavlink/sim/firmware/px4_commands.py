@@ -28,6 +28,8 @@ from m2pem_plugin_mavlink.sim.specification import Kind
 CHANGE_MODE = 1
 """Parameter 2 of DO_REPOSITION; PX4 does without no reposition."""
 FORCE = 21196
+AUTOMATIC = 4
+"""Parameter 2 of DO_SET_MODE: parameter 3 says which of the automatic modes."""
 ORBIT_MPS = 3.0
 WIDEST_ORBIT_M = 1000.0
 """MC_ORBIT_RAD_MAX."""
@@ -73,6 +75,8 @@ class Px4Commands(Part):
         firmware = self.autopilot.firmware
         number = firmware.mode_number(int(command.param1), int(command.param2), int(command.param3))
         if number is None or number not in self.autopilot.modes.by_number:
+            kind = "auto" if command.param2 == AUTOMATIC else "main"
+            self.autopilot.warn(f"Unsupported {kind} mode")
             return Result.TEMPORARILY_REJECTED
         return self._enter(number)
 
@@ -140,11 +144,11 @@ class Px4Commands(Part):
         if not -1 <= first < len(pilot.plans[0]):
             return Result.DENIED
         if not missions.available:
-            pilot.warn(f"Switching to {NAMES[MISSION]} is currently not available")
+            pilot.warn("Mission start denied! No valid mission")
             return Result.DENIED
         if first > 0:
             pilot.mission.set_current(first)
-        started = pilot.modes.switch(MISSION) and pilot.arming.arm()
+        started = pilot.modes.switch(MISSION) and pilot.arming.arm(by="mission start")
         return Result.ACCEPTED if started else Result.TEMPORARILY_REJECTED
 
     def _up_m(self, amsl_m: float) -> float | None:

@@ -3,22 +3,17 @@
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from m2pem_plugin_mavlink.sim.firmware.px4_modes import (
-    HOLD,
-    LAND,
-    OFFBOARD,
-    POSITION,
-    RETURN,
-    custom_mode,
-)
+from m2pem_plugin_mavlink.sim.failsafes.px4 import Px4Failsafes
+from m2pem_plugin_mavlink.sim.firmware.px4_modes import HOLD, LAND, OFFBOARD, RETURN
 from m2pem_plugin_mavlink.sim.part import MessageHandler, Part
 from m2pem_plugin_mavlink.sim.peers import Heard
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.sim.autopilot import Autopilot
 
-ACTIONS = {0: POSITION, 1: custom_mode(2), 2: custom_mode(1), 3: RETURN, 4: LAND, 5: HOLD}
-"""COM_OBL_RC_ACT: the mode that follows on OFFBOARD."""
+ACTIONS = {4: LAND, 5: HOLD}
+"""COM_OBL_RC_ACT: the mode that follows on OFFBOARD; else it is RETURN, because modes for a pilot
+cannot be entered without a remote control."""
 
 
 class OffboardWatch(Part):
@@ -52,9 +47,5 @@ class OffboardWatch(Part):
         pilot = self.autopilot
         if pilot.modes.mode.number != OFFBOARD or not pilot.arming.armed or self.streaming:
             return
-        mode = ACTIONS.get(int(pilot.parameters["COM_OBL_RC_ACT"]), HOLD)
-        if mode not in pilot.modes.by_number:
-            mode = HOLD
-        pilot.warn(f"Offboard signal lost, switching to {pilot.modes.by_number[mode].name}")
-        if not pilot.modes.switch(mode):
-            pilot.modes.switch(LAND if LAND in pilot.modes.by_number else custom_mode(1))
+        mode = ACTIONS.get(int(pilot.parameters["COM_OBL_RC_ACT"]), RETURN)
+        pilot.part(Px4Failsafes).act("no setpoints", mode)

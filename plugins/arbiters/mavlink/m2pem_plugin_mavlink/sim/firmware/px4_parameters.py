@@ -42,6 +42,7 @@ FLOATS: Mapping[str, float] = {
     "COM_DISARM_LAND": 2.0,
     "COM_DISARM_PRFLT": 10.0,
     "COM_OF_LOSS_T": 1.0,
+    "COM_SPOOLUP_TIME": 1.0,
     "GF_MAX_HOR_DIST": 0.0,
     "GF_MAX_VER_DIST": 0.0,
     "MIS_DIST_1WP": 10000.0,

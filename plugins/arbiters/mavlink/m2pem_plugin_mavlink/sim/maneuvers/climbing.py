@@ -1,5 +1,7 @@
 """AUTO.TAKEOFF of PX4: climb straight up, then hold."""
 
+from dataclasses import replace
+
 from m2pem_plugin_mavlink.sim.demands import Demand
 from m2pem_plugin_mavlink.sim.maneuvers.holding import Hold
 from m2pem_plugin_mavlink.sim.maneuvers.maneuver import Maneuver
@@ -46,4 +48,5 @@ class TakeOff(Maneuver):
             if isinstance(pilot.modes.maneuver, Hold):
                 pilot.modes.maneuver.keep(self._start.at_height(up_m))
             return demand
-        return self.reach(self._start.at_height(up_m), yaw_rad=pilot.body.yaw_rad)
+        goal = self.reach(self._start.at_height(up_m), yaw_rad=pilot.body.yaw_rad)
+        return replace(goal, climb_mps=pilot.parameters["MPC_TKO_SPEED"])
