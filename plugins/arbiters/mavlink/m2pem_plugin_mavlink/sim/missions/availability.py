@@ -9,8 +9,8 @@ from m2pem_plugin_mavlink.sim.part import Part
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.sim.autopilot import Autopilot
 
-CHECKING_S = 2.5
-"""As measured on PX4 main: half a second at five times the speed of time."""
+CHECKING_S = 0.2
+"""Real ones take 0.1 s."""
 
 
 class MissionAvailability(Part):

@@ -7,11 +7,10 @@ from m2pem_plugin_mavlink.sim.maneuvers.maneuver import Maneuver
 from m2pem_plugin_mavlink.sim.maneuvers.standing import Stay
 from m2pem_plugin_mavlink.sim.missions.actions import Actions
 from m2pem_plugin_mavlink.sim.missions.items import NAVIGATION
-from m2pem_plugin_mavlink.sim.missions.legs import Leg, leg_of
+from m2pem_plugin_mavlink.sim.missions.legs import NAV_TAKEOFF, Leg, leg_of
 from m2pem_plugin_mavlink.sim.missions.plan import Item
 from m2pem_plugin_mavlink.sim.specification import Kind
 
-NAV_TAKEOFF = 22
 LOOKS_AHEAD = 3
 """So many items are watched for changes (Mission_Change_Detector)."""
 
@@ -53,7 +52,7 @@ class Auto(Maneuver):
         """The item to begin with."""
         pilot, progress = self.autopilot, self.autopilot.mission
         # A new plan may be shorter than the one in which it was.
-        known = progress.first <= progress.current < len(progress.items)
+        known = progress.first <= progress.resume_at < len(progress.items)
         again = progress.complete or not known
         if again or pilot.parameters.get("MIS_RESTART") == 1:
             return progress.first

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from m2pem_plugin_mavlink.sim.autopilot import Autopilot
 
 SURFACE = (Kind.ROVER, Kind.BOAT)
+NAV_TAKEOFF = 22
 
 
 class Leg(Maneuver):
@@ -87,6 +88,25 @@ class Takeoff(Leg):
         self.autopilot.modes.maneuver.taking_off = not self.done
         yaw_rad = None if self.autopilot.spec.kind is Kind.PLANE else self.autopilot.body.yaw_rad
         return self.reach(self.place, yaw_rad=yaw_rad)
+
+
+class Px4Takeoff(Leg):
+    """Climb if it stands on the ground, and go to the item's place."""
+
+    def __init__(self, autopilot: "Autopilot", item: Item) -> None:
+        super().__init__(autopilot, item)
+        self._climb = Takeoff(autopilot, item) if autopilot.body.on_ground else None
+
+    def step(self, dt_s: float) -> Demand:
+        """Up, then there."""
+        if self._climb is not None and not self._climb.done:
+            return self._climb.step(dt_s)
+        return super().step(dt_s)
+
+    def there(self, dt_s: float) -> Demand:
+        """Its first parameter is no time."""
+        self.done = True
+        return self.stay(self.place)
 
 
 class Loiter(Leg):
@@ -204,7 +224,7 @@ LEGS: Mapping[int, type[Leg]] = {
     19: LoiterTime,
     20: Return,
     21: Land,
-    22: Takeoff,
+    NAV_TAKEOFF: Takeoff,
     31: LoiterToAltitude,
     82: Leg,
     93: Delay,
@@ -214,4 +234,6 @@ LEGS: Mapping[int, type[Leg]] = {
 
 def leg_of(autopilot: "Autopilot", item: Item) -> Leg:
     """What flies an item of navigation."""
+    if item.command == NAV_TAKEOFF and not autopilot.firmware.is_ardupilot:
+        return Px4Takeoff(autopilot, item)
     return LEGS[item.command](autopilot, item)

@@ -41,8 +41,8 @@ class Item(NamedTuple):
 class PlanStore:
     """What was uploaded, by MAV_MISSION_TYPE; a mission with ArduPilot's item 0 (home).
 
-    As in an autopilot, an upload changes the plan item by item: one that is abandoned leaves the
-    new items that came and, behind them, nothing.
+    An upload to ArduPilot changes the plan item by item: one that is abandoned leaves the new items
+    that came and, behind them, nothing.
     """
 
     def __init__(self) -> None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.sim.command import Command, Result
+from m2pem_plugin_mavlink.sim.maneuvers.climbing import TakeOff
+from m2pem_plugin_mavlink.sim.maneuvers.landing import Land
 from m2pem_plugin_mavlink.sim.missions.execution import Auto
 from m2pem_plugin_mavlink.sim.missions.items import NAVIGATION
 from m2pem_plugin_mavlink.sim.missions.plan import MISSION, Item
@@ -21,6 +23,7 @@ MOST_JUMPS = 64
 """So many items without navigation in a row are a mission that goes around in circles."""
 
 A_MOMENT_S = 0.1
+MISSION_MODE_ACTIVE, MISSION_MODE_SUSPENDED = 1, 2
 
 
 class MissionState(IntEnum):
@@ -67,21 +70,39 @@ class MissionProgress(Part):
 
     @property
     def state(self) -> MissionState:
-        """As MISSION_CURRENT has it; ArduPilot has no pause."""
+        """As MISSION_CURRENT has it; ArduPilot has no pause, PX4 goes by its mode."""
+        ardupilot = self.autopilot.firmware.is_ardupilot
         if self.empty:
             return MissionState.NO_MISSION
         if self.complete:
             return MissionState.COMPLETE
-        if self.running:
+        if self.running if ardupilot else self._mode == MISSION_MODE_ACTIVE:
             return MissionState.ACTIVE
-        paused = self.begun and not self.autopilot.firmware.is_ardupilot
+        paused = self.begun and not ardupilot
         return MissionState.PAUSED if paused else MissionState.NOT_STARTED
+
+    @property
+    def _mode(self) -> int:
+        """As MISSION_CURRENT has it: ArduPilot says 0, unknown, where PX4 says 2, suspended. PX4
+        counts the modes in which it takes off and lands as those of a mission."""
+        maneuver = self.autopilot.modes.maneuver
+        if self.autopilot.firmware.is_ardupilot:
+            return MISSION_MODE_ACTIVE if isinstance(maneuver, Auto) else 0
+        active = isinstance(maneuver, Auto | TakeOff | Land)
+        return MISSION_MODE_ACTIVE if active else MISSION_MODE_SUSPENDED
 
     def restart(self) -> None:
         """Be at the beginning."""
         self.current = self.resume_at = self.first
         self.begun = self.complete = False
         self._jumps.clear()
+
+    def replaced(self) -> None:
+        """Another mission was uploaded: PX4 begins it, at once if it flies the mission."""
+        self.restart()
+        maneuver = self.autopilot.modes.maneuver
+        if self.running and isinstance(maneuver, Auto):
+            maneuver.go_on(self.first)
 
     def clear(self) -> None:
         """There is no mission any more."""
@@ -132,7 +153,8 @@ class MissionProgress(Part):
 
     def set_current(self, index: int) -> bool:
         """Go on from an item, now or when the mission is flown; ArduPilot's is then at the next
-        item of navigation, and a completed mission has not been started."""
+        item of navigation, and a completed mission has not been started; PX4 is at the item only
+        when it flies the mission."""
         # Item 0, home, means the beginning.
         index = max(index, self.first)
         if index >= len(self.items):
@@ -143,7 +165,7 @@ class MissionProgress(Part):
         if self.running and isinstance(maneuver, Auto):
             maneuver.go_on(index)
             return not self.complete
-        self.current = self.resume_at = index
+        self.resume_at = index
         if self.autopilot.firmware.is_ardupilot:
             actions, following = self.advance(index)
             self.current = following or 0
@@ -152,11 +174,8 @@ class MissionProgress(Part):
         return self.current >= self.first
 
     def reached(self, index: int) -> None:
-        """Every ground station gets it; of items in a moment ArduPilot sends the last one."""
-        if self.autopilot.firmware.is_ardupilot:
-            self._reached.append((self.autopilot.now_s, index))
-        else:
-            self.autopilot.send(dialect.MAVLink_mission_item_reached_message(index))
+        """Every ground station gets it; of items in a moment, the last one."""
+        self._reached.append((self.autopilot.now_s, index))
         self.autopilot.note("reached", str(index))
         text = self.autopilot.firmware.reached_text(self.autopilot, index)
         if text:
@@ -188,7 +207,7 @@ class MissionProgress(Part):
     def _command(self, command: Command) -> Result:
         index = int(command.param1)
         if index >= len(self.items):
-            return Result.DENIED
+            return Result.DENIED if self.autopilot.firmware.is_ardupilot else Result.FAILED
         if command.param2 == 1:
             self.restart()
         if index >= 0 and not self.set_current(index):
@@ -197,12 +216,9 @@ class MissionProgress(Part):
         return Result.ACCEPTED
 
     def _current(self, seq: int | None = None) -> Any:
-        """`mission_mode`: ArduPilot says 0, unknown, where PX4 says 2, suspended."""
-        home = self.autopilot.firmware.is_ardupilot
-        flies_it = isinstance(self.autopilot.modes.maneuver, Auto)
         return dialect.MAVLink_mission_current_message(
             self.current if seq is None else seq,
             max(0, len(self.items) - self.first),
             self.state,
-            1 if flies_it else 0 if home else 2,
+            self._mode,
         )

@@ -1,5 +1,5 @@
-"""The mission protocol as ArduPilot serves it (mavlink.io, "Mission Protocol"; ArduPilot's
-MissionItemProtocol): upload, partial upload, download, clearing."""
+"""The mission protocol (mavlink.io, "Mission Protocol"; ArduPilot's MissionItemProtocol, PX4's
+MavlinkMissionManager): upload, partial upload, download, clearing."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,8 @@ ALL = 255
 """MAV_MISSION_TYPE of a request to clear all plans."""
 MOST_ITEMS: Mapping[int, int] = {MISSION: 724, FENCE: 200, RALLY: 30}
 NAMES: Mapping[int, str] = {MISSION: "Mission", FENCE: "Fence", RALLY: "Rally"}
+GIVE_UP_S, PX4_GIVES_UP_S = 8.0, 5.0
+"""Without any item for so long, an upload is cancelled."""
 RECEIVED: Mapping[int, str] = {MISSION: "Flight plan received", RALLY: "Rally points received"}
 KEPT_FRAMES: Mapping[int, int] = {5: 0, 6: 3, 11: 10}
 """ArduPilot keeps no difference between a MAV_FRAME and its _INT."""
@@ -31,7 +33,10 @@ TOTALS: Mapping[int, str] = {MISSION: "MIS_TOTAL", FENCE: "FENCE_TOTAL", RALLY: 
 
 
 class MissionServer(Part):
-    """Takes and gives plans. One upload at a time; a second uploader is denied."""
+    """Takes and gives plans. One upload at a time; a second uploader is denied.
+
+    ArduPilot's plan changes item by item, PX4's when the last item has come.
+    """
 
     def __init__(self, autopilot: "Autopilot") -> None:
         super().__init__(autopilot)
@@ -56,12 +61,19 @@ class MissionServer(Part):
         upload, now_s = self.upload, self.autopilot.now_s
         if upload is None:
             return
-        if upload.abandoned(now_s):
+        if upload.abandoned(now_s, GIVE_UP_S if self._ardupilot else PX4_GIVES_UP_S):
             self.upload = None
-            self.autopilot.warn(f"{NAMES[upload.kind]} upload timeout")
-            self._acknowledge(upload.uploader, upload.kind, CANCELLED)
+            if self._ardupilot:
+                self.autopilot.warn(f"{NAMES[upload.kind]} upload timeout")
+                self._acknowledge(upload.uploader, upload.kind, CANCELLED)
+            else:
+                self.autopilot.warn("Mission sync timeout")
         elif upload.should_ask(now_s):
             self._ask(upload)
+
+    @property
+    def _ardupilot(self) -> bool:
+        return self.autopilot.firmware.is_ardupilot
 
     def _begin(self, message: Any, sender: Heard) -> None:
         kind, count = message.mission_type, message.count
@@ -71,15 +83,20 @@ class MissionServer(Part):
             self._acknowledge(sender, kind, NO_SPACE)
             return
         plans = self.autopilot.plans
-        plans[kind] = plans[kind][:count]
-        self._counted(kind)
+        if self._ardupilot:
+            plans[kind] = plans[kind][:count]
+            self._counted(kind)
         if count == 0:
+            self._replace(kind, ())
             self._complete(sender, kind)
         else:
             self._start(sender, kind, 0, count)
 
     def _begin_partial(self, message: Any, sender: Heard) -> None:
+        """PX4 does not know it."""
         kind, first, last = message.mission_type, message.start_index, message.end_index
+        if not self._ardupilot:
+            return
         if not self._may_upload(kind, sender):
             return
         if not 0 <= first <= last < len(self.autopilot.plans[kind]):
@@ -94,7 +111,7 @@ class MissionServer(Part):
             return False
         other = self.upload is not None and self.upload.uploader != sender
         if other:
-            self._acknowledge(sender, kind, DENIED)
+            self._acknowledge(sender, kind, DENIED if self._ardupilot else ERROR)
         return not other
 
     def _start(self, sender: Heard, kind: int, first: int, end: int) -> None:
@@ -117,7 +134,8 @@ class MissionServer(Part):
             self._acknowledge(sender, kind, ERROR)
             return
         if message.seq != upload.next:
-            self._acknowledge(sender, kind, INVALID_SEQUENCE)
+            if self._ardupilot:
+                self._acknowledge(sender, kind, INVALID_SEQUENCE)
             return
         if sender != upload.uploader:
             self._acknowledge(sender, kind, DENIED)
@@ -129,26 +147,40 @@ class MissionServer(Part):
             fault = INVALID
         if fault != ACCEPTED:
             self.upload = None
+            if not self._ardupilot:
+                self.autopilot.warn("IGN MISSION_ITEM: Invalid item")
             self._acknowledge(sender, kind, fault)
             return
-        self.autopilot.plans.put(kind, upload.next, item)
-        self._counted(kind)
+        if self._ardupilot:
+            self.autopilot.plans.put(kind, upload.next, item)
+            self._counted(kind)
+        upload.items.append(item)
         upload.heard_s = self.autopilot.now_s
         upload.next += 1
         if upload.next < upload.end:
             self._ask(upload)
         else:
             self.upload = None
+            self._replace(kind, tuple(upload.items))
             self._complete(sender, kind)
+
+    def _replace(self, kind: int, items: tuple[Item, ...]) -> None:
+        """PX4 takes a plan as a whole, and only one that differs."""
+        pilot = self.autopilot
+        if self._ardupilot or items == pilot.plans[kind]:
+            return
+        pilot.plans[kind] = items
+        if kind == MISSION:
+            pilot.mission.replaced()
 
     def _complete(self, sender: Heard, kind: int) -> None:
         pilot = self.autopilot
-        if kind == FENCE and pilot.firmware.is_ardupilot and not is_whole(pilot.plans[kind]):
+        if kind == FENCE and self._ardupilot and not is_whole(pilot.plans[kind]):
             pilot.warn("Fence validation failed")
             self._acknowledge(sender, kind, ERROR)
             return
         self._acknowledge(sender, kind, ACCEPTED)
-        if kind in RECEIVED:
+        if kind in RECEIVED and self._ardupilot:
             self.autopilot.say(RECEIVED[kind])
         self.autopilot.note("upload", f"{NAMES[kind]} {len(self.autopilot.plans[kind])}")
 
@@ -178,9 +210,9 @@ class MissionServer(Part):
             self._acknowledge(sender, kind, INVALID_SEQUENCE)
             return
         item = pilot.plans[kind][seq]
-        if kind == MISSION and seq == 0 and pilot.firmware.is_ardupilot:
+        if kind == MISSION and seq == 0 and self._ardupilot:
             item = self._home()
-        if pilot.firmware.is_ardupilot:
+        if self._ardupilot:
             item = item._replace(frame=KEPT_FRAMES.get(item.frame, item.frame))
         current = kind == MISSION and seq == pilot.mission.current
         whole = message.get_type() == "MISSION_REQUEST_INT"

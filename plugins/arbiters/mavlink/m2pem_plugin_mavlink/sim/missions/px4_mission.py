@@ -3,6 +3,7 @@
 from m2pem_plugin_mavlink.sim.demands import Demand
 from m2pem_plugin_mavlink.sim.missions.availability import MissionAvailability
 from m2pem_plugin_mavlink.sim.missions.execution import Auto
+from m2pem_plugin_mavlink.sim.missions.legs import Return
 
 
 class Px4Mission(Auto):
@@ -23,12 +24,23 @@ class Px4Mission(Auto):
     def complete(self) -> None:
         """It is over when the actions behind the last item have been done."""
         self._actions.finish()
+        self.autopilot.say("Mission finished, loitering")
         super().complete()
 
     def step(self, dt_s: float) -> Demand:
-        """Fly it; at its end, hold."""
+        """Fly it; at its end, hold; an item that says so enters AUTO.RTL, and is the end."""
+        pilot, roles = self.autopilot, self.autopilot.firmware.roles
         demand = super().step(dt_s)
-        pilot = self.autopilot
-        if pilot.mission.complete and pilot.arming.armed:
-            return self.hand_over(pilot.firmware.roles.hold, dt_s)
+        returns = isinstance(self._leg, Return)
+        if returns and self._index is not None:
+            pilot.mission.reached(self._index)
+            self._leg = None
+            self.complete()
+        if not (pilot.mission.complete and pilot.arming.armed):
+            return demand
+        demand = self.hand_over(roles.hold, dt_s)
+        if returns:
+            pilot.say("Returning to launch")
+            pilot.modes.switch(roles.back)
+            demand = pilot.modes.maneuver.step(dt_s)
         return demand

@@ -1,13 +1,12 @@
 """One upload of a plan, from the first request for an item to the acknowledgement."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from m2pem_plugin_mavlink.sim.missions.plan import Item
 from m2pem_plugin_mavlink.sim.peers import Heard
 
 REQUEST_S = 1.0
 """An item that did not come is asked for again after that."""
-GIVE_UP_S = 8.0
-"""Without any item for so long, the upload is cancelled."""
 
 
 @dataclass(slots=True)
@@ -20,11 +19,13 @@ class Upload:
     end: int
     asked_s: float
     heard_s: float
+    items: list[Item] = field(default_factory=list)
+    """Those that came, where they become the plan all at once."""
 
     def should_ask(self, now_s: float) -> bool:
         """It is time to ask again."""
         return now_s - self.asked_s >= REQUEST_S
 
-    def abandoned(self, now_s: float) -> bool:
-        """The uploader has gone."""
-        return now_s - self.heard_s > GIVE_UP_S
+    def abandoned(self, now_s: float, after_s: float) -> bool:
+        """No item has come for so long."""
+        return now_s - self.heard_s > after_s
