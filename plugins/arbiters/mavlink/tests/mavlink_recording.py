@@ -116,7 +116,10 @@ class Recording:
                 self._change("mission", name("MISSION_STATE", m.mission_state))
                 self._change("mission mode", m.mission_mode)
             case "MISSION_ITEM_REACHED":
-                self._step.setdefault("reached", []).append(m.seq)
+                # PX4 repeats the last one ten times, once in a second.
+                if self._modes is not None or self.known.get("reached") != m.seq:
+                    self._step.setdefault("reached", []).append(m.seq)
+                self.known["reached"] = m.seq
             case "EXTENDED_SYS_STATE":
                 self._change("landed", name("MAV_LANDED_STATE", m.landed_state))
                 self._change("vtol", name("MAV_VTOL_STATE", m.vtol_state))

@@ -61,6 +61,9 @@ def boot(s: Station) -> None:
     s.known.clear()
     s.begin("boot")
     s.until("position", lambda: s.located, 120.0)
+    if s.px4:
+        # It knew its position before it was connected.
+        s.watch(3.0)
 
 
 @of(*ARDUPILOT)
@@ -301,7 +304,7 @@ def velocity_of_px4(s: Station) -> None:
         s.watch(0.1)
     s.note("moves", s.speed_mps > 1.0)
     s.begin("silence")
-    s.watch(5.0)
+    s.watch(12.0)
 
 
 # --- missions -----------------------------------------------------------------------------------

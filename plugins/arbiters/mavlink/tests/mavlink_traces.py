@@ -27,13 +27,14 @@ NEAR_S, NEAR_SHARE = 4.0, 0.4
 
 
 class Vehicle(NamedTuple):
-    """`model`: of the program's own simulation; `parameters`: what the file of parameters that
-    belongs to it sets."""
+    """`model`: of the program's own simulation; `parameters`: what the file of parameters or the
+    start script that belongs to it sets; `estimator_s`: of the simulated one."""
 
     kind: Kind
     firmware: str
     model: str
     parameters: Mapping[str, float] = MappingProxyType({})
+    estimator_s: float = VehicleSpec().estimator_s
 
 
 VEHICLES = {
@@ -42,11 +43,13 @@ VEHICLES = {
         Kind.ROVER, "ardupilot", "rover", {"WP_SPEED": 5.0, "CRUISE_SPEED": 5.0, "WP_RADIUS": 3.0}
     ),
     "arduplane": Vehicle(Kind.PLANE, "ardupilot", "plane"),
-    "px4copter": Vehicle(Kind.COPTER, "px4", "sihsim_quadx"),
+    # PX4's start script multiplies these by the speed of time, and knows where it is soon after.
+    "px4copter": Vehicle(
+        *(Kind.COPTER, "px4", "sihsim_quadx"),
+        {"COM_DL_LOSS_T": 50.0, "COM_OF_LOSS_T": 5.0, "COM_DISARM_PRFLT": 50.0},
+        estimator_s=1.0,
+    ),
 }
-
-HELD = ("arducopter", "ardurover", "arduplane")
-"""Those whose simulation is held to the traces; the simulated PX4 is not yet."""
 
 
 class Difference(NamedTuple):
@@ -84,8 +87,9 @@ def reasons(vehicle: str, scenario: str) -> dict[str, str]:
 
 def play_simulated(vehicle: str, scenario: Scenario) -> Trace:
     """The trace of the simulated autopilot."""
-    kind, firmware, _, parameters = VEHICLES[vehicle]
-    station = Station(SimulatedWire(VehicleSpec(kind, firmware=firmware, parameters=parameters)))
+    kind, firmware, _, parameters, estimator_s = VEHICLES[vehicle]
+    spec = VehicleSpec(kind, firmware=firmware, parameters=parameters, estimator_s=estimator_s)
+    station = Station(SimulatedWire(spec))
     station.connect()
     scenario.play(station)
     return station.trace
@@ -102,7 +106,7 @@ def play_real(vehicle: str, binary: Path, scenario: Scenario, instance: int) -> 
 
 @contextmanager
 def _real(vehicle: str, binary: Path, instance: int) -> Iterator[Station]:
-    kind, firmware, model, _ = VEHICLES[vehicle]
+    kind, firmware, model, _, _ = VEHICLES[vehicle]
     wire = UdpWire(kind, firmware, px4_port(instance) if firmware == "px4" else 0)
     with TemporaryDirectory() as folder:
         if firmware == "px4":

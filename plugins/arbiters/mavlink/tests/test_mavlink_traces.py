@@ -8,7 +8,7 @@ import pytest
 from mavlink_recording import Recording, plain
 from mavlink_scenarios import SCENARIOS, scenarios_of
 from mavlink_sitl import program
-from mavlink_traces import HELD, VEHICLES, compare, play_real, play_simulated, reasons, recorded
+from mavlink_traces import VEHICLES, compare, play_real, play_simulated, reasons, recorded
 from mavlink_traces_page import page
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -16,7 +16,7 @@ INSTANCE = 71
 REPOSITORY = Path(__file__).parents[4]
 PLAYED = [
     pytest.param(vehicle, scenario, id=f"{vehicle}-{scenario.name}")
-    for vehicle in HELD
+    for vehicle in VEHICLES
     for scenario in scenarios_of(vehicle)
 ]
 
