@@ -128,10 +128,10 @@ def take_off_of_a_plane(s: Station) -> None:
     s.disarm()
 
 
-@of("arducopter")
+@of(*COPTERS)
 def take_off_unarmed(s: Station) -> None:
     s.ready()
-    s.set_mode("GUIDED")
+    s.set_mode(s.guided)
     s.take_off(20.0)
 
 
@@ -217,7 +217,7 @@ def go_to_unarmed(s: Station) -> None:
     s.note("stays", s.distance_m() < 3.0)
 
 
-@of("arducopter", "ardurover")
+@of(*GROUNDED)
 def speed_at_rest(s: Station) -> None:
     """Rovers refuse a speed while they have no target."""
     s.airborne()
@@ -441,7 +441,7 @@ def mission_that_returns(s: Station) -> None:
     s.landed(240.0)
 
 
-@of("arducopter", "ardurover")
+@of(*GROUNDED)
 def mission_cleared_on_the_way(s: Station) -> None:
     s.airborne()
     s.mission("upload", _leg(s, 80.0))
@@ -516,7 +516,7 @@ def second_station_holds(s: Station) -> None:
     s.until("at rest", lambda: s.speed_mps < 0.3, 30.0)
 
 
-@of("arducopter", "ardurover")
+@of(*GROUNDED)
 def second_station_takes_a_mission_over(s: Station) -> None:
     s.airborne()
     s.mission("upload", _leg(s, 80.0))
@@ -553,7 +553,7 @@ def ground_station_lost(s: Station) -> None:
     s.watch(5.0)
 
 
-@of("arducopter", "ardurover")
+@of(*GROUNDED)
 def ground_station_lost_without_a_failsafe(s: Station) -> None:
     s.airborne()
     s.go_to("go 30 m north", (30.0, 0.0, 20.0))
@@ -592,13 +592,38 @@ def battery_critical_lands(s: Station) -> None:
     s.watch(25.0)
 
 
-@of("arducopter", "ardurover")
+@of("px4copter")
+def battery_critical_of_px4_returns(s: Station) -> None:
+    s.ready()
+    s.parameter("COM_LOW_BAT_ACT", 3)
+    s.airborne()
+    s.battery(0.066, 10.3)
+    s.begin("wait")
+    s.watch(25.0)
+
+
+@of("px4copter")
+def fence_of_px4_breached(s: Station) -> None:
+    """A circle of 50 m around home; the action is to return."""
+    s.ready()
+    s.parameter("GF_MAX_HOR_DIST", 50)
+    s.parameter("GF_ACTION", 3)
+    s.airborne()
+    s.go_to("go 40 m north", (40.0, 0.0, 20.0))
+    s.begin("on the way")
+    s.until("there", lambda: s.distance_m(40.0) < 2.5)
+    s.go_to("go 90 m north", (90.0, 0.0, 20.0))
+    s.watch(10.0)
+    s.note("stays", s.distance_m(40.0) < 3.0)
+
+
+@of(*GROUNDED)
 def satellites_lost(s: Station) -> None:
     s.airborne()
     s.satellites(False)
     s.watch(20.0)
     s.begin("try to be guided")
-    s.set_mode("GUIDED")
+    s.set_mode(s.guided)
     s.satellites(True)
     s.watch(30.0)
 
@@ -620,7 +645,7 @@ def fence_breached(s: Station) -> None:
     s.watch(20.0)
 
 
-@of(*ARDUPILOT)
+@of(*ALL)
 def fence_uploaded(s: Station) -> None:
     s.ready()
     corners = [(-100.0, -100.0), (100.0, -100.0), (100.0, 100.0), (-100.0, 100.0)]

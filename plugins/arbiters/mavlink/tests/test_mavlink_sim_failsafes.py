@@ -150,7 +150,7 @@ def test_px4_misses_any_ground_station(action: int, then: str) -> None:
     bench = Px4Bench(parameters={"NAV_DLL_ACT": action}).airborne()
     bench.beats = False
     beat(bench, 2, system=254)
-    bench.run(8)
+    bench.run(8 + 5)
     assert bench.mode == "AUTO.LOITER"
     bench.run(3)
     assert bench.mode == then
@@ -175,6 +175,9 @@ def test_px4_warns_of_a_low_battery_returns_at_a_critical_and_lands_at_last() ->
     assert bench.mode == "AUTO.LOITER"
     assert "Low battery" in bench.texts()
     bench.autopilot.battery.left = 0.065
+    bench.run(4.5)
+    assert bench.mode == "AUTO.LOITER"
+    assert "Failsafe activated: entering Hold for 5 seconds" in bench.texts()
     bench.run(1)
     assert bench.mode == "AUTO.RTL"
     bench.autopilot.battery.left = 0.04
@@ -182,10 +185,22 @@ def test_px4_warns_of_a_low_battery_returns_at_a_critical_and_lands_at_last() ->
     assert bench.mode == "AUTO.LAND"
 
 
-def test_px4_without_a_position_lands() -> None:
+def test_px4_holds_no_longer_once_another_mode_is_commanded() -> None:
+    bench = Px4Bench(parameters={"COM_LOW_BAT_ACT": 3}).airborne(40)
+    bench.autopilot.battery.left = 0.065
+    bench.run(2)
+    assert bench.enter(4, 5) == 0
+    bench.run(1)
+    assert bench.enter(4, 3) == 0
+    bench.run(20)
+    assert bench.mode == "AUTO.LOITER"
+
+
+def test_px4_without_a_position_descends() -> None:
     bench = Px4Bench().airborne(10)
     bench.autopilot.troubles.gps_lost = True
     bench.run(2)
-    assert bench.mode == "AUTO.LAND"
-    assert bench.report(230).flags & dialect.ESTIMATOR_CONST_POS_MODE
+    assert bench.mode == "AUTO.DESCEND"
+    assert not bench.report(230).flags & dialect.ESTIMATOR_POS_HORIZ_ABS
     bench.run_until(lambda: not bench.autopilot.arming.armed)
+    assert bench.mode == "AUTO.LOITER"

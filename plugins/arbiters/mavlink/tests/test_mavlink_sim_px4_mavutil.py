@@ -98,7 +98,8 @@ async def test_an_upload_over_a_link_that_loses_frames_is_asked_for_again(
             ground.link.mav.send(plan[message.seq])
         assert message.type == 0
 
-    sim = await at(ground, scene, PX4)
+    # An upload ends after 5 s of simulated time without an item.
+    sim = await at(ground, scene, PX4, speed=5)
     assert len(sim[1].autopilot.plans[0]) == 5
     assert sim[1].faults.lost_frames >= 5 // frames
 

@@ -93,3 +93,20 @@ def test_it_begins_at_the_item_that_was_set() -> None:
     bench.run(1)
     reached = [each.seq for each in bench.heard if each.get_type() == "MISSION_ITEM_REACHED"]
     assert reached == [2]
+
+
+def test_a_plan_is_replaced_when_its_last_item_has_come() -> None:
+    bench = uploaded()
+    before = bench.autopilot.plans[0]
+    bench.tell(dialect.MAVLink_mission_count_message(1, 1, 2, 0))
+    bench.tell(item(0, 16, bench.offset(50, 0), 10))
+    assert bench.autopilot.plans[0] == before
+    bench.tell(item(1, 16, bench.offset(60, 0), 10))
+    assert len(bench.autopilot.plans[0]) == 2
+
+
+def test_the_last_item_once_more_is_acknowledged_once_more() -> None:
+    bench = uploaded()
+    for seq, result in ((2, dialect.MAV_MISSION_ACCEPTED), (1, dialect.MAV_MISSION_ERROR)):
+        (ack,) = bench.tell(plan(bench)[seq])
+        assert ack.type == result

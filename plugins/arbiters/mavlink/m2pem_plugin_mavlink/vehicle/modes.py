@@ -185,6 +185,7 @@ _PX4 = Modes(
         px4_mode(PX4_AUTO, 8): "AUTO.FOLLOW_TARGET",
         px4_mode(PX4_AUTO, 9): "AUTO.PRECLAND",
         px4_mode(PX4_AUTO, 10): "AUTO.VTOL_TAKEOFF",
+        px4_mode(PX4_AUTO, 20): "AUTO.DESCEND",
         px4_mode(PX4_ACRO): "ACRO",
         px4_mode(PX4_OFFBOARD): "OFFBOARD",
         px4_mode(7): "STABILIZED",
@@ -200,6 +201,7 @@ _PX4 = Modes(
         "AUTO.RTL": _RETURN,
         "AUTO.LAND": _LAND,
         "AUTO.PRECLAND": _LAND,
+        "AUTO.DESCEND": _LAND,
         "POSCTL.ORBIT": _ORBIT,
         **dict.fromkeys(
             ("MANUAL", "ALTCTL", "POSCTL", "POSCTL.SLOW", "ACRO", "STABILIZED", "RATTITUDE"),

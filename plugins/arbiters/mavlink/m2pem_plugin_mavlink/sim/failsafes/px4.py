@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.sim.failsafes.watch import Change, Heartbeats, Lasting, Watch
 from m2pem_plugin_mavlink.sim.firmware.px4_modes import (
+    DESCEND,
     HOLD,
     LAND,
     MISSION,
@@ -40,6 +41,9 @@ class Px4Failsafes(Part):
         self._position = Lasting()
         self._low, self._critical, self._emergency = Watch(), Watch(), Watch()
         self._acting_in: int | None = None
+        self._then: int | None = None  # the mode that follows on holding
+        self._holds_until_s = 0.0
+        self._before = HOLD  # the mode in which the position was lost
 
     @property
     def failsafe(self) -> bool:
@@ -58,17 +62,35 @@ class Px4Failsafes(Part):
         """Look after all three."""
         pilot = self.autopilot
         if not pilot.arming.armed or pilot.modes.mode.number != self._acting_in:
-            self._acting_in = None
+            self._acting_in = self._then = None
+        if self._then is not None and pilot.now_s >= self._holds_until_s:
+            then, self._then = self._then, None
+            self._enter(then)
         self._look_at_link()
         self._look_at_battery()
         self._look_at_position()
 
-    def act(self, what: str, mode: int) -> None:
-        """Enter a mode, in the air only, and never one that is milder than LAND once in that."""
+    def act(self, what: str, mode: int, *, at_once: bool = False) -> None:
+        """Enter a mode, in the air only, after holding for COM_FAIL_ACT_T unless it acts already;
+        never one that is milder than LAND once in that."""
         pilot = self.autopilot
         pilot.note("failsafe", what)
-        if not pilot.arming.armed or pilot.modes.mode.number == LAND:
+        present = pilot.modes.mode.number
+        if not pilot.arming.armed or present == LAND or present == mode == RETURN:
             return
+        delay_s = pilot.parameters["COM_FAIL_ACT_T"]
+        if self._then is not None and not at_once:
+            self._then = mode
+        elif at_once or mode == HOLD or self._acting_in is not None or not delay_s:
+            self._then = None
+            self._enter(mode)
+        elif pilot.modes.switch(HOLD):
+            self._acting_in, self._then = HOLD, mode
+            self._holds_until_s = pilot.now_s + delay_s
+            pilot.warn(f"Failsafe activated: entering Hold for {delay_s:.0f} seconds")
+
+    def _enter(self, mode: int) -> None:
+        pilot = self.autopilot
         last_resort = LAND if LAND in pilot.modes.by_number else custom_mode(1)
         for number in (mode, last_resort):
             if number in pilot.modes.by_number and pilot.modes.switch(number):
@@ -111,7 +133,11 @@ class Px4Failsafes(Part):
 
     def _look_at_position(self) -> None:
         pilot = self.autopilot
-        needs = pilot.arming.armed and pilot.modes.mode.needs_position
-        lost = needs and not pilot.estimator.ready
-        if self._position.look_for(lost, POSITION_S, pilot.now_s) is Change.WRONG:
-            self.act("no valid position estimate", LAND)
+        needs = pilot.modes.mode.needs_position or self._position.wrong
+        lost = pilot.arming.armed and needs and not pilot.estimator.ready
+        change = self._position.look_for(lost, POSITION_S, pilot.now_s)
+        if change is Change.WRONG:
+            self._before = pilot.modes.mode.number
+            self.act("no valid position estimate", DESCEND, at_once=True)
+        elif change is Change.WELL and self._acting_in == DESCEND:
+            pilot.modes.switch(self._before)

@@ -12,6 +12,7 @@ from m2pem_plugin_mavlink.sim.firmware.firmware import Firmware, Tuning
 from m2pem_plugin_mavlink.sim.firmware.px4_commands import Px4Commands
 from m2pem_plugin_mavlink.sim.firmware.px4_landing import LandingWatch
 from m2pem_plugin_mavlink.sim.firmware.px4_modes import (
+    DESCEND,
     FENCE_ACTIONS,
     HOLD,
     NAMES,
@@ -180,8 +181,9 @@ class Px4(Firmware):
             flags |= dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
             flags |= dialect.MAV_MODE_FLAG_GUIDED_ENABLED
         else:
-            flags |= dialect.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
             flags |= dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
+            if autopilot.modes.mode.number != DESCEND:
+                flags |= dialect.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
         if autopilot.arming.armed:
             flags |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
         return flags

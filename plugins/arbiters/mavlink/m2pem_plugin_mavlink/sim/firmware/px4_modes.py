@@ -3,7 +3,7 @@
 from m2pem_plugin_mavlink.sim.firmware.firmware import Roles
 from m2pem_plugin_mavlink.sim.maneuvers.climbing import TakeOff
 from m2pem_plugin_mavlink.sim.maneuvers.holding import Hold
-from m2pem_plugin_mavlink.sim.maneuvers.landing import Land
+from m2pem_plugin_mavlink.sim.maneuvers.landing import Descend, Land
 from m2pem_plugin_mavlink.sim.maneuvers.offboard import Offboard
 from m2pem_plugin_mavlink.sim.maneuvers.orbiting import Orbit
 from m2pem_plugin_mavlink.sim.maneuvers.px4_return import Px4Return
@@ -21,6 +21,7 @@ def custom_mode(main: int, sub: int = 0) -> int:
 POSITION, ORBIT = custom_mode(3), custom_mode(3, 1)
 TAKEOFF, HOLD, MISSION = custom_mode(4, 2), custom_mode(4, 3), custom_mode(4, 4)
 RETURN, LAND, OFFBOARD = custom_mode(4, 5), custom_mode(4, 6), custom_mode(6)
+DESCEND = custom_mode(4, 20)
 
 ROLES = Roles(hold=HOLD, guided=HOLD, mission=MISSION, back=RETURN, land=LAND)
 
@@ -61,4 +62,5 @@ def modes_of(kind: Kind) -> tuple[Mode, ...]:
         Mode(ORBIT, "POSCTL.ORBIT", Orbit),
         Mode(TAKEOFF, "AUTO.TAKEOFF", TakeOff, armable=True),
         Mode(LAND, "AUTO.LAND", Land, needs_position=False),
+        Mode(DESCEND, "AUTO.DESCEND", Descend, needs_position=False, automatic=False),
     )

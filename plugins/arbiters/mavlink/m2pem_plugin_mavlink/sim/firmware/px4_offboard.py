@@ -48,4 +48,4 @@ class OffboardWatch(Part):
         if pilot.modes.mode.number != OFFBOARD or not pilot.arming.armed or self.streaming:
             return
         mode = ACTIONS.get(int(pilot.parameters["COM_OBL_RC_ACT"]), RETURN)
-        pilot.part(Px4Failsafes).act("no setpoints", mode)
+        pilot.part(Px4Failsafes).act("no setpoints", mode, at_once=True)

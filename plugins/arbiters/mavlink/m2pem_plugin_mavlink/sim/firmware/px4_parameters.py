@@ -41,6 +41,7 @@ FLOATS: Mapping[str, float] = {
     "BAT_LOW_THR": 0.15,
     "COM_DISARM_LAND": 2.0,
     "COM_DISARM_PRFLT": 10.0,
+    "COM_FAIL_ACT_T": 5.0,
     "COM_OF_LOSS_T": 1.0,
     "COM_SPOOLUP_TIME": 1.0,
     "GF_MAX_HOR_DIST": 0.0,

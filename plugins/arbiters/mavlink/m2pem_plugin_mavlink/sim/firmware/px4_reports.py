@@ -29,7 +29,7 @@ class Px4Reports(Part):
         position" means also that it is at rest (since July 2024)."""
         ready, body = self.autopilot.estimator.ready, self.autopilot.body
         ratio, accuracy_m = (0.05, 0.3) if ready else (0.8, 50.0)
-        flags = 0x37F if ready else self.autopilot.estimator.flags & 0x3FF
+        flags = 0x37F if ready else self.autopilot.estimator.flags & 0x37F
         if body.on_ground and not body.moving:
             flags |= dialect.ESTIMATOR_CONST_POS_MODE
         return dialect.MAVLink_estimator_status_message(

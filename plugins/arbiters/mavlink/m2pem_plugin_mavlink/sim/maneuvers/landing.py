@@ -1,6 +1,6 @@
 """LAND: come down where it is, and stop the motors on the ground."""
 
-from m2pem_plugin_mavlink.sim.demands import Demand, Reach
+from m2pem_plugin_mavlink.sim.demands import Demand, Go, Reach
 from m2pem_plugin_mavlink.sim.geometry import Point
 from m2pem_plugin_mavlink.sim.maneuvers.maneuver import Maneuver
 
@@ -18,6 +18,16 @@ class Land(Maneuver):
     def step(self, dt_s: float) -> Demand:
         """Down, slowly near the ground."""
         return come_down(self, self._point)
+
+
+class Descend(Maneuver):
+    """Descend of PX4: down without knowing where it is."""
+
+    def step(self, dt_s: float) -> Demand:
+        """Slowly."""
+        if self.autopilot.body.on_ground:
+            self.autopilot.arming.disarm_after_landing()
+        return Go(0.0, 0.0, -self.autopilot.tuning.land_mps)
 
 
 def come_down(maneuver: Maneuver, point: Point) -> Demand:

@@ -25,6 +25,7 @@ MOST_ITEMS: Mapping[int, int] = {MISSION: 724, FENCE: 200, RALLY: 30}
 NAMES: Mapping[int, str] = {MISSION: "Mission", FENCE: "Fence", RALLY: "Rally"}
 GIVE_UP_S, PX4_GIVES_UP_S = 8.0, 5.0
 """Without any item for so long, an upload is cancelled."""
+ASK_AGAIN_S, PX4_ASKS_AGAIN_S = 1.0, 0.25
 RECEIVED: Mapping[int, str] = {MISSION: "Flight plan received", RALLY: "Rally points received"}
 KEPT_FRAMES: Mapping[int, int] = {5: 0, 6: 3, 11: 10}
 """ArduPilot keeps no difference between a MAV_FRAME and its _INT."""
@@ -41,6 +42,7 @@ class MissionServer(Part):
     def __init__(self, autopilot: "Autopilot") -> None:
         super().__init__(autopilot)
         self.upload: Upload | None = None
+        self._last: tuple[Heard, int, int] | None = None  # the last item of the last upload
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """The protocol."""
@@ -68,7 +70,7 @@ class MissionServer(Part):
                 self._acknowledge(upload.uploader, upload.kind, CANCELLED)
             else:
                 self.autopilot.warn("Mission sync timeout")
-        elif upload.should_ask(now_s):
+        elif upload.should_ask(now_s, ASK_AGAIN_S if self._ardupilot else PX4_ASKS_AGAIN_S):
             self._ask(upload)
 
     @property
@@ -131,7 +133,8 @@ class MissionServer(Part):
     def _take(self, message: Any, sender: Heard) -> None:
         upload, kind = self.upload, message.mission_type
         if upload is None or kind != upload.kind:
-            self._acknowledge(sender, kind, ERROR)
+            again = not self._ardupilot and self._last == (sender, kind, message.seq)
+            self._acknowledge(sender, kind, ACCEPTED if again else ERROR)
             return
         if message.seq != upload.next:
             if self._ardupilot:
@@ -161,6 +164,7 @@ class MissionServer(Part):
             self._ask(upload)
         else:
             self.upload = None
+            self._last = (sender, kind, message.seq)
             self._replace(kind, tuple(upload.items))
             self._complete(sender, kind)
 
@@ -228,22 +232,22 @@ class MissionServer(Part):
         return Item(0, 16, 0, 0, 0, 0, x, y, round(place.altitude_amsl_m, 2))
 
     def _clear(self, message: Any, sender: Heard) -> None:
-        """A mission that is being flown is not cleared."""
+        """ArduPilot does not clear a mission that is being flown."""
         kind, pilot = message.mission_type, self.autopilot
         kinds = tuple(MOST_ITEMS) if kind == ALL else (kind,)
         if kind != ALL and kind not in MOST_ITEMS:
             self._acknowledge(sender, kind, UNSUPPORTED)
         elif self.upload is not None:
             self._acknowledge(sender, kind, DENIED)
-        elif MISSION in kinds and pilot.mission.running and pilot.arming.armed:
+        elif self._ardupilot and MISSION in kinds and pilot.mission.running and pilot.arming.armed:
             self._acknowledge(sender, kind, ERROR)
         else:
             for each in kinds:
                 pilot.plans[each] = ()
                 self._counted(each)
+            self._acknowledge(sender, kind, ACCEPTED)
             if MISSION in kinds:
                 pilot.mission.clear()
-            self._acknowledge(sender, kind, ACCEPTED)
 
     def _acknowledged(self, message: Any, sender: Heard) -> None:
         """The end of a download, or an uploader that gives up."""

@@ -30,6 +30,9 @@ class Px4Mission(Auto):
     def step(self, dt_s: float) -> Demand:
         """Fly it; at its end, hold; an item that says so enters AUTO.RTL, and is the end."""
         pilot, roles = self.autopilot, self.autopilot.firmware.roles
+        if pilot.mission.empty and not pilot.body.on_ground:
+            pilot.warn("No valid mission available, loitering")
+            return self.hand_over(roles.hold, dt_s)
         demand = super().step(dt_s)
         returns = isinstance(self._leg, Return)
         if returns and self._index is not None:

@@ -5,9 +5,6 @@ from dataclasses import dataclass, field
 from m2pem_plugin_mavlink.sim.missions.plan import Item
 from m2pem_plugin_mavlink.sim.peers import Heard
 
-REQUEST_S = 1.0
-"""An item that did not come is asked for again after that."""
-
 
 @dataclass(slots=True)
 class Upload:
@@ -22,9 +19,9 @@ class Upload:
     items: list[Item] = field(default_factory=list)
     """Those that came, where they become the plan all at once."""
 
-    def should_ask(self, now_s: float) -> bool:
-        """It is time to ask again."""
-        return now_s - self.asked_s >= REQUEST_S
+    def should_ask(self, now_s: float, after_s: float) -> bool:
+        """It is time to ask again for an item that did not come."""
+        return now_s - self.asked_s >= after_s
 
     def abandoned(self, now_s: float, after_s: float) -> bool:
         """No item has come for so long."""
