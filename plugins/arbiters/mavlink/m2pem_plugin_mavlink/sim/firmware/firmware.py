@@ -56,7 +56,7 @@ class Firmware(ABC):
     capacity: ClassVar[str]
     """The parameter that has the battery's capacity in mAh."""
     texts_need_heartbeats: ClassVar[bool] = False
-    """Only links on which a ground station has been heard a moment ago get texts."""
+    """Only links on which a ground station sent a heartbeat a moment ago get texts."""
     gimbal_needs_control: ClassVar[bool] = False
     """Only a ground station that has taken control of the gimbal may move it."""
     reason_home: str
