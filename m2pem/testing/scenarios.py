@@ -71,8 +71,8 @@ def in_parallel(behavior: str, first: str, second: str, **parameters: object) ->
 
 
 def side_by_side(*branches: tuple[str, Sequence[tuple[str, Mapping[str, object]]]]) -> bytes:
-    """Start, Fork, branches, Join, End. A branch is a resource and its behaviors, one after another:
-    A1, A2, ... in the first branch, B1, B2, ... in the second."""
+    """Start, Fork, branches, Join, End. A branch is a resource and its behaviors, one after the
+    other: A1, A2, ... in the first branch, B1, B2, ... in the second."""
     elements = '<parallelGateway id="Fork"/><parallelGateway id="Join"/>'
     paths = ["Start Fork", "Join End"]
     for letter, (resource, steps) in zip(ascii_uppercase, branches, strict=False):
