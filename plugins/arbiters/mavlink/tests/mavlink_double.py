@@ -170,6 +170,10 @@ class DoubleLink:
     def listen(self, ids, listener):
         return lambda: None
 
+    async def perform(self, exchange):
+        """It answers no question."""
+        raise NoAnswerError(f"{exchange.name}: no answer")
+
 
 class DoubleVehicle:
     """A body as it is heard ten times a second."""
