@@ -4,6 +4,7 @@ import os
 import signal
 import tempfile
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 # What a change has broken fails, and fails again: `make test` tries the same examples every time.
@@ -20,3 +21,28 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 # Executives that tests start are no concern of those that this user runs, nor of another worker's.
 os.environ["M2PEM_RUNTIME_DIR"] = tempfile.mkdtemp(prefix="m2pem-tests-")
+
+# Tests on real autopilots run where their programs are; elsewhere one line each says so.
+_PROGRAMS = ("M2PEM_ARDUCOPTER", "M2PEM_ARDUROVER", "M2PEM_ARDUPLANE", "M2PEM_PX4")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out the tests of autopilots whose programs are not named."""
+    absent = [item for item in items if not _programs_of(item) <= os.environ.keys()]
+    if absent:
+        config.hook.pytest_deselected(items=absent)
+        items[:] = [item for item in items if item not in set(absent)]
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name the programs that would let the others run."""
+    unset = [name for name in _PROGRAMS if name not in os.environ]
+    if unset:
+        terminalreporter.write_line(
+            f"no tests on real autopilots: {', '.join(unset)} unset (docs/mavlink.md)"
+        )
+
+
+def _programs_of(item: pytest.Item) -> set[str]:
+    marker = item.get_closest_marker("sitl")
+    return set() if marker is None else set(marker.args)
