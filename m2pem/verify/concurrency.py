@@ -87,7 +87,7 @@ class Concurrency:
     def _fire(self, rule: Rule) -> set[int]:
         """Add what firing a rule leads to; the places that it is news for."""
         wants = self._wants[rule.index]
-        if wants.needed_bits & ~self._marked:
+        if wants.needed_bits & (~self._marked | wants.absent):
             return set()
         beside = self._marked
         for number, place in enumerate(wants.needed):

@@ -40,7 +40,7 @@ class Compiled:
     at_least: list[tuple[int, int, int]] = field(default_factory=list)
     takes: list[tuple[int, int]] = field(default_factory=list)
     moves: list[tuple[int, int, int, bool]] = field(default_factory=list)
-    gives: list[tuple[int, int, int, int, int]] = field(default_factory=list)
+    gives: list[tuple[int, int, int, int]] = field(default_factory=list)
     kill: int = 0
     reads: int = 0
     changes: int = 0
@@ -100,7 +100,7 @@ class Encoding:
         c = Compiled()
         taken = dict(rule.consume)
         for place, count in rule.consume:
-            if self.width[place] == 1:
+            if self.width[place] == 1 and count == 1:
                 c.test |= self.mask[place]
                 c.need |= self.mask[place]
                 c.clear |= self.mask[place]
@@ -117,6 +117,8 @@ class Encoding:
                 c.any_of.append(self.mask[place])
         for place in rule.inhibit:
             c.test |= self.mask[place]
+            if place in taken or place in rule.read:  # which it never can
+                c.at_least.append((self.mask[place], self.offset[place], 1 << self.width[place]))
         for variable, values in rule.guard:
             mask = self._values_mask(variable, values)
             if len(values) == 1:
@@ -140,7 +142,6 @@ class Encoding:
                         self.offset[place],
                         count,
                         (1 << self.width[place]) - 1,
-                        place,
                     )
                 )
         for variable, value in rule.assign:
@@ -179,17 +180,14 @@ class Encoding:
         return all((state & mask) >> offset >= count for mask, offset, count in c.at_least)
 
     def fire(self, number: int, state: int) -> tuple[int, int]:
-        """The state after an enabled rule, and the place that got more than it can hold, or -1.
+        """The state after an enabled rule, and the bits of the places that got more than they hold.
 
-        A place that is full stays full. Of several, one is told that can be given more room, if
-        there is one: it would never be known of otherwise.
+        A place that is full stays full.
         """
         c = self.rules[number]
         if c.plain:
             state &= ~c.clear
-            if state & c.put:
-                return state | c.put, self._full(number, state & c.put)
-            return state | c.put, -1
+            return state | c.put, state & c.put
         return self._fire_slowly(c, number, state)
 
     def _fire_slowly(self, c: Compiled, number: int, state: int) -> tuple[int, int]:
@@ -207,30 +205,19 @@ class Encoding:
                 if state & target != target:
                     state += 1 << offset
         state &= ~c.erase
-        full = -1
-        if state & c.put:
-            full = self._full(number, state & c.put)
+        full = state & c.put
         state |= c.put
-        for mask, offset, count, most, place in c.gives:
-            now = (state & mask) >> offset
-            if now + count > most:
-                if full < 0 or not self.system.places[place].once:
-                    full = place
+        for mask, offset, count, most in c.gives:
+            if ((state & mask) >> offset) + count > most:
+                full |= mask
                 state |= mask
             else:
                 state += count << offset
         return state, full
 
-    def _full(self, number: int, bits: int) -> int:
-        full = -1
-        for place, _ in self.system.rules[number].produce:
-            if self.mask[place] & bits:
-                if not self.system.places[place].once:
-                    return place
-                full = place
-        if full < 0:
-            raise AssertionError("a variable was assigned a value before its old one had gone")
-        return full
+    def places_in(self, bits: int) -> list[int]:
+        """The places that have some of these bits."""
+        return [place for place, mask in enumerate(self.mask) if mask & bits]
 
     # --- reading --------------------------------------------------------------------------------
 

@@ -188,9 +188,10 @@ def _exact(found: Exploration, run: Sequence[int], limits: Limits) -> bool:
     state = encoding.initial
     for rule in run:
         state, full = encoding.fire(rule, state)
-        widest = full < 0 or (1 << (encoding.width[full] + 1)) - 1 > limits.tokens
-        if not widest and not found.system.places[full].once:
-            return False
+        for place in encoding.places_in(full) if full else ():
+            widest = (1 << (encoding.width[place] + 1)) - 1 > limits.tokens
+            if not widest and not found.system.places[place].once:
+                return False
     return True
 
 
@@ -291,7 +292,7 @@ class _Search:
         add_state, add_parent, add_via = states.append, parents.append, via.append
         wait, setdefault = waiting.append, index.setdefault
         outside = [each == 2 for each in rank]
-        transitions = looked = 0
+        transitions = looked = overfull = 0
         look_every = _LOOK_EVERY if choose is None else _LOOK_EVERY_CHOICE
         self.partly, self.inner = partly, inner = set(), set()
         self.goes_back = False
@@ -329,15 +330,14 @@ class _Search:
                 if masks_of is not None:
                     after = state & masks_of[0]
                     put = masks_of[1]
-                    if after & put:
-                        after, full = fire(number, state)
-                        overflows.setdefault(full, (at, number))
-                    else:
-                        after |= put
+                    full = after & put
+                    after |= put
                 else:
                     after, full = fire(number, state)
-                    if full >= 0:
-                        overflows.setdefault(full, (at, number))
+                if full & ~overfull:
+                    for place in encoding.places_in(full & ~overfull):
+                        overflows[place] = (at, number)
+                        overfull |= encoding.mask[place]
                 if unfired[number]:
                     unfired[number] = False
                     fired[number] = at

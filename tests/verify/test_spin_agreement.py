@@ -54,7 +54,7 @@ BROKEN = (JOIN_FED_BY_ONE, TWO_ON_ONE, UNJOINED, UNSENT, UNHANDLED, ROUND)
 SMALL = Limits(states=3_000, tokens=3)
 FEW = 12
 LONG_S = 600.0
-ODD_MISSIONS, ODD_RULES = (18, 27, 234, 251, 356), (1, 19, 176, 203, 540, 728866273)
+ODD_MISSIONS, ODD_RULES = (18, 27, 234, 251, 356), (1, 19, 176, 203, 540, 728866273, 983159541)
 """Seeds at which one of the two was wrong once."""
 
 
@@ -74,11 +74,8 @@ def same(system: System, limits: Limits = SMALL) -> tuple[Exploration, Found]:
     assert spins.transitions == ours.transitions + len(ours.terminals) + 1
     assert spins.fired == ours.fired.keys()
     assert spins.stopped is ours.stopped
-    # Of several places that are overfull at once, the built-in search tells one at a time.
-    assert spins.beyond >= ours.beyond
-    assert spins.overflow_runs.keys() >= ours.overflows.keys()
-    if ours.complete:
-        assert spins.overflow_runs.keys() == ours.overflows.keys()
+    assert spins.beyond == ours.beyond
+    assert spins.overflow_runs.keys() == ours.overflows.keys()
     assert bool(spins.stuck_runs) == bool(stuck(ours))
     for run in spins.stuck_runs:
         assert spins.encoding.marking(replay(spins.encoding, run)[-1]) in stuck(ours)

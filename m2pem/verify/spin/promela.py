@@ -201,7 +201,7 @@ class Writer:
         places = self.places
         consumed = {p for p, _ in rule.consume}
         tests = [
-            places[p] if self.most[p] == 1 or n == 1 else f"{places[p]} >= {n}"
+            "false" if n > self.most[p] else places[p] if n == 1 else f"{places[p]} >= {n}"
             for p, n in rule.consume
         ]
         tests += [places[p] for p in rule.read if p not in consumed]
