@@ -1,5 +1,7 @@
 """Events that are entered: starts, ends, catches, throws, and the event-based gateway."""
 
+from dataclasses import replace
+
 from m2pem.model import elements as e
 from m2pem.model.events import (
     CancelEventDefinition,
@@ -21,6 +23,7 @@ from m2pem.verify.derive.leaving import along, leave
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, Draft, at
 from m2pem.verify.derive.throwing import (
+    ending_thrower,
     message_effects,
     signal_effects,
     throw_error,
@@ -221,9 +224,16 @@ def _throw_all(
             case SignalEventDefinition(signal=signal):
                 thrown = Effect(steps=(Step(node.id, Action.THROWN, signal.id),))
                 begun = product(product(begun, [thrown]), signal_effects(making, signal.id))
+                around = ending_thrower(making, "signal", signal.id, area)
+                caught = [Effect(read=frozenset({place})) for place in sorted(around)]
+                ended += _interrupted(node, product(begun, caught))
+                begun = product(begun, [Effect(inhibit=around)])
             case MessageEventDefinition(message=message):
                 thrown = Effect(steps=(Step(node.id, Action.THROWN, message.id),))
                 begun = product(product(begun, [thrown]), message_effects(making, message.id))
+                around = ending_thrower(making, "message", message.id, area)
+                ended += _interrupted(node, [each for each in begun if around & {*each.consume}])
+                begun = [each for each in begun if not around & {*each.consume}]
             case EscalationEventDefinition(escalation=escalation):
                 assert escalation is not None
                 going: list[Effect] = []
@@ -236,6 +246,15 @@ def _throw_all(
             case _:
                 pass
     return [*product(begun, ways), *ended]
+
+
+def _interrupted(node: e.Event, thrown: list[Effect]) -> list[Effect]:
+    """What it throws interrupts what is around it: it does not complete."""
+    done, cut = Step(node.id, Action.COMPLETED), Step(node.id, Action.INTERRUPTED)
+    return [
+        replace(each, steps=tuple(cut if step == done else step for step in each.steps))
+        for each in thrown
+    ]
 
 
 def end(making: Making, node: e.FlowNode, area: Area) -> None:

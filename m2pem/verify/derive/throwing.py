@@ -276,6 +276,26 @@ def message_effects(making: Making, message: str, *, kept: bool = True) -> list[
     return [*found, nobody]
 
 
+def ending_thrower(making: Making, what: str, ref: str, area: Area) -> frozenset[int]:
+    """Where what is around an element of an area waits to interrupt it by what the element throws.
+
+    A signal or message goes out before its thrower completes: such a one never does.
+    """
+    around: set[int] = set()
+    here: Area | None = area
+    while here is not None:
+        if here.open is not None:
+            around.add(here.open)
+        host = here.host if isinstance(here.host, Host) else None
+        if host is not None:
+            around.add(host.active)
+        here = host.outer if host is not None else None
+    register = making.signals if what == "signal" else making.messages
+    return frozenset(
+        each.waiting for each in register.get(ref, ()) if each.waiting in around and not each.keeps
+    )
+
+
 def _letters(making: Making, message: str) -> int:
     """Where copies of a message are kept until somebody waits: nothing limits how many come."""
     making.net.approximate(

@@ -211,7 +211,7 @@ class _Search:
                 raise InternalError(f"Spin finds no run to rule {rule}, which it says can fire")
             return
         run = self._runs(model)[0]
-        if run[-1] != rule:
+        if run[-1:] != (rule,):
             raise InternalError(f"Spin's run to rule {rule} does not end with it")
         self.found.rule_runs[rule] = run
 
