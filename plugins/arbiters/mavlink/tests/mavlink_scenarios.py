@@ -628,6 +628,16 @@ def satellites_lost(s: Station) -> None:
     s.watch(30.0)
 
 
+@of("px4copter")
+def satellites_lost_on_the_ground(s: Station) -> None:
+    """It says why it cannot be armed when it is asked."""
+    s.ready()
+    s.satellites(False)
+    s.watch(5.0)
+    s.command("check", dialect.MAV_CMD_RUN_PREARM_CHECKS)
+    s.arm()
+
+
 @of("arducopter")
 def fence_breached(s: Station) -> None:
     """A circle of 50 m; the action is to return or land."""

@@ -78,6 +78,29 @@ def test_it_arms_in_a_mode_that_holds_and_takes_off_to_a_height_above_the_sea(vi
     virtual(main)
 
 
+def test_a_vehicle_whose_checks_fail_is_made_to_say_why(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        link, vehicle = px4(clock)
+        bit = dialect.MAV_SYS_STATUS_PREARM_CHECK
+        link.says["SYS_STATUS"] = {
+            "onboard_control_sensors_present": bit,
+            "onboard_control_sensors_enabled": bit,
+            "battery_remaining": 90,
+        }
+
+        def say(_: Any) -> int:
+            link.say("Preflight: GPS fix too low")
+            return ACCEPTED
+
+        link.obey[dialect.MAV_CMD_RUN_PREARM_CHECKS] = say
+        async with Playing((link, vehicle)):
+            with pytest.raises(RefusedError, match="not ready: prearm: GPS fix too low"):
+                await vehicle.driver.arm()
+            assert not link.of("COMMAND_LONG", ARM)
+
+    virtual(main)
+
+
 def test_a_place_is_told_by_its_height_above_the_sea(virtual: Run) -> None:
     async def main(clock: Clock) -> None:
         async with Playing(px4(clock)) as (link, vehicle):

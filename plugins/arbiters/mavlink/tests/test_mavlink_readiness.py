@@ -65,6 +65,7 @@ def test_prearm_texts_are_the_reasons_of_a_check_that_fails() -> None:
     assert reasons(ARDUPILOT, READY, *texts) == ()
     assert "does not say which" in reasons(ARDUPILOT, failing)[0]
     assert reasons(PX4, failing, "Preflight Fail: no RC") == ("prearm: no RC",)
+    assert reasons(PX4, failing, "Preflight: GPS fix too low") == ("prearm: GPS fix too low",)
 
 
 def test_gps_battery_and_link_are_reasons() -> None:

@@ -65,9 +65,8 @@ def test_arming_without_a_position_is_rejected_with_texts() -> None:
     bench = Px4Bench(estimator_s=20)
     bench.run(5)
     assert bench.command(ARM, 1) == LATER
-    # Its last text is longer than a message.
-    assert "Preflight Fail: Sensors are still calibrating" in bench.texts()
-    assert "".join(bench.texts()[-2:]) == "Arming denied: Resolve system health failures first"
+    denied = "Arming denied: Resolve system health failures first"  # longer than a message
+    assert f"{denied}Preflight Fail: Sensors are still calibrating" in "".join(bench.texts())
     bench.run(10)
     assert bench.command(ARM, 1) == LATER
     assert "Preflight Fail: No valid position estimate" in bench.texts()

@@ -79,19 +79,24 @@ class _RealAutopilot(ArbiterContract):
         link = await open_link(Address(number, 1), [url], clock)
         vehicle = Vehicle(ResourceId("x"), self.domain, link, clock, lost_after_s=10.0)
         vehicle.open()
+        try:
+            await self._ready(vehicle)
+        finally:
+            await vehicle.close()
+            await link.close()
+
+    async def _ready(self, vehicle: Vehicle) -> None:
         assert await vehicle.identified(READY_WITHIN_S)
         assert await vehicle.until(lambda: vehicle.driver.readiness().ready, READY_WITHIN_S)
-        if self.domain == "air":
-            await vehicle.driver.take_off(self.height_m)
-            high = await vehicle.until(
-                lambda: (vehicle.heard.altitude_above_home_m or 0.0) > self.height_m - 2,
-                READY_WITHIN_S,
-            )
-            assert high, vehicle.recent_texts(60.0)
-        else:
+        if self.domain != "air":
             await vehicle.driver.arm()
-        await vehicle.close()
-        await link.close()
+            return
+        await vehicle.driver.take_off(self.height_m)
+        high = await vehicle.until(
+            lambda: (vehicle.heard.altitude_above_home_m or 0.0) > self.height_m - 2,
+            READY_WITHIN_S,
+        )
+        assert high, vehicle.recent_texts(60.0)
 
     @pytest.fixture(params=["pymavlink", "mavsdk"])
     def make_arbiter(

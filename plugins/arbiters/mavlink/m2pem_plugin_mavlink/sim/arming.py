@@ -44,7 +44,10 @@ class Arming(Part):
             yield self.autopilot.firmware.reason_sensors
         if mode.needs_position and not estimator.ready:
             firmware = self.autopilot.firmware
-            yield firmware.reason_position if estimator.sensors_well else firmware.reason_home
+            if estimator.gps_lost and firmware.reason_satellites:
+                yield firmware.reason_satellites
+            else:
+                yield firmware.reason_position if estimator.sensors_well else firmware.reason_home
 
     @property
     def healthy(self) -> bool:
@@ -56,6 +59,8 @@ class Arming(Part):
         if self.armed:
             return True
         reasons = [] if force else list(self.reasons())
+        if reasons and self.autopilot.firmware.arming_denied:
+            self.autopilot.warn(self.autopilot.firmware.arming_denied)
         for reason in reasons:
             self.autopilot.warn(self.autopilot.firmware.arming_text(reason))
         if reasons:
@@ -121,5 +126,5 @@ class Arming(Part):
         if self.armed:
             return Result.TEMPORARILY_REJECTED
         for reason in self.reasons():
-            self.autopilot.warn(f"PreArm: {reason}")
+            self.autopilot.warn(self.autopilot.firmware.check_text(reason))
         return Result.ACCEPTED

@@ -1,6 +1,5 @@
 """How ArduPilot is driven: ArduCopter, ArduPlane, ArduRover (boats too) and ArduSub."""
 
-import contextlib
 import math
 from collections.abc import Sequence
 
@@ -8,7 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.microservices.commands import CommandPlace
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
-from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedError
+from m2pem_plugin_mavlink.protocol.transaction import RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot, cannot, not_now
 from m2pem_plugin_mavlink.vehicle.circling import WINGED
@@ -58,10 +57,6 @@ class ArdupilotDriver(Autopilot):
         out at once; it is armed in the mode that it is in."""
         if self.kind not in WINGED:
             await self.set_mode(FlightMode.GUIDED)
-
-    async def _have_it_checked(self) -> None:
-        with contextlib.suppress(ExchangeError):  # older ones do not know the command
-            await exchanges.command(self.link, dialect.MAV_CMD_RUN_PREARM_CHECKS)
 
     # --- up and down ----------------------------------------------------------------------------
 

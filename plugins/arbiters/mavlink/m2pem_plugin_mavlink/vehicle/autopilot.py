@@ -1,5 +1,6 @@
 """What the drivers of all autopilots share: to command, and to believe what is then heard."""
 
+import contextlib
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable, Sequence
@@ -248,8 +249,11 @@ class Autopilot(ABC):
     def _not_ready(self) -> RefusedError:
         return not_now("not ready: " + "; ".join(self.readiness().reasons))
 
-    async def _have_it_checked(self) -> None:  # noqa: B027  # only ArduPilot can be asked
-        """Have it say now why it cannot be armed; else it does that every 30 s."""
+    async def _have_it_checked(self) -> None:
+        """Have it say now why it cannot be armed; else ArduPilot does that every 30 s, and PX4 when
+        a reason comes or goes."""
+        with contextlib.suppress(ExchangeError):  # older ones do not know the command
+            await exchanges.command(self.link, dialect.MAV_CMD_RUN_PREARM_CHECKS)
 
     @abstractmethod
     async def _enter_arming_mode(self) -> None: ...

@@ -23,7 +23,7 @@ _NO_POSITION = dialect.EKF_CONST_POS_MODE
 _FIX_3D = dialect.GPS_FIX_TYPE_3D_FIX
 _REFUSALS = {
     Firmware.ARDUPILOT: ("PreArm: ", "Arm: "),
-    Firmware.PX4: ("Preflight Fail: ", "Arming denied: ", "Arming denied! "),
+    Firmware.PX4: ("Preflight Fail: ", "Preflight: ", "Arming denied: ", "Arming denied! "),
 }
 
 

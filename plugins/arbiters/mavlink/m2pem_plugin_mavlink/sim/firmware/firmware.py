@@ -62,6 +62,10 @@ class Firmware(ABC):
     reason_home: str
     reason_position: str
     reason_sensors: str
+    reason_satellites: str = ""
+    """Without satellites, on the ground; "": as for any other lack of a position."""
+    arming_denied: str = ""
+    """What it says before the reasons why it does not arm."""
     loop_hz: float
     first_mode: int
     vtol_state: int
@@ -125,6 +129,10 @@ class Firmware(ABC):
     def checks_sensors(self, autopilot: "Autopilot") -> bool:
         """Arming waits until sensors are well, whatever the mode."""
         return True
+
+    def check_text(self, reason: str) -> str:
+        """How it says what is against arming it, when it is asked."""
+        return f"PreArm: {reason}"
 
     def arming_text(self, reason: str) -> str:
         """How it says that it does not arm."""

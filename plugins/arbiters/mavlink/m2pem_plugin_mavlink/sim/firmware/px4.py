@@ -22,7 +22,7 @@ from m2pem_plugin_mavlink.sim.firmware.px4_modes import (
 )
 from m2pem_plugin_mavlink.sim.firmware.px4_offboard import OffboardWatch
 from m2pem_plugin_mavlink.sim.firmware.px4_parameters import parameters_of, whole
-from m2pem_plugin_mavlink.sim.firmware.px4_reports import Px4Reports
+from m2pem_plugin_mavlink.sim.firmware.px4_reports import Px4Reports, SatelliteWatch
 from m2pem_plugin_mavlink.sim.missions.availability import MissionAvailability
 from m2pem_plugin_mavlink.sim.modes import Mode
 from m2pem_plugin_mavlink.sim.parameters import Parameters
@@ -96,6 +96,8 @@ class Px4(Firmware):
     reason_position = "No valid position estimate"
     reason_home = reason_position
     reason_sensors = "Sensors are still calibrating"
+    reason_satellites = "GPS fix too low"
+    arming_denied = "Arming denied: Resolve system health failures first"
     loop_hz = 1000.0
     first_mode = HOLD
     vtol_state = dialect.MAV_VTOL_STATE_UNDEFINED
@@ -207,6 +209,7 @@ class Px4(Firmware):
             Px4Commands,
             Px4Reports,
             LandingWatch,
+            SatelliteWatch,
         )
 
     def mode_entered(self, autopilot: "Autopilot") -> None:
@@ -214,8 +217,13 @@ class Px4(Firmware):
         autopilot.part(LandingWatch).entered(autopilot.modes.mode)
 
     def arming_text(self, reason: str) -> str:
-        """The reason, which PX4 says by itself before."""
-        return f"Preflight Fail: {reason}"
+        """The reason; some are warnings while it is not armed."""
+        failure = "" if reason == self.reason_satellites else " Fail"
+        return f"Preflight{failure}: {reason}"
+
+    def check_text(self, reason: str) -> str:
+        """The same."""
+        return self.arming_text(reason)
 
     def mode_text(self, mode: Mode, reason: str) -> str:
         """Without a reason."""

@@ -63,8 +63,6 @@ class Px4Commands(Part):
             return Result.UNSUPPORTED
         if command.param1 == 1:
             done = arming.arm(force=force)
-            if not done:
-                self.autopilot.warn("Arming denied: Resolve system health failures first")
         else:
             done = arming.disarm(force=force)
             if not done:

@@ -1,12 +1,15 @@
-"""Telemetry that PX4 sends and ArduPilot does not."""
+"""Telemetry and texts that PX4 sends and ArduPilot does not."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.sim.maneuvers.orbiting import Orbit
 from m2pem_plugin_mavlink.sim.part import Part, ReportMaker
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink.sim.autopilot import Autopilot
 
 
 class Px4Reports(Part):
@@ -59,3 +62,19 @@ class Px4Reports(Part):
             round(center.longitude_deg * 1e7),
             center.altitude_amsl_m,
         )
+
+
+class SatelliteWatch(Part):
+    """Says on the ground that the satellites are gone, when they go."""
+
+    def __init__(self, autopilot: "Autopilot") -> None:
+        super().__init__(autopilot)
+        self._lost = False
+
+    def step(self, dt_s: float) -> None:
+        """Look at the receiver."""
+        pilot = self.autopilot
+        lost = pilot.estimator.gps_lost
+        if lost and not self._lost and not pilot.arming.armed:
+            pilot.warn(pilot.firmware.check_text(pilot.firmware.reason_satellites))
+        self._lost = lost
