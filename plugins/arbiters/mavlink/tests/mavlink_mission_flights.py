@@ -17,7 +17,7 @@ from m2pem_plugin_mavlink.sitl.readiness import connected, ready
 from mavlink_tracks import At, Sample, Tap, Uploaded, east_north, logged_missions
 
 from m2pem import load_fleet
-from m2pem.api import Area, Fleet, Route
+from m2pem.api import Area, Fleet, Point, Route
 
 Record = dict[str, Any]
 
@@ -58,10 +58,14 @@ class Flight:
         return [each for each in self.tracks[vehicle] if begin_s <= each.at_s <= end_s]
 
     def outline(self, name: str) -> list[At]:
-        """The outer ring of an area, or the points of a route."""
-        geometry = self.fleet.geometries[name]
-        assert isinstance(geometry, Area | Route)
-        points = geometry.rings[0] if isinstance(geometry, Area) else geometry.points
+        """The outer ring of an area, the waypoints of a route, or a point."""
+        match self.fleet.geometries[name]:
+            case Area(rings=rings):
+                points = rings[0]
+            case Route(waypoints=waypoints):
+                points = waypoints
+            case Point(position=position):
+                points = (position,)
         return [east_north(self.origin, (point[0], point[1])) for point in points]
 
 

@@ -206,9 +206,11 @@ class TestPx4(_RealAutopilot):
 class TestPx4Rover(TestPx4):
     model = "sihsim_rover_ackermann"
     domain = "ground"
+    standing_m_s = 0.3  # in AUTO.LOITER it creeps back to its place
 
 
 @pytest.mark.sitl("M2PEM_PX4")
+@pytest.mark.xfail(reason="the plane of PX4's simulation does not take off (its issue 27344)")
 class TestPx4Plane(TestPx4):
     model = "sihsim_airplane"
     unsupported = _RealPlane.unsupported

@@ -1,6 +1,7 @@
 """Missions on real autopilots: where the vehicles went, against what was commanded."""
 
 import json
+import math
 from itertools import pairwise
 from pathlib import Path
 
@@ -87,6 +88,67 @@ def test_a_survey_leaves_nothing_out_and_keeps_to_its_lines(programs: Path, tmp_
         assert off.rms_m < 1.0
         assert off.most_m <= ARRIVED_M
         assert max(abs(each - height_m) for each in up) < 1.0
+
+
+ON_A_ROUTE = ("single_vehicle_routing", "road_following_formation", "bridge_crossing")
+WEDGE: tuple[At, At] = ((1.0, 1.0), (1.0, -1.0))
+"""Of the two after the lead: spacings behind it and to its left."""
+
+
+@pytest.mark.parametrize(
+    ("mission", "answers"),
+    [
+        ("vignette1", "vignette1_route"),
+        ("mehds_vignette_2", "mehds_vignette_2_rejoined"),
+        ("mehds_vignette_3", "mehds_vignette_3_crossed"),
+        ("mehds_vignette_4", "mehds_vignette_4_route_driven"),
+    ],
+)
+def test_the_vehicles_of_the_field_tests_keep_to_their_routes(
+    programs: Path, tmp_path: Path, mission: str, answers: str
+) -> None:
+    flight = fly(
+        *(programs, with_patience("mehds_sitl", tmp_path), MISSIONS / f"{mission}.bpmn"),
+        *(tmp_path / "vehicles", 5.0),
+        *("--answers", MISSIONS / "answers" / f"{answers}.yaml"),
+    )
+    assert flight.status == 0, flight.errors
+    driven = [each for name in ON_A_ROUTE for each in flight.behaviors(name)]
+    assert driven
+    for record, begin_s, end_s in driven:
+        route = flight.outline(record["parameters"]["route"])
+        spacing_m = float(record["parameters"].get("spacing", "0").split()[0])
+        for number, vehicle in enumerate(record["resources"]):
+            places = [each.place for each in flight.between(vehicle, begin_s, end_s)]
+            first = next(
+                at
+                for at, place in enumerate(places)
+                if cross_track([place], route).most_m < ARRIVED_M
+            )
+            off = cross_track(places[first:], route)
+            left_m = abs(math.dist(places[-1], route[-1]) - number * spacing_m)
+            said(
+                f"{mission} {record['element']} {vehicle}",
+                f"beside its route {off}",
+                f"{left_m:.1f} m",
+            )
+            assert off.rms_m < 1.0
+            assert left_m < 1.5
+    for record, begin_s, end_s in flight.behaviors("formation"):
+        lead, *others = record["resources"]
+        spacing_m = float(record["parameters"]["spacing"].split()[0])
+        for vehicle, (behind, left) in zip(others, WEDGE, strict=True):
+            place = (behind * spacing_m, left * spacing_m)
+            tracks = (flight.between(each, begin_s, end_s) for each in (lead, vehicle))
+            kept = formation_error(*tracks, place)
+            assert kept is not None, f"{vehicle} never came to its place"
+            said(f"{mission} {record['element']} {vehicle}", kept[0], f"after {kept[1]:.0f} s")
+            assert kept[0].rms_m < 0.6 * spacing_m  # the lead waits from half of it on
+    for record, _, end_s in flight.behaviors("goto"):
+        (target,) = flight.outline(record["parameters"]["target"])
+        away_m = math.dist(flight.between(record["resources"][0], 0.0, end_s)[-1].place, target)
+        said(f"{mission} {record['element']}", f"{away_m:.1f} m from its target")
+        assert away_m < ARRIVED_M
 
 
 NEAREST_M = 7.5
