@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
@@ -15,7 +16,7 @@ from m2pem.resources.madeup import fleet_for
 from m2pem.verify.check import check
 from m2pem.verify.derive import Options, derive
 from m2pem.verify.encoding import Marking
-from m2pem.verify.explore import Exploration, Limits, explore
+from m2pem.verify.explore import Exploration, Limits, Stopped, explore
 from m2pem.verify.labels import Labels
 from m2pem.verify.ltl import Formula, propositions
 from m2pem.verify.ltl.formula import Active, Completed, needs_steps, rebuilt
@@ -29,10 +30,11 @@ from m2pem.verify.requirements.requirement import Requirement
 from m2pem.verify.results import Verdict
 from m2pem.verify.simplify import simplify
 from m2pem.verify.spin import requiring
+from m2pem.verify.spin.asking import Asking, Told
 from m2pem.verify.spin.checking import check_with_spin
-from m2pem.verify.spin.search import Found, search
+from m2pem.verify.spin.search import Found, Wanted, search
 from m2pem.verify.spin.trail import replay
-from m2pem.verify.system import System
+from m2pem.verify.system import Flag, System
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
 from tests.seeds import seeds_for
@@ -54,6 +56,7 @@ BROKEN = (JOIN_FED_BY_ONE, TWO_ON_ONE, UNJOINED, UNSENT, UNHANDLED, ROUND)
 SMALL = Limits(states=3_000, tokens=3)
 FEW = 12
 LONG_S = 600.0
+MOST_RULES = 2_000
 ODD_MISSIONS, ODD_RULES = (18, 27, 234, 251, 356), (1, 19, 176, 203, 540, 728866273, 983159541)
 """Seeds at which one of the two was wrong once."""
 
@@ -145,12 +148,33 @@ def test_random_rules_have_the_same_states(seed: int) -> None:
 def test_many_random_ones_have_the_same_states(made) -> None:  # type: ignore[no-untyped-def]
     for seed in seeds_for(LONG_S):
         system = made(seed)
+        if len(system.rules) > MOST_RULES:
+            continue  # Spin takes half a minute for each question
         if len(explore(system, SMALL).states) <= SMALL.states:
             try:
                 same(system)
             except Exception as error:
                 error.add_note(f"seed {seed}")
                 raise
+
+
+def test_no_more_is_asked_when_the_time_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = random_system(Random(13))
+    system = replace(made, rules=tuple(replace(rule, flag=Flag.CONFLICT) for rule in made.rules))
+    assert len(search(system, SMALL).rule_runs) > 1
+    asked: list[object] = []
+    ask = Asking.ask
+
+    def counted(self: Asking, *words: Any, **options: Any) -> Told:
+        asked.append(words)
+        return ask(self, *words, **options)
+
+    monkeypatch.setattr(Asking, "ask", counted)
+    monkeypatch.setattr(Asking, "began_ago", lambda self: 0.0 if len(asked) < 2 else 1e9)
+    found = search(system, SMALL, wanted=replace(Wanted.of(system), stuck=False))
+    assert found.stopped is Stopped.TIME
+    assert len(found.rule_runs) <= 1
+    assert len(asked) <= 3
 
 
 # --- requirements ---------------------------------------------------------------------------------

@@ -134,13 +134,22 @@ class _Search:
             if self.wanted.stuck and model.stuck_line not in told.report.unreached_skips:
                 self._get_stuck()
             for rule in sorted(found.fired & self.wanted.rules):
-                self._lead_to(rule)
+                if self._in_time():
+                    self._lead_to(rule)
             for place in self.wanted.left:
-                self._leave(place)
+                if self._in_time():
+                    self._leave(place)
         elif told.stopped is not Stopped.INTERRUPTED:
             self._anything()
         if found.beyond and found.stopped is None:
             found.stopped = Stopped.TOKENS
+
+    def _in_time(self) -> bool:
+        """Whether there is time for another question: each has a large model translated anew."""
+        if self.asking.began_ago() <= self.asking.limits.seconds:
+            return True
+        self.found.stopped = self.found.stopped or Stopped.TIME
+        return False
 
     # --- all there is ---------------------------------------------------------------------------
 
