@@ -32,11 +32,14 @@ def _armed(bus: FleetBus, resource: ResourceId) -> VehicleState | None:
 
 
 def _how(state: VehicleState, domain: Domain) -> str:
-    how = f"{f' in {state.mode}' if state.mode else ''}{_height(state, domain)}"
+    height = _height(state, domain)
+    how = f"{f' in {state.mode}' if state.mode else ''}{height}"
     if state.link is LinkState.LOST:
+        comma = "," if height else ""
+        may = "bring it down" if domain is Domain.AIR else "move or stop it"
         return (
-            f"{state.resource} was armed{how}, when its link was lost; what it does now is not "
-            "known, its own failsafe may bring it down"
+            f"{state.resource} was armed{how}{comma} when its link was lost; what it does now is "
+            f"not known, its own failsafe may {may}"
         )
     return f"{state.resource} stays armed{how}"
 

@@ -72,9 +72,9 @@ def test_a_run_that_ends_says_what_stays_armed_and_what_may_be_done(play):
     alert = play(story, "uav1", "ugv1", "ugv2", "ugv3")
     assert alert.run == "r1"
     assert alert.text == (
-        "uav1 stays armed in BRAKE, 20 m above its home; ugv1 stays armed in HOLD; ugv3 was armed, "
-        "when its link was lost; what it does now is not known, its own failsafe may bring it "
-        "down. Nothing commands them now: land, return to launch or disarm by another mission, or "
+        "uav1 stays armed in BRAKE, 20 m above its home; ugv1 stays armed in HOLD; ugv3 was armed "
+        "when its link was lost; what it does now is not known, its own failsafe may move or stop "
+        "it. Nothing commands them now: land, return to launch or disarm by another mission, or "
         "by the vehicle's own ground station or remote control"
     )
 
