@@ -174,6 +174,7 @@ class MavlinkArbiter:
             area = self._connections[resource].fence
             if area is not None:
                 self._fences[resource] = fences.setdefault(id(area), Fence(area))
+            self._publish_changes(self._helms[resource])
             self._tasks.append(create(self._attend(resource)))
         heard = await asyncio.gather(*(helm.knows(HEARD_WITHIN_S) for helm in self._helms.values()))
         for vehicle in vehicles.values():  # who is commanded first may be told to follow another
@@ -382,6 +383,20 @@ class MavlinkArbiter:
                 self._states.put(replace(vehicle.state(), behavior=helm.behavior))
             left_s = bound_s - silent_s
             await clock.sleep(min(TELEMETRY_EVERY_S, left_s) if left_s > 0 else TELEMETRY_EVERY_S)
+
+    def _publish_changes(self, helm: "Helm") -> None:
+        """Publish changes of mode, and arming, at once: they may end a run, and what operators then
+        read of the vehicle is its last state."""
+        heard = helm.vehicle.heard
+        shown = heard.custom_mode, heard.armed
+
+        def look() -> None:
+            nonlocal shown
+            if (heard.custom_mode, heard.armed) != shown:
+                shown = heard.custom_mode, heard.armed
+                self._states.put(replace(helm.vehicle.state(), behavior=helm.behavior))
+
+        helm.vehicle.watch(look)
 
 
 def _vehicles(request: BehaviorRequest) -> list[ResourceId]:

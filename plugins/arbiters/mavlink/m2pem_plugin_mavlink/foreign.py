@@ -190,10 +190,20 @@ class TakeoverWatch:
         texts = self.vehicle.recent_texts(now_s - since_s + TEXTS_BEFORE_S)
         for cause, pattern in ((Cause.FAILSAFE, _FAILSAFE), (Cause.PILOT, _PILOT)):
             said = [text for text in texts if pattern.search(text)]
+            if cause is Cause.FAILSAFE and not said:
+                said = self._fence_breached(since_s)
             if said:
                 who = "a failsafe of its own" if cause is Cause.FAILSAFE else "a person"
                 return Takeover(cause, f"{who} has taken over: {changed}: {'; '.join(said)}")
         return otherwise if now_s - since_s >= SETTLES_S else None
+
+    def _fence_breached(self, since_s: float) -> list[str]:
+        """ArduRover says nothing of a breach but in FENCE_STATUS."""
+        heard = self.vehicle.heard
+        breached_s = heard.fence_breached_s
+        if breached_s is None or breached_s < since_s - TEXTS_BEFORE_S:
+            return []
+        return [f"fence breached ({heard.fence_breach or 'it is inside again'})"]
 
     def _mission_is_over(self) -> bool:
         mission, driver = self.vehicle.ours.mission, self.vehicle.driver

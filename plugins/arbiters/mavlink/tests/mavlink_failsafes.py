@@ -1,8 +1,8 @@
-"""Failsafes of a real ArduCopter while m2pem runs a mission on it: what each of the two does.
+"""Failsafes of real autopilots while m2pem runs a mission on them: what each of the two does.
 
-A cell is a failsafe in a phase of a mission. It is played with the real program, `m2pem run` as a
-user starts it, and a second ground station that brings the failsafe about and looks on. What was
-seen is kept in `traces/failsafes.json`; docs/failsafes.md is made of that.
+A cell is a failsafe in a phase of a mission (`mavlink_failsafe_cells`). It is played with the real
+program, `m2pem run` as a user starts it, and a second ground station that brings the failsafe about
+and looks on. What was seen is kept in `traces/failsafes.json`; docs/failsafes.md is made of that.
 """
 
 import json
@@ -21,23 +21,30 @@ from typing import Any, NamedTuple
 
 from m2pem_plugin_mavlink.sim.specification import Kind
 from m2pem_plugin_mavlink.sitl.frames import FRAMES
-from m2pem_plugin_mavlink.sitl.launch import Start, ardupilot_launch
+from m2pem_plugin_mavlink.sitl.launch import (
+    Launch,
+    Start,
+    ardupilot_launch,
+    px4_launch,
+    px4_port,
+)
 from m2pem_plugin_mavlink.sitl.processes import running
-from m2pem_plugin_mavlink.sitl.programs import ardupilot_program
+from m2pem_plugin_mavlink.sitl.programs import ardupilot_program, find_px4
 from mavlink_sitl import free_port
-from mavlink_station import SECOND, Station
+from mavlink_station import Station
 from mavlink_wires import UdpWire
-from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.testing.scenarios import ORIGIN, one_after_another
 
 FILE = Path(__file__).parent / "traces/failsafes.json"
-SPEED = 10
-HIGH_M = 12.0
 AFTERWARDS_S = 90.0
 """So long the vehicle is watched after the mission, unless its motors stop."""
+STANDS_M_S = 0.3
+GROUND_STATION_PORT = 14550
+"""Every PX4 sends there, too."""
 LATITUDE, LONGITUDE, ALTITUDE_M = ORIGIN
 NORTH = f"[{LATITUDE + 0.0008},{LONGITUDE}]"
+FAR_NORTH = f"[{LATITUDE + 0.003},{LONGITUDE}]"
 CORNERS = [
     (LONGITUDE + east, LATITUDE + north)
     for north, east in ((0.0003, 0.0), (0.0012, 0.0), (0.0012, 0.001), (0.0003, 0.001))
@@ -47,39 +54,16 @@ AREA = {
     "properties": {},
     "geometry": {"type": "Polygon", "coordinates": [[*CORNERS, CORNERS[0]]]},
 }
-UP: tuple[str, Mapping[str, object]] = ("takeoff", {"altitude": "30 m"})
 
 
 class Phase(NamedTuple):
-    """`steps`: the behaviors of the mission; `now`: whether it is time for the failsafe."""
+    """`steps`: the behaviors of the mission; `now`: whether it is time for the failsafe, which is
+    `before` the mission if it is there before the mission begins."""
 
     name: str
     steps: tuple[tuple[str, Mapping[str, object]], ...]
     now: Callable[[Station], bool]
-
-
-PHASES = {
-    phase.name: phase
-    for phase in (
-        Phase("on the ground", (UP,), lambda s: s.located),
-        Phase("taking off", (("takeoff", {"altitude": "90 m"}),), lambda s: s.height_m > HIGH_M),
-        Phase(
-            "in a survey",
-            (UP, ("area_survey", {"area": "field", "spacing": "20 m", "altitude": "30 m"})),
-            lambda s: s.mode == "AUTO" and s.known.get("current", 0) > 1,
-        ),
-        Phase(
-            "in RTL",
-            (UP, ("goto", {"target": NORTH}), ("return_to_launch", {})),
-            lambda s: s.mode == "RTL",
-        ),
-        Phase(
-            "landing",
-            (UP, ("goto", {"target": NORTH}), ("land", {})),
-            lambda s: s.mode == "LAND",
-        ),
-    )
-}
+    before: bool = False
 
 
 class Failsafe(NamedTuple):
@@ -91,64 +75,30 @@ class Failsafe(NamedTuple):
     end: Callable[["Play"], None] = lambda play: None
 
 
-def _set(parameter: str, value: float) -> Callable[["Play"], None]:
-    return lambda play: play.station.set_quietly(parameter, value)
+class Vehicle(NamedTuple):
+    """A program with its parameters, and what is played with it.
 
+    `name`: in the traces; `title`: for people; `variable`: of the environment, names the program;
+    `model`: of its simulation; `speed`: how much faster than real time."""
 
-def _cut(play: "Play") -> None:
-    play.relay.cut = True
+    name: str
+    title: str
+    variable: str
+    kind: Kind
+    firmware: str
+    model: str
+    domain: str
+    resource: str
+    failsafe: str
+    speed: int
+    parameters: Mapping[str, float]
+    phases: Mapping[str, Phase]
+    failsafes: Mapping[str, Failsafe]
 
-
-def _mend(play: "Play") -> None:
-    play.relay.cut = False
-
-
-def _second(command: int, *params: float) -> Callable[["Play"], None]:
-    return lambda play: play.station.command_quietly(command, *params)
-
-
-def _clear(play: "Play") -> None:
-    play.station.send(dialect.MAVLink_mission_clear_all_message(1, 1, 0), SECOND)
-
-
-def _restart(play: "Play") -> None:
-    """Forced, as it is in flight."""
-    reboot = dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
-    play.station.command_quietly(reboot, 1, 0, 0, 0, 0, 20190226)
-    play.station.start_anew()
-
-
-MODE = dialect.MAV_CMD_DO_SET_MODE
-VOLTS = "SIM_BATT_VOLTAGE"
-FAILSAFES = {
-    failsafe.name: failsafe
-    for failsafe in (
-        Failsafe("ground station lost for 20 s, RTL", {}, _cut, _mend),
-        Failsafe("battery low, no action", {"BATT_FS_LOW_ACT": 0}, _set(VOLTS, 10.4)),
-        Failsafe("battery low, RTL", {"BATT_FS_LOW_ACT": 2}, _set(VOLTS, 10.4)),
-        Failsafe(
-            "battery critical, LAND",
-            {"BATT_CRT_VOLT": 10.45, "BATT_FS_CRT_ACT": 1},
-            _set(VOLTS, 10.3),
-        ),
-        Failsafe("radio of the pilot lost, RTL", {"FS_THR_ENABLE": 1}, _set("SIM_RC_FAIL", 1)),
-        Failsafe("no GPS (EKF failsafe)", {}, _set("SIM_GPS1_ENABLE", 0)),
-        Failsafe(
-            "fence breached, RTL",
-            {"FENCE_ENABLE": 1, "FENCE_TYPE": 1, "FENCE_ALT_MAX": 100, "FENCE_ACTION": 1},
-            _set("FENCE_ALT_MAX", 10),
-        ),
-        Failsafe("motors fail, crash check", {"SIM_ENGINE_MUL": 0.0}, _set("SIM_ENGINE_FAIL", 15)),
-        Failsafe(
-            "the autopilot restarts",
-            {},
-            _restart,
-        ),
-        Failsafe("a second ground station: mode LOITER", {}, _second(MODE, 1, 5)),
-        Failsafe("a second ground station: mode RTL", {}, _second(MODE, 1, 6)),
-        Failsafe("a second ground station: clears the mission", {}, _clear),
-    )
-}
+    @property
+    def flies(self) -> bool:
+        """It does not stand safely where its motors run."""
+        return self.domain == "air"
 
 
 @dataclass
@@ -164,8 +114,9 @@ class Relay:
     """Between an autopilot and m2pem; `cut`: nothing passes."""
 
     to_port: int
-    cut: bool = False
     port: int = 0
+    """Of its own, to which the autopilot sends; 0: one that is free."""
+    cut: bool = False
     _stopped: bool = False
     _sockets: list[socket.socket] = field(default_factory=list)
 
@@ -173,7 +124,7 @@ class Relay:
     def run(self) -> Iterator["Relay"]:
         """Pass datagrams on in a thread."""
         near, far = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
-        near.bind(("127.0.0.1", 0))
+        near.bind(("127.0.0.1", self.port))
         far.bind(("127.0.0.1", 0))
         self.port = near.getsockname()[1]
         thread = threading.Thread(target=self._pass, args=(near, far))
@@ -204,46 +155,72 @@ class Relay:
                     near.sendto(data, autopilot)
 
 
-def play(failsafe: Failsafe, phase: Phase, binary: Path, instance: int) -> dict[str, Any]:
-    """What a real ArduCopter and m2pem do.
+def play(
+    vehicle: Vehicle, failsafe: Failsafe, phase: Phase, binary: Path, instance: int
+) -> dict[str, Any]:
+    """What a real autopilot and m2pem do.
 
     `modes`: of the vehicle, from the failsafe on; `texts`: its warnings; `end`: how the behavior
     ended; `said`: what operators read from the failsafe on; `status`: of m2pem; `disarmed`: the
-    motors stopped; `at home`: it was then within 4 m of where it took off.
+    motors stopped; `stands`: at the end, it did not move; `at home`: it was then within 4 m of
+    where it began.
     """
-    wire = UdpWire(Kind.COPTER, "ardupilot")
-    frame = FRAMES["quad"]
-    with TemporaryDirectory() as name, Relay(free_port()).run() as relay:
-        folder = Path(name)
-        launch = ardupilot_launch(
-            "quad",
-            ardupilot_program(binary, frame),
-            frame,
-            Start(LATITUDE, LONGITUDE, ALTITUDE_M, speed=SPEED),
+    px4 = vehicle.firmware == "px4"
+    wire = UdpWire(vehicle.kind, vehicle.firmware, GROUND_STATION_PORT if px4 else 0)
+    relayed = Relay(free_port(), px4_port(instance) if px4 else 0)
+    try:
+        with TemporaryDirectory() as name, relayed.run() as relay:
+            folder = Path(name)
+            with running(
+                [_launch(vehicle, failsafe, binary, instance, wire, relay, folder)], folder
+            ):
+                station = Station(wire, instance + 1 if px4 else 1)
+                return _played(vehicle, failsafe, phase, Play(station, relay), folder)
+    finally:
+        wire.close()
+
+
+def _launch(
+    vehicle: Vehicle,
+    failsafe: Failsafe,
+    binary: Path,
+    instance: int,
+    wire: UdpWire,
+    relay: Relay,
+    folder: Path,
+) -> Launch:
+    start = Start(LATITUDE, LONGITUDE, ALTITUDE_M, speed=vehicle.speed)
+    parameters = {**vehicle.parameters, **failsafe.parameters}
+    if vehicle.firmware == "px4":
+        return px4_launch(
+            *(vehicle.model, find_px4(binary.parent.parent), vehicle.model, start),
             instance=instance,
-            system_id=1,
-            ports=[relay.port, wire.port],
-            parameters={"FS_GCS_ENABLE": 1, **failsafe.parameters},
+            folder=folder / vehicle.model,
+            parameters=parameters,
         )
-        with running([launch], folder):
-            try:
-                return _played(failsafe, phase, Play(Station(wire), relay), folder)
-            finally:
-                wire.close()
+    frame = FRAMES[vehicle.model]
+    return ardupilot_launch(
+        *(vehicle.model, ardupilot_program(binary, frame), frame, start),
+        instance=instance,
+        system_id=1,
+        ports=[relay.port, wire.port],
+        parameters=parameters,
+    )
 
 
-def _played(failsafe: Failsafe, phase: Phase, cell: Play, folder: Path) -> dict[str, Any]:
+def _played(
+    vehicle: Vehicle, failsafe: Failsafe, phase: Phase, cell: Play, folder: Path
+) -> dict[str, Any]:
     s = cell.station
     s.beats = False
     s.connect()
     s.ready()
-    grounded = phase.name == "on the ground"
-    if grounded:
+    if phase.before:
         failsafe.cause(cell)
         s.watch(3.0)
-    with _mission(phase, cell.relay.to_port, folder) as (process, lines):
+    with _mission(vehicle, phase, s.system, cell.relay.to_port, folder) as (process, lines):
         s.until("begun", lambda: bool(lines) or process.poll() is not None, 120.0)
-        if not grounded:
+        if not phase.before:
             if not s.until("phase", lambda: phase.now(s), 200.0):
                 process.kill()
                 raise RuntimeError(f"the phase did not come: {s.mode}, {list(lines)}")
@@ -267,6 +244,7 @@ def _played(failsafe: Failsafe, phase: Phase, cell: Play, folder: Path) -> dict[
         "said": [_plain(line) for line in lines],
         "status": status if over else None,
         "disarmed": not s.armed,
+        "stands": s.speed_mps < STANDS_M_S,
         "at home": s.distance_m() < 4.0,
     }
 
@@ -278,12 +256,13 @@ def _plain(line: str) -> str:
 
 @contextmanager
 def _mission(
-    phase: Phase, port: int, folder: Path
+    vehicle: Vehicle, phase: Phase, system: int, port: int, folder: Path
 ) -> Iterator[tuple["subprocess.Popen[str]", list[str]]]:
-    (folder / "mission.bpmn").write_bytes(one_after_another("uav1", *phase.steps))
+    (folder / "mission.bpmn").write_bytes(one_after_another(vehicle.resource, *phase.steps))
     (folder / "field.geojson").write_text(json.dumps(AREA), encoding="utf-8")
-    (folder / "fleet.yaml").write_text(FLEET.format(port=port), encoding="utf-8")
-    words = ("run", "mission.bpmn", "--fleet", "fleet.yaml", "--speed", SPEED)
+    fleet = FLEET.format(vehicle=vehicle, system=system, port=port)
+    (folder / "fleet.yaml").write_text(fleet, encoding="utf-8")
+    words = ("run", "mission.bpmn", "--fleet", "fleet.yaml", "--speed", vehicle.speed)
     words += ("--journal", "journal.db", "--ocu", "none")
     lines: list[str] = []
     with subprocess.Popen(
@@ -312,12 +291,12 @@ version: 1
 name: one
 origin: {{lat: 38.1075, lon: -77.3192, alt: 60.0}}
 vehicles:
-  uav1:
-    domain: air
+  {vehicle.resource}:
+    domain: {vehicle.domain}
     arbiter: mavlink
-    connection: {{url: "udpin://127.0.0.1:{port}", system_id: 1}}
+    connection: {{url: "udpin://127.0.0.1:{port}", system_id: {system}}}
     lost_after: 10 s
     sitl: true
-    failsafe: return_to_launch
+    failsafe: {vehicle.failsafe}
 areas: {{field: field.geojson}}
 """

@@ -5,25 +5,30 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from mavlink_failsafes import FAILSAFES, FILE, PHASES
+from mavlink_failsafe_cells import VEHICLES
+from mavlink_failsafes import FILE
 
 PAGE = """# Failsafes of a vehicle while a mission runs
 
-What a real ArduCopter (4.7, which simulates itself) and m2pem do when a failsafe of the vehicle
-acts in a mission. Each row was played with the real program, `m2pem run` and a second ground
-station that brought the failsafe about; `tools/record_failsafes` does it again and writes this
-page. The rules are in [MAVLink vehicles](mavlink.md#when-the-link-is-lost-and-other-failsafes):
-m2pem interrupts no RTL and no LAND that it has not asked for, arms no vehicle that is not ready,
-and says what it sees.
+What real autopilots, which simulate themselves, and m2pem do when a failsafe of the vehicle acts
+in a mission. Each row was played with the real program, `m2pem run` and a second ground station
+that brought the failsafe about; `tools/record_failsafes` does it again and writes this page. The
+rules are in [MAVLink vehicles](mavlink.md#when-the-link-is-lost-and-other-failsafes): m2pem
+interrupts no RTL and no LAND that it has not asked for, arms no vehicle that is not ready, and says
+what it sees.
 
-In all missions the first task takes off to 30 m (90 m in "taking off"); the fleet says
-`lost_after: 10 s` and `failsafe: return_to_launch`, the vehicle has `FS_GCS_ENABLE` 1. No boundary
-event catches an error, so that a behavior that fails ends the mission; a mission of yours can catch
-the error and go on. When the mission is over, m2pem ends, and with it the heartbeats of the ground
-station: a vehicle that stays in the air then returns by its own ground station failsafe.
+In the missions of aircraft the first task takes off to 30 m (90 m in "taking off"); the fleet says
+`lost_after: 10 s`. No boundary event catches an error, so that a behavior that fails ends the
+mission; a mission of yours can catch the error and go on. When the mission is over, m2pem ends, and
+with it the heartbeats of the ground station: a vehicle that stays in the air then returns by its
+own ground station failsafe.
 
 Rovers say "Radio Failsafe" when it is the ground station that they have lost. Terrain failsafes are
 not among the rows: m2pem commands no heights above terrain unless a mission says so.
+"""
+
+SET = """
+The fleet says `failsafe: {vehicle.failsafe}`, the vehicle has {parameters}.
 """
 
 HEAD = """
@@ -32,10 +37,10 @@ HEAD = """
 """
 
 ROUTINE = re.compile(
-    r"^(Start|End|Task\d|r1 of \w+ started|Task\d: uav1 begins .*|r1 completed"
-    r"|Task\d: uav1 ends .*: succeeded|Task\d: error .*|r1 failed: .*"
-    r"|WARNING m2pem.arbiter: uav1: nothing happens when its battery is low.*"
-    r"|WARNING m2pem.arbiter: uav1 is ready|.*waits until it is ready: EKF: .*"
+    r"^(Start|End|Task\d|r1 of \w+ started|Task\d: \w+ begins .*|r1 completed"
+    r"|Task\d: \w+ ends .*: succeeded|Task\d: error .*|r1 failed: .*"
+    r"|WARNING m2pem.arbiter: \w+: nothing happens when its battery is low.*"
+    r"|WARNING m2pem.arbiter: \w+ is ready|.*waits until it is ready: EKF: .*"
     r"|.*where it is was not heard yet)$"
 )
 """Lines of every mission; how it ends has a column of its own."""
@@ -49,16 +54,20 @@ def page() -> str:
 def _page() -> Iterator[str]:
     yield PAGE
     kept = json.loads(FILE.read_text(encoding="utf-8"))
-    for failsafe in FAILSAFES.values():
-        yield f"\n## {failsafe.name[0].upper()}{failsafe.name[1:]}\n{HEAD}"
-        for phase in PHASES:
-            seen = kept[failsafe.name][phase]
-            yield f"| {phase} | {_vehicle(seen)} | {_mission(seen)} | {_read(seen)} |\n"
+    for vehicle in VEHICLES.values():
+        parameters = ", ".join(f"`{key}` {value:g}" for key, value in vehicle.parameters.items())
+        yield f"\n## {vehicle.title}\n{SET.format(vehicle=vehicle, parameters=parameters)}"
+        for name, phases in kept[vehicle.name].items():
+            yield f"\n### {vehicle.title}: {name}\n{HEAD}"
+            for phase in vehicle.phases:
+                if phase in phases:
+                    seen = phases[phase]
+                    yield f"| {phase} | {_vehicle(seen)} | {_mission(seen)} | {_read(seen)} |\n"
 
 
 def _vehicle(seen: dict[str, Any]) -> str:
     modes = ", ".join(seen["modes"]) or "changes no mode"
-    end = "stays armed"
+    end = "stands, armed" if seen.get("stands") else "stays armed"
     if seen["disarmed"]:
         end = "disarmed at home" if seen["at home"] else "disarmed elsewhere"
     texts = "".join(f"<br>*{text}*" for text in seen["texts"])

@@ -1,52 +1,77 @@
-"""Failsafes of a real ArduCopter under a mission of m2pem: what was recorded, and still is so."""
+"""Failsafes of real autopilots under a mission of m2pem: what was recorded, and still is so."""
 
 import json
 from pathlib import Path
 
 import pytest
-from mavlink_failsafes import FAILSAFES, FILE, PHASES, play
+from mavlink_failsafe_cells import COPTER, PX4, VEHICLES
+from mavlink_failsafes import FILE, Vehicle, play
 from mavlink_failsafes_page import page
 from mavlink_sitl import program
 
 REPOSITORY = Path(__file__).parents[4]
 KEPT = json.loads(FILE.read_text(encoding="utf-8"))
-CELLS = [(failsafe, phase) for failsafe in FAILSAFES for phase in PHASES]
-RETURNS = ("RTL", "LAND")
+CELLS = [
+    (vehicle, failsafe, phase)
+    for vehicle in VEHICLES.values()
+    for failsafe in vehicle.failsafes
+    for phase in vehicle.phases
+]
+RECORDED = [cell for cell in CELLS if cell[2] in KEPT[cell[0].name].get(cell[1], {})]
+RETURNS = ("RTL", "LAND", "DESCEND")
 
 
-def test_every_cell_is_recorded_and_no_other() -> None:
-    recorded = [(failsafe, phase) for failsafe, cells in KEPT.items() for phase in cells]
-    assert sorted(recorded) == sorted(CELLS)
+def _named(cells: list[tuple[Vehicle, str, str]]) -> list[str]:
+    return [f"{vehicle.name}-{failsafe}-{phase}" for vehicle, failsafe, phase in cells]
+
+
+def test_every_cell_of_a_copter_and_a_rover_is_recorded_and_no_other() -> None:
+    kept = {(v, f, p) for v, failsafes in KEPT.items() for f in failsafes for p in failsafes[f]}
+    cells = {(vehicle.name, failsafe, phase) for vehicle, failsafe, phase in CELLS}
+    assert kept <= cells
+    assert {cell[0] for cell in cells - kept} <= {"px4copter"}
 
 
 def test_the_page_says_what_was_recorded() -> None:
     assert (REPOSITORY / "docs/failsafes.md").read_text(encoding="utf-8") == page()
 
 
-@pytest.mark.parametrize(("failsafe", "phase"), CELLS)
+@pytest.mark.parametrize(("vehicle", "failsafe", "phase"), RECORDED, ids=_named(RECORDED))
 def test_nothing_made_it_worse_and_operators_were_not_left_without_a_word(
-    failsafe: str, phase: str
+    vehicle: Vehicle, failsafe: str, phase: str
 ) -> None:
-    seen = KEPT[failsafe][phase]
-    # No mode comes after RTL or LAND but one of them: m2pem interrupts no failsafe.
-    returning = [mode in RETURNS for mode in seen["modes"]]
+    seen = KEPT[vehicle.name][failsafe][phase]
+    # No mode comes after RTL or LAND but one of them: m2pem interrupts no failsafe. When it has
+    # arrived, a rover holds, and a PX4 that is not armed is in the mode that was commanded last.
+    modes = seen["modes"]
+    if seen["at home"] and (vehicle is PX4 or modes[-1:] == ["HOLD"]):
+        modes = modes[:-1]
+    returning = [mode in RETURNS for mode in modes]
     assert returning == sorted(returning)
     assert seen["status"] is not None, "the mission waits for what cannot come"
-    assert seen["disarmed"] or failsafe.startswith("motors fail")
+    if vehicle.flies:
+        assert seen["disarmed"] or failsafe.startswith("motors fail")
+    else:
+        assert seen["disarmed"] or seen["stands"]
     said = "\n".join(seen["said"])
-    assert seen["status"] == 0 or "uav1 ends" in said
-    # Texts of the autopilot that come before its ground station has gone, with the mission.
-    before = "|".join(seen["texts"]).split("GCS")[0].split("|")[0]
-    late = failsafe.startswith("motors fail")  # it may notice that when m2pem has given up
-    assert late or before.split(" N")[0] in said
+    assert seen["status"] == 0 or f"{vehicle.resource} ends" in said
+    if vehicle is COPTER:
+        # Texts of the autopilot that come before its ground station has gone, with the mission.
+        before = "|".join(seen["texts"]).split("GCS")[0].split("|")[0]
+        late = failsafe.startswith("motors fail")  # it may notice that when m2pem has given up
+        assert late or before.split(" N")[0] in said
 
 
-@pytest.mark.sitl("M2PEM_ARDUCOPTER")
-@pytest.mark.parametrize(("failsafe", "phase"), CELLS)
-def test_a_failsafe_still_goes_as_recorded(failsafe: str, phase: str) -> None:
-    binary = program("M2PEM_ARDUCOPTER")
+@pytest.mark.parametrize(
+    ("vehicle", "failsafe", "phase"),
+    [pytest.param(*cell, marks=pytest.mark.sitl(cell[0].variable)) for cell in RECORDED],
+    ids=_named(RECORDED),
+)
+def test_a_failsafe_still_goes_as_recorded(vehicle: Vehicle, failsafe: str, phase: str) -> None:
+    binary = program(vehicle.variable)
     assert binary is not None
-    seen = play(FAILSAFES[failsafe], PHASES[phase], binary, 72)
-    kept = KEPT[failsafe][phase]
+    instance = 9 if vehicle.firmware == "px4" else 72
+    seen = play(vehicle, vehicle.failsafes[failsafe], vehicle.phases[phase], binary, instance)
+    kept = KEPT[vehicle.name][failsafe][phase]
     for what in ("modes", "status", "disarmed", "at home"):
         assert seen[what] == kept[what], (what, seen, kept)

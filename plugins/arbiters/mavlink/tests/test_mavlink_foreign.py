@@ -19,6 +19,7 @@ from mavlink_vehicle_world import (
     fly,
     make,
 )
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import Clock
 
@@ -127,6 +128,33 @@ def test_a_change_that_nobody_here_asked_for_is_told_with_its_cause(
             takeover = watched.watch.taken_over(FLYING)
             assert takeover is not None
             assert (takeover.cause, takeover.reason) == (cause, words)
+
+    virtual(main)
+
+
+def test_a_breach_of_the_fence_is_the_cause_of_a_change_without_a_text(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        watched = Watched(clock)
+        async with watched as (link, vehicle):
+            boundary = dialect.FENCE_BREACH_BOUNDARY
+            link.says["FENCE_STATUS"] = {"breach_status": 1, "breach_type": boundary}
+            await vehicle.until(lambda: bool(vehicle.heard.fence_breach), 5.0)
+            await changes_to(link, vehicle, RTL)
+            found = watched.watch.taken_over(FLYING)
+            assert found is not None
+            assert found.cause is Cause.FAILSAFE
+            assert found.reason == (
+                "a failsafe of its own has taken over: the mode changed from GUIDED to RTL: "
+                "fence breached (boundary)"
+            )
+            # Outside since long, it explains nothing more.
+            await vehicle.driver.set_mode(FlightMode.GUIDED)
+            await vehicle.sleep(5.0)
+            await changes_to(link, vehicle, LOITER)
+            await vehicle.sleep(2.0)
+            found = watched.watch.taken_over(FLYING)
+            assert found is not None
+            assert found.cause is Cause.STATION
 
     virtual(main)
 

@@ -1,6 +1,7 @@
 """Taking over, being taken over, falling silent: who steers a vehicle."""
 
 import pytest
+from m2pem_plugin_mavlink import arbiter
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from mavlink_double import Body, at
 from mavlink_play import V, after_a_restart, play
@@ -274,6 +275,19 @@ def test_a_silent_vehicle_is_lost_and_its_state_says_so() -> None:
         assert (end.state, end.code) == (BehaviorState.LOST, "LINK_LOST")
         await bench.clock.sleep(1)
         assert bench.latest(V).link is LinkState.LOST
+
+    play(Body().fly(), main)
+
+
+def test_a_change_of_mode_is_in_its_state_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        await bench.clock.sleep(1)
+        monkeypatch.setattr(arbiter, "TELEMETRY_EVERY_S", 60.0)
+        await bench.clock.sleep(1)
+        before = bench.latest(V).mode
+        bench.body.mode = FlightMode.RETURN
+        assert await bench.until(lambda: bench.latest(V).mode != before, 2.0)
 
     play(Body().fly(), main)
 

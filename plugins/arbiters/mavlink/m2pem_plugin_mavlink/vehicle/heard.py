@@ -44,6 +44,9 @@ class Heard:
     gps_fix: int | None = None
     estimator_flags: int | None = None
     prearm_passed: bool | None = None
+    # Its fence: what was breached ("boundary"), "" while it is inside, and since when
+    fence_breach: str = ""
+    fence_breached_s: float | None = None
     # The hearing itself
     changes: int = 0
     at_s: float | None = None
@@ -69,4 +72,5 @@ class Heard:
         self.position = self.home = self.velocity_enu_m_s = self.yaw_rad = None
         self.altitude_above_home_m = self.altitude_above_terrain_m = None
         self.landed = self.reached_sequence = None
+        self.fence_breach, self.fence_breached_s = "", None
         self.messages_s.clear()

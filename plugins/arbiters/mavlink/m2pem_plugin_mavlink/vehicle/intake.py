@@ -26,6 +26,11 @@ _LANDED = {
     dialect.MAV_LANDED_STATE_TAKEOFF: False,
     dialect.MAV_LANDED_STATE_LANDING: False,
 }
+_BREACHES = {
+    dialect.FENCE_BREACH_MINALT: "lowest altitude",
+    dialect.FENCE_BREACH_MAXALT: "highest altitude",
+    dialect.FENCE_BREACH_BOUNDARY: "boundary",
+}
 
 
 def enu_yaw(heading_rad: float) -> float:
@@ -69,6 +74,7 @@ class Intake:
             "EXTENDED_SYS_STATE": self._extended_sys_state,
             "TERRAIN_REPORT": self._terrain,
             "ALTITUDE": self._altitude,
+            "FENCE_STATUS": self._fence,
         }
         self._takers = {message_type(name).id: take for name, take in named.items()}
 
@@ -186,6 +192,14 @@ class Intake:
     def _altitude(self, message: Any) -> None:
         if 0.0 <= message.bottom_clearance < math.inf:  # below 0: it does not know
             self.heard.altitude_above_terrain_m = message.bottom_clearance
+
+    def _fence(self, message: Any) -> None:
+        """Breached since the last crossing (mavlink.io, "FENCE_STATUS")."""
+        heard = self.heard
+        breached = message.breach_status != 0
+        if breached and not heard.fence_breach:
+            heard.fence_breached_s = heard.at_s
+        heard.fence_breach = _BREACHES.get(message.breach_type, "fence") if breached else ""
 
     def _guess_landed(self) -> None:
         heard = self.heard

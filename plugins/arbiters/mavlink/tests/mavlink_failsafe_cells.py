@@ -1,0 +1,208 @@
+"""Which failsafes of real autopilots are played, in which phases of a mission.
+
+Parameters are those of ArduPilot 4.7 and of PX4 1.17.
+"""
+
+from collections.abc import Callable, Mapping
+
+from m2pem_plugin_mavlink.sim.specification import Kind
+from mavlink_failsafes import FAR_NORTH, NORTH, Failsafe, Phase, Play, Vehicle
+from mavlink_station import SECOND, Station
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+HIGH_M = 12.0
+FAR_M = 35.0
+"""Beyond the fence of a rover."""
+MODE = dialect.MAV_CMD_DO_SET_MODE
+VOLTS = "SIM_BATT_VOLTAGE"
+UP: tuple[str, Mapping[str, object]] = ("takeoff", {"altitude": "30 m"})
+GO: tuple[str, Mapping[str, object]] = ("goto", {"target": NORTH})
+DRIVE: tuple[str, Mapping[str, object]] = ("goto", {"target": FAR_NORTH})
+RETURN: tuple[str, Mapping[str, object]] = ("return_to_launch", {})
+
+Act = Callable[[Play], None]
+
+
+# --- causes ---------------------------------------------------------------------------------------
+
+
+def _set(parameter: str, value: float) -> Act:
+    return lambda play: play.station.set_quietly(parameter, value)
+
+
+def _cut(play: Play) -> None:
+    play.relay.cut = True
+
+
+def _mend(play: Play) -> None:
+    play.relay.cut = False
+
+
+def _second(command: int, *params: float) -> Act:
+    return lambda play: play.station.command_quietly(command, *params)
+
+
+def _clear(play: Play) -> None:
+    station = play.station
+    station.send(dialect.MAVLink_mission_clear_all_message(station.system, 1, 0), SECOND)
+
+
+def _restart(play: Play) -> None:
+    """Forced, as it is in flight."""
+    reboot = dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+    play.station.command_quietly(reboot, 1, 0, 0, 0, 0, 20190226)
+    play.station.start_anew()
+
+
+def _charge(left: float) -> Act:
+    return lambda play: play.station.battery(left, 10.3)
+
+
+def _no_satellites(play: Play) -> None:
+    play.station.satellites(False)
+
+
+def _slowly(parameter: str, value: float) -> Act:
+    """With an answer: PX4 must say first of what type it is."""
+    return lambda play: play.station.parameter(parameter, value)
+
+
+# --- phases ---------------------------------------------------------------------------------------
+
+
+def _phases(*phases: Phase) -> dict[str, Phase]:
+    return {each.name: each for each in phases}
+
+
+def _failsafes(*failsafes: Failsafe) -> dict[str, Failsafe]:
+    return {each.name: each for each in failsafes}
+
+
+def _in_its_mission(s: Station) -> bool:
+    return s.mode == s.auto and int(s.known.get("current", 0)) > 1
+
+
+SURVEY: tuple[str, Mapping[str, object]] = (
+    *("area_survey", {"area": "field", "spacing": "20 m", "altitude": "30 m"}),
+)
+FLYING = _phases(
+    Phase("on the ground", (UP,), lambda s: s.located, before=True),
+    Phase("taking off", (("takeoff", {"altitude": "90 m"}),), lambda s: s.height_m > HIGH_M),
+    Phase("in a survey", (UP, SURVEY), _in_its_mission),
+    Phase("in RTL", (UP, GO, RETURN), lambda s: s.mode == "RTL"),
+    Phase("landing", (UP, GO, ("land", {})), lambda s: s.mode == "LAND"),
+)
+DRIVING = _phases(
+    Phase("standing", (DRIVE,), lambda s: s.located, before=True),
+    Phase("in a goto", (DRIVE,), lambda s: s.mode == "GUIDED" and s.distance_m() > FAR_M),
+    Phase(
+        "in a survey",
+        (("area_survey", {"area": "field", "spacing": "20 m"}),),
+        lambda s: _in_its_mission(s) and s.distance_m() > FAR_M,
+    ),
+    Phase("in RTL", (DRIVE, RETURN), lambda s: s.mode == "RTL"),
+)
+
+# --- vehicles -------------------------------------------------------------------------------------
+
+COPTER = Vehicle(
+    "arducopter",
+    "ArduCopter 4.7",
+    "M2PEM_ARDUCOPTER",
+    Kind.COPTER,
+    "ardupilot",
+    "quad",
+    "air",
+    "uav1",
+    "return_to_launch",
+    10,
+    {"FS_GCS_ENABLE": 1},
+    FLYING,
+    _failsafes(
+        Failsafe("ground station lost for 20 s, RTL", {}, _cut, _mend),
+        Failsafe("battery low, no action", {"BATT_FS_LOW_ACT": 0}, _set(VOLTS, 10.4)),
+        Failsafe("battery low, RTL", {"BATT_FS_LOW_ACT": 2}, _set(VOLTS, 10.4)),
+        Failsafe(
+            "battery critical, LAND",
+            {"BATT_CRT_VOLT": 10.45, "BATT_FS_CRT_ACT": 1},
+            _set(VOLTS, 10.3),
+        ),
+        Failsafe("radio of the pilot lost, RTL", {"FS_THR_ENABLE": 1}, _set("SIM_RC_FAIL", 1)),
+        Failsafe("no GPS (EKF failsafe)", {}, _set("SIM_GPS1_ENABLE", 0)),
+        Failsafe(
+            "fence breached, RTL",
+            {"FENCE_ENABLE": 1, "FENCE_TYPE": 1, "FENCE_ALT_MAX": 100, "FENCE_ACTION": 1},
+            _set("FENCE_ALT_MAX", 10),
+        ),
+        Failsafe("motors fail, crash check", {"SIM_ENGINE_MUL": 0.0}, _set("SIM_ENGINE_FAIL", 15)),
+        Failsafe("the autopilot restarts", {}, _restart),
+        Failsafe("a second ground station: mode LOITER", {}, _second(MODE, 1, 5)),
+        Failsafe("a second ground station: mode RTL", {}, _second(MODE, 1, 6)),
+        Failsafe("a second ground station: clears the mission", {}, _clear),
+    ),
+)
+
+ROVER = Vehicle(
+    "ardurover",
+    "ArduRover 4.7",
+    "M2PEM_ARDUROVER",
+    Kind.ROVER,
+    "ardupilot",
+    "rover",
+    "ground",
+    "rover1",
+    "hold",
+    10,
+    {"FS_GCS_ENABLE": 1, "FS_ACTION": 2, "BATT_LOW_VOLT": 10.5},
+    DRIVING,
+    _failsafes(
+        Failsafe("ground station lost for 20 s, HOLD", {}, _cut, _mend),
+        Failsafe("ground station lost for 20 s, RTL", {"FS_ACTION": 1}, _cut, _mend),
+        Failsafe("battery low, no action", {"BATT_FS_LOW_ACT": 0}, _set(VOLTS, 10.4)),
+        Failsafe("battery low, RTL", {"BATT_FS_LOW_ACT": 1}, _set(VOLTS, 10.4)),
+        Failsafe(
+            "battery critical, HOLD",
+            {"BATT_CRT_VOLT": 10.45, "BATT_FS_CRT_ACT": 2},
+            _set(VOLTS, 10.3),
+        ),
+        Failsafe("radio of the pilot lost, HOLD", {"FS_THR_ENABLE": 1}, _set("SIM_RC_FAIL", 1)),
+        Failsafe("no GPS (EKF failsafe)", {}, _set("SIM_GPS1_ENABLE", 0)),
+        Failsafe(
+            "fence breached, RTL",
+            {"FENCE_ENABLE": 1, "FENCE_TYPE": 2, "FENCE_RADIUS": 500, "FENCE_ACTION": 1},
+            _set("FENCE_RADIUS", 30),
+        ),
+        Failsafe("the autopilot restarts", {}, _restart),
+        Failsafe("a second ground station: mode HOLD", {}, _second(MODE, 1, 4)),
+        Failsafe("a second ground station: mode RTL", {}, _second(MODE, 1, 11)),
+        Failsafe("a second ground station: clears the mission", {}, _clear),
+    ),
+)
+
+PX4 = Vehicle(
+    "px4copter",
+    "PX4 main, a copter",
+    "M2PEM_PX4",
+    Kind.COPTER,
+    "px4",
+    "sihsim_quadx",
+    "air",
+    "uav1",
+    "return_to_launch",
+    4,
+    {"NAV_DLL_ACT": 2, "COM_DL_LOSS_T": 10, "SIM_BAT_MIN_PCT": 50},
+    FLYING,
+    _failsafes(
+        Failsafe("ground station lost for 20 s, RTL", {}, _cut, _mend),
+        Failsafe("battery critical, no action", {"COM_LOW_BAT_ACT": 0}, _charge(0.06)),
+        Failsafe("battery critical, RTL", {"COM_LOW_BAT_ACT": 3}, _charge(0.06)),
+        Failsafe("battery emergency, LAND", {"COM_LOW_BAT_ACT": 3}, _charge(0.03)),
+        Failsafe("no GPS", {}, _no_satellites),
+        Failsafe("fence breached, RTL", {"GF_ACTION": 3}, _slowly("GF_MAX_VER_DIST", 10)),
+        Failsafe("a second ground station: mode LOITER", {}, _second(MODE, 1, 4, 3)),
+        Failsafe("a second ground station: mode RTL", {}, _second(MODE, 1, 4, 5)),
+        Failsafe("a second ground station: clears the mission", {}, _clear),
+    ),
+)
+
+VEHICLES = {each.name: each for each in (COPTER, ROVER, PX4)}
