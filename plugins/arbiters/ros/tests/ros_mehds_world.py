@@ -36,8 +36,8 @@ SPEED = 4.0
 LOST_AFTER_S = 20
 """Longer than in the fleet: so long may a busy computer leave a program alone."""
 
-SILENT = "silent for 18 s"
-"""Longer than the arbiter listens (0.8 of that), and shorter than an operator takes."""
+SILENT = f"silent for {LOST_AFTER_S + 2} s"
+"""Until it is lost, and hardly longer: the mission goes on with it."""
 
 STUCK = "wheels stuck for 25 s"
 """ROUTE_BLOCKED after 15 s."""
