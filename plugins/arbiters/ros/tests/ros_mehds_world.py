@@ -37,12 +37,12 @@ LOST_AFTER_S = 20
 """Longer than in the fleet: so long may a busy computer leave a program alone."""
 
 SILENT = f"silent for {LOST_AFTER_S + 2} s"
-"""Until it is lost, and hardly longer: the mission goes on with it."""
+"""Until it is lost, and hardly longer: before an operator has answered it is back and has stopped."""
 
 STUCK = "wheels stuck for 25 s"
 """ROUTE_BLOCKED after 15 s."""
 
-THINKS_S = 1.0
+THINKS_S = 6.0
 """So long does an operator think, in simulated time."""
 
 PATIENCE_S = 60.0
