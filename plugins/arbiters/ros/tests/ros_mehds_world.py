@@ -37,7 +37,7 @@ LOST_AFTER_S = 20
 """Longer than in the fleet: so long may a busy computer leave a program alone."""
 
 SILENT = f"silent for {LOST_AFTER_S + 2} s"
-"""Until it is lost, and hardly longer: before an operator has answered it is back and has stopped."""
+"""Until it is lost, and hardly longer: it is back, and has stopped, before an operator answers."""
 
 STUCK = "wheels stuck for 25 s"
 """ROUTE_BLOCKED after 15 s."""
