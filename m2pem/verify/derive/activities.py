@@ -15,7 +15,13 @@ from m2pem.verify.derive.leaving import leave
 from m2pem.verify.derive.loops import looped
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, at
-from m2pem.verify.derive.throwing import catchable, ending_thrower, message_effects, throw_error
+from m2pem.verify.derive.throwing import (
+    catchable,
+    interrupting_places,
+    message_effects,
+    parted,
+    throw_error,
+)
 from m2pem.verify.derive.timers import due_us, runs, written
 from m2pem.verify.derive.undoable import noted
 from m2pem.verify.derive.waiting import boundaries, caught_before_work
@@ -276,16 +282,14 @@ def _send(making: Making, host: Host, message: str) -> list[Effect]:
     def spell_out() -> None:
         sends = Effect(steps=(Step(host.node.id, Action.THROWN, message),), consume=(thrown,))
         over = Effect(kill_scopes=frozenset({host.inside.index}))
-        around = ending_thrower(making, "message", message, host.outer)
-        ways = product([sends], message_effects(making, message))
-        ended = [each for each in ways if around & {*each.consume}]
+        around = interrupting_places(making, "message", message, host.outer)
+        ended, gone_on = parted(product([sends], message_effects(making, message)), around)
         ended += [
             replace(sends, produce=(catcher.told,))
             for catcher in making.messages.get(message, ())
             if catcher.waiting == thrown and not catcher.keeps
         ]
         making.rules(ended)
-        gone_on = [each for each in ways if not around & {*each.consume}]
         making.rules(product(product(gone_on, [over]), _at_once(host)))
 
     making.later.append(spell_out)

@@ -23,8 +23,9 @@ from m2pem.verify.derive.leaving import along, leave
 from m2pem.verify.derive.making import Host, Making
 from m2pem.verify.derive.net import Area, Draft, at
 from m2pem.verify.derive.throwing import (
-    ending_thrower,
+    interrupting_places,
     message_effects,
+    parted,
     signal_effects,
     throw_error,
     throw_escalation,
@@ -224,16 +225,16 @@ def _throw_all(
             case SignalEventDefinition(signal=signal):
                 thrown = Effect(steps=(Step(node.id, Action.THROWN, signal.id),))
                 begun = product(product(begun, [thrown]), signal_effects(making, signal.id))
-                around = ending_thrower(making, "signal", signal.id, area)
+                around = interrupting_places(making, "signal", signal.id, area)
                 caught = [Effect(read=frozenset({place})) for place in sorted(around)]
                 ended += _interrupted(node, product(begun, caught))
                 begun = product(begun, [Effect(inhibit=around)])
             case MessageEventDefinition(message=message):
                 thrown = Effect(steps=(Step(node.id, Action.THROWN, message.id),))
-                begun = product(product(begun, [thrown]), message_effects(making, message.id))
-                around = ending_thrower(making, "message", message.id, area)
-                ended += _interrupted(node, [each for each in begun if around & {*each.consume}])
-                begun = [each for each in begun if not around & {*each.consume}]
+                sent = product(product(begun, [thrown]), message_effects(making, message.id))
+                around = interrupting_places(making, "message", message.id, area)
+                cut, begun = parted(sent, around)
+                ended += _interrupted(node, cut)
             case EscalationEventDefinition(escalation=escalation):
                 assert escalation is not None
                 going: list[Effect] = []

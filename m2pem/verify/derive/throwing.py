@@ -1,6 +1,6 @@
 """Errors, escalations, signals and messages: who catches them, and what follows."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -276,10 +276,11 @@ def message_effects(making: Making, message: str, *, kept: bool = True) -> list[
     return [*found, nobody]
 
 
-def ending_thrower(making: Making, what: str, ref: str, area: Area) -> frozenset[int]:
-    """Where what is around an element of an area waits to interrupt it by what the element throws.
+def interrupting_places(making: Making, what: str, ref: str, area: Area) -> frozenset[int]:
+    """The places on which an activity or event subprocess around an element of `area` waits, with
+    an interrupting event, for a signal or message that the element throws.
 
-    A signal or message goes out before its thrower completes: such a one never does.
+    It goes out before its thrower completes: one that is interrupted by it never does.
     """
     around: set[int] = set()
     here: Area | None = area
@@ -294,6 +295,13 @@ def ending_thrower(making: Making, what: str, ref: str, area: Area) -> frozenset
     return frozenset(
         each.waiting for each in register.get(ref, ()) if each.waiting in around and not each.keeps
     )
+
+
+def parted(ways: Iterable[Effect], places: frozenset[int]) -> tuple[list[Effect], list[Effect]]:
+    """The effects that take a token from one of some places, and the others."""
+    all_of = list(ways)
+    taking = [each for each in all_of if not places.isdisjoint(each.consume)]
+    return taking, [each for each in all_of if places.isdisjoint(each.consume)]
 
 
 def _letters(making: Making, message: str) -> int:
