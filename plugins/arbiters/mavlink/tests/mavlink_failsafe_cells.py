@@ -1,6 +1,6 @@
 """Which failsafes of real autopilots are played, in which phases of a mission.
 
-Parameters are those of ArduPilot 4.7 and of PX4 1.17.
+Parameters are those of ArduPilot 4.7 and of PX4 main of August 2026.
 """
 
 from collections.abc import Callable, Mapping
@@ -82,9 +82,8 @@ def _in_its_mission(s: Station) -> bool:
     return s.mode == s.auto and int(s.known.get("current", 0)) > 1
 
 
-SURVEY: tuple[str, Mapping[str, object]] = (
-    *("area_survey", {"area": "field", "spacing": "20 m", "altitude": "30 m"}),
-)
+ON_THE_FIELD = {"area": "field", "spacing": "20 m"}
+SURVEY: tuple[str, Mapping[str, object]] = ("area_survey", {**ON_THE_FIELD, "altitude": "30 m"})
 FLYING = _phases(
     Phase("on the ground", (UP,), lambda s: s.located, before=True),
     Phase("taking off", (("takeoff", {"altitude": "90 m"}),), lambda s: s.height_m > HIGH_M),
@@ -97,7 +96,7 @@ DRIVING = _phases(
     Phase("in a goto", (DRIVE,), lambda s: s.mode == "GUIDED" and s.distance_m() > FAR_M),
     Phase(
         "in a survey",
-        (("area_survey", {"area": "field", "spacing": "20 m"}),),
+        (("area_survey", ON_THE_FIELD),),
         lambda s: _in_its_mission(s) and s.distance_m() > FAR_M,
     ),
     Phase("in RTL", (DRIVE, RETURN), lambda s: s.mode == "RTL"),
@@ -106,19 +105,19 @@ DRIVING = _phases(
 # --- vehicles -------------------------------------------------------------------------------------
 
 COPTER = Vehicle(
-    "arducopter",
-    "ArduCopter 4.7",
-    "M2PEM_ARDUCOPTER",
-    Kind.COPTER,
-    "ardupilot",
-    "quad",
-    "air",
-    "uav1",
-    "return_to_launch",
-    10,
-    {"FS_GCS_ENABLE": 1},
-    FLYING,
-    _failsafes(
+    name="arducopter",
+    title="ArduCopter 4.7",
+    variable="M2PEM_ARDUCOPTER",
+    kind=Kind.COPTER,
+    firmware="ardupilot",
+    model="quad",
+    domain="air",
+    resource="uav1",
+    failsafe="return_to_launch",
+    speed=10,
+    parameters={"FS_GCS_ENABLE": 1},
+    phases=FLYING,
+    failsafes=_failsafes(
         Failsafe("ground station lost for 20 s, RTL", {}, _cut, _mend),
         Failsafe("battery low, no action", {"BATT_FS_LOW_ACT": 0}, _set(VOLTS, 10.4)),
         Failsafe("battery low, RTL", {"BATT_FS_LOW_ACT": 2}, _set(VOLTS, 10.4)),
@@ -143,19 +142,19 @@ COPTER = Vehicle(
 )
 
 ROVER = Vehicle(
-    "ardurover",
-    "ArduRover 4.7",
-    "M2PEM_ARDUROVER",
-    Kind.ROVER,
-    "ardupilot",
-    "rover",
-    "ground",
-    "rover1",
-    "hold",
-    10,
-    {"FS_GCS_ENABLE": 1, "FS_ACTION": 2, "BATT_LOW_VOLT": 10.5},
-    DRIVING,
-    _failsafes(
+    name="ardurover",
+    title="ArduRover 4.7",
+    variable="M2PEM_ARDUROVER",
+    kind=Kind.ROVER,
+    firmware="ardupilot",
+    model="rover",
+    domain="ground",
+    resource="rover1",
+    failsafe="hold",
+    speed=10,
+    parameters={"FS_GCS_ENABLE": 1, "FS_ACTION": 2, "BATT_LOW_VOLT": 10.5},
+    phases=DRIVING,
+    failsafes=_failsafes(
         Failsafe("ground station lost for 20 s, HOLD", {}, _cut, _mend),
         Failsafe("ground station lost for 20 s, RTL", {"FS_ACTION": 1}, _cut, _mend),
         Failsafe("battery low, no action", {"BATT_FS_LOW_ACT": 0}, _set(VOLTS, 10.4)),
@@ -180,19 +179,19 @@ ROVER = Vehicle(
 )
 
 PX4 = Vehicle(
-    "px4copter",
-    "PX4 main, a copter",
-    "M2PEM_PX4",
-    Kind.COPTER,
-    "px4",
-    "sihsim_quadx",
-    "air",
-    "uav1",
-    "return_to_launch",
-    4,
-    {"NAV_DLL_ACT": 2, "COM_DL_LOSS_T": 10, "SIM_BAT_MIN_PCT": 50},
-    FLYING,
-    _failsafes(
+    name="px4copter",
+    title="PX4 main, a copter",
+    variable="M2PEM_PX4",
+    kind=Kind.COPTER,
+    firmware="px4",
+    model="sihsim_quadx",
+    domain="air",
+    resource="uav1",
+    failsafe="return_to_launch",
+    speed=4,
+    parameters={"NAV_DLL_ACT": 2, "COM_DL_LOSS_T": 10, "SIM_BAT_MIN_PCT": 50},
+    phases=FLYING,
+    failsafes=_failsafes(
         Failsafe("ground station lost for 20 s, RTL", {}, _cut, _mend),
         Failsafe("battery critical, no action", {"COM_LOW_BAT_ACT": 0}, _charge(0.06)),
         Failsafe("battery critical, RTL", {"COM_LOW_BAT_ACT": 3}, _charge(0.06)),

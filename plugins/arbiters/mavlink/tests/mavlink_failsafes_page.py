@@ -23,8 +23,9 @@ mission; a mission of yours can catch the error and go on. When the mission is o
 with it the heartbeats of the ground station: a vehicle that stays in the air then returns by its
 own ground station failsafe.
 
-Rovers say "Radio Failsafe" when it is the ground station that they have lost. Terrain failsafes are
-not among the rows: m2pem commands no heights above terrain unless a mission says so.
+Of PX4, not every failsafe was played yet. Rovers say "Radio Failsafe" when it is the ground station
+that they have lost. Terrain failsafes are not among the rows: m2pem commands no heights above
+terrain unless a mission says so.
 """
 
 SET = """
