@@ -202,6 +202,22 @@ def ready_to_fly(link: ScriptedLink) -> None:
     }
 
 
+def fail_its_checks(link: ScriptedLink, text: str) -> None:
+    """It cannot be armed, and says why when it is asked."""
+    check = dialect.MAV_SYS_STATUS_PREARM_CHECK
+    link.says["SYS_STATUS"] = {
+        "onboard_control_sensors_present": check,
+        "onboard_control_sensors_enabled": check,
+        "battery_remaining": 90,
+    }
+
+    def say(_: Any) -> int:
+        link.say(text)
+        return ACCEPTED
+
+    link.obey[dialect.MAV_CMD_RUN_PREARM_CHECKS] = say
+
+
 def fly(link: ScriptedLink, height_m: float = 10.0) -> None:
     """It is in the air."""
     ready_to_fly(link)

@@ -21,6 +21,7 @@ from mavlink_vehicle_world import (
     Playing,
     ScriptedLink,
     copter,
+    fail_its_checks,
     fly,
     plane,
     rover,
@@ -108,18 +109,7 @@ def test_a_check_that_fails_in_a_mode_that_cannot_be_armed_is_no_obstacle(virtua
 def test_a_vehicle_whose_checks_fail_is_made_to_say_why(virtual: Run) -> None:
     async def main(clock: Clock) -> None:
         link, vehicle = copter(clock)
-        bit = 0x10000000
-        link.says["SYS_STATUS"] = {
-            "onboard_control_sensors_present": bit,
-            "onboard_control_sensors_enabled": bit,
-            "battery_remaining": 90,
-        }
-
-        def say(_: Any) -> int:
-            link.say("PreArm: Compass not calibrated")
-            return ACCEPTED
-
-        link.obey[dialect.MAV_CMD_RUN_PREARM_CHECKS] = say
+        fail_its_checks(link, "PreArm: Compass not calibrated")
         async with Playing((link, vehicle)):
             with pytest.raises(RefusedError, match="not ready: prearm: Compass not calibrated"):
                 await vehicle.driver.arm()

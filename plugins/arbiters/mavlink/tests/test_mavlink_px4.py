@@ -8,7 +8,16 @@ from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedErro
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 from m2pem_plugin_mavlink.vehicle.modes import px4_mode
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
-from mavlink_vehicle_world import ACCEPTED, DENIED, FAILED, Playing, ScriptedLink, fly, px4
+from mavlink_vehicle_world import (
+    ACCEPTED,
+    DENIED,
+    FAILED,
+    Playing,
+    ScriptedLink,
+    fail_its_checks,
+    fly,
+    px4,
+)
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import Clock
@@ -81,18 +90,7 @@ def test_it_arms_in_a_mode_that_holds_and_takes_off_to_a_height_above_the_sea(vi
 def test_a_vehicle_whose_checks_fail_is_made_to_say_why(virtual: Run) -> None:
     async def main(clock: Clock) -> None:
         link, vehicle = px4(clock)
-        bit = dialect.MAV_SYS_STATUS_PREARM_CHECK
-        link.says["SYS_STATUS"] = {
-            "onboard_control_sensors_present": bit,
-            "onboard_control_sensors_enabled": bit,
-            "battery_remaining": 90,
-        }
-
-        def say(_: Any) -> int:
-            link.say("Preflight: GPS fix too low")
-            return ACCEPTED
-
-        link.obey[dialect.MAV_CMD_RUN_PREARM_CHECKS] = say
+        fail_its_checks(link, "Preflight: GPS fix too low")
         async with Playing((link, vehicle)):
             with pytest.raises(RefusedError, match="not ready: prearm: GPS fix too low"):
                 await vehicle.driver.arm()

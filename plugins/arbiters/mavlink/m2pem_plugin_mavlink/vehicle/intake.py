@@ -194,7 +194,7 @@ class Intake:
             self.heard.altitude_above_terrain_m = message.bottom_clearance
 
     def _fence(self, message: Any) -> None:
-        """Breached since the last crossing (mavlink.io, "FENCE_STATUS")."""
+        """Whether the vehicle is outside of its fence now (mavlink.io, "FENCE_STATUS")."""
         heard = self.heard
         breached = message.breach_status != 0
         if breached and not heard.fence_breach:

@@ -222,7 +222,7 @@ class Px4(Firmware):
         return f"Preflight{failure}: {reason}"
 
     def check_text(self, reason: str) -> str:
-        """The same."""
+        """In the words of a vehicle that does not arm."""
         return self.arming_text(reason)
 
     def mode_text(self, mode: Mode, reason: str) -> str:
