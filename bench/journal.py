@@ -27,7 +27,7 @@ from m2pem.engine.records import (
 )
 from m2pem.journal import Entry, Journal, MemoryJournal, RunHeader
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.model.catalogue import BehaviorState
+from m2pem.mission.catalogue import BehaviorState
 
 HEADER = RunHeader("bench.bpmn", b"<definitions/>" * 1000, "PATROL")
 P, E = "PATROL", "Activity_0x81c2"

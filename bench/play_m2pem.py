@@ -16,13 +16,13 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from bench.measured import ENOUGH_S, Stopwatch, again_and_again, peak_kb
+from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import Continue, Input, StartRun
 from m2pem.engine.records import DataWritten, Record, TokenEntered
 from m2pem.engine.run import MissionRun, Step
 from m2pem.journal import Entry, Journal, MemoryJournal, RunHeader
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.mission import Mission
+from m2pem.mission.mission import Mission
 
 PROCESS = "BENCH"
 AT_ONCE = 100

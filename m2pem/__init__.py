@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from m2pem.hookspecs import hookimpl
 
 if TYPE_CHECKING:
-    from m2pem.model.bpmn import read_mission as load_mission
-    from m2pem.resources.fleet_file import load_fleet
+    from m2pem.bpmn import read_mission as load_mission
+    from m2pem.fleet.fleet_file import load_fleet
 
 __version__ = "0.1.0"
 
@@ -19,8 +19,8 @@ __all__ = ["__version__", "hookimpl", "load_fleet", "load_mission"]
 
 # Loaded when asked for: the parsers of files are most of what importing m2pem would cost.
 _LAZY = {
-    "load_fleet": ("m2pem.resources.fleet_file", "load_fleet"),
-    "load_mission": ("m2pem.model.bpmn", "read_mission"),
+    "load_fleet": ("m2pem.fleet.fleet_file", "load_fleet"),
+    "load_mission": ("m2pem.bpmn", "read_mission"),
 }
 
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from m2pem.api.service import Service
     from m2pem.engine.records import Record
     from m2pem.findings import Finding
-    from m2pem.model.mission import Mission
-    from m2pem.resources.fleet import Fleet
+    from m2pem.fleet.fleet import Fleet
+    from m2pem.mission.mission import Mission
 
 hookspec = pluggy.HookspecMarker("m2pem")
 hookimpl = pluggy.HookimplMarker("m2pem")

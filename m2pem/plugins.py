@@ -33,14 +33,14 @@ if TYPE_CHECKING:
     from m2pem.api.ocu import Ocu
     from m2pem.api.service import Service
     from m2pem.engine.records import Record
-    from m2pem.model.mission import Mission
-    from m2pem.resources.fleet import Fleet
+    from m2pem.fleet.fleet import Fleet
+    from m2pem.mission.mission import Mission
 
 __all__ = ["DEFAULT_PLUGINS", "PluginFailure", "PluginInfo", "PluginManager"]
 
 T = TypeVar("T")
 
-DEFAULT_PLUGINS = ("m2pem.sim.plugin", "m2pem.services.plugin", "m2pem.cli.plain_plugin")
+DEFAULT_PLUGINS = ("m2pem.simulation.plugin", "m2pem.services.plugin", "m2pem.cli.plain_plugin")
 """Modules of the core that load through the same hooks as anyone's plugin."""
 
 BLOCK_VARIABLE = "M2PEM_BLOCK_PLUGINS"

@@ -16,7 +16,7 @@ import pytest
 from m2pem import hookspecs
 from m2pem.errors import InternalError, PluginError
 from m2pem.findings import Finding, Severity
-from m2pem.model.mission import Mission
+from m2pem.mission.mission import Mission
 from m2pem.plugins import DEFAULT_PLUGINS, PluginFailure, PluginInfo, PluginManager
 from m2pem.services.detector import Detector
 

@@ -38,10 +38,10 @@ from bench.programs.mavlink_rovers import APART_DEG, REPOSITION, SET_MODE, addre
 from bench.programs.stage import Plugins, opened
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.journal import Journal
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.geometry import Point
-from m2pem.resources.fleet import Domain, Fleet, Vehicle
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Point
 
 URL = "udpin://127.0.0.1:0"
 ORDERS = Orders((SET_MODE, REPOSITION), (SET_MODE,), (SET_MODE, REPOSITION))

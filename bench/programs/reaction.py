@@ -19,8 +19,8 @@ from bench.programs.stage import asking, executive, flows, opened, waiting
 from m2pem.api.arbiter import ArbiterContext, BehaviorRequest, Connection
 from m2pem.engine.records import TokenEntered
 from m2pem.executive.executive import Executive
-from m2pem.model.catalogue import BehaviorState, ResourceId
-from m2pem.resources.fleet import Domain, Fleet, Vehicle
+from m2pem.fleet.fleet import Domain, Fleet, Vehicle
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.testing.fakes import FakeArbiter
 
 FLEET = Fleet(

@@ -12,13 +12,13 @@ from pathlib import Path
 from bench.graphs import loop
 from bench.measured import Stopwatch
 from bench.play_m2pem import entry
+from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import Continue, StartRun
 from m2pem.engine.records import Record
 from m2pem.engine.run import MissionRun
 from m2pem.executive.recovery import replay
 from m2pem.journal import RunHeader
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.model.bpmn import parse_mission
 
 
 async def measure(rounds: int, folder: Path) -> dict[str, float]:

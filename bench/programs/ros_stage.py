@@ -13,9 +13,9 @@ from m2pem_plugin_ros import loopback
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 
 from bench.programs.commanding import PATIENCE_S, PAUSED, Got
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.geometry import Point
-from m2pem.resources.fleet import Domain, Fleet, Vehicle
+from m2pem.fleet.fleet import Domain, Fleet, Vehicle
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Point
 
 VEHICLES = Path(__file__).with_name("ros_vehicles.py")
 ORIGIN = (47.397742, 8.545594, 0.0)

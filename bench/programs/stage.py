@@ -7,10 +7,10 @@ from typing import Any
 from bench.graphs import file, path
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet import Fleet
 from m2pem.journal import Journal, MemoryJournal
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet import Fleet
 
 NOTHING = Fleet("bench", "bench.yaml", {})
 

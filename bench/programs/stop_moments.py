@@ -30,10 +30,10 @@ from m2pem.control_socket.server import ControlSocket
 from m2pem.errors import JournalError, M2pemError
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.journal.base import Entry
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.model.catalogue import BehaviorState, ResourceId
-from m2pem.resources.fleet import Domain, Fleet, Vehicle
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.testing.fakes import FakeArbiter
 
 VEHICLES = 4

@@ -34,10 +34,10 @@ from bench.programs.commanding import PATIENCE_S, PAUSE_S, Got, Orders
 from bench.programs.stage import Plugins, flows, opened
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet import Domain, Fleet, Team, Vehicle
 from m2pem.journal import Journal
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.geometry import Point
-from m2pem.resources.fleet import Domain, Fleet, Team, Vehicle
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Point
 
 ROS_RATE_HZ, MAVLINK_RATE_HZ = 10, 50
 RNG = random.Random(6)

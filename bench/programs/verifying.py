@@ -19,14 +19,13 @@ from statistics import median
 from typing import Any, TypeVar
 
 from bench.measured import peak_kb
+from m2pem.bpmn import parse_mission
 from m2pem.cli.proving import asked_of, findings
 from m2pem.executive.loading import load_source
 from m2pem.executive.proving import Engine
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.mission import Mission
-from m2pem.resources.madeup import fleet_for
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 from m2pem.verify.check import search as search_as_it_does
-from m2pem.verify.derive import derive
 from m2pem.verify.explore import Exploration, Limits, explore
 from m2pem.verify.ltl import parse
 from m2pem.verify.product import Result as Answered
@@ -43,6 +42,7 @@ from m2pem.verify.results import Result, Verdict
 from m2pem.verify.simplify import simplify
 from m2pem.verify.spin.search import search as search_with_spin
 from m2pem.verify.system import System
+from m2pem.verify.translate import derive
 
 T = TypeVar("T")
 LIMIT_S = 300.0

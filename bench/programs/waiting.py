@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 from bench.graphs import document, path
+from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import StartRun
 from m2pem.engine.run import MissionRun
-from m2pem.model.bpmn import parse_mission
 
 PAGE = 4096
 

@@ -11,7 +11,7 @@ from m2pem.api.control import MissionControl, OpenPrompt, RunSummary
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 from m2pem.plugins import PluginManager
 
 HERE = Path(__file__).parent

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from m2pem import load_fleet
 from m2pem.engine.records import BehaviorEnded, BehaviorRequested
-from m2pem.model.catalogue import ResourceId
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.catalogue import ResourceId
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet import Fleet
-from m2pem.sim.rehearsal import rehearse
+from m2pem.rehearsal.rehearsal import rehearse
 
 HERE = Path(__file__).parent
 PERCENT = range(10, 101, 10)

@@ -65,11 +65,17 @@ if TYPE_CHECKING:
         Telemetry,
         VehicleState,
     )
+    from m2pem.bpmn import parse_mission
     from m2pem.engine.records import Record
     from m2pem.findings import Finding, Severity
-    from m2pem.model.behavior import BehaviorType, Decision
-    from m2pem.model.bpmn import parse_mission
-    from m2pem.model.catalogue import (
+    from m2pem.fleet.behaviors import SHARED
+    from m2pem.fleet.fence import Fence
+    from m2pem.fleet.fleet import Fleet
+    from m2pem.fleet.geojson import as_geojson, parse_geojson
+    from m2pem.fleet.lawn_mower import lawn_mower, longest_edge_yaw
+    from m2pem.fleet.units import Dimension, UnitError, quantity
+    from m2pem.mission.behavior import BehaviorType, Decision
+    from m2pem.mission.catalogue import (
         BehaviorSpec,
         BehaviorState,
         ParameterKind,
@@ -77,16 +83,10 @@ if TYPE_CHECKING:
         ResourceId,
         ResumePolicy,
     )
-    from m2pem.model.geometry import Area, Point, Route, VehiclePosition
-    from m2pem.model.library import MissionFile
-    from m2pem.model.mission import Mission
-    from m2pem.model.values import Value
-    from m2pem.resources.behaviors import SHARED
-    from m2pem.resources.fence import Fence
-    from m2pem.resources.fleet import Fleet
-    from m2pem.resources.geojson import as_geojson, parse_geojson
-    from m2pem.resources.lawn_mower import lawn_mower, longest_edge_yaw
-    from m2pem.resources.units import Dimension, UnitError, quantity
+    from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
+    from m2pem.mission.library import MissionFile
+    from m2pem.mission.mission import Mission
+    from m2pem.mission.values import Value
 
 # Loaded when asked for: an arbiter's module need not pay for what an OCU imports.
 _MODULES = {
@@ -116,21 +116,21 @@ _MODULES = {
     ),
     "m2pem.engine.records": "Record",
     "m2pem.findings": "Finding Severity",
-    "m2pem.model.behavior": "BehaviorType Decision",
-    "m2pem.model.bpmn": "parse_mission",
-    "m2pem.model.catalogue": (
+    "m2pem.mission.behavior": "BehaviorType Decision",
+    "m2pem.bpmn": "parse_mission",
+    "m2pem.mission.catalogue": (
         "BehaviorSpec BehaviorState ParameterKind ParameterSpec ResourceId ResumePolicy"
     ),
-    "m2pem.model.library": "MissionFile",
-    "m2pem.model.mission": "Mission",
-    "m2pem.model.geometry": "Area Point Route VehiclePosition",
-    "m2pem.model.values": "Value",
-    "m2pem.resources.behaviors": "SHARED",
-    "m2pem.resources.fence": "Fence",
-    "m2pem.resources.fleet": "Fleet",
-    "m2pem.resources.geojson": "as_geojson parse_geojson",
-    "m2pem.resources.lawn_mower": "lawn_mower longest_edge_yaw",
-    "m2pem.resources.units": "Dimension UnitError quantity",
+    "m2pem.mission.library": "MissionFile",
+    "m2pem.mission.mission": "Mission",
+    "m2pem.mission.geometry": "Area Point Route VehiclePosition",
+    "m2pem.mission.values": "Value",
+    "m2pem.fleet.behaviors": "SHARED",
+    "m2pem.fleet.fence": "Fence",
+    "m2pem.fleet.fleet": "Fleet",
+    "m2pem.fleet.geojson": "as_geojson parse_geojson",
+    "m2pem.fleet.lawn_mower": "lawn_mower longest_edge_yaw",
+    "m2pem.fleet.units": "Dimension UnitError quantity",
 }
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 

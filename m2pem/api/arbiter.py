@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 from uuid import UUID, uuid4
 
 from m2pem.api.telemetry import Telemetry, VehicleState
-from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
-from m2pem.model.geometry import Area
-from m2pem.model.values import Value
-from m2pem.resources import parameters
+from m2pem.fleet import parameters
+from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.mission.geometry import Area
+from m2pem.mission.values import Value
 
 if TYPE_CHECKING:
     import logging

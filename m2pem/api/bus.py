@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator
 from typing import Protocol
 
 from m2pem.api.telemetry import PayloadState, Telemetry, VehicleState
-from m2pem.model.catalogue import ResourceId
+from m2pem.mission.catalogue import ResourceId
 
 
 class FleetBus(Protocol):

@@ -18,14 +18,14 @@ from m2pem.api.authoring import (
 from m2pem.api.telemetry import PayloadState, Telemetry, VehicleState
 from m2pem.engine.records import Record
 from m2pem.findings import Finding
-from m2pem.model.behavior import Decision
-from m2pem.model.catalogue import BehaviorSpec, ResourceId
-from m2pem.model.library import MissionFile
-from m2pem.model.values import Value
+from m2pem.mission.behavior import Decision
+from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.mission.library import MissionFile
+from m2pem.mission.values import Value
 
 if TYPE_CHECKING:
-    from m2pem.model.mission import Mission
-    from m2pem.resources.fleet import Fleet
+    from m2pem.fleet.fleet import Fleet
+    from m2pem.mission.mission import Mission
 
 RunId: TypeAlias = str
 """r1, r2, ... in a journal."""

@@ -17,7 +17,7 @@ from m2pem.api.arbiter import (
 from m2pem.api.ledger import Ledger
 from m2pem.api.mailbox import Mailbox
 from m2pem.api.telemetry import PayloadState, VehicleState
-from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 
 STATES_WAITING = 1000
 CONNECT_WITHIN_S = 2.0

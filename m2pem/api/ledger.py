@@ -8,9 +8,9 @@ from m2pem.api import refusal as parameters
 from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.epochs import Epochs
 from m2pem.api.mailbox import Mailbox
-from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
-from m2pem.model.values import Value
-from m2pem.resources.nearmiss import suggest
+from m2pem.fleet.nearmiss import suggest
+from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.mission.values import Value
 
 REMEMBERED = 10_000
 

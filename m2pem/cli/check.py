@@ -19,8 +19,8 @@ from m2pem.errors import FleetError, MissionError
 from m2pem.findings import Finding, Severity, escaped, has_errors, lines
 
 if TYPE_CHECKING:
-    from m2pem.model.mission import Mission
-    from m2pem.model.values import Value
+    from m2pem.mission.mission import Mission
+    from m2pem.mission.values import Value
 
 UNUSABLE = 2
 
@@ -71,8 +71,8 @@ def _check(
     data: "dict[str, Value]",
 ) -> tuple[list[Finding], bool]:
     """All findings, and whether there is nothing there to be checked."""
+    from m2pem.bpmn import NO_BPMN_RULES
     from m2pem.executive.loading import load_source
-    from m2pem.model.bpmn import NO_BPMN_RULES
 
     mission: Mission | None = None
     findings: list[Finding] = []
@@ -101,7 +101,7 @@ def _against_fleet(
 
     if mission is None:
         if fleet_file is not None and fleet_file != MADE_UP:
-            from m2pem.resources.fleet_file import load_fleet
+            from m2pem.fleet.fleet_file import load_fleet
 
             load_fleet(fleet_file)
         return []

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from m2pem.cli.story import Story
     from m2pem.engine.run import Step
-    from m2pem.model.mission import Mission
+    from m2pem.mission.mission import Mission
 
 VERSIONS = (1,)
 

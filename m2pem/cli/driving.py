@@ -18,10 +18,10 @@ from m2pem.cli.output import Output
 from m2pem.control_socket.server import ControlSocket
 from m2pem.executive.executive import Executive
 from m2pem.executive.loop_monitor import LoopMonitor
-from m2pem.model.mission import Mission
+from m2pem.mission.mission import Mission
 
 if TYPE_CHECKING:
-    from m2pem.sim.answers import Answers
+    from m2pem.rehearsal.answers import Answers
 
 log = logging.getLogger("m2pem.cli")
 

@@ -22,7 +22,7 @@ def fleet(fleet_file: str | None, schema: bool, journal: str | None, output: str
     Also the interrupted runs of the journal that have vehicles of the fleet.
     """
     if schema:
-        from m2pem.resources.fleet_schema import fleet_schema
+        from m2pem.fleet.fleet_schema import fleet_schema
 
         click.echo(as_json(fleet_schema()))
         return
@@ -32,8 +32,8 @@ def fleet(fleet_file: str | None, schema: bool, journal: str | None, output: str
         raise click.UsageError(f"{MADE_UP!r} is made up from a mission; name a fleet file")
     from m2pem.cli.fleets import arbiters_of
     from m2pem.cli.interrupted import interrupted_runs
+    from m2pem.fleet.fleet_file import load_fleet
     from m2pem.plugins import PluginManager
-    from m2pem.resources.fleet_file import load_fleet
 
     arbiters = arbiters_of(load_fleet(fleet_file), PluginManager())
     left = [
@@ -48,7 +48,7 @@ def fleet(fleet_file: str | None, schema: bool, journal: str | None, output: str
 
 
 def _as_data(arbiters: "FleetArbiters") -> dict[str, Any]:
-    from m2pem.model.behavior import BehaviorType
+    from m2pem.mission.behavior import BehaviorType
 
     fleet = arbiters.fleet
     # What a vehicle can do in a team stands with the team.

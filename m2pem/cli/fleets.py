@@ -7,9 +7,9 @@ from m2pem.cli.options import UnusableError
 from m2pem.errors import PluginError
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.clock import SystemClock
-from m2pem.gateway.bus import Bus
+from m2pem.fleet.fleet import Fleet
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet import Fleet
+from m2pem.telemetry.bus import Bus
 
 
 def arbiters_of(fleet: Fleet, plugins: PluginManager) -> FleetArbiters:

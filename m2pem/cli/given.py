@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from m2pem.cli.options import MADE_UP
 
 if TYPE_CHECKING:
-    from m2pem.model.mission import Mission
-    from m2pem.resources.fleet import Fleet
-    from m2pem.sim.answers import Answers
+    from m2pem.fleet.fleet import Fleet
+    from m2pem.mission.mission import Mission
+    from m2pem.rehearsal.answers import Answers
 
 
 def get_fleet(name: str, mission: "Mission") -> "Fleet":
@@ -21,10 +21,10 @@ def get_fleet(name: str, mission: "Mission") -> "Fleet":
         FleetError: with every finding.
     """
     if name == MADE_UP:
-        from m2pem.resources.madeup import fleet_for
+        from m2pem.fleet.madeup import fleet_for
 
         return fleet_for(mission)
-    from m2pem.resources.fleet_file import load_fleet
+    from m2pem.fleet.fleet_file import load_fleet
 
     return load_fleet(name)
 
@@ -39,7 +39,7 @@ def get_answers(file: Path | None, mission: "Mission") -> "Answers | None":
         return None
     from m2pem.errors import AnswersError
     from m2pem.findings import has_errors
-    from m2pem.sim.answers import check_answers, load_answers
+    from m2pem.rehearsal.answers import check_answers, load_answers
 
     answers = load_answers(file)
     findings = check_answers(answers, mission)

@@ -9,7 +9,7 @@ import click
 from m2pem.errors import M2pemError
 
 if TYPE_CHECKING:
-    from m2pem.model.values import Value
+    from m2pem.mission.values import Value
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -65,7 +65,7 @@ process_option = click.option(
 def _read_data(_: click.Context, __: click.Parameter, words: tuple[str, ...]) -> "dict[str, Value]":
     if not words:
         return {}
-    from m2pem.resources.yaml_source import parse_yaml
+    from m2pem.fleet.yaml_source import parse_yaml
 
     data: dict[str, Value] = {}
     for word in words:

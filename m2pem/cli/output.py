@@ -12,7 +12,7 @@ from m2pem.cli.story import Story, printable
 from m2pem.cli.writer import LineWriter, writer_for
 from m2pem.engine.records import RunEnded
 from m2pem.journal.codec import record_line
-from m2pem.model.mission import Mission
+from m2pem.mission.mission import Mission
 
 US_PER_S = 1_000_000
 

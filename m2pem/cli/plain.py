@@ -20,7 +20,7 @@ from m2pem.cli.story import printable
 from m2pem.cli.writer import writer_for
 from m2pem.engine.records import RunClaimed, RunEnded, RunStarted
 from m2pem.errors import BusyError, M2pemError, OperatorError
-from m2pem.model.behavior import Decision
+from m2pem.mission.behavior import Decision
 
 NAME = "plain"
 BACKLOG = 1_000_000
@@ -242,8 +242,8 @@ class PlainOcu:
 
     async def _hand_over(self, kind: str, words: list[str]) -> None:
         """To every run, now and later (paper, section 4.3)."""
-        from m2pem.resources.geofiles import read_geometry
-        from m2pem.resources.geojson import as_geojson
+        from m2pem.fleet.geofiles import read_geometry
+        from m2pem.fleet.geojson import as_geojson
 
         if len(words) < 2:
             raise OperatorError(f"say which, and from where: {kind} NAME FILE")

@@ -44,9 +44,9 @@ def _behaviors(manager: "PluginManager", arbiter: str) -> "dict[str, list[str]]"
     """What an arbiter offers in each domain and on a payload; nothing if it needs a real fleet."""
     from m2pem.api.arbiter import ArbiterContext, Connection
     from m2pem.executive.clock import SystemClock
-    from m2pem.gateway.bus import Bus
-    from m2pem.model.catalogue import ResourceId
-    from m2pem.resources.fleet import Domain
+    from m2pem.fleet.fleet import Domain
+    from m2pem.mission.catalogue import ResourceId
+    from m2pem.telemetry.bus import Bus
 
     vehicles = {ResourceId(domain.value): domain.value for domain in Domain}
     payload = ResourceId(f"{Domain.GROUND.value}/payload")

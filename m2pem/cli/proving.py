@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from m2pem.executive.proving import Asked, Engine
-    from m2pem.model.mission import Mission
-    from m2pem.model.values import Value
+    from m2pem.mission.mission import Mission
+    from m2pem.mission.values import Value
     from m2pem.verify.explore import Progress
     from m2pem.verify.report.findings import Findings
 
@@ -59,9 +59,9 @@ def findings(asked: "Asked", engine: "Engine", *, strict: bool) -> "Findings":
 
 def promela(asked: "Asked") -> str:
     """The model that Spin would be given."""
-    from m2pem.verify.derive import derive
     from m2pem.verify.simplify import simplify
     from m2pem.verify.spin.promela import text_of
+    from m2pem.verify.translate import derive
 
     system = derive(asked.mission, asked.fleet, process=asked.process, options=asked.options)
     return text_of(simplify(system)).text

@@ -59,10 +59,10 @@ async def _resume(
     from m2pem.cli.state_files import tidy_up
     from m2pem.engine.state import RunStatus
     from m2pem.executive.clock import SystemClock
+    from m2pem.fleet.snapshot import restore
     from m2pem.journal import file_of
     from m2pem.journal.mission import mission_of
     from m2pem.plugins import PluginManager
-    from m2pem.resources.snapshot import restore
 
     plugins = PluginManager()
     operators = Operators(chosen(ocu_names, plugins), plugins)

@@ -22,7 +22,7 @@ from m2pem.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from m2pem.model.values import Value
+    from m2pem.mission.values import Value
 
 
 @click.command(

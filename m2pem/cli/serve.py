@@ -21,8 +21,8 @@ from m2pem.cli.options import (
 
 if TYPE_CHECKING:
     from m2pem.executive.executive import Executive
+    from m2pem.fleet.fleet import Fleet
     from m2pem.journal.base import Journal, RunLine
-    from m2pem.resources.fleet import Fleet
 
 
 @click.command(epilog=example("m2pem serve --fleet fleet_configs/vignette1.yaml --ocu plain"))
@@ -66,9 +66,9 @@ async def _serve(
     from m2pem.cli.setting import make_executive, refuse_speed
     from m2pem.cli.state_files import tidy_up, with_shared_state
     from m2pem.executive.clock import SystemClock
+    from m2pem.fleet.fleet_file import load_fleet
     from m2pem.journal import file_of
     from m2pem.plugins import PluginManager
-    from m2pem.resources.fleet_file import load_fleet
 
     if fleet_file == MADE_UP:
         raise click.UsageError(f"--fleet {MADE_UP}: a fleet is made up from a mission; name a file")
@@ -107,7 +107,7 @@ async def _interrupted(
     journal: "Journal", fleet: "Fleet", simulated: bool, speed: float
 ) -> "tuple[list[RunLine], list[RunLine]]":
     """The runs that nobody drives: those with this very fleet, and the others."""
-    from m2pem.resources.snapshot import dump
+    from m2pem.fleet.snapshot import dump
 
     here = (dump(fleet), simulated, speed)
     mine: list[RunLine] = []

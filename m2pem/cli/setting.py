@@ -13,9 +13,9 @@ from m2pem.executive.arbiters import SIMULATED
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.executive.script import Script
+from m2pem.fleet.fleet import Fleet, Payload, Vehicle
 from m2pem.journal.base import Journal
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet import Fleet, Payload, Vehicle
 
 
 def refuse_speed(fleet: Fleet, speed: float, *, simulated: bool) -> None:
@@ -72,6 +72,6 @@ def make_executive(
 
 
 async def _rehearse(*arguments: Any, **options: Any) -> SimulationResult:
-    from m2pem.sim.rehearser import rehearse_apart
+    from m2pem.rehearsal.rehearser import rehearse_apart
 
     return await rehearse_apart(*arguments, **options)

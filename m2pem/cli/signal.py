@@ -8,7 +8,7 @@ from m2pem.cli.options import example, journal_option, run_argument, signal_data
 from m2pem.cli.steering import by_option, steer
 
 if TYPE_CHECKING:
-    from m2pem.model.values import Value
+    from m2pem.mission.values import Value
 
 
 @click.command(epilog=example("m2pem signal r1 'Stop driving'"))

@@ -20,8 +20,8 @@ from m2pem.cli.options import (
 
 if TYPE_CHECKING:
     from m2pem.api.control import StampedRecord
-    from m2pem.model.values import Value
-    from m2pem.resources.fleet import Fleet
+    from m2pem.fleet.fleet import Fleet
+    from m2pem.mission.values import Value
 
 US_PER_S = 1_000_000
 
@@ -88,7 +88,7 @@ def simulate(
     from m2pem.cli.output import output_of
     from m2pem.executive.loading import load_source
     from m2pem.plugins import PluginManager
-    from m2pem.sim.rehearsal import START_US, rehearse
+    from m2pem.rehearsal.rehearsal import START_US, rehearse
 
     loaded = load_source(mission, search_path)
     fleet = get_fleet(fleet_file, loaded) if fleet_file is not None else None
@@ -124,7 +124,7 @@ def simulate(
 
 
 def _draw(file: Path, records: "list[StampedRecord]", fleet: "Fleet | None") -> None:
-    from m2pem.sim.gantt import gantt_svg
+    from m2pem.rehearsal.gantt import gantt_svg
 
     try:
         file.write_text(gantt_svg(records, fleet), encoding="utf-8")

@@ -8,10 +8,10 @@ from m2pem.cli.table import table
 from m2pem.engine.records import DataWritten, Record
 from m2pem.engine.run import MissionRun
 from m2pem.executive.control import summary
+from m2pem.fleet.snapshot import restore
 from m2pem.journal.base import RunLine
 from m2pem.journal.mission import mission_of
-from m2pem.model.values import Value
-from m2pem.resources.snapshot import restore
+from m2pem.mission.values import Value
 
 
 def run_of(line: RunLine) -> MissionRun:

@@ -14,8 +14,8 @@ from typing import Any
 from m2pem.engine.state import RunStatus
 from m2pem.executive.arbiters import SIMULATED
 from m2pem.executive.executive import Executive
-from m2pem.resources.fleet import Fleet, Payload, Vehicle
-from m2pem.resources.snapshot import dump
+from m2pem.fleet.fleet import Fleet, Payload, Vehicle
+from m2pem.fleet.snapshot import dump
 
 STATE = "state"
 """The setting of a simulated resource that names its file."""

@@ -8,9 +8,9 @@ import click
 from m2pem.api.control import RunId, StampedRecord
 from m2pem.engine import records as r
 from m2pem.engine.state import RunState
-from m2pem.model.catalogue import BehaviorState
-from m2pem.model.elements import Activity, Event
-from m2pem.model.mission import Mission
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.elements import Activity, Event
+from m2pem.mission.mission import Mission
 
 Told: TypeAlias = tuple[str, str]
 """A line, and the colour of it ("" for none)."""

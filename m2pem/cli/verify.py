@@ -20,7 +20,7 @@ from m2pem.cli.options import (
 from m2pem.cli.report_files import KINDS, write
 
 if TYPE_CHECKING:
-    from m2pem.model.values import Value
+    from m2pem.mission.values import Value
     from m2pem.verify.report.findings import Findings
 
 

@@ -7,8 +7,8 @@ from typing import Any, TypeAlias
 import msgspec
 
 from m2pem.api.control import MissionControl
-from m2pem.model.values import Value
-from m2pem.resources.snapshot import dump
+from m2pem.fleet.snapshot import dump
+from m2pem.mission.values import Value
 
 
 class Params(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -23,17 +23,17 @@ from m2pem.api.control import (
     TakeEffect,
 )
 from m2pem.api.telemetry import PayloadState, TeamState, Telemetry, VehicleState
+from m2pem.bpmn import parse_mission
 from m2pem.control_socket.place import ControlSocketError, address
 from m2pem.control_socket.protocol import LONGEST_LINE_BYTES, Request, line, result_of
 from m2pem.errors import OperatorError
 from m2pem.findings import Finding
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.catalogue import BehaviorSpec, ResourceId
-from m2pem.model.library import KeptLibrary, Source
-from m2pem.model.mission import Mission
-from m2pem.model.values import Value
-from m2pem.resources.fleet import Fleet
-from m2pem.resources.snapshot import restore
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.snapshot import restore
+from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.mission.library import KeptLibrary, Source
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
 
 _KINDS: dict[str, type] = {
     kind.__name__: kind

@@ -6,10 +6,10 @@ all, or as text.
 
 from lxml import etree
 
-from m2pem.drawing.layout.model import BPMN, Element, children, tag
-from m2pem.model.bpmn.behavior_xml import is_behavior
-from m2pem.model.bpmn.names import M2PEM, local
-from m2pem.model.bpmn.xml import XmlError, parse_xml
+from m2pem.bpmn.behavior_xml import is_behavior
+from m2pem.bpmn.names import M2PEM, local
+from m2pem.bpmn.xml import XmlError, parse_xml
+from m2pem.diagram.layout.model import BPMN, Element, children, tag
 
 _SCRIPTS = ("scriptTask", "globalScriptTask")
 _FORMAT = {"scriptTask": "scriptFormat", "globalScriptTask": "scriptLanguage"}

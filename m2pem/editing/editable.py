@@ -8,14 +8,14 @@ import re
 from lxml import etree
 
 from m2pem.api.authoring import Editable
-from m2pem.drawing.interchange import NAMESPACES, add_diagrams, remove_diagrams, undrawn
-from m2pem.drawing.layout.model import Element
+from m2pem.bpmn.files import open_part
+from m2pem.bpmn.names import M2PEM
+from m2pem.diagram.interchange import NAMESPACES, add_diagrams, remove_diagrams, undrawn
+from m2pem.diagram.layout.model import Element
 from m2pem.editing.behaviors import lift_behaviors
 from m2pem.editing.flow_references import refer_to_flows
 from m2pem.editing.identifiers import name_all, unqualify_references
 from m2pem.editing.texts import flatten_texts, set_types
-from m2pem.model.bpmn.files import open_part
-from m2pem.model.bpmn.names import M2PEM
 
 _DECLARATION = b'<?xml version="1.0" encoding="UTF-8"?>\n'
 _XSI = "http://www.w3.org/2001/XMLSchema-instance"

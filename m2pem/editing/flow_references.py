@@ -2,7 +2,7 @@
 
 from lxml import etree
 
-from m2pem.drawing.layout.model import BPMN, Element, children, is_node, local
+from m2pem.diagram.layout.model import BPMN, Element, children, is_node, local
 
 _BEFORE = ("documentation", "extensionElements", "auditing", "monitoring", "categoryValueRef")
 

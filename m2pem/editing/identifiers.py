@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 from lxml import etree
 
-from m2pem.drawing.interchange import NAMESPACES
-from m2pem.drawing.layout.model import BPMN, Element, is_node, tag
+from m2pem.diagram.interchange import NAMESPACES
+from m2pem.diagram.layout.model import BPMN, Element, is_node, tag
 
 _LEGAL = re.compile(r"([a-z][\w.-]*:)?[a-z_][\w.-]*", re.IGNORECASE | re.ASCII)
 _NEED_ONE = frozenset(

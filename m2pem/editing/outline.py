@@ -11,14 +11,14 @@ from m2pem.api.authoring import (
     OutlineProcess,
     OutlineTrigger,
 )
-from m2pem.drawing.layout.model import DATA, Element, children, is_node, local, tag
-from m2pem.model.bpmn import read_partly
-from m2pem.model.bpmn.files import open_part
-from m2pem.model.bpmn.reading import KEY, Reading
-from m2pem.model.elements import Activity
-from m2pem.model.events import Message, Signal
-from m2pem.model.library import Library
-from m2pem.model.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
+from m2pem.bpmn import read_partly
+from m2pem.bpmn.files import open_part
+from m2pem.bpmn.reading import KEY, Reading
+from m2pem.diagram.layout.model import DATA, Element, children, is_node, local, tag
+from m2pem.mission.elements import Activity
+from m2pem.mission.events import Message, Signal
+from m2pem.mission.library import Library
+from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
 from m2pem.verify.requirements.data_names import read_by, written_by
 
 _LISTED = (*DATA, "sequenceFlow")

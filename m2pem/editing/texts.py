@@ -2,8 +2,8 @@
 
 from lxml import etree
 
-from m2pem.drawing.layout.model import BPMN, Element, local, tag
-from m2pem.model.bpmn.reading import text_of
+from m2pem.bpmn.reading import text_of
+from m2pem.diagram.layout.model import BPMN, Element, local, tag
 
 _TYPE = "{http://www.w3.org/2001/XMLSchema-instance}type"
 _READ_AS_TEXT = ("documentation", "text")

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from m2pem.engine.execution import Execution
 from m2pem.engine.state import Token
-from m2pem.model.elements import FlowNode
+from m2pem.mission.elements import FlowNode
 
 WHEN_ENTERED: dict[type[FlowNode], Callable[[Execution, Token], None]] = {}
 """What happens at once when a token enters a kind of node; filled by the handlers."""

@@ -7,8 +7,8 @@ stops a run may go out before it.
 from dataclasses import dataclass
 from typing import TypeAlias, Union
 
-from m2pem.model.behavior import Decision
-from m2pem.model.values import Value
+from m2pem.mission.behavior import Decision
+from m2pem.mission.values import Value
 
 
 @dataclass(frozen=True, slots=True)

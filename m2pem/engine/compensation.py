@@ -14,8 +14,8 @@ from m2pem.engine.records import TokenOutcome
 from m2pem.engine.scopes import close, compensates_around, compensator, open_scope
 from m2pem.engine.state import Compensation, Completion, Scope, Token
 from m2pem.engine.triggering import WHEN_TRIGGERED
-from m2pem.model.elements import Activity, Element, SubProcess
-from m2pem.model.events import CompensateEventDefinition
+from m2pem.mission.elements import Activity, Element, SubProcess
+from m2pem.mission.events import CompensateEventDefinition
 
 # --- what can be undone -------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.state import Wait
 from m2pem.engine.throwing import throw_error, throw_error_in
 from m2pem.errors import ExpressionError
-from m2pem.model.events import ConditionalEventDefinition
+from m2pem.mission.events import ConditionalEventDefinition
 
 
 def definition_of(wait: Wait) -> ConditionalEventDefinition:

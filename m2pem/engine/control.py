@@ -11,7 +11,7 @@ from m2pem.engine.reports import give_up
 from m2pem.engine.state import Behavior, BehaviorPhase, RunState
 from m2pem.engine.throwing import catcher_of_error
 from m2pem.engine.triggering import throw_signal
-from m2pem.model.elements import Event
+from m2pem.mission.elements import Event
 
 CODE = "TAKEN_OVER"
 

@@ -10,10 +10,10 @@ from m2pem.engine.data import Place, reader
 from m2pem.engine.execution import Execution
 from m2pem.engine.state import Scope, Token
 from m2pem.errors import ExpressionError
-from m2pem.model.elements import Process
-from m2pem.model.events import CorrelationProperty
-from m2pem.model.expression import Expression
-from m2pem.model.values import ReadValue, Value
+from m2pem.mission.elements import Process
+from m2pem.mission.events import CorrelationProperty
+from m2pem.mission.expression import Expression
+from m2pem.mission.values import ReadValue, Value
 
 OWN_KEY = "key"
 """Under which a message's own correlation key stands among its keys."""

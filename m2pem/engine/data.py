@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from typing import TypeAlias
 
 from m2pem.engine.state import Loop, Scope, Shared, Token
-from m2pem.model.elements import Activity, Process
-from m2pem.model.loops import INSTANCE_COUNTS, LOOP_COUNTER
-from m2pem.model.values import ReadValue, Value
+from m2pem.mission.elements import Activity, Process
+from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER
+from m2pem.mission.values import ReadValue, Value
 
 Place: TypeAlias = Token | Scope
 """Where a name is used."""

@@ -5,10 +5,10 @@ from m2pem.engine.execution import Execution
 from m2pem.engine.state import Token
 from m2pem.engine.throwing import throw_error
 from m2pem.errors import ExpressionError
-from m2pem.model.behavior import Mapping
-from m2pem.model.elements import Activity, Event, ReceiveTask
-from m2pem.model.loops import LOOP_COUNTER, MultiInstance
-from m2pem.model.values import ReadValue, Value
+from m2pem.mission.behavior import Mapping
+from m2pem.mission.elements import Activity, Event, ReceiveTask
+from m2pem.mission.loops import LOOP_COUNTER, MultiInstance
+from m2pem.mission.values import ReadValue, Value
 
 
 def evaluate(

@@ -12,13 +12,13 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.arming import arm_entered
 from m2pem.engine.data import flatten
+from m2pem.engine.elements.activities import answered
+from m2pem.engine.elements.ad_hoc import chosen
+from m2pem.engine.elements.completion import complete
+from m2pem.engine.elements.containers import begin
 from m2pem.engine.interruption import end_run
 from m2pem.engine.lifecycle import Welcome, welcome
 from m2pem.engine.messaging import receive
-from m2pem.engine.nodes.activities import answered
-from m2pem.engine.nodes.ad_hoc import chosen
-from m2pem.engine.nodes.completion import complete
-from m2pem.engine.nodes.containers import begin
 from m2pem.engine.records import RunOutcome
 from m2pem.engine.reports import fault, missing, reported, settle
 from m2pem.engine.state import BehaviorPhase
@@ -31,7 +31,7 @@ from m2pem.engine.triggering import (
     trigger,
 )
 from m2pem.engine.waiting import next_timer
-from m2pem.model.elements import Activity, AdHocSubProcess
+from m2pem.mission.elements import Activity, AdHocSubProcess
 
 _THROW_NOTHING = (i.Continue, i.StopRun, i.PauseRun, i.ClaimRun, i.GeometrySet)
 

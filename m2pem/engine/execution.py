@@ -14,7 +14,8 @@ from m2pem.engine.apply import apply
 from m2pem.engine.data import Store, flatten, store_for
 from m2pem.engine.records import Record, TokenOutcome
 from m2pem.engine.state import RunState, Scope, Token
-from m2pem.model.elements import (
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.elements import (
     Activity,
     AdHocSubProcess,
     CallActivity,
@@ -30,17 +31,16 @@ from m2pem.model.elements import (
     SubProcess,
     Transaction,
 )
-from m2pem.model.events import (
+from m2pem.mission.events import (
     ConditionalEventDefinition,
     EventDefinition,
     MessageEventDefinition,
     SignalEventDefinition,
     TimerEventDefinition,
 )
-from m2pem.model.mission import Mission
-from m2pem.model.upstream import upstream
-from m2pem.model.values import Value
-from m2pem.resources.fleet import Fleet
+from m2pem.mission.mission import Mission
+from m2pem.mission.upstream import upstream
+from m2pem.mission.values import Value
 
 NO_FLEET = Fleet("", "no fleet", {})
 """For a mission that commands no resource."""
@@ -115,7 +115,7 @@ class Execution:
         return self.process_ids[node.index]
 
     def upstream(self, join: FlowNode) -> dict[FlowNode, int]:
-        """`m2pem.model.upstream.upstream`, worked out once for each join."""
+        """`m2pem.mission.upstream.upstream`, worked out once for each join."""
         reach = self._reach.get(join)
         if reach is None:
             reach = self._reach[join] = upstream(join)

@@ -8,8 +8,8 @@ from typing import TypeAlias, Union
 
 import msgspec
 
-from m2pem.model.catalogue import BehaviorState, ResumePolicy
-from m2pem.model.values import Value
+from m2pem.mission.catalogue import BehaviorState, ResumePolicy
+from m2pem.mission.values import Value
 
 
 class _Input(

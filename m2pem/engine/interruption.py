@@ -8,7 +8,7 @@ from m2pem.engine.execution import Execution
 from m2pem.engine.records import RunOutcome, TokenOutcome
 from m2pem.engine.scopes import Failing, empty, kill, open_scope, withdraw
 from m2pem.engine.state import Scope, Token
-from m2pem.model.elements import BoundaryEvent, StartEvent, SubProcess
+from m2pem.mission.elements import BoundaryEvent, StartEvent, SubProcess
 
 
 def divert(x: Execution, token: Token, boundary: BoundaryEvent, failed: Failing = ()) -> Token:

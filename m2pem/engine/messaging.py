@@ -13,7 +13,7 @@ from m2pem.engine.state import Token
 from m2pem.engine.throwing import throw_error
 from m2pem.engine.triggering import deliver, message_receiver
 from m2pem.errors import ExpressionError
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 
 
 def send(x: Execution, token: Token, message: str) -> None:

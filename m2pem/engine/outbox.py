@@ -16,7 +16,7 @@ from m2pem.engine.commands import (
 )
 from m2pem.engine.records import Record
 from m2pem.engine.state import Behavior, BehaviorPhase, Prompt, RunState, RunStatus, Service
-from m2pem.model.behavior import Decision
+from m2pem.mission.behavior import Decision
 
 _ASKING = frozenset(
     {

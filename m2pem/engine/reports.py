@@ -3,14 +3,14 @@ after a restart (docs/architecture.md, section 6)."""
 
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
+from m2pem.engine.elements.completion import complete
 from m2pem.engine.execution import Execution
 from m2pem.engine.interruption import end_run
-from m2pem.engine.nodes.completion import complete
 from m2pem.engine.records import RunOutcome
 from m2pem.engine.state import Behavior, BehaviorPhase
 from m2pem.engine.throwing import throw_error
-from m2pem.model.catalogue import BehaviorState, ResumePolicy
-from m2pem.model.values import Value
+from m2pem.mission.catalogue import BehaviorState, ResumePolicy
+from m2pem.mission.values import Value
 
 DEFAULT_CODES: dict[BehaviorState, str] = {
     BehaviorState.FAILED: "FAILED",

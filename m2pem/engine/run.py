@@ -19,8 +19,8 @@ from m2pem.engine.records import Record
 from m2pem.engine.state import RunState, RunStatus
 from m2pem.engine.steps import Steps
 from m2pem.engine.waiting import next_timer
-from m2pem.model.mission import Mission
-from m2pem.resources.fleet import Fleet
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.mission import Mission
 
 
 @dataclass(frozen=True, slots=True)

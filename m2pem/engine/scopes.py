@@ -6,8 +6,8 @@ from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.state import Scope, Token
-from m2pem.model.elements import Activity, Container, SubProcess
-from m2pem.model.events import CompensateEventDefinition
+from m2pem.mission.elements import Activity, Container, SubProcess
+from m2pem.mission.events import CompensateEventDefinition
 
 
 def open_scope(x: Execution, token: Token) -> Scope:

@@ -10,15 +10,15 @@ from enum import StrEnum
 
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import RunOutcome, Trigger
-from m2pem.model.catalogue import BehaviorState
-from m2pem.model.elements import (
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.elements import (
     Activity,
     Container,
     FlowNode,
     SequenceFlow,
 )
-from m2pem.model.mission import Mission
-from m2pem.model.values import Value
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
 
 
 class RunStatus(StrEnum):

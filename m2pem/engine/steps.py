@@ -6,16 +6,16 @@ from collections.abc import Iterator
 from m2pem.engine import records as r
 from m2pem.engine.arming import arm_next
 from m2pem.engine.conditions import comes_true
+from m2pem.engine.elements import EXECUTE, look_at
+from m2pem.engine.elements.beginning import has_entered
+from m2pem.engine.elements.joins import fire_joins
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.interruption import end_run
-from m2pem.engine.nodes import EXECUTE, look_at
-from m2pem.engine.nodes.beginning import has_entered
-from m2pem.engine.nodes.joins import fire_joins
 from m2pem.engine.records import Record, RunOutcome
 from m2pem.engine.state import RunState, RunStatus, Scope, Token
 from m2pem.engine.triggering import trigger
-from m2pem.model.events import MessageEventDefinition, SignalEventDefinition
-from m2pem.resources.fleet import Fleet
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.events import MessageEventDefinition, SignalEventDefinition
 
 
 class Steps(Execution):

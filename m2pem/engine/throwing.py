@@ -10,8 +10,8 @@ from m2pem.engine.interruption import begin_event_subprocess, divert, end_run
 from m2pem.engine.records import RunOutcome, TokenOutcome
 from m2pem.engine.scopes import Failing, failing
 from m2pem.engine.state import Scope, Token
-from m2pem.model.elements import Activity, BoundaryEvent, Event, StartEvent
-from m2pem.model.events import (
+from m2pem.mission.elements import Activity, BoundaryEvent, Event, StartEvent
+from m2pem.mission.events import (
     ErrorEventDefinition,
     Escalation,
     EscalationEventDefinition,

@@ -11,8 +11,8 @@ from m2pem.engine.execution import Execution
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.scopes import empty, withdraw
 from m2pem.engine.state import Scope, Token
-from m2pem.model.elements import Activity
-from m2pem.model.events import CancelEventDefinition
+from m2pem.mission.elements import Activity
+from m2pem.mission.events import CancelEventDefinition
 
 
 def cancel(x: Execution, token: Token) -> None:

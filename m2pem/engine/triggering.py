@@ -12,7 +12,7 @@ from m2pem.engine.interruption import begin_event_subprocess, divert
 from m2pem.engine.records import Trigger
 from m2pem.engine.state import Scope, Token, Wait
 from m2pem.engine.waiting import arm, arm_again
-from m2pem.model.elements import (
+from m2pem.mission.elements import (
     Activity,
     BoundaryEvent,
     Event,
@@ -22,14 +22,14 @@ from m2pem.model.elements import (
     ReceiveTask,
     StartEvent,
 )
-from m2pem.model.events import (
+from m2pem.mission.events import (
     ConditionalEventDefinition,
     EventDefinition,
     MessageEventDefinition,
     SignalEventDefinition,
     TimerEventDefinition,
 )
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 
 WHEN_TRIGGERED: dict[type[FlowNode], Callable[[Execution, Token], None]] = {}
 """What a wait at a token's own node leads to, by kind of node; filled by the handlers."""

@@ -14,10 +14,10 @@ from m2pem.engine.records import Trigger
 from m2pem.engine.state import Scope, Token, Wait
 from m2pem.engine.throwing import throw_error, throw_error_in
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.model.cycle import cycle, next_round
-from m2pem.model.duration import date_us, duration_us
-from m2pem.model.elements import FlowNode
-from m2pem.model.events import (
+from m2pem.mission.cycle import cycle, next_round
+from m2pem.mission.duration import date_us, duration_us
+from m2pem.mission.elements import FlowNode
+from m2pem.mission.events import (
     ConditionalEventDefinition,
     EventDefinition,
     MessageEventDefinition,
@@ -25,8 +25,8 @@ from m2pem.model.events import (
     TimerEventDefinition,
     TimerKind,
 )
-from m2pem.model.expression import Expression
-from m2pem.model.expression.literals import describe
+from m2pem.mission.expression import Expression
+from m2pem.mission.expression.literals import describe
 
 
 class _NotATimeError(Exception):

@@ -15,11 +15,11 @@ from m2pem.api.arbiter import (
 )
 from m2pem.errors import FleetError
 from m2pem.findings import Finding
-from m2pem.model.behavior import BehaviorType
-from m2pem.model.catalogue import BehaviorSpec, ResourceId
-from m2pem.model.geometry import Area
-from m2pem.resources.fleet import Fleet
-from m2pem.resources.graph import ResourceGraph
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.graph import ResourceGraph
+from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.mission.geometry import Area
 from m2pem.teams.offers import Offers
 
 if TYPE_CHECKING:

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Container, Mapping
 
 from m2pem.errors import BusyError
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.mission import Mission
-from m2pem.resources.allocation import resources_of_mission
-from m2pem.resources.fleet import Fleet
+from m2pem.fleet.allocation import resources_of_mission
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.mission import Mission
 
 
 def refuse_busy(

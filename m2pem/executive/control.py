@@ -37,13 +37,13 @@ from m2pem.executive.loss import PROMPT as LOSS_PROMPT
 from m2pem.executive.prover import verify_apart
 from m2pem.executive.requiring import requirement_findings
 from m2pem.findings import Finding
+from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import RunLine
 from m2pem.journal.mission import mission_of
-from m2pem.model.catalogue import BehaviorSpec, ResourceId
-from m2pem.model.events import Signal
-from m2pem.model.mission import Mission
-from m2pem.model.values import MAX_DEPTH, Value, is_too_deep
-from m2pem.resources.fleet import Fleet
+from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.mission.events import Signal
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import MAX_DEPTH, Value, is_too_deep
 
 if TYPE_CHECKING:
     from m2pem.executive.executive import Executive

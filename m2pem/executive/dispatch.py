@@ -16,11 +16,11 @@ from m2pem.engine.commands import CancelBehavior, StartBehavior
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.clearance import Clearance
 from m2pem.executive.script import Script
-from m2pem.model.behavior import BehaviorType
-from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
-from m2pem.model.geometry import Geometry
-from m2pem.resources.availability import Availability
-from m2pem.resources.parameters import ParameterError, resolve
+from m2pem.fleet.availability import Availability
+from m2pem.fleet.parameters import ParameterError, resolve
+from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.mission.geometry import Geometry
 
 log = logging.getLogger("m2pem.dispatch")
 

@@ -52,21 +52,21 @@ from m2pem.executive.space import watch_space
 from m2pem.executive.stop_marks import StopMarks
 from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.findings import Severity
-from m2pem.gateway.bus import Bus
-from m2pem.gateway.watch import Watch, watch
+from m2pem.fleet.allocation import spelled_out
+from m2pem.fleet.availability import Availability
+from m2pem.fleet.distance import NO_ORIGIN, geometry_out_of_reach
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.geojson import GeometryError, parse_geojson
+from m2pem.fleet.snapshot import dump
 from m2pem.journal.base import Journal, RunHeader
 from m2pem.journal.mission import mission_of
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.geometry import Geometry
-from m2pem.model.mission import Mission
-from m2pem.model.values import Value
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Geometry
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
 from m2pem.plugins import PluginManager
-from m2pem.resources.allocation import spelled_out
-from m2pem.resources.availability import Availability
-from m2pem.resources.distance import NO_ORIGIN, geometry_out_of_reach
-from m2pem.resources.fleet import Fleet
-from m2pem.resources.geojson import GeometryError, parse_geojson
-from m2pem.resources.snapshot import dump
+from m2pem.telemetry.bus import Bus
+from m2pem.telemetry.watch import Watch, watch
 
 log = logging.getLogger("m2pem.executive")
 

@@ -11,9 +11,9 @@ from m2pem.engine.control import preview_taken
 from m2pem.engine.inputs import ControlReturned, ControlTaken
 from m2pem.errors import OperatorError
 from m2pem.executive.runner import Runner
-from m2pem.model.catalogue import ResourceId
-from m2pem.resources.availability import Availability
-from m2pem.resources.nearmiss import did_you_mean
+from m2pem.fleet.availability import Availability
+from m2pem.fleet.nearmiss import did_you_mean
+from m2pem.mission.catalogue import ResourceId
 
 if TYPE_CHECKING:
     from m2pem.executive.arbiters import FleetArbiters

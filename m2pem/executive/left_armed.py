@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 from m2pem.api.bus import FleetBus
 from m2pem.api.telemetry import LinkState, VehicleState
-from m2pem.model.catalogue import ResourceId
-from m2pem.resources.fleet import Domain, Vehicle
+from m2pem.fleet.fleet import Domain, Vehicle
+from m2pem.mission.catalogue import ResourceId
 
 ALOFT_M = 1.0
 """Higher above its home, an aircraft flies."""

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
 from m2pem.api.authoring import Draft, MissionSource
+from m2pem.bpmn import parse_mission
+from m2pem.bpmn.rules.registry import code
+from m2pem.bpmn.search_path import SearchPath
+from m2pem.bpmn.size import max_bytes, too_large
 from m2pem.errors import MissionError
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.findings import Finding, Severity, has_errors, lines, unreadable_remedy
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.bpmn.rules.registry import code
-from m2pem.model.bpmn.search_path import SearchPath
-from m2pem.model.bpmn.size import max_bytes, too_large
-from m2pem.model.elements import ServiceTask
-from m2pem.model.lint import by_file, lint
-from m2pem.model.mission import Mission
-from m2pem.model.near import did_you_mean
-from m2pem.resources.behaviors import SHARED
-from m2pem.resources.check import check_mission, check_named
+from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.check import check_mission, check_named
+from m2pem.mission.elements import ServiceTask
+from m2pem.mission.lint import by_file, lint
+from m2pem.mission.mission import Mission
+from m2pem.mission.near import did_you_mean
 
 if TYPE_CHECKING:
     from m2pem.plugins import PluginManager

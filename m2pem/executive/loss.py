@@ -19,10 +19,10 @@ from m2pem.engine.records import BehaviorRequested, Record, RunEnded, RunResumed
 from m2pem.engine.state import Behavior, BehaviorPhase
 from m2pem.errors import OperatorError
 from m2pem.executive.runner import Runner
+from m2pem.fleet.allocation import resources_of_mission
 from m2pem.journal.base import Loss
-from m2pem.model.behavior import Decision
-from m2pem.model.catalogue import BehaviorState, ResourceId, ResumePolicy
-from m2pem.resources.allocation import resources_of_mission
+from m2pem.mission.behavior import Decision
+from m2pem.mission.catalogue import BehaviorState, ResourceId, ResumePolicy
 
 if TYPE_CHECKING:
     from m2pem.executive.executive import Executive

@@ -14,10 +14,10 @@ from m2pem.executive.apart import Given, Tell, apart, given, serve
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.loading import load_source
-from m2pem.gateway.bus import Bus
-from m2pem.model.values import Value
-from m2pem.resources.fleet import Fleet
-from m2pem.resources.snapshot import dump, restore
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.snapshot import dump, restore
+from m2pem.mission.values import Value
+from m2pem.telemetry.bus import Bus
 
 TOKENS = 3
 """On one place, where one is meant: as `m2pem verify` has it."""

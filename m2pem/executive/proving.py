@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.loading import findings_for, refuse_errors
-from m2pem.model.mission import Mission
-from m2pem.model.values import Value
-from m2pem.resources.fleet import Fleet
-from m2pem.resources.madeup import fleet_for
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
 from m2pem.verify.check import Report, check
-from m2pem.verify.derive.options import Options
 from m2pem.verify.explore import Limits, Progress
 from m2pem.verify.report.findings import Findings, findings_of
 from m2pem.verify.requirements import Names, Requirement, gather
 from m2pem.verify.requirements.results import with_requirements
 from m2pem.verify.spin.asking import Storage
+from m2pem.verify.translate.options import Options
 
 if TYPE_CHECKING:
     from m2pem.plugins import PluginManager

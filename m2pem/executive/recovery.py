@@ -20,10 +20,10 @@ from m2pem.executive.loss import doubted, paused_by
 from m2pem.executive.reporting import reported, spec_of
 from m2pem.executive.runner import Runner
 from m2pem.executive.script import Script
+from m2pem.fleet.parameters import ParameterError
 from m2pem.journal.base import Journal, Loss
-from m2pem.model.behavior import BehaviorType
-from m2pem.model.catalogue import BehaviorState, ResourceId, ResumePolicy
-from m2pem.resources.parameters import ParameterError
+from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.catalogue import BehaviorState, ResourceId, ResumePolicy
 
 log = logging.getLogger("m2pem.resume")
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.findings import Finding, Severity
-from m2pem.model.mission import Mission
-from m2pem.resources.madeup import fleet_for
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 
 if TYPE_CHECKING:
     from m2pem.plugins import PluginManager

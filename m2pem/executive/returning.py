@@ -15,8 +15,8 @@ from m2pem.api.clock import Clock
 from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.handover import Handover
-from m2pem.model.catalogue import ResourceId
-from m2pem.resources.availability import Availability
+from m2pem.fleet.availability import Availability
+from m2pem.mission.catalogue import ResourceId
 
 log = logging.getLogger("m2pem.executive")
 

@@ -1,6 +1,6 @@
 """A scripted outside world, as an answers file tells it (docs/rehearsal.md).
 
-The executive asks it before it runs a service or starts a behavior; `m2pem.sim.answers` reads one
+The executive asks it before it runs a service or starts a behavior; `m2pem.rehearsal.answers` reads one
 from a file.
 """
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from m2pem.engine.records import Record
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ from m2pem.engine.commands import RunService
 from m2pem.engine.inputs import Input, ServiceCompleted, ServiceFailed
 from m2pem.errors import PluginError
 from m2pem.executive.script import Script, ScriptedService
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.values import Value
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.values import Value
 
 log = logging.getLogger("m2pem.service")
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from m2pem.errors import M2pemError
 from m2pem.executive.arbiters import SIMULATED, FleetArbiters
 from m2pem.executive.runtime_folder import VARIABLE, runtime_folder
-from m2pem.model.catalogue import ResourceId
+from m2pem.mission.catalogue import ResourceId
 
 
 class VehicleInUseError(M2pemError):

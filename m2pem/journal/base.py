@@ -11,7 +11,7 @@ from uuid import UUID
 
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record, RunOutcome
-from m2pem.model.library import Source
+from m2pem.mission.library import Source
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class RunHeader:
     """What a run needs to be rebuilt from nothing else: the mission and the fleet themselves.
 
     `mission_name` is the file's name for people, `mission` its bytes, `library` the other files
-    that it uses; `fleet` is `m2pem.resources.snapshot.dump(fleet)`, or b"" without one.
+    that it uses; `fleet` is `m2pem.fleet.snapshot.dump(fleet)`, or b"" without one.
     `simulated`: every arbiter was replaced by the simulated one; `speed`: of the clock against
     the wall clock. `created_us`: by the wall clock, also where the executive's runs ahead of it.
     """

@@ -13,7 +13,7 @@ from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record
 from m2pem.errors import InternalError, JournalError
 from m2pem.journal.base import Entry
-from m2pem.model.library import Source
+from m2pem.mission.library import Source
 
 # 18 digits: what the 64-bit keys of a database hold.
 _RUN_ID = re.compile(r"r[1-9][0-9]{0,17}")

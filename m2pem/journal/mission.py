@@ -1,9 +1,9 @@
 """The mission of a run, as it was when the run began: from the journal, and from nothing else."""
 
+from m2pem.bpmn import parse_mission
 from m2pem.journal.base import RunHeader
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.library import KeptLibrary
-from m2pem.model.mission import Mission
+from m2pem.mission.library import KeptLibrary
+from m2pem.mission.mission import Mission
 
 
 def mission_of(header: RunHeader) -> Mission:

@@ -5,8 +5,8 @@ from datetime import UTC, datetime, timedelta
 
 from m2pem.api.service import ServiceContext, ServiceError
 from m2pem.api.telemetry import Detection, PayloadState
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.values import Value
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.values import Value
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 

@@ -15,9 +15,9 @@ from m2pem.api.arbiter import (
 from m2pem.api.ledger import Ledger
 from m2pem.api.mailbox import Mailbox
 from m2pem.api.telemetry import TeamMemberState, TeamState
-from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
-from m2pem.resources.allocation import spelled_out
-from m2pem.resources.fleet import Fleet, LostMemberPolicy
+from m2pem.fleet.allocation import spelled_out
+from m2pem.fleet.fleet import Fleet, LostMemberPolicy
+from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.teams.behavior import TeamBehavior
 from m2pem.teams.member import Member
 from m2pem.teams.offers import Offers

@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from m2pem.model.geometry import Area, Route, VehiclePosition
-from m2pem.resources.lawn_mower import lawn_mower, longest_edge_yaw
-from m2pem.resources.parameters import accepted
+from m2pem.fleet.lawn_mower import lawn_mower, longest_edge_yaw
+from m2pem.fleet.parameters import accepted
+from m2pem.mission.geometry import Area, Route, VehiclePosition
 from m2pem.teams.bands import Pass, bands, strips, turned
 from m2pem.teams.plan import Leg, Plan, Setting, TeamRefusedError
 from m2pem.teams.shapes import SPACING_M

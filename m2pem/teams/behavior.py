@@ -8,7 +8,7 @@ from dataclasses import replace
 from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import TeamMemberState
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.teams.marshal import Marshal
 from m2pem.teams.member import Member
 from m2pem.teams.plan import Plan, Stand

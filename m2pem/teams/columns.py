@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 from itertools import accumulate, combinations, pairwise
 
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.geometry import Route
-from m2pem.resources.offsets import read_offsets
+from m2pem.fleet.offsets import read_offsets
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Route
 from m2pem.teams.path import Path
 from m2pem.teams.plan import Leg, March, Marcher, Plan, Setting, TeamRefusedError
 from m2pem.teams.shapes import SPACING_M, Vector, beside, shifted, slot, trimmed

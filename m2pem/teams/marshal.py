@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from m2pem.api.telemetry import TeamMemberState
-from m2pem.model.catalogue import ResourceId
+from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.columns import GAP_SHARE, lane_mates
 from m2pem.teams.plan import March, Marcher, Stand
 

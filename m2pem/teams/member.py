@@ -12,7 +12,7 @@ from m2pem.api.arbiter import (
     BehaviorRequest,
     SightedArbiter,
 )
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.teams.plan import Leg
 
 CALL_TIMEOUT_S = 10.0

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 
 from m2pem.api.arbiter import Arbiter
-from m2pem.model.behavior import BehaviorType
-from m2pem.model.catalogue import BehaviorSpec, ResourceId
-from m2pem.resources.behaviors import SHARED
-from m2pem.resources.fleet import Fleet
-from m2pem.resources.team_needs import TEAM_NEEDS, lacking
+from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.team_needs import TEAM_NEEDS, lacking
+from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 
 
 class Offers:

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from m2pem.api.arbiter import ResolvedValue
-from m2pem.model.catalogue import BehaviorSpec, ResourceId
-from m2pem.model.geometry import Area, Coordinate, Point, Route, VehiclePosition
-from m2pem.resources.parameters import accepted
+from m2pem.fleet.parameters import accepted
+from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
 from m2pem.teams.motion import MOTIONS, Motion
 from m2pem.teams.path import Path
 from m2pem.teams.plane import MAX_RANGE_M, Plane

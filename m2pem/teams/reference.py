@@ -9,7 +9,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from m2pem.model.catalogue import ResourceId
+from m2pem.mission.catalogue import ResourceId
 
 
 @dataclass(frozen=True, slots=True)

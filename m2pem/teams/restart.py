@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.teams.plan import Plan
 from m2pem.teams.reference import Reference
 

@@ -7,9 +7,9 @@ from m2pem.api.arbiter import Arbiter, BehaviorRequest, SightedArbiter
 from m2pem.api.bus import FleetBus
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import VehicleState
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.geometry import VehiclePosition
-from m2pem.resources.fleet import Fleet
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import VehiclePosition
 from m2pem.teams.offers import Offers
 from m2pem.teams.plan import Plan, Setting, Stand, TeamRefusedError
 from m2pem.teams.plane import Plane

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from m2pem.model.catalogue import ResourceId
+from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.member import Member
 from m2pem.teams.plan import Leg, Plan
 

@@ -16,9 +16,9 @@ from m2pem.api.arbiter import (
     Limits,
 )
 from m2pem.api.telemetry import Telemetry
-from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
-from m2pem.model.values import Value
-from m2pem.resources.behaviors import SHARED
+from m2pem.fleet.behaviors import SHARED
+from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.mission.values import Value
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,9 @@ from string import ascii_uppercase
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.geometry import Geometry
-from m2pem.resources.fleet import Domain, Fleet, Payload, Vehicle
+from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Geometry
 
 ORIGIN = (38.1075, -77.3192, 60.0)
 

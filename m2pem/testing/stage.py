@@ -11,9 +11,9 @@ from m2pem.api.control import MissionControl, OpenPrompt, RunSummary, StampedRec
 from m2pem.engine.records import Record, TokenEntered
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet import Fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet import Fleet
 
 Factories = Mapping[str, Callable[..., Any]]
 

@@ -4,11 +4,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from m2pem.model.mission import Mission
-from m2pem.resources.fleet import Fleet
-from m2pem.resources.madeup import fleet_for
-from m2pem.verify.derive import Bound, Options, TooLargeError, derive
-from m2pem.verify.derive.bound import MOST_RULES
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 from m2pem.verify.explore import Exploration, Limits, Progress, Stopped, explore
 from m2pem.verify.interruption import watch_interruptions
 from m2pem.verify.properties import ALL, Searched
@@ -17,6 +15,8 @@ from m2pem.verify.reduction import StubbornSets
 from m2pem.verify.results import Result, Verdict
 from m2pem.verify.simplify import simplify
 from m2pem.verify.system import Place, Role, Scope, System
+from m2pem.verify.translate import Bound, Options, TooLargeError, derive
+from m2pem.verify.translate.bound import MOST_RULES
 
 FULL_STATES = 100_000
 """States up to which nothing is left out: that gives the shortest runs."""

@@ -6,8 +6,8 @@ to have one token at most, and rules never to fire.
 
 from collections.abc import Iterable
 
-from m2pem.verify.derive.bound import Bound
 from m2pem.verify.system import Rule, System
+from m2pem.verify.translate.bound import Bound
 
 MOST_PLACES = 1_500
 """Of a system that is looked at; the work grows with the square."""

@@ -7,7 +7,7 @@ was found to get more is given more bits, and the search begins anew (`m2pem.ver
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 from m2pem.verify.system import Rule, System
 
 SEVERAL_BITS = 2

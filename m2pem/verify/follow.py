@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from m2pem.engine.records import RunOutcome
 from m2pem.engine.state import RunState, RunStatus, Scope, Token
-from m2pem.model.elements import CallActivity, ComplexGateway, InclusiveGateway, ParallelGateway
+from m2pem.mission.elements import CallActivity, ComplexGateway, InclusiveGateway, ParallelGateway
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.retesting import affected_rules
 from m2pem.verify.system import Kind, Role, System

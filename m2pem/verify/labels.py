@@ -3,11 +3,10 @@
 from collections.abc import Callable, Sequence
 
 from m2pem.errors import ExpressionError
-from m2pem.model.elements import Process, SequenceFlow
-from m2pem.model.mission import Mission
-from m2pem.resources.allocation import spelled_out
-from m2pem.resources.fleet import Fleet
-from m2pem.verify.derive.domains import tells_apart
+from m2pem.fleet.allocation import spelled_out
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.elements import Process, SequenceFlow
+from m2pem.mission.mission import Mission
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.ltl.formula import (
     Active,
@@ -18,6 +17,7 @@ from m2pem.verify.ltl.formula import (
     Proposition,
 )
 from m2pem.verify.system import Action, Place, Role, Rule, System
+from m2pem.verify.translate.domains import tells_apart
 
 Test = Callable[[int], bool]
 _NO_TOKEN = frozenset({Role.CONTROL, Role.END})

@@ -4,9 +4,9 @@ from collections.abc import Collection, Iterator, Mapping
 from itertools import combinations, islice, product
 
 from m2pem.errors import ExpressionError
-from m2pem.model.expression import Expression
-from m2pem.model.values import ReadValue, Value
-from m2pem.verify.derive.domains import constants, representatives
+from m2pem.mission.expression import Expression
+from m2pem.mission.values import ReadValue, Value
+from m2pem.verify.translate.domains import constants, representatives
 
 _MOST_TRIES = 20_000
 _ORDINARY: tuple[Value, ...] = (True, False, 1, 0, -1, 2, None, "something", [])

@@ -20,10 +20,10 @@ from m2pem.engine.data import reader
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import BehaviorPhase, RunStatus, Token, Wait
 from m2pem.engine.steps import Steps
-from m2pem.model.catalogue import BehaviorState
-from m2pem.model.mission import Mission
-from m2pem.model.values import Value
-from m2pem.resources.fleet import Fleet
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
 from m2pem.verify.making_true import data_for
 from m2pem.verify.system import Trigger
 

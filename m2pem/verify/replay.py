@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from m2pem.engine import inputs as i
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import BehaviorPhase, RunState, RunStatus
-from m2pem.model.catalogue import BehaviorState
-from m2pem.model.mission import Mission
-from m2pem.model.values import Value
-from m2pem.resources.fleet import Fleet
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
 from m2pem.verify.follow import Follower
 from m2pem.verify.system import Action, Kind, Rule, System, Trigger
 

@@ -10,8 +10,8 @@ from dataclasses import replace
 from functools import cache
 
 from m2pem.verify.concurrency import Concurrency, is_small
-from m2pem.verify.derive.bound import Bound
 from m2pem.verify.system import Kind, Role, Rule, System
+from m2pem.verify.translate.bound import Bound
 
 _MOST_PAIRS = 64
 """Rules that one passed place may be replaced by."""

@@ -22,7 +22,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 
 
 class Kind(StrEnum):

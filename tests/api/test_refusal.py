@@ -4,9 +4,9 @@ import pytest
 
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.api.refusal import refusal
-from m2pem.model.behavior import BehaviorType
-from m2pem.model.geometry import Point, Route
-from m2pem.resources.behaviors import SHARED
+from m2pem.fleet.behaviors import SHARED
+from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.geometry import Point, Route
 
 ROUTE = Route(((0.0, 0.0, None), (0.0, 1.0, None)))
 PLACE = Point((0.0, 0.0, None))

@@ -5,9 +5,9 @@ from hashlib import sha256
 from m2pem.executive.loading import load_source
 from m2pem.plugins import PluginManager
 from m2pem.verify.check import check
-from m2pem.verify.derive.options import Options
 from m2pem.verify.report.findings import findings_of
 from m2pem.verify.report.picture import picture
+from m2pem.verify.translate.options import Options
 from tests.broken.expected import EXPECTED, Expected
 
 

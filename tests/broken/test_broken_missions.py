@@ -9,8 +9,8 @@ import jsonschema
 import pytest
 from lxml import etree
 
+from m2pem.bpmn import parse_mission
 from m2pem.cli.entry import run_command_line
-from m2pem.model.bpmn import parse_mission
 from tests.broken.__main__ import drawn
 from tests.broken.expected import BROKEN, EXPECTED, REPOSITORY, Expected
 

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.model.bpmn import parse_mission
+from m2pem.bpmn import parse_mission
+from m2pem.fleet.madeup import fleet_for
 from m2pem.plugins import PluginManager
-from m2pem.resources.madeup import fleet_for
-from m2pem.sim.rehearsal import rehearse
+from m2pem.rehearsal.rehearsal import rehearse
 from m2pem.verify.check import check
-from m2pem.verify.derive import Options
 from m2pem.verify.report.findings import Findings, findings_of
 from m2pem.verify.spin.checking import check_with_spin
+from m2pem.verify.translate import Options
 from tests.broken.expected import EXPECTED, Expected
 from tests.broken.situations import Records, Situation, situations
 

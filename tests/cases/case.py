@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 from tests.cases.when import When
 
 Ending = Literal["completed", "failed", "terminated", "stopped", "running"]

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from m2pem import load_mission
 from m2pem.engine import records as r
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 from tests.cases.case import Case, Expected, Step
 from tests.cases.when import When
 from tests.engine.kit import CANCELLED, FAILED, SUCCEEDED, Play

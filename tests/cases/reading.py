@@ -8,7 +8,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import YAMLError
 
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 from tests.cases.case import ENDS, Case, Expected, Step
 from tests.cases.when import read_when
 

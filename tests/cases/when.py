@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 
 Verb = Literal[
     "start", "answer", "complete", "fail", "cancelled", "signal", "message", "advance",

@@ -35,9 +35,9 @@ def test_help_imports_nothing_slow(words: list[str], may: list[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "unneeded"),
     [
-        (["check"], ["asyncio", "m2pem.sim.arbiters", "pydantic"]),
+        (["check"], ["asyncio", "m2pem.simulation.arbiters", "pydantic"]),
         (["check", "--fleet", str(FLEET)], ["m2pem.executive.executive"]),
-        (["simulate"], ["m2pem.resources.fleet_file", "numpy"]),
+        (["simulate"], ["m2pem.fleet.fleet_file", "numpy"]),
         (["run", "--fleet", "sim", "--ocu", "none", "--journal", "memory:"], ["numpy", "pydantic"]),
     ],
 )

@@ -4,7 +4,7 @@ import click
 import pytest
 
 from m2pem.cli.setting import refuse_speed
-from m2pem.resources.fleet_file import load_fleet
+from m2pem.fleet.fleet_file import load_fleet
 
 FLEET = """
 version: 1

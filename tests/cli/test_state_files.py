@@ -8,8 +8,8 @@ import pytest
 from m2pem.cli.state_files import tidy_up, with_own_state, with_shared_state
 from m2pem.engine.state import RunStatus
 from m2pem.executive.executive import Executive
-from m2pem.resources.fleet import Fleet
-from m2pem.resources.fleet_file import load_fleet
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.fleet_file import load_fleet
 from tests.command_line import FLEET
 
 

@@ -1,11 +1,11 @@
 import pytest
 
 from m2pem.api.control import StampedRecord
+from m2pem.bpmn import parse_mission
 from m2pem.cli.story import Story, printable
 from m2pem.engine import records as r
 from m2pem.engine.records import Record, RunOutcome, TokenOutcome
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.catalogue import BehaviorState
+from m2pem.mission.catalogue import BehaviorState
 from tests.command_line import MISSION
 
 VIGNETTE = parse_mission(MISSION.read_bytes(), str(MISSION))

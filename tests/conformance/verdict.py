@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 from tests.cases import Case
 from tests.cases.playing import play_case
 from tests.conformance.peers import VERBS, Played

@@ -19,7 +19,7 @@ from m2pem.api.telemetry import (
 from m2pem.control_socket.place import ControlSocketError
 from m2pem.control_socket.remote import RemoteControl
 from m2pem.errors import NotDrivenError, OperatorError
-from m2pem.model.catalogue import ResourceId
+from m2pem.mission.catalogue import ResourceId
 from tests.control_socket.conftest import Served
 from tests.executive.conftest import mission, sequence
 

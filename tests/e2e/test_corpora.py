@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 
 from m2pem.api.control import RunStatus, StampedRecord
+from m2pem.bpmn import parse_mission
 from m2pem.errors import MissionError
 from m2pem.findings import has_errors
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.mission import Mission
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager
-from m2pem.resources.madeup import fleet_for
-from m2pem.sim.rehearsal import rehearse
+from m2pem.rehearsal.rehearsal import rehearse
 
 if not os.environ.get("M2PEM_CORPORA"):
     pytest.skip("M2PEM_CORPORA names no folder of foreign BPMN files", allow_module_level=True)

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from m2pem.api.control import StampedRecord
+from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal.codec import record_line
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet_file import load_fleet
-from m2pem.sim.effects import EffectKind
-from m2pem.sim.rehearsal import rehearse
-from m2pem.sim.statefile import recorded_effects
+from m2pem.rehearsal.rehearsal import rehearse
+from m2pem.simulation.effects import EffectKind
+from m2pem.simulation.statefile import recorded_effects
 from tests.command_line import (
     ANSWERS,
     FLEET,
@@ -52,7 +52,7 @@ def look(self, run_id, records):
 Observers.put = look
 
 if "DIE_IN" in os.environ:
-    from m2pem.sim.arbiters import SimArbiter
+    from m2pem.simulation.arbiters import SimArbiter
     begin = SimArbiter.start
 
     async def start(self, request):

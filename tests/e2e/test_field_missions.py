@@ -11,20 +11,20 @@ import pytest
 from m2pem import load_fleet
 from m2pem.api.arbiter import ArbiterContext
 from m2pem.api.control import RunStatus
+from m2pem.bpmn import parse_mission
 from m2pem.engine import records as r
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.loading import findings_for
 from m2pem.findings import Finding
-from m2pem.gateway.bus import Bus
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.catalogue import BehaviorState
-from m2pem.model.elements import EndEvent
-from m2pem.model.mission import Mission
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.elements import EndEvent
+from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet import Fleet
-from m2pem.sim.answers import check_answers, load_answers
-from m2pem.sim.rehearsal import RehearsalResult, rehearse
+from m2pem.rehearsal.answers import check_answers, load_answers
+from m2pem.rehearsal.rehearsal import RehearsalResult, rehearse
+from m2pem.telemetry.bus import Bus
 
 REPOSITORY = Path(__file__).parents[2]
 MISSIONS = REPOSITORY / "missions"

@@ -2,7 +2,7 @@
 
 import json
 
-from m2pem.model.elements import EndEvent
+from m2pem.mission.elements import EndEvent
 from tests.command_line import CommandLine
 
 from .test_field_missions import ANSWERS, FLEET, Story, every_story, mission

@@ -9,10 +9,10 @@ from m2pem.engine import records as r
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
-from m2pem.model.catalogue import BehaviorState
-from m2pem.model.elements import EndEvent
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.elements import EndEvent
 from m2pem.plugins import PluginManager
-from m2pem.sim.answers import load_answers
+from m2pem.rehearsal.answers import load_answers
 
 from .test_field_missions import ANSWERS, STORIES, Story, fleet, mission
 

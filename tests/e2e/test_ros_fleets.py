@@ -3,9 +3,9 @@
 import pytest
 
 from m2pem.api.control import RunStatus
+from m2pem.fleet.fleet_file import load_fleet
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet_file import load_fleet
-from m2pem.sim.rehearsal import rehearse
+from m2pem.rehearsal.rehearsal import rehearse
 from tests.command_line import ANSWERS, FLEET, MISSION
 
 

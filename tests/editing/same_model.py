@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from m2pem.model.elements import Element
-from m2pem.model.mission import Mission
+from m2pem.mission.elements import Element
+from m2pem.mission.mission import Mission
 
 _OF_THE_TEXT = frozenset({"line", "source", "warnings", "library", "elements"})
 _NOT_LEGAL = "~"

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from lxml import etree
 
+from m2pem.bpmn import parse_mission
+from m2pem.bpmn.search_path import SearchPath
 from m2pem.editing.editable import editable
 from m2pem.errors import MissionError
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.bpmn.search_path import SearchPath
-from m2pem.model.mission import Mission
+from m2pem.mission.mission import Mission
 from tests.editing.same_model import model_of, new_names
 from tests.editor import BPMN, BPMNDI, has_symbol, read_with_moddle
 

@@ -1,7 +1,7 @@
 """What is always true of a run's state between two inputs."""
 
 from m2pem.engine.state import BehaviorPhase, RunState, RunStatus, Scope
-from m2pem.model.elements import Activity
+from m2pem.mission.elements import Activity
 
 
 def check_state(state: RunState) -> None:

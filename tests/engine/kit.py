@@ -8,13 +8,13 @@ from m2pem.engine import records as r
 from m2pem.engine.commands import Command
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import Behavior, BehaviorPhase, RunStatus
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.madeup import fleet_for
 from m2pem.journal.base import Entry
 from m2pem.journal.codec import decode_body, encode_body
-from m2pem.model.catalogue import BehaviorState
-from m2pem.model.mission import Mission
-from m2pem.model.values import Value
-from m2pem.resources.fleet import Fleet
-from m2pem.resources.madeup import fleet_for
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
 from tests.engine.invariants import check_state
 from tests.engine.notation import mission
 from tests.engine.snapshot import snapshot

@@ -33,8 +33,8 @@ from collections.abc import Callable
 from itertools import pairwise
 from xml.sax.saxutils import escape, quoteattr
 
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.mission import Mission
+from m2pem.bpmn import parse_mission
+from m2pem.mission.mission import Mission
 
 _BPMN = "http://www.omg.org/spec/BPMN/20100524/MODEL"
 _OWN = "https://m2pem.org/schema/1"

@@ -4,8 +4,8 @@ from random import Random
 
 from lxml import etree
 
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.mission import Mission
+from m2pem.bpmn import parse_mission
+from m2pem.mission.mission import Mission
 from tests.engine.notation import xml
 
 _B = "{http://www.omg.org/spec/BPMN/20100524/MODEL}"

@@ -11,8 +11,8 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.run import Step
 from m2pem.engine.state import BehaviorPhase, RunStatus
-from m2pem.model.catalogue import BehaviorState, ResumePolicy
-from m2pem.model.mission import Mission
+from m2pem.mission.catalogue import BehaviorState, ResumePolicy
+from m2pem.mission.mission import Mission
 from tests.engine.invariants import check_state
 from tests.engine.kit import SECOND_US, Play
 

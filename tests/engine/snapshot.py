@@ -18,8 +18,8 @@ from m2pem.engine.state import (
     Token,
     Wait,
 )
-from m2pem.model.elements import Element
-from m2pem.model.mission import Mission
+from m2pem.mission.elements import Element
+from m2pem.mission.mission import Mission
 
 _OBJECTS = (Scope, Token, Wait, Behavior, Prompt, Service, Completion, Compensation)
 

@@ -6,7 +6,7 @@ import pytest
 
 from m2pem.engine import records as r
 from m2pem.engine.commands import OpenPrompt, RunService, StartBehavior
-from m2pem.resources.fleet import Domain, Fleet, Payload, Vehicle
+from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle
 from tests.engine.kit import FAILED, Play
 from tests.engine.trace import table
 

@@ -5,7 +5,7 @@ import pytest
 from m2pem.engine import records as r
 from m2pem.engine.commands import CancelBehavior
 from m2pem.engine.inputs import BehaviorReported
-from m2pem.model.catalogue import BehaviorState
+from m2pem.mission.catalogue import BehaviorState
 from tests.engine.kit import ACCEPTED, CANCELLED, FAILED, RUNNING, SUCCEEDED, Play
 from tests.engine.trace import table
 

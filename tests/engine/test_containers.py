@@ -2,8 +2,8 @@
 
 import pytest
 
+from m2pem.bpmn import MAX_DEPTH
 from m2pem.engine import records as r
-from m2pem.model.bpmn import MAX_DEPTH
 from tests.engine.kit import Play
 from tests.engine.trace import table
 

@@ -2,10 +2,10 @@
 
 import pytest
 
+from m2pem.bpmn import parse_mission
 from m2pem.engine.control import preview_taken
 from m2pem.engine.inputs import ControlReturned, ControlTaken
 from m2pem.engine.records import ErrorThrown
-from m2pem.model.bpmn import parse_mission
 from tests.engine.kit import CANCELLED, SUCCEEDED, Play
 from tests.engine.notation import xml
 

@@ -1,6 +1,6 @@
 """Messages for one instance among several (clause 8.4.2)."""
 
-from m2pem.model.bpmn import parse_mission
+from m2pem.bpmn import parse_mission
 from tests.engine.kit import Play
 from tests.engine.notation import xml
 

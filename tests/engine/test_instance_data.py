@@ -1,6 +1,6 @@
 """What the instances of a multi-instance activity read and give (BPMN 2.0.2, table 10.29)."""
 
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 from tests.engine.kit import Play
 
 

@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
+from m2pem.engine.elements import joins
 from m2pem.engine.inputs import Continue, StartRun
-from m2pem.engine.nodes import joins
 from m2pem.engine.run import MissionRun
-from m2pem.model.mission import Mission
+from m2pem.mission.mission import Mission
 from tests.engine.kit import Play
 from tests.engine.notation import mission
 

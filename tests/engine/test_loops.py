@@ -5,7 +5,7 @@ import pytest
 from m2pem.engine import records as r
 from m2pem.engine.inputs import Continue, StartRun
 from m2pem.engine.run import MissionRun
-from m2pem.model.mission import Mission
+from m2pem.mission.mission import Mission
 from tests.engine.kit import FAILED, Play
 from tests.engine.notation import mission
 from tests.engine.trace import table

@@ -6,7 +6,7 @@ from m2pem.engine import records as r
 from m2pem.engine.commands import CancelBehavior
 from m2pem.engine.inputs import Continue, StartRun
 from m2pem.engine.run import MissionRun
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 from tests.engine.kit import FAILED, Play
 from tests.engine.notation import mission
 from tests.engine.trace import table

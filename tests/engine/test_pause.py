@@ -13,7 +13,7 @@ from m2pem.engine.inputs import (
     StartRun,
     Tick,
 )
-from m2pem.model.catalogue import ResumePolicy
+from m2pem.mission.catalogue import ResumePolicy
 from tests.engine.kit import CANCELLED, RUNNING, SUCCEEDED, Play
 from tests.engine.snapshot import snapshot
 from tests.engine.trace import table

@@ -11,7 +11,7 @@ import pytest
 
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record, RunOutcome, TokenOutcome, Trigger
-from m2pem.model.catalogue import BehaviorState
+from m2pem.mission.catalogue import BehaviorState
 
 PAGE = (Path(__file__).parents[2] / "docs" / "records.md").read_text(encoding="utf-8")
 RECORDS = {kind.__name__: kind for kind in get_args(Record)}

@@ -6,7 +6,7 @@ from m2pem.engine import records as r
 from m2pem.engine.commands import CancelBehavior, StartBehavior
 from m2pem.engine.inputs import BehaviorMissing, ClaimRun, ResourceFault
 from m2pem.engine.state import BehaviorPhase
-from m2pem.model.catalogue import BehaviorState, ResumePolicy
+from m2pem.mission.catalogue import BehaviorState, ResumePolicy
 from tests.engine.kit import CANCELLED, FAILED, RUNNING, Play
 from tests.engine.trace import line, table
 

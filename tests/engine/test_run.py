@@ -10,7 +10,7 @@ import pytest
 
 from m2pem.engine import inputs as i
 from m2pem.engine.run import MissionRun
-from m2pem.model.catalogue import BehaviorState, ResumePolicy
+from m2pem.mission.catalogue import BehaviorState, ResumePolicy
 from tests.engine.kit import CANCELLED, RUNNING, START_US, Play
 from tests.engine.snapshot import snapshot
 from tests.engine.trace import table

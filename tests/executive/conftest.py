@@ -11,10 +11,10 @@ from m2pem.api.arbiter import ArbiterContext, Connection
 from m2pem.engine.records import Record
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.journal import MemoryJournal
-from m2pem.model.catalogue import ResourceId
+from m2pem.mission.catalogue import ResourceId
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet import Domain, Fleet, Vehicle
 from m2pem.testing.fakes import FakeArbiter
 
 START_US = 1_767_225_600_000_000

@@ -20,10 +20,10 @@ from m2pem.executive.apart import apart
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control
 from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet_file import load_fleet
-from m2pem.sim.rehearser import rehearse_apart
+from m2pem.rehearsal.rehearser import rehearse_apart
 from m2pem.verify.requirements.requirement import RequirementsError
 
 T = TypeVar("T")

@@ -5,8 +5,8 @@ import pytest
 
 from m2pem.api import Arbiter, ArbiterContext, Area, Connection, Route
 from m2pem.executive.arbiters import ArbiterPlugins, FleetArbiters
-from m2pem.model.catalogue import ResourceId
-from m2pem.resources.fleet import Domain, Fleet, Payload, Vehicle
+from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle
+from m2pem.mission.catalogue import ResourceId
 
 FIELD = Area((((47.0, 8.0, None), (47.0, 8.1, None), (47.1, 8.1, None), (47.0, 8.0, None)),))
 UAV1, CAMERA = ResourceId("uav1"), ResourceId("uav1/camera")

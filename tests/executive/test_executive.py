@@ -15,7 +15,7 @@ from m2pem.errors import (
     OperatorError,
     PluginError,
 )
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.testing.fakes import FakeArbiter
 
 from .conftest import World, behavior, flow, mission, question, sequence

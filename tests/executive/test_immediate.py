@@ -17,7 +17,7 @@ from m2pem.executive.notices import Notices
 from m2pem.executive.observers import MAX_WAITING, Observers
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry
-from m2pem.model.catalogue import BehaviorState
+from m2pem.mission.catalogue import BehaviorState
 
 from .conftest import World, behavior, flow, mission, question, sequence
 

@@ -2,9 +2,9 @@
 
 import pytest
 
+from m2pem.bpmn import parse_mission
 from m2pem.executive.loading import findings_for, without_effect
 from m2pem.findings import Severity
-from m2pem.model.bpmn import parse_mission
 from m2pem.plugins import PluginManager
 
 MISSION = """\

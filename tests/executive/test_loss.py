@@ -10,7 +10,7 @@ from m2pem.api.control import PromptClosed, RunStatus
 from m2pem.engine.records import BehaviorRequested, RunClaimed
 from m2pem.errors import OperatorError
 from m2pem.journal.base import Loss
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 from .conftest import START_US, World, behavior, mission, sequence
 from .test_recovery import ACCEPTED, GOTO, OUTAGE_US, RUNNING, left_behind

@@ -5,7 +5,7 @@ import logging
 
 from m2pem.api.control import LOGGED, Alert
 from m2pem.api.telemetry import LinkState, VehicleState
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 from .conftest import World, behavior, mission, sequence
 

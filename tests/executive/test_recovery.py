@@ -7,6 +7,7 @@ import pytest
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.api.control import RunStatus
 from m2pem.api.telemetry import VehicleState
+from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import (
     BehaviorReported,
     ControlTaken,
@@ -18,11 +19,10 @@ from m2pem.engine.inputs import (
 from m2pem.engine.records import BehaviorRestarted, PromptOpened
 from m2pem.engine.run import MissionRun
 from m2pem.errors import JournalError, OperatorError
+from m2pem.fleet.snapshot import dump
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.catalogue import BehaviorState, ResourceId
-from m2pem.resources.snapshot import dump
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 from .conftest import START_US, World, behavior, fleet, mission, question, sequence
 

@@ -3,17 +3,17 @@
 import math
 
 from m2pem.api.arbiter import BehaviorReport
+from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import StartRun
 from m2pem.engine.records import DataWritten
 from m2pem.engine.run import MissionRun
 from m2pem.executive.clock import run_virtual
 from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle
+from m2pem.fleet.snapshot import dump
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.catalogue import BehaviorState, ResourceId
-from m2pem.resources.fleet import Domain, Fleet, Payload, Vehicle
-from m2pem.resources.snapshot import dump
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 from .conftest import START_US, FakePlugins, Fakes, World, mission, sequence
 

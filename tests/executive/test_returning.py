@@ -1,7 +1,7 @@
 """A lost vehicle that is heard again stops before it is free."""
 
 from m2pem.api.telemetry import LinkState, VehicleState
-from m2pem.model.catalogue import ResourceId
+from m2pem.mission.catalogue import ResourceId
 from m2pem.testing.fakes import Call
 
 from .conftest import World, behavior, mission, sequence

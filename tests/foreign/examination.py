@@ -9,14 +9,14 @@ from functools import cache
 from pathlib import Path
 
 from m2pem.api.control import RunStatus, StampedRecord
+from m2pem.bpmn import NO_BPMN_RULES
 from m2pem.errors import FleetError, MissionError
 from m2pem.executive.loading import findings_for, load_source
 from m2pem.findings import Finding, Severity, has_errors
-from m2pem.model.bpmn import NO_BPMN_RULES
-from m2pem.model.mission import Mission
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager
-from m2pem.resources.madeup import fleet_for
-from m2pem.sim.rehearsal import rehearse
+from m2pem.rehearsal.rehearsal import rehearse
 from tests.foreign.flaws import flaws
 
 MAX_STEPS = 5_000

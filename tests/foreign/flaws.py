@@ -3,9 +3,9 @@
 import re
 from collections.abc import Iterable, Iterator
 
+from m2pem.bpmn import NO_BPMN_RULES
+from m2pem.bpmn.xml import XmlError, parse_xml
 from m2pem.findings import Finding
-from m2pem.model.bpmn import NO_BPMN_RULES
-from m2pem.model.bpmn.xml import XmlError, parse_xml
 
 MAX_CHARACTERS = 1000
 """Of a finding as it is printed: more is not read."""

@@ -15,13 +15,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from random import Random
 
+from m2pem.bpmn import parse_mission
 from m2pem.errors import FleetError, MissionError
 from m2pem.executive.loading import findings_for
 from m2pem.findings import has_errors
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.mission import Mission
-from m2pem.resources.madeup import fleet_for
-from m2pem.sim.rehearsal import rehearse
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
+from m2pem.rehearsal.rehearsal import rehearse
 from tests.engine.kit import Play
 from tests.engine.random_play import RandomPlay
 from tests.foreign.examination import plugins

@@ -7,7 +7,7 @@ from random import Random
 
 from lxml import etree
 
-from m2pem.model.bpmn.schema import FLOW_ELEMENT_NAMES, ROOT_NAMES, SHAPES
+from m2pem.bpmn.schema import FLOW_ELEMENT_NAMES, ROOT_NAMES, SHAPES
 from tests.foreign.bytes_mutation import damaged, encoded
 from tests.foreign.oddities import ATTRIBUTES, TEXTS
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from m2pem.model.bpmn import parse_mission
+from m2pem.bpmn import parse_mission
 from tests.foreign.fuzz import ROOT, case, seeds, survive
 from tests.foreign.models import models
 

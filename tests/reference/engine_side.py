@@ -4,12 +4,12 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from m2pem.bpmn import parse_mission
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunState
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.mission import Mission
+from m2pem.mission.mission import Mission
 from tests.engine.invariants import check_state
 from tests.reference.diagram import Level
 from tests.reference.interpreter import Input, Seen

@@ -6,9 +6,9 @@ import pytest
 from m2pem.api.service import Service, ServiceContext, ServiceError
 from m2pem.api.telemetry import Detection, GeoPosition, PayloadState, VehicleState
 from m2pem.executive.clock import VirtualClock, run_virtual
-from m2pem.gateway.bus import Bus
-from m2pem.model.catalogue import ResourceId
+from m2pem.mission.catalogue import ResourceId
 from m2pem.services.detector import Detector
+from m2pem.telemetry.bus import Bus
 from m2pem.testing.contracts.service import START_US, ServiceCase, ServiceContract, run_case
 
 GPR, OTHER, CAMERA = ResourceId("evsg1/gpr"), ResourceId("evsg2/gpr"), ResourceId("evsg1/ptz")

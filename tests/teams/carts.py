@@ -8,10 +8,10 @@ from typing import ClassVar
 from m2pem.api.arbiter import ArbiterContext, BehaviorId, BehaviorRequest, Connection, ResolvedValue
 from m2pem.api.goals import GoalArbiter
 from m2pem.api.telemetry import GeoPosition, VehicleState
-from m2pem.model.behavior import BehaviorType
-from m2pem.model.catalogue import BehaviorSpec, BehaviorState, ResourceId
-from m2pem.model.geometry import Point, Route, VehiclePosition
-from m2pem.resources.behaviors import SHARED
+from m2pem.fleet.behaviors import SHARED
+from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.mission.geometry import Point, Route, VehiclePosition
 from m2pem.teams.plane import Plane
 
 ORIGIN = (38.1075, -77.3192, 60.0)

@@ -8,13 +8,13 @@ from typing import Any
 from m2pem.engine.records import BehaviorEnded, Record
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy, Payload, Team, Vehicle
 from m2pem.journal import MemoryJournal
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.geometry import Geometry
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Geometry
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet import Domain, Fleet, LostMemberPolicy, Payload, Team, Vehicle
-from m2pem.sim.arbiters import SimArbiter
-from m2pem.sim.rehearsal import SETTINGS
+from m2pem.rehearsal.rehearsal import SETTINGS
+from m2pem.simulation.arbiters import SimArbiter
 
 from .carts import ORIGIN, PLANE
 from .conftest import START_US

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from m2pem.api.control import RunStatus
-from m2pem.model.catalogue import BehaviorState
+from m2pem.mission.catalogue import BehaviorState
 from tests.executive.conftest import mission, sequence
 
 from .carts import PLANE, Yard

@@ -11,8 +11,8 @@ import pytest
 from m2pem.api.control import RunStatus
 from m2pem.api.telemetry import TeamState, VehicleState
 from m2pem.engine.records import BehaviorProgressed
-from m2pem.model.catalogue import BehaviorState, ResourceId
-from m2pem.resources.fleet import Domain
+from m2pem.fleet.fleet import Domain
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 from .carts import PLANE, Yard
 from .conftest import Play, World, area, one_task, route

@@ -6,16 +6,16 @@ from typing import Any, cast
 import pytest
 
 from m2pem.api.arbiter import ArbiterContext, Connection
+from m2pem.bpmn import parse_mission
 from m2pem.executive.arbiters import ArbiterPlugins, FleetArbiters
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.loading import findings_for
 from m2pem.findings import Finding
-from m2pem.model.behavior import BehaviorType
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.catalogue import BehaviorSpec, ResourceId
+from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.fleet import Domain, Fleet, Team, Vehicle
+from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.plugins import PluginManager
-from m2pem.resources.behaviors import SHARED
-from m2pem.resources.fleet import Domain, Fleet, Team, Vehicle
 from m2pem.testing.contracts.bench import context
 
 from .conftest import one_task, route

@@ -8,10 +8,10 @@ import pytest
 from m2pem.api.arbiter import Limits
 from m2pem.api.control import RunStatus
 from m2pem.engine.records import BehaviorEnded, BehaviorProgressed
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy, Team, Vehicle
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet import Domain, Fleet, LostMemberPolicy, Team, Vehicle
-from m2pem.sim.rehearsal import rehearse
+from m2pem.rehearsal.rehearsal import rehearse
 
 from .carts import ORIGIN, CartArbiter, Yard
 from .conftest import Play, World, area, one_task, route

@@ -3,7 +3,7 @@
 from typing import Any
 
 from m2pem.api.control import RunStatus
-from m2pem.model.catalogue import BehaviorState
+from m2pem.mission.catalogue import BehaviorState
 from tests.executive.conftest import behavior, mission, sequence
 
 from .conftest import one_task, route, team_task

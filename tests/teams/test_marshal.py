@@ -7,9 +7,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from m2pem.model.behavior import BehaviorType
-from m2pem.model.catalogue import ResourceId
-from m2pem.resources.behaviors import SHARED
+from m2pem.fleet.behaviors import SHARED
+from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.behavior import PERIOD_S
 from m2pem.teams.columns import lane_mates, march
 from m2pem.teams.marshal import Marshal

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from m2pem.model.behavior import BehaviorType
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.geometry import Point, Route, VehiclePosition
-from m2pem.resources.behaviors import SHARED
-from m2pem.resources.lawn_mower import lawn_mower
-from m2pem.resources.parameters import accepted
-from m2pem.resources.team_needs import TEAM_NEEDS
+from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.lawn_mower import lawn_mower
+from m2pem.fleet.parameters import accepted
+from m2pem.fleet.team_needs import TEAM_NEEDS
+from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Point, Route, VehiclePosition
 from m2pem.teams.bands import strips
 from m2pem.teams.path import Path
 from m2pem.teams.plan import Plan, Setting, Stand, TeamRefusedError

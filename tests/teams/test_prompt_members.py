@@ -9,8 +9,8 @@ from m2pem.api.arbiter import BehaviorId, BehaviorRequest, ResolvedValue
 from m2pem.api.control import RunStatus
 from m2pem.engine.records import BehaviorEnded
 from m2pem.executive.dispatch import CALL_TIMEOUT_S
-from m2pem.model.catalogue import BehaviorState, ResourceId
-from m2pem.sim.arbiters import SimArbiter
+from m2pem.mission.catalogue import BehaviorState, ResourceId
+from m2pem.simulation.arbiters import SimArbiter
 
 from .conftest import one_task, route
 from .rehearsed import Rehearsed, rehearsed, sim_fleet

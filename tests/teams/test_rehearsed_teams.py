@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from m2pem.api.control import RunStatus
 from m2pem.errors import MissionError
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.fleet.fleet import LostMemberPolicy
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet import LostMemberPolicy
-from m2pem.sim.faults import Fault
-from m2pem.sim.rehearsal import RehearsalResult, rehearse
+from m2pem.rehearsal.rehearsal import RehearsalResult, rehearse
+from m2pem.simulation.faults import Fault
 from m2pem.teams.path import Path as Way
 from m2pem.teams.shapes import slot
 

@@ -9,9 +9,9 @@ import pytest
 
 from m2pem.api.control import OpenPrompt, RunStatus
 from m2pem.engine.records import BehaviorEnded
+from m2pem.fleet.fleet import LostMemberPolicy
 from m2pem.journal import MemoryJournal
-from m2pem.model.catalogue import BehaviorState
-from m2pem.resources.fleet import LostMemberPolicy
+from m2pem.mission.catalogue import BehaviorState
 
 from .carts import Yard
 from .conftest import START_US, Play, World, one_task, route

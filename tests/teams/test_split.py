@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from m2pem.api.telemetry import GeoPosition, VehicleState
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.geometry import Route
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Route
 from m2pem.teams.plan import Plan, TeamRefusedError
 from m2pem.teams.planning import PLANS
 from m2pem.teams.reference import Reference, read_reference

@@ -8,8 +8,8 @@ import pytest
 
 from m2pem.api.arbiter import ArbiterContext, BehaviorReport, Connection
 from m2pem.api.telemetry import PayloadState, VehicleState
-from m2pem.model.catalogue import ResourceId
-from m2pem.resources.fleet import Domain, Fleet, Team, Vehicle
+from m2pem.fleet.fleet import Domain, Fleet, Team, Vehicle
+from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.arbiter import Teams
 from m2pem.teams.offers import Offers
 from m2pem.testing import ArbiterCase, ArbiterContract

@@ -20,9 +20,9 @@ from m2pem.api.arbiter import (
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.executive.clock import run_virtual
-from m2pem.model.catalogue import BehaviorState, ResourceId
-from m2pem.model.geometry import Point, Route
-from m2pem.sim.arbiters import SimArbiter
+from m2pem.mission.catalogue import BehaviorState, ResourceId
+from m2pem.mission.geometry import Point, Route
+from m2pem.simulation.arbiters import SimArbiter
 from m2pem.testing.contracts.arbiter import ArbiterCase, ArbiterContract
 
 UGV1, UGV2 = ResourceId("ugv1"), ResourceId("ugv2")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from m2pem.model.bpmn import parse_mission
+from m2pem.bpmn import parse_mission
 from m2pem.testing import play, scenarios
 
 FLEET = scenarios.fleet("sim", {"ugv1": {}, "ugv2": {}, "ugv1/camera": {}})

@@ -8,8 +8,8 @@ from typing import cast
 import pytest
 
 from m2pem.api.service import Service, ServiceContext, ServiceError
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.values import Value
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.values import Value
 from m2pem.testing.contracts.service import ServiceCase, ServiceContract
 
 CASE = ServiceCase()

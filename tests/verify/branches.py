@@ -2,8 +2,8 @@
 
 from hypothesis import strategies as st
 
-from m2pem.model.mission import Mission
-from tests.model.bpmn_text import flow
+from m2pem.mission.mission import Mission
+from tests.bpmn.bpmn_text import flow
 from tests.verify.missions import mission, task
 
 

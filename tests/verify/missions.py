@@ -2,8 +2,8 @@
 
 from itertools import pairwise
 
-from m2pem.model.mission import Mission
-from tests.model.bpmn_text import definitions, flow, load
+from m2pem.mission.mission import Mission
+from tests.bpmn.bpmn_text import definitions, flow, load
 
 
 def task(name: str, vehicle: str, behavior: str, **parameters: str) -> str:

@@ -2,13 +2,13 @@
 
 from random import Random
 
+from m2pem.bpmn import parse_mission
 from m2pem.engine import inputs as i
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import BehaviorPhase, RunStatus
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.catalogue import BehaviorState
-from m2pem.model.mission import Mission
-from m2pem.resources.fleet import Fleet
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.mission import Mission
 from m2pem.verify.follow import Follower, look_of_run
 from m2pem.verify.replay import START_US
 from m2pem.verify.system import System

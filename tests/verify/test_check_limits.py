@@ -6,14 +6,14 @@ import tracemalloc
 
 import pytest
 
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.mission import Mission
+from m2pem.bpmn import parse_mission
+from m2pem.mission.mission import Mission
 from m2pem.verify import concurrency
 from m2pem.verify.check import check, search
-from m2pem.verify.derive import Bound, Options, TooLargeError, derive
 from m2pem.verify.explore import Limits, Stopped, explore
 from m2pem.verify.results import Verdict
 from m2pem.verify.simplify import simplify
+from m2pem.verify.translate import Bound, Options, TooLargeError, derive
 from tests.verify.models import branches
 
 SEARCHED = {"no-deadlock", "proper-completion", "can-complete", "no-dead-element", "one-token"}

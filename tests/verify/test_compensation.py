@@ -4,14 +4,14 @@ from random import Random
 
 import pytest
 
-from m2pem.resources.madeup import fleet_for
+from m2pem.fleet.madeup import fleet_for
 from m2pem.verify.check import check
-from m2pem.verify.derive import Options, derive
 from m2pem.verify.explore import Limits, explore
 from m2pem.verify.follow import TooManyStatesError
 from m2pem.verify.results import Verdict
 from m2pem.verify.simplify import simplify
 from m2pem.verify.system import Action, Exactness, Kind, Role, System
+from m2pem.verify.translate import Options, derive
 from tests.engine.notation import mission
 from tests.engine.random_compensation import with_compensation
 from tests.engine.random_missions import graph, structured

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 
 from m2pem.engine import records as r
-from m2pem.model.mission import Mission
-from m2pem.resources.madeup import fleet_for
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 from m2pem.verify.check import check
 from m2pem.verify.making_true import data_for
 from m2pem.verify.playing import NotPlayableError, Player

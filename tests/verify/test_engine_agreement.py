@@ -6,18 +6,18 @@ from random import Random
 
 import pytest
 
+from m2pem.bpmn import read_mission
 from m2pem.errors import MissionError
-from m2pem.model.bpmn import read_mission
-from m2pem.model.mission import Mission
-from m2pem.resources.madeup import fleet_for
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 from m2pem.verify.check import check
-from m2pem.verify.derive import Options, derive
 from m2pem.verify.explore import Limits, explore
 from m2pem.verify.follow import TooManyStatesError
 from m2pem.verify.replay import play
 from m2pem.verify.results import Verdict
 from m2pem.verify.simplify import simplify
 from m2pem.verify.system import Exactness, System
+from m2pem.verify.translate import Options, derive
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
 from tests.verify.models import Walk

@@ -2,9 +2,8 @@
 
 from random import Random
 
-from m2pem.model.mission import Mission
+from m2pem.mission.mission import Mission
 from m2pem.verify.check import Report, check
-from m2pem.verify.derive import derive
 from m2pem.verify.explore import Exploration, Limits, explore
 from m2pem.verify.fair_rounds import FairRounds
 from m2pem.verify.labels import Labels
@@ -20,6 +19,7 @@ from m2pem.verify.reduction import StubbornSets
 from m2pem.verify.results import Result, Verdict
 from m2pem.verify.simplify import simplify
 from m2pem.verify.system import System
+from m2pem.verify.translate import derive
 from tests.engine.notation import mission
 from tests.engine.random_missions import graph, structured
 from tests.verify.missions import approval

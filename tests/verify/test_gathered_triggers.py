@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from m2pem.resources.madeup import fleet_for
-from m2pem.verify.derive import Options, derive
+from m2pem.fleet.madeup import fleet_for
 from m2pem.verify.explore import Limits, explore
 from m2pem.verify.system import Action, Exactness, Role, System
+from m2pem.verify.translate import Options, derive
 from tests.engine.notation import mission
 from tests.verify.models import Walk
 from tests.verify.test_spin_agreement import same

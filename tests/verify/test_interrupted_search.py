@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from m2pem.verify.derive import derive
 from m2pem.verify.explore import Exploration, Stopped, _Search, explore
 from m2pem.verify.reduction import StubbornSets
 from m2pem.verify.simplify import simplify
 from m2pem.verify.system import System
+from m2pem.verify.translate import derive
 from tests.verify.models import branches
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.model.bpmn import parse_mission
+from m2pem.bpmn import parse_mission
 from m2pem.verify.check import Report, check
 from m2pem.verify.results import Verdict
 

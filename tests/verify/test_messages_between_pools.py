@@ -4,13 +4,13 @@ import itertools
 
 import pytest
 
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.mission import Mission
+from m2pem.bpmn import parse_mission
+from m2pem.mission.mission import Mission
 from m2pem.verify.check import Report, check
-from m2pem.verify.derive import derive
 from m2pem.verify.results import Verdict
 from m2pem.verify.spin.checking import check_with_spin
 from m2pem.verify.system import Exactness
+from m2pem.verify.translate import derive
 
 WORK = (
     '<userTask id="{}"><extensionElements><m2pem:prompt>?</m2pem:prompt>'

@@ -2,11 +2,11 @@
 
 import pytest
 
-from m2pem.resources.madeup import fleet_for
-from m2pem.verify.derive import derive
+from m2pem.fleet.madeup import fleet_for
 from m2pem.verify.explore import explore
 from m2pem.verify.spin.search import search
 from m2pem.verify.system import Action
+from m2pem.verify.translate import derive
 from tests.engine.kit import Play
 from tests.engine.notation import mission as notation
 from tests.verify.models import Walk

@@ -2,11 +2,11 @@
 
 import pytest
 
-from m2pem.model.mission import Mission
-from m2pem.resources.madeup import fleet_for
-from m2pem.verify.derive import Options, derive
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 from m2pem.verify.explore import Limits, explore
 from m2pem.verify.system import System
+from m2pem.verify.translate import Options, derive
 from tests.engine.notation import mission
 from tests.engine.test_data_flow import into, out_of
 from tests.verify.models import Walk

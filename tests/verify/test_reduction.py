@@ -6,14 +6,14 @@ from random import Random
 import pytest
 
 from m2pem.verify import concurrency
-from m2pem.verify.derive import derive
 from m2pem.verify.explore import Exploration, Limits, explore
 from m2pem.verify.reduction import StubbornSets
 from m2pem.verify.simplify import simplify
 from m2pem.verify.system import System
+from m2pem.verify.translate import derive
+from tests.bpmn.bpmn_text import flow
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
-from tests.model.bpmn_text import flow
 from tests.verify.missions import mission, task
 from tests.verify.models import branches
 

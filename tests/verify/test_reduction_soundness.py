@@ -8,12 +8,12 @@ from random import Random
 import pytest
 
 from m2pem.verify import concurrency
-from m2pem.verify.derive import derive
 from m2pem.verify.explore import Exploration, explore
 from m2pem.verify.ltl.formula import needs_steps
 from m2pem.verify.product import Result
 from m2pem.verify.reduction import StubbornSets
 from m2pem.verify.system import System
+from m2pem.verify.translate import derive
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
 from tests.seeds import seeds_for

@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 from bench.verification.works import FLEETS, Subject, subjects
-from m2pem.model.bpmn import read_mission
+from m2pem.bpmn import read_mission
+from m2pem.fleet.fleet_file import load_fleet
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet_file import load_fleet
 from m2pem.verify.check import check
-from m2pem.verify.derive import Options
 from m2pem.verify.results import Verdict
+from m2pem.verify.translate import Options
 
 ROOT = Path(__file__).parents[2]
 OURS = [each for each in subjects() if not each.file.startswith("docs/broken/")]

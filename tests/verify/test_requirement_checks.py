@@ -1,8 +1,7 @@
 import pytest
 
-from m2pem.model.mission import Mission
-from m2pem.resources.madeup import fleet_for
-from m2pem.verify.derive import Options, derive
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 from m2pem.verify.explore import Limits
 from m2pem.verify.labels import Labels
 from m2pem.verify.ltl import parse, propositions
@@ -10,6 +9,7 @@ from m2pem.verify.product import Result
 from m2pem.verify.requirements import Names, parse_spec
 from m2pem.verify.requirements.checking import Answer, check_mission
 from m2pem.verify.system import Action
+from m2pem.verify.translate import Options, derive
 from tests.verify.missions import approval, in_a_row, pair, survey, task
 
 HOLDS, VIOLATED, UNDECIDED = Result.HOLDS, Result.VIOLATED, Result.UNDECIDED

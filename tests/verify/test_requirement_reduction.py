@@ -4,9 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from m2pem.model.mission import Mission
-from m2pem.resources.madeup import fleet_for
-from m2pem.verify.derive import Options
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 from m2pem.verify.explore import Exploration, explore
 from m2pem.verify.ignoring import ignoring
 from m2pem.verify.ltl import parse
@@ -19,7 +18,8 @@ from m2pem.verify.requirements.checking import (
     reduction_for,
     system_for,
 )
-from tests.model.bpmn_text import flow
+from m2pem.verify.translate import Options
+from tests.bpmn.bpmn_text import flow
 from tests.verify import formulas
 from tests.verify.branches import branches, shapes
 from tests.verify.missions import ask

@@ -5,10 +5,10 @@ from random import Random
 import pytest
 
 from m2pem.verify import retesting
-from m2pem.verify.derive import derive
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.explore import explore
 from m2pem.verify.retesting import affected_rules
+from m2pem.verify.translate import derive
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import structured
 from tests.verify.random_systems import random_system

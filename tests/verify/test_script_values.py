@@ -5,7 +5,7 @@ import pytest
 from m2pem.verify.check import Report, check
 from m2pem.verify.results import Verdict
 from m2pem.verify.system import Exactness
-from tests.model.bpmn_text import flow
+from tests.bpmn.bpmn_text import flow
 from tests.verify.missions import mission
 
 

@@ -10,11 +10,10 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from m2pem.model.bpmn import read_mission
-from m2pem.model.mission import Mission
-from m2pem.resources.madeup import fleet_for
+from m2pem.bpmn import read_mission
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 from m2pem.verify.check import check
-from m2pem.verify.derive import Options, derive
 from m2pem.verify.encoding import Marking
 from m2pem.verify.explore import Exploration, Limits, Stopped, explore
 from m2pem.verify.labels import Labels
@@ -35,6 +34,7 @@ from m2pem.verify.spin.checking import check_with_spin
 from m2pem.verify.spin.search import Found, Wanted, search
 from m2pem.verify.spin.trail import replay
 from m2pem.verify.system import Flag, System
+from m2pem.verify.translate import Options, derive
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
 from tests.seeds import seeds_for

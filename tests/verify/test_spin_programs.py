@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from m2pem.errors import InternalError
-from m2pem.verify.derive import derive
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.explore import Limits, Progress, Stopped
 from m2pem.verify.simplify import simplify
@@ -19,6 +18,7 @@ from m2pem.verify.spin.search import search
 from m2pem.verify.spin.trail import Trail, replay
 from m2pem.verify.spin.trail import read as read_trail
 from m2pem.verify.system import System
+from m2pem.verify.translate import derive
 from tests.verify.models import branches
 
 WHOLE = """

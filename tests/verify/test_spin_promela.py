@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.model.bpmn import read_mission
-from m2pem.verify.derive import derive
+from m2pem.bpmn import read_mission
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.spin.naming import comment, identifiers
 from m2pem.verify.spin.promela import Asks, text_of
 from m2pem.verify.system import Kind, System
+from m2pem.verify.translate import derive
 from tests.engine.notation import mission as notation
 
 ROOT = Path(__file__).parents[2]

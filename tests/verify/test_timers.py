@@ -5,15 +5,15 @@ from random import Random
 
 import pytest
 
-from m2pem.model.mission import Mission
-from m2pem.resources.madeup import fleet_for
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 from m2pem.verify.check import Report, check
-from m2pem.verify.derive import Options, derive
 from m2pem.verify.explore import Limits, explore
 from m2pem.verify.results import Result, Verdict
 from m2pem.verify.spin.checking import check_with_spin
 from m2pem.verify.spin.promela import text_of
 from m2pem.verify.system import System, Trigger
+from m2pem.verify.translate import Options, derive
 from tests.engine.notation import mission
 from tests.verify.models import Walk
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from m2pem import hookimpl
 from m2pem.api.service import Service, ServiceContext, ServiceError
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.values import Value
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.values import Value
 
 
 class WindGauge:

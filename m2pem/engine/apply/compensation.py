@@ -2,7 +2,7 @@
 
 from m2pem.engine import records as r
 from m2pem.engine.state import Compensation, Completion, RunState, Scope, Token
-from m2pem.model.elements import Activity
+from m2pem.mission.elements import Activity
 
 
 def compensation_enabled(state: RunState, record: r.CompensationEnabled) -> None:

@@ -11,7 +11,7 @@ from m2pem.engine.state import (
     Token,
     Wait,
 )
-from m2pem.model.elements import (
+from m2pem.mission.elements import (
     FlowNode,
 )
 

@@ -9,7 +9,7 @@ from m2pem.engine.state import (
     RunState,
     Scope,
 )
-from m2pem.model.elements import (
+from m2pem.mission.elements import (
     Activity,
     CallActivity,
     Container,

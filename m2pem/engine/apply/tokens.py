@@ -10,7 +10,7 @@ from m2pem.engine.state import (
     Scope,
     Token,
 )
-from m2pem.model.elements import (
+from m2pem.mission.elements import (
     Activity,
     AdHocSubProcess,
     ComplexGateway,

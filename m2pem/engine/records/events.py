@@ -3,7 +3,7 @@
 import msgspec
 
 from m2pem.engine.records.base import BaseRecord, Trigger
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 
 
 class DataWritten(BaseRecord, frozen=True):

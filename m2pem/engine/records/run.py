@@ -2,7 +2,7 @@
 
 from m2pem.engine.inputs import Input
 from m2pem.engine.records.base import BaseRecord, RunOutcome
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 
 
 class RunStarted(BaseRecord, frozen=True):

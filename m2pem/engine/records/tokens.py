@@ -1,7 +1,7 @@
 """Records about scopes and tokens: the game itself."""
 
 from m2pem.engine.records.base import BaseRecord, TokenOutcome
-from m2pem.model.values import Value
+from m2pem.mission.values import Value
 
 
 class ScopeOpened(BaseRecord, frozen=True):

@@ -1,8 +1,8 @@
 """Records about what activities do: behaviors, prompts and services."""
 
 from m2pem.engine.records.base import BaseRecord
-from m2pem.model.catalogue import BehaviorState
-from m2pem.model.values import Value
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.values import Value
 
 
 class BehaviorRequested(BaseRecord, frozen=True):

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from itertools import pairwise
 
-from m2pem.model.catalogue import BehaviorState
+from m2pem.mission.catalogue import BehaviorState
 from m2pem.testing.contracts.arbiter_case import (
     ArbiterCase,
     ArbiterFixtures,

@@ -12,7 +12,7 @@ from m2pem.api.arbiter import Arbiter, ArbiterContext, ResolvedValue
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.executive.clock import SystemClock, run_virtual
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.testing.contracts.bench import ArbiterBench, context
 from m2pem.testing.contracts.contract import Contract
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 
 from m2pem.api.arbiter import ReclaimingArbiter
 from m2pem.api.clock import Clock
-from m2pem.model.catalogue import BehaviorState
+from m2pem.mission.catalogue import BehaviorState
 from m2pem.testing.contracts.arbiter_case import (
     ArbiterCase,
     ArbiterFixtures,

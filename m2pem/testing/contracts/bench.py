@@ -16,8 +16,8 @@ from m2pem.api.arbiter import (
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import PayloadState, TeamState, VehicleState
 from m2pem.executive.clock import SystemClock
-from m2pem.gateway.bus import Bus
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
+from m2pem.telemetry.bus import Bus
 
 ORIGIN = (38.1075, -77.3192, 60.0)
 JOURNAL = UUID("3f0e7d0a-6a51-4f5c-9a2c-0c1a7b1f2d11")

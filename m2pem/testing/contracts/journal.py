@@ -31,9 +31,9 @@ from m2pem.engine.records import (
 )
 from m2pem.errors import InternalError, JournalError, StaleEpochError
 from m2pem.journal.base import Entry, Journal, RunHeader, RunLine
-from m2pem.model.catalogue import BehaviorState
-from m2pem.model.library import Source
-from m2pem.model.values import Value
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.library import Source
+from m2pem.mission.values import Value
 from m2pem.testing.contracts.contract import Contract, needs
 
 HEADER = RunHeader(

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from m2pem.api.control import MissionControl, OpenPrompt, RunId, RunStatus
 from m2pem.api.ocu import Ocu
 from m2pem.engine.records import BehaviorProgressed, PromptAnswered
-from m2pem.model.catalogue import BehaviorState
+from m2pem.mission.catalogue import BehaviorState
 from m2pem.testing import scenarios
 from m2pem.testing.stage import stage
 

@@ -13,9 +13,9 @@ import pytest
 from m2pem.api.service import Service, ServiceContext, ServiceError
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.executive.clock import VirtualClock, run_virtual
-from m2pem.gateway.bus import Bus
-from m2pem.model.catalogue import ResourceId
-from m2pem.model.values import Value
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.values import Value
+from m2pem.telemetry.bus import Bus
 from m2pem.testing.contracts.contract import Contract
 
 START_US = 1_767_225_600_000_000  # 2026-01-01T00:00:00Z

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeAlias, Union
 
-from m2pem.model.expression import Expression
+from m2pem.mission.expression import Expression
 
 # --- propositions: what is true or false of one moment of a run ----------------------------------
 

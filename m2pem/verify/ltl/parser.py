@@ -9,11 +9,11 @@ import re
 from collections.abc import Callable
 
 from m2pem.errors import ExpressionSyntaxError
-from m2pem.model.expression import Expression
-from m2pem.model.expression.dialect import Dialect
-from m2pem.model.expression.functions import FUNCTIONS
-from m2pem.model.expression.parser import Parser
-from m2pem.resources.nearmiss import did_you_mean
+from m2pem.fleet.nearmiss import did_you_mean
+from m2pem.mission.expression import Expression
+from m2pem.mission.expression.dialect import Dialect
+from m2pem.mission.expression.functions import FUNCTIONS
+from m2pem.mission.expression.parser import Parser
 from m2pem.verify.ltl import formula as f
 from m2pem.verify.ltl.reading import WORDS, Reader
 

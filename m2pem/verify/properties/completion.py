@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from m2pem.model import elements as e
-from m2pem.model.events import CompensateEventDefinition
+from m2pem.mission import elements as e
+from m2pem.mission.events import CompensateEventDefinition
 from m2pem.verify.fair_rounds import FairRounds
 from m2pem.verify.properties.searched import Searched
 from m2pem.verify.results import Result, Violation

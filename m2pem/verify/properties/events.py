@@ -1,13 +1,13 @@
 """Can what is awaited come, and is what is thrown heard?"""
 
-from m2pem.model import elements as e
-from m2pem.model.events import MessageEventDefinition, RootElement, SignalEventDefinition
-from m2pem.verify.derive.derive import messages_from_strangers
-from m2pem.verify.derive.events import awaited
-from m2pem.verify.derive.throwing import thrown_by
+from m2pem.mission import elements as e
+from m2pem.mission.events import MessageEventDefinition, RootElement, SignalEventDefinition
 from m2pem.verify.properties.searched import Searched
 from m2pem.verify.results import Result, Violation
 from m2pem.verify.system import Flag
+from m2pem.verify.translate.derive import messages_from_strangers
+from m2pem.verify.translate.events import awaited
+from m2pem.verify.translate.throwing import thrown_by
 
 
 def _thrown(searched: Searched) -> set[str]:

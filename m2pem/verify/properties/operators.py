@@ -1,6 +1,6 @@
 """Are operators asked what they can answer, and is every answer handled?"""
 
-from m2pem.model import elements as e
+from m2pem.mission import elements as e
 from m2pem.verify.properties.searched import Searched
 from m2pem.verify.results import Result, Violation
 from m2pem.verify.system import Flag, Trigger

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from m2pem.model.mission import Mission
+from m2pem.mission.mission import Mission
 from m2pem.verify.explore import Exploration
 from m2pem.verify.results import Result, Verdict, Violation
 from m2pem.verify.system import Role, System

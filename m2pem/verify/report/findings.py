@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from m2pem.drawing import Marks
-from m2pem.model import elements as e
-from m2pem.model.events import CompensateEventDefinition
-from m2pem.model.mission import Mission
-from m2pem.model.values import Value
+from m2pem.diagram import Marks
+from m2pem.mission import elements as e
+from m2pem.mission.events import CompensateEventDefinition
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
 from m2pem.verify.check import Report
 from m2pem.verify.report.stuck import why_stuck
 from m2pem.verify.report.telling import Token, Told, encoding_of, tell, tokens_of

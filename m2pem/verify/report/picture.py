@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from m2pem.drawing import Marks, draw
-from m2pem.model.elements import Element
-from m2pem.model.mission import Mission
+from m2pem.diagram import Marks, draw
+from m2pem.mission.elements import Element
+from m2pem.mission.mission import Mission
 from m2pem.verify.report.findings import Findings, Violated, marks_of
 
 

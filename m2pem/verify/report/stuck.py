@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from m2pem.model import elements as e
+from m2pem.mission import elements as e
 from m2pem.verify.report.telling import Token, Told
 from m2pem.verify.report.words import Words
 from m2pem.verify.system import Action

@@ -4,8 +4,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from m2pem.model import elements as e
-from m2pem.model.values import Value
+from m2pem.mission import elements as e
+from m2pem.mission.values import Value
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.report.words import Words
 from m2pem.verify.system import BEGINS, UNDOES, UNDONE, Action, Kind, Rule, Step, System, Trigger

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
-from m2pem.model import elements as e
-from m2pem.model.behavior import Behavior
-from m2pem.model.events import RootElement
-from m2pem.model.mission import Mission
+from m2pem.mission import elements as e
+from m2pem.mission.behavior import Behavior
+from m2pem.mission.events import RootElement
+from m2pem.mission.mission import Mission
 
 
 class Words:

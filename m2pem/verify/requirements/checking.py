@@ -3,11 +3,9 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from m2pem.model.expression import Expression
-from m2pem.model.mission import Mission
-from m2pem.resources.fleet import Fleet
-from m2pem.verify.derive import Options, derive
-from m2pem.verify.derive.bound import Bound
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.expression import Expression
+from m2pem.mission.mission import Mission
 from m2pem.verify.explore import Exploration, explore
 from m2pem.verify.explore import Limits as ExploreLimits
 from m2pem.verify.explore import Stopped as ExploreStopped
@@ -20,6 +18,8 @@ from m2pem.verify.reduction import Reduction, StubbornSets
 from m2pem.verify.requirements.requirement import Requirement
 from m2pem.verify.simplify import simplify
 from m2pem.verify.system import Rule, System
+from m2pem.verify.translate import Options, derive
+from m2pem.verify.translate.bound import Bound
 
 
 @dataclass(frozen=True, slots=True)

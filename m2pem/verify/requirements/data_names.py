@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from m2pem.model import elements as e
-from m2pem.model.behavior import Assignment, Parameter
-from m2pem.model.expression import Expression
-from m2pem.model.loops import MultiInstance, StandardLoop
-from m2pem.model.mission import Mission
-from m2pem.resources.behaviors import SHARED
+from m2pem.fleet.behaviors import SHARED
+from m2pem.mission import elements as e
+from m2pem.mission.behavior import Assignment, Parameter
+from m2pem.mission.expression import Expression
+from m2pem.mission.loops import MultiInstance, StandardLoop
+from m2pem.mission.mission import Mission
 
 
 def data_names(

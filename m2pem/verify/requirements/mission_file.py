@@ -4,9 +4,9 @@ from typing import Any
 
 from lxml import etree
 
+from m2pem.bpmn.names import BPMN, M2PEM
+from m2pem.bpmn.xml import Document, parse_xml
 from m2pem.findings import Finding, Severity
-from m2pem.model.bpmn.names import BPMN, M2PEM
-from m2pem.model.bpmn.xml import Document, parse_xml
 from m2pem.verify.requirements.names import Names
 from m2pem.verify.requirements.reading import UnusableError, Written, made
 from m2pem.verify.requirements.requirement import Requirement, RequirementsError, misread

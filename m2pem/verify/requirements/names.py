@@ -3,14 +3,14 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from m2pem.errors import ExpressionSyntaxError
-from m2pem.model.behavior import Behavior
-from m2pem.model.elements import FlowNode, UserTask
-from m2pem.model.expression import Expression
-from m2pem.model.mission import Mission
-from m2pem.resources.allocation import resources_of, spelled_out
-from m2pem.resources.behaviors import SHARED
-from m2pem.resources.fleet import Fleet
-from m2pem.resources.nearmiss import suggest
+from m2pem.fleet.allocation import resources_of, spelled_out
+from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.nearmiss import suggest
+from m2pem.mission.behavior import Behavior
+from m2pem.mission.elements import FlowNode, UserTask
+from m2pem.mission.expression import Expression
+from m2pem.mission.mission import Mission
 from m2pem.verify.ltl.formula import (
     Active,
     Commanded,

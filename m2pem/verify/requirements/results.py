@@ -3,11 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from m2pem.model.mission import Mission
-from m2pem.resources.fleet import Fleet
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.mission import Mission
 from m2pem.verify import product
 from m2pem.verify.check import Report, bound_of, full_states
-from m2pem.verify.derive import Options, TooLargeError
 from m2pem.verify.explore import Exploration, Limits, Progress, Stopped, explore
 from m2pem.verify.ltl import propositions
 from m2pem.verify.ltl.formula import Active, Completed
@@ -24,6 +23,7 @@ from m2pem.verify.spin.asking import Storage
 from m2pem.verify.spin.search import Found, Wanted
 from m2pem.verify.spin.search import search as search_with_spin
 from m2pem.verify.system import System
+from m2pem.verify.translate import Options, TooLargeError
 
 Show = Callable[[Progress], None] | None
 

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from m2pem.findings import Finding
-from m2pem.resources.nearmiss import suggest
-from m2pem.resources.yaml_source import KeyPath, YamlSource, dotted, parse_yaml, read_yaml
+from m2pem.fleet.nearmiss import suggest
+from m2pem.fleet.yaml_source import KeyPath, YamlSource, dotted, parse_yaml, read_yaml
 from m2pem.verify.requirements.names import Names
 from m2pem.verify.requirements.reading import UnusableError, Written, made
 from m2pem.verify.requirements.requirement import Requirement, RequirementsError, misread

@@ -10,12 +10,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from m2pem.errors import InternalError
-from m2pem.model.mission import Mission
-from m2pem.resources.fleet import Fleet
-from m2pem.resources.madeup import fleet_for
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.madeup import fleet_for
+from m2pem.mission.mission import Mission
 from m2pem.verify.check import Report, bound_of, too_large
 from m2pem.verify.check import search as search_built_in
-from m2pem.verify.derive import Options, TooLargeError, derive
 from m2pem.verify.explore import Exploration, Limits, Progress, Stopped
 from m2pem.verify.interruption import watch_interruptions
 from m2pem.verify.properties import ALL, Searched
@@ -25,6 +24,7 @@ from m2pem.verify.simplify import simplify
 from m2pem.verify.spin.asking import Storage
 from m2pem.verify.spin.search import Found, Wanted, search
 from m2pem.verify.system import System
+from m2pem.verify.translate import Options, TooLargeError, derive
 
 BEYOND_SPIN = (can_complete, completes_if_fair, no_livelock)
 """Properties that are about what can be reached from each state."""

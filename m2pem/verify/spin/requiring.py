@@ -4,8 +4,8 @@ import time
 from collections.abc import Callable
 
 from m2pem.errors import InternalError
-from m2pem.model.mission import Mission
-from m2pem.resources.fleet import Fleet
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.mission import Mission
 from m2pem.verify.encoding import Encoding
 from m2pem.verify.explore import Limits, Progress, Stopped
 from m2pem.verify.labels import Labels, UnknownDataError

@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+from m2pem.bpmn import parse_mission
 from m2pem.errors import MissionError
 from m2pem.executive.loading import findings_for
 from m2pem.findings import Severity
-from m2pem.model.bpmn import parse_mission
 from m2pem.plugins import PluginManager
 from m2pem.verify.check import Report, check
-from m2pem.verify.derive import Options
 from m2pem.verify.explore import Limits
 from m2pem.verify.results import Verdict
+from m2pem.verify.translate import Options
 from tests.verify.foreign.sketches import UNREACHABLE, WORK, read_sketch
 
 FOR_THE_CHECK = 0.9

@@ -12,11 +12,11 @@ from contextlib import suppress
 
 from lxml import etree
 
+from m2pem.bpmn import parse_mission
+from m2pem.bpmn.names import BPMN, M2PEM
 from m2pem.errors import MissionError
 from m2pem.findings import Finding, Severity
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.bpmn.names import BPMN, M2PEM
-from m2pem.model.mission import Mission
+from m2pem.mission.mission import Mission
 
 _MOST_ROUNDS = 4
 """Filling one thing in can show that another is missing."""

@@ -2,7 +2,7 @@
 
 import itertools
 
-from m2pem.model.expression import parse as parse_expression
+from m2pem.mission.expression import parse as parse_expression
 from m2pem.verify.ltl.formula import (
     FALSE,
     Active,

@@ -11,7 +11,7 @@ from test_mavlink_demo import FLEETS
 from m2pem import load_fleet
 from m2pem.api.control import RunStatus
 from m2pem.plugins import PluginManager
-from m2pem.sim.rehearsal import rehearse
+from m2pem.rehearsal.rehearsal import rehearse
 
 MISSIONS = FLEETS.parent / "missions"
 

@@ -21,7 +21,7 @@ from std_msgs.msg import String
 
 from m2pem.api import ArbiterContext, Connection, ResourceId
 from m2pem.executive.clock import SystemClock
-from m2pem.gateway.bus import Bus
+from m2pem.telemetry.bus import Bus
 
 CAMERA = ResourceId("evsg2/ptz")
 PEER = Path(__file__).with_name("ptz_ros_camera_peer.py")

@@ -29,7 +29,7 @@ from m2pem.api import (
     ResourceId,
     Route,
 )
-from m2pem.gateway.bus import Bus
+from m2pem.telemetry.bus import Bus
 
 BASE = Path(__file__).with_name("ros_base_peer.py")
 ORIGIN = (38.1075, -77.3192, 60.0)

@@ -24,7 +24,7 @@ from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
-from m2pem.sim.answers import Answers, load_answers
+from m2pem.rehearsal.answers import Answers, load_answers
 
 log = logging.getLogger("mehds")
 

@@ -28,10 +28,10 @@ from m2pem.api import (
 )
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
-from m2pem.gateway.bus import Bus
+from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
-from m2pem.resources.fleet_file import load_fleet
+from m2pem.telemetry.bus import Bus
 from m2pem.testing.contracts.bench import ArbiterBench
 
 PEER = Path(__file__).with_name("ros_plain_peer.py")

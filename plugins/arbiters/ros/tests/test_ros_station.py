@@ -12,7 +12,7 @@ from m2pem_plugin_ros.testing import reserved_domain
 
 from m2pem.api import ArbiterContext, Connection, ResourceId
 from m2pem.executive.clock import SystemClock
-from m2pem.gateway.bus import Bus
+from m2pem.telemetry.bus import Bus
 
 A, B, GPR = ResourceId("a"), ResourceId("b"), ResourceId("b/gpr")
 

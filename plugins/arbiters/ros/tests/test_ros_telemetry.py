@@ -12,8 +12,8 @@ from ros_double import ORIGIN, at
 from ros_sensors import AMPLE_S, GPR, PEER, TOPICS, V, connected, fix, odometry, sensors, until
 
 from m2pem.api import GeoPosition, PayloadState, ResourceId, ServiceContext, VehicleState
-from m2pem.gateway.bus import Bus
 from m2pem.services.detector import Detector
+from m2pem.telemetry.bus import Bus
 
 NAN = math.nan
 ERROR, WARN, OK = 2, 1, 0

@@ -19,7 +19,7 @@ from m2pem_plugin_ros import loopback
 from m2pem_plugin_ros.testing import reserved_domain
 
 from m2pem.api import MissionControl, ResourceId
-from m2pem.resources.fleet import Fleet
+from m2pem.fleet.fleet import Fleet
 from m2pem.testing import scenarios
 from m2pem.testing.contracts.ocu_bench import Faults
 from m2pem.testing.stage import stage

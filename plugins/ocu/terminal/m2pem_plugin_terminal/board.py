@@ -13,7 +13,7 @@ from m2pem.api import records as r
 from m2pem.api.control import RunId, RunStatus, StampedRecord
 
 if TYPE_CHECKING:
-    from m2pem.model.mission import Mission
+    from m2pem.mission.mission import Mission
 
 REMEMBERED = 20
 """Finished elements kept for fading."""

@@ -12,7 +12,7 @@ from m2pem_plugin_terminal.words import shortened
 if TYPE_CHECKING:
     from m2pem.api import ResourceId
     from m2pem.api.control import TakeEffect
-    from m2pem.resources.fleet import Fleet
+    from m2pem.fleet.fleet import Fleet
 
 TITLE = "Take, or give back"
 TEXT = "Takes what is free or with a mission; gives back yours. Asks before it does."

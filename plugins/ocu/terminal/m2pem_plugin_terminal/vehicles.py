@@ -19,7 +19,7 @@ from m2pem_plugin_terminal.payloads import payload_words
 from m2pem_plugin_terminal.words import shortened
 
 if TYPE_CHECKING:
-    from m2pem.resources.fleet import Fleet
+    from m2pem.fleet.fleet import Fleet
 
 SILENT_AFTER_S = 3.0
 """Where the fleet does not say when a vehicle counts as lost."""

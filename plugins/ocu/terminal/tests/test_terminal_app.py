@@ -11,7 +11,7 @@ from m2pem.api.telemetry import (
     TeamState,
     VehicleState,
 )
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 POINT = {"type": "Point", "coordinates": [-77.3, 38.1]}
 

@@ -4,9 +4,9 @@ import pytest
 from m2pem_plugin_terminal.board import Board
 
 from m2pem.api.control import RunId, StampedRecord
+from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import PromptAnswer, SignalReceived, StartRun
 from m2pem.engine.run import MissionRun
-from m2pem.model.bpmn import parse_mission
 
 MISSION = """
 <definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targetNamespace="urn:t">

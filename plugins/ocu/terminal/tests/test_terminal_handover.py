@@ -3,7 +3,7 @@
 from m2pem_plugin_terminal.handover import choices, taken
 from terminal_world import World, fleet, scout
 
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 
 async def holder(world: World, resource: str = "scout") -> str:

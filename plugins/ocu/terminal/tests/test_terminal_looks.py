@@ -12,7 +12,7 @@ import pytest
 from terminal_world import Terminal, World, characters, scout
 
 from m2pem.api.telemetry import GeoPosition, VehicleState
-from m2pem.model.catalogue import BehaviorState, ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 PICTURES = Path(__file__).parents[4] / "docs" / "images"
 

@@ -7,7 +7,7 @@ import pytest
 from m2pem_plugin_terminal.payloads import payload_words
 
 from m2pem.api.telemetry import LinkState, PayloadState
-from m2pem.model.catalogue import ResourceId
+from m2pem.mission.catalogue import ResourceId
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ from rest_world import VIGNETTE, rest_world
 from m2pem.cli.fleets import arbiters_of
 from m2pem.executive.loading import findings_for, load_source
 from m2pem.executive.proving import Engine, asked_of, prove
+from m2pem.fleet.madeup import fleet_for
 from m2pem.plugins import PluginManager
-from m2pem.resources.madeup import fleet_for
-from m2pem.sim.rehearsal import rehearse
+from m2pem.rehearsal.rehearsal import rehearse
 from m2pem.verify.explore import Limits
 
 NAMES = ("escort", "patrol", "search", "survey", "sweep_and_detect")

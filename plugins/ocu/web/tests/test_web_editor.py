@@ -8,7 +8,7 @@ from web_desk import IN_ONE_LOOP, Desk
 from web_drawing import SAVED, Drawing, new_mission
 
 from m2pem import load_mission
-from m2pem.model.elements import ScriptTask, SequenceFlow, UserTask
+from m2pem.mission.elements import ScriptTask, SequenceFlow, UserTask
 
 pytestmark = IN_ONE_LOOP
 

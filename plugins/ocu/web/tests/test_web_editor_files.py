@@ -9,10 +9,10 @@ from playwright.async_api import FilePayload, Page, expect
 from web_desk import IN_ONE_LOOP, Desk
 from web_served import REPOSITORY
 
+from m2pem.bpmn import parse_mission
+from m2pem.bpmn.search_path import SearchPath
 from m2pem.editing.editable import editable
 from m2pem.errors import MissionError
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.bpmn.search_path import SearchPath
 from tests.editing.same_model import model_of, new_names
 
 pytestmark = IN_ONE_LOOP

@@ -10,8 +10,8 @@ from web_desk import IN_ONE_LOOP, Desk
 from web_drawing import Drawing
 from web_served import REPOSITORY
 
-from m2pem.model.bpmn import parse_mission
-from m2pem.model.bpmn.search_path import SearchPath
+from m2pem.bpmn import parse_mission
+from m2pem.bpmn.search_path import SearchPath
 from tests.editing.same_model import model_of
 
 pytestmark = IN_ONE_LOOP

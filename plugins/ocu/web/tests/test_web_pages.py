@@ -12,9 +12,9 @@ from web_world import VEHICLE, MakeWorld, executive, serving
 
 from m2pem.api.arbiter import Arbiter
 from m2pem.journal import MemoryJournal
-from m2pem.model.catalogue import ResourceId
+from m2pem.mission.catalogue import ResourceId
 from m2pem.plugins import PluginManager
-from m2pem.sim.arbiters import SimArbiter
+from m2pem.simulation.arbiters import SimArbiter
 
 pytestmark = IN_ONE_LOOP
 

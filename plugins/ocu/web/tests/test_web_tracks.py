@@ -18,7 +18,7 @@ from m2pem_plugin_web.tracks.thinning import Sample, Thinner, differs, thinned
 from m2pem_plugin_web.tracks.track import Head, Track
 
 from m2pem.api import GeoPosition, LinkState, PayloadState, VehicleState
-from m2pem.model.catalogue import ResourceId
+from m2pem.mission.catalogue import ResourceId
 
 HEAD = Head("r1", 1_000)
 M = 1 / 111_320.0

@@ -1,0 +1,158 @@
+"""Reads missions: BPMN 2.0 XML to the model of `m2pem.mission.elements`.
+
+Everything that is wrong with a file is found at once. See docs/missions.md for what is read.
+"""
+
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from m2pem.bpmn import collector
+from m2pem.bpmn.calls import resolve_calls
+from m2pem.bpmn.collaboration import check_collaborations
+from m2pem.bpmn.compensation import link_compensation, note_compensation
+from m2pem.bpmn.containers import MAX_DEPTH
+from m2pem.bpmn.correlation import resolve_correlation
+from m2pem.bpmn.data import resolve_data
+from m2pem.bpmn.data_flow import resolve_data_flows
+from m2pem.bpmn.files import Files, Part, open_part
+from m2pem.bpmn.graph import add_unreachable, check_graph
+from m2pem.bpmn.link import link
+from m2pem.bpmn.loop_data import join_default_signals, resolve_loops
+from m2pem.bpmn.merge import merge
+from m2pem.bpmn.messages import resolve_messages
+from m2pem.bpmn.prompts import resolve_prompts
+from m2pem.bpmn.reading import Reading
+from m2pem.bpmn.rules import check_rules
+from m2pem.bpmn.rules.registry import code
+from m2pem.bpmn.search_path import SearchPath
+from m2pem.bpmn.size import max_bytes
+from m2pem.bpmn.targets import find_called
+from m2pem.errors import MissionError
+from m2pem.findings import Finding, Severity, has_errors
+from m2pem.mission.library import Library
+from m2pem.mission.mission import Mission
+
+__all__ = [
+    "MAX_DEPTH",
+    "NO_BPMN_RULES",
+    "parse_mission",
+    "read_mission",
+    "read_partly",
+]
+
+NO_BPMN_RULES = frozenset(
+    {"doctype", "encoding", "not-bpmn", "not-xml", "too-large", "unreadable-file"}
+)
+"""Rules of the findings that say that a file is no BPMN at all (`m2pem check`: exit 2)."""
+
+
+def read_mission(path: str | Path, search_path: Iterable[Path | str] = ()) -> Mission:
+    """Read a mission file, and the files that it calls into or imports.
+
+    `search_path`: folders to look in for what it calls, after its own (docs/missions.md).
+
+    Raises:
+        MissionError: the file cannot be read or executed; it carries every finding.
+    """
+    file = str(path)
+    try:
+        with Path(path).open("rb") as stream:
+            data = stream.read(max_bytes() + 1)
+    except OSError as error:
+        finding = Finding(
+            Severity.ERROR,
+            file,
+            0,
+            "",
+            "unreadable-file",
+            f"cannot read the file: {error.strerror or error}",
+            "name a BPMN 2.0 file",
+            code("unreadable-file"),
+        )
+        raise MissionError(f"{file}: no mission", [finding]) from error
+    return parse_mission(data, file, SearchPath(Path(path), map(Path, search_path)))
+
+
+def parse_mission(
+    data: bytes, file: str, library: Library | None = None, *, accepted: bool = False
+) -> Mission:
+    """Parse the bytes of a mission file; `file` is its name in findings.
+
+    `library` has the other files that it calls into or imports; without one there are none.
+    `accepted`: an earlier release has begun a run of it. What is an error since is read as that
+    release read it, and is an error among the mission's `warnings`.
+
+    Raises:
+        MissionError: it is no BPMN 2.0, or has something that m2pem cannot execute; it carries
+            every finding, errors and warnings, by file and line.
+    """
+    with collector.paused():
+        return _parse(data, file, library, accepted=accepted)
+
+
+def read_partly(data: bytes, file: str, library: Library | None = None) -> Reading:
+    """What can be read of a mission's own file, whatever is wrong with it.
+
+    Raises:
+        MissionError: it is no BPMN 2.0 at all.
+    """
+    with collector.paused():
+        files = Files(open_part(data, file), library)
+        find_called(files)
+        for part in [each for each in files.parts if each.is_read]:
+            _resolve(part)
+        return files.main.reading
+
+
+def _parse(data: bytes, file: str, library: Library | None, *, accepted: bool) -> Mission:
+    files = Files(open_part(data, file), library)
+    reached = find_called(files)
+    parts = [part for part in files.parts if part.is_read]
+    for part in parts:
+        _resolve(part)
+    findings = [each for part in files.parts for each in part.reading.report.sorted()]
+    if has_errors([*findings, *files.findings]):
+        if accepted:
+            with suppress(Exception):  # merging relies on what is no error in a mission
+                return merge(files, reached)
+        for part in parts:
+            add_unreachable(part.reading)
+        raise _refusal(file, files)
+    return merge(files, reached)
+
+
+def _refusal(file: str, files: Files) -> MissionError:
+    findings = [each for part in files.parts for each in part.reading.report.sorted()]
+    findings += files.findings
+    count = sum(finding.severity is Severity.ERROR for finding in findings)
+    problems = "1 problem" if count == 1 else f"{count} problems"
+    return MissionError(f"{file}: the mission has {problems}", findings)
+
+
+def _resolve(part: Part) -> None:
+    """Look up what is referred to within the file, and check what it is then."""
+    reading = part.reading
+    if not reading.processes:
+        root = part.document.root
+        reading.report.error(
+            root,
+            root.get("id", ""),
+            "no-process",
+            "the file has no process",
+            "draw a process with a start event",
+        )
+    resolve_data(reading)
+    resolve_loops(reading)
+    resolve_data_flows(reading)
+    resolve_prompts(reading)
+    resolve_calls(reading)
+    note_compensation(reading)
+    link(reading)
+    link_compensation(reading)
+    join_default_signals(reading)
+    resolve_messages(reading)
+    part.correlation = resolve_correlation(reading)
+    check_collaborations(reading)
+    check_graph(reading)
+    check_rules(part.document.root, reading.report, part.data)

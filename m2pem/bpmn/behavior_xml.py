@@ -1,0 +1,252 @@
+"""Behaviors and services as XML: the paper's Figure 3 (docs/missions.md)."""
+
+from collections.abc import Callable, Iterator
+from typing import TypeVar
+
+from lxml import etree
+
+from m2pem.bpmn.names import BPMN, M2PEM, local
+from m2pem.bpmn.reading import Reading
+from m2pem.mission.behavior import Behavior, BehaviorType, Parameter, Role, RoleKind, ServiceCall
+
+_ROLE_ATTRIBUTES = frozenset({"name", "optional", "requires", *RoleKind})
+
+Named = TypeVar("Named", Role, Parameter)
+
+
+class BehaviorReader:
+    """Reads the XML inside one task; `line` finds the lines of that XML in the mission file."""
+
+    def __init__(self, reading: Reading, task: str, line: Callable[[etree._Element], int]) -> None:
+        self._reading = reading
+        self._report = reading.report
+        self._task = task
+        self._line = line
+
+    def behavior(self, element: etree._Element) -> Behavior | None:
+        """A `<behavior>`; None when findings say why there is none."""
+        head: dict[str, str] = {}
+        for name in ("type", "name"):
+            text = _attribute(element, name)
+            if text is not None:
+                head[name] = text
+        parameters: list[Parameter] = []
+        roles: list[Role] = []
+        for child in self._children(element):
+            what = local(child.tag)
+            if what == "property":
+                self._head_property(child, head)
+            elif what == "properties":
+                parameters += self._parameters(child)
+            elif what == "resources":
+                roles += self._resources(child)
+            elif what == "role":
+                self._misplaced(child, "role", "resources")
+        self.refuse_repeated(parameters, "parameter")
+        self.refuse_repeated(roles, "role")
+        return self._finish(element, head, parameters, roles)
+
+    def _finish(
+        self,
+        element: etree._Element,
+        head: dict[str, str],
+        parameters: list[Parameter],
+        roles: list[Role],
+    ) -> Behavior | None:
+        kind = head.get("type", "").strip()
+        name = head.get("name", "").strip()
+        line = self._line(element)
+        if kind not in list(BehaviorType):
+            what = f"its type is '{kind}'" if kind else "it has no type"
+            self._error(
+                line,
+                "behavior-type",
+                f"the behavior cannot be commanded: {what}",
+                f"write one of the types {', '.join(BehaviorType)}",
+            )
+        if not name or "${" in name:
+            what = f"its name '{name}' is no literal text" if name else "it has no name"
+            self._error(
+                line,
+                "behavior-name",
+                f"the behavior cannot be commanded: {what}",
+                'write for example <property name="name" value="goto"/>',
+            )
+        if kind not in list(BehaviorType) or not name:
+            return None
+        return Behavior(BehaviorType(kind), name, line, tuple(parameters), tuple(roles))
+
+    def _head_property(self, element: etree._Element, head: dict[str, str]) -> None:
+        name = _attribute(element, "name") or ""
+        if name not in ("type", "name"):
+            self._misplaced(element, f"property '{name}'", "properties")
+            return
+        text = _value_text(element)
+        if head.get(name, text) != text:
+            self._error(
+                self._line(element),
+                f"behavior-{name}",
+                f"the behavior's {name} is both '{head[name]}' and '{text}'",
+                "keep one of the two",
+            )
+        head[name] = text
+
+    def service(self, element: etree._Element) -> ServiceCall | None:
+        """An `<m2pem:service class="...">`; None when it has no class."""
+        parameters: list[Parameter] = []
+        roles: list[Role] = []
+        for child in self._children(element):
+            what = local(child.tag)
+            if what == "property":
+                parameters += self.one_parameter(child)
+            elif what == "role":
+                roles += self._role(child)
+            elif what == "properties":
+                parameters += self._parameters(child)
+            elif what == "resources":
+                roles += self._resources(child)
+        self.refuse_repeated(parameters, "property")
+        self.refuse_repeated(roles, "role")
+        name = (_attribute(element, "class") or "").strip()
+        line = self._line(element)
+        if not name:
+            self._error(
+                line,
+                "service-class",
+                "the service has no class",
+                'write for example <m2pem:service class="Detector"/>',
+            )
+            return None
+        return ServiceCall(name, line, tuple(roles), tuple(parameters))
+
+    # --- properties and roles -------------------------------------------------------------------
+
+    def _parameters(self, element: etree._Element) -> list[Parameter]:
+        result: list[Parameter] = []
+        for child in self._children(element):
+            if local(child.tag) == "property":
+                result += self.one_parameter(child)
+        return result
+
+    def one_parameter(self, element: etree._Element) -> list[Parameter]:
+        """A `<property>`; nothing when a finding says why."""
+        name = _attribute(element, "name")
+        text = _value_text(element)
+        line = self._line(element)
+        if not name:
+            self._error(
+                line,
+                "parameter-name",
+                "a property has no name",
+                'write <property name="speed" value="2 m/s"/>',
+            )
+            return []
+        if "{" not in text and not text.lstrip().startswith("="):
+            return [Parameter(name, text, line)]
+        value = self._reading.template(line, self._task, text)
+        return [] if value is None else [Parameter(name, value, line)]
+
+    def _resources(self, element: etree._Element) -> list[Role]:
+        return self.roles([each for each in self._children(element) if local(each.tag) == "role"])
+
+    def roles(self, elements: list[etree._Element]) -> list[Role]:
+        """The roles that some `<role>` elements say, without those that findings refuse."""
+        return [role for element in elements for role in self._role(element)]
+
+    def _role(self, element: etree._Element) -> list[Role]:
+        line = self._line(element)
+        name = (_attribute(element, "name") or "").strip()
+        if not name:
+            self._error(line, "role-name", "a role has no name", 'write <role name="driver" .../>')
+        texts = {key: _attribute(element, key) for key in sorted(_ROLE_ATTRIBUTES)}
+        for key, text in texts.items():
+            if text is not None and ("${" in text or "#{" in text):
+                self._error(
+                    line,
+                    "role-not-literal",
+                    f"{key}='{text}' of role '{name}' is an expression, but roles are literal",
+                    "write the vehicle, payload or team itself",
+                )
+                return []
+        if texts["requires"] is not None:
+            self._error(
+                line,
+                "requires-reserved",
+                f"role '{name}' asks for a dynamic allocation (requires=), which m2pem reserves "
+                "but does not offer yet",
+                'name the resource: vehicle="...", payload="vehicle/payload" or team="..."',
+            )
+            return []
+        named = [(kind, texts[kind] or "") for kind in RoleKind if texts[kind] is not None]
+        if len(named) != 1 or not named[0][1].strip():
+            what = " and ".join(kind for kind, _ in named) if len(named) > 1 else "no resource"
+            self._error(
+                line,
+                "role-allocation",
+                f"role '{name}' names {what}",
+                "name exactly one vehicle, payload or team",
+            )
+            return []
+        kind, resource = named[0]
+        optional = self._optional(line, name, texts["optional"])
+        return [Role(name, kind, resource.strip(), line, optional)] if name else []
+
+    def _optional(self, line: int, role: str, text: str | None) -> bool:
+        if text not in (None, "true", "false", "1", "0"):
+            self._error(
+                line,
+                "bad-value",
+                f"optional='{text}' of role '{role}' is neither true nor false",
+                'write optional="true", or delete it',
+            )
+        return text in ("true", "1")
+
+    # --- findings ------------------------------------------------------------------------------
+
+    def _children(self, element: etree._Element) -> Iterator[etree._Element]:
+        for child in element:
+            if _is_ours(child.tag):
+                yield child
+
+    def refuse_repeated(self, items: list[Named], what: str) -> None:
+        """Say which names stand there more than once."""
+        seen: set[str] = set()
+        for item in items:
+            if item.name in seen:
+                self._error(
+                    item.line,
+                    f"duplicate-{what}",
+                    f"the {what} '{item.name}' stands there twice",
+                    "keep one of the two",
+                )
+            seen.add(item.name)
+
+    def _misplaced(self, element: etree._Element, what: str, wrapper: str) -> None:
+        self._error(
+            self._line(element),
+            "misplaced",
+            f"{what} stands outside <{wrapper}>",
+            f"move it into <{wrapper}>",
+        )
+
+    def _error(self, line: int, rule: str, message: str, remedy: str) -> None:
+        self._report.error(line, self._task, rule, message, remedy)
+
+
+def is_behavior(element: etree._Element) -> bool:
+    """Whether an element is a `<behavior>`, of no namespace, BPMN's or m2pem's."""
+    return local(element.tag) == "behavior" and _is_ours(element.tag)
+
+
+def _is_ours(tag: str) -> bool:
+    return not tag.startswith("{") or tag.startswith((BPMN, M2PEM))
+
+
+def _attribute(element: etree._Element, name: str) -> str | None:
+    plain = element.get(name)
+    return plain if plain is not None else element.get(M2PEM + name)
+
+
+def _value_text(element: etree._Element) -> str:
+    value = _attribute(element, "value")
+    return value if value is not None else (element.text or "").strip()

@@ -1,0 +1,82 @@
+"""What undoes what (BPMN 2.0.2, clauses 10.7.1 and 13.5.5).
+
+A compensation boundary event and the activity that it leads to are joined by an association, not
+by a sequence flow. What is wrong with that is said by rules.
+"""
+
+from collections.abc import Iterator
+
+from lxml import etree
+
+from m2pem.bpmn.names import BPMN
+from m2pem.bpmn.reading import Drawn, Reading, reference
+from m2pem.bpmn.scan import scan
+from m2pem.mission.elements import Activity, BoundaryEvent
+from m2pem.mission.events import CompensateEventDefinition
+
+_set = object.__setattr__
+
+ASSOCIATION = BPMN + "association"
+
+
+def read_association(reading: Reading, element: etree._Element) -> None:
+    """An association; only one of a compensation event has an effect."""
+    identifier = element.get("id", "")
+    scan(reading, element, identifier)
+    reading.associations.append(
+        Drawn(
+            reference(element.get("sourceRef", "")),
+            reference(element.get("targetRef", "")),
+            element.get("associationDirection", "None"),
+        )
+    )
+
+
+def note_compensation(reading: Reading) -> None:
+    """Note what is for compensation, before anything is linked: it does not begin by itself.
+
+    That is what is marked so, and what a compensation event leads to all the same.
+    """
+    for _, handler in _pairs(reading):
+        reading.undoing.add(handler)
+    for node in reading.undoing:
+        reading.self_starting.add(node)
+        _set(node, "for_compensation", True)
+
+
+def link_compensation(reading: Reading) -> None:
+    """Give each activity what undoes it: the first, when several were drawn."""
+    for event, handler in _pairs(reading):
+        activity = getattr(event, "attached_to", None)  # a dangling one has none
+        if isinstance(activity, Activity) and activity.compensation is None:
+            _set(activity, "compensation", handler)
+
+
+def _pairs(reading: Reading) -> Iterator[tuple[BoundaryEvent, Activity]]:
+    """Compensation events and the activities in the same container that they lead to.
+
+    An association without a direction may have been drawn from either end.
+    """
+    if not reading.associations:
+        return
+    hosts = dict(reading.attachments)
+    events = {
+        event.id: (event, container)
+        for event, container in zip(reading.nodes, reading.containers, strict=True)
+        if isinstance(event, BoundaryEvent)
+        and any(isinstance(each, CompensateEventDefinition) for each in event.definitions)
+    }
+    activities = {
+        node.id: (node, container)
+        for node, container in zip(reading.nodes, reading.containers, strict=True)
+        if isinstance(node, Activity)
+    }
+    for drawn in reading.associations:
+        ends = [(drawn.source_ref, drawn.target_ref)]
+        if drawn.direction != "One":
+            ends.append((drawn.target_ref, drawn.source_ref))
+        for source, target in ends:
+            if source in events and target in activities:
+                (event, here), (activity, there) = events[source], activities[target]
+                if here is there and hosts[event] != target:
+                    yield event, activity

@@ -1,0 +1,46 @@
+"""Collects the findings about one file."""
+
+from collections.abc import Callable
+from typing import TypeAlias, Union
+
+from lxml import etree
+
+from m2pem.bpmn.rules.registry import code
+from m2pem.findings import Finding, Severity
+
+Where: TypeAlias = Union[etree._Element, int]
+"""An element, or a line."""
+
+
+class Report:
+    """Findings of one file, in the order they were made; `qualifier` goes in front of ids."""
+
+    __slots__ = ("file", "findings", "line", "qualifier")
+
+    def __init__(
+        self, file: str, line: Callable[[etree._Element], int], qualifier: str = ""
+    ) -> None:
+        self.file = file
+        self.qualifier = qualifier
+        self.line = line
+        self.findings: list[Finding] = []
+
+    def error(self, where: Where, element: str, rule: str, message: str, remedy: str) -> None:
+        """Note something that stops the mission from being loaded."""
+        self._add(Severity.ERROR, where, element, rule, (message, remedy))
+
+    def warning(self, where: Where, element: str, rule: str, message: str, remedy: str) -> None:
+        """Note something doubtful."""
+        self._add(Severity.WARNING, where, element, rule, (message, remedy))
+
+    def _add(
+        self, severity: Severity, where: Where, element: str, rule: str, said: tuple[str, str]
+    ) -> None:
+        line = where if isinstance(where, int) else self.line(where)
+        if self.qualifier and element:
+            element = f"{self.qualifier}:{element}"
+        self.findings.append(Finding(severity, self.file, line, element, rule, *said, code(rule)))
+
+    def sorted(self) -> tuple[Finding, ...]:
+        """All findings by line; those of one line in the order they were made."""
+        return tuple(sorted(self.findings, key=lambda finding: finding.line))

@@ -1,0 +1,223 @@
+"""Compensation: handlers, and what triggers them (BPMN 2.0.2, 10.5.5 and 10.7)."""
+
+from lxml import etree
+
+from m2pem.bpmn.names import BPMN
+from m2pem.bpmn.rules.rule import E, Rule, Topic, W, declared
+from m2pem.bpmn.rules.tree import (
+    ACTIVITIES,
+    CATCHING,
+    CONTAINERS,
+    EVENTS,
+    SUBPROCESSES,
+    Tree,
+    has_trigger,
+    is_false,
+    is_true,
+    names,
+    parent,
+    what,
+)
+
+ACTIVITY = Rule(
+    10535,
+    "compensated-activity",
+    "10.5.5",
+    E,
+    "activityRef names no activity",
+    "name the activity that is to be compensated, or delete it to compensate all",
+    same_as=("dangling-reference",),
+)
+INVISIBLE = Rule(
+    10708,
+    "compensated-elsewhere",
+    "10.7.2",
+    E,
+    "the activity to be compensated is not in the scope of the event",
+    "throw it where the activity stands, or in an event subprocess there",
+)
+NO_HANDLER = Rule(
+    10537,
+    "compensated-without-handler",
+    "10.5.4",
+    W,
+    "the activity to be compensated has nothing that compensates it",
+    "attach a compensation boundary event with a handler to it",
+)
+CAUGHT_ACTIVITY = Rule(
+    10538,
+    "compensation-catch-activity",
+    "10.5.5",
+    W,
+    "an event that catches compensation must not name an activity; where it stands says it",
+    "delete activityRef",
+)
+BOUNDARY_FLOW = Rule(
+    10518,
+    "compensation-boundary-flow",
+    "10.5.4",
+    E,
+    "a compensation boundary event must not have an outgoing sequence flow",
+    "draw an association to the activity that compensates",
+)
+BOUNDARY_GOES_ON = Rule(
+    10522,
+    "compensation-boundary-not-interrupting",
+    "10.5.4",
+    W,
+    "cancelActivity has no meaning on a compensation boundary event: its activity has completed",
+    'delete cancelActivity="false"',
+)
+HANDLER_IN = Rule(
+    10701,
+    "handler-incoming",
+    "10.7.1",
+    E,
+    "a compensation activity must not have an incoming flow",
+    "delete the flow; an association from a compensation boundary event leads to it",
+)
+HANDLER_OUT = Rule(
+    10702,
+    "handler-outgoing",
+    "10.7.1",
+    E,
+    "a compensation activity must not have an outgoing flow",
+    "delete the flow; put what follows into a subprocess for compensation",
+)
+HANDLER_UNUSED = Rule(
+    10703,
+    "handler-unused",
+    "10.7.1",
+    W,
+    "no compensation boundary event leads to the compensation activity",
+    "draw an association to it, or delete isForCompensation",
+)
+NO_ASSOCIATION = Rule(
+    10704,
+    "compensation-without-handler",
+    "10.7.1",
+    W,
+    "the compensation boundary event leads to no activity that compensates",
+    "draw an association from it to one",
+)
+TWO_HANDLERS = Rule(
+    10705,
+    "two-handlers",
+    "10.7.1",
+    W,
+    "the compensation boundary event leads to several activities",
+    "put them into one subprocess for compensation",
+)
+TWO_EVENTS = Rule(
+    10709,
+    "two-compensation-events",
+    "10.7.1",
+    W,
+    "the activity has several compensation boundary events; the first counts",
+    "keep one of them",
+)
+HANDLER_UNMARKED = Rule(
+    10706,
+    "handler-not-marked",
+    "10.7.1",
+    W,
+    "the activity that compensates is not marked as such",
+    'add isForCompensation="true" to it',
+)
+HANDLER_ELSEWHERE = Rule(
+    10707,
+    "handler-elsewhere",
+    "10.7.1",
+    E,
+    "the activity that compensates is in another process or subprocess",
+    "put it beside the activity whose work it undoes",
+)
+
+_BOUNDARY = names("boundaryEvent")
+
+
+def _definition(tree: Tree, definition: etree._Element) -> None:
+    name = definition.get("activityRef")
+    event = parent(definition)
+    if not name:
+        return
+    if event.tag in CATCHING:
+        tree.say(CAUGHT_ACTIVITY, definition)
+        return
+    if tree.leads_nowhere(definition, name, ACTIVITIES):
+        tree.say(ACTIVITY, definition, f"'{name}'")
+        return
+    activity = tree.find(definition, name)
+    if activity is None or event.tag not in EVENTS:
+        return
+    if not _visible(event, activity):
+        tree.say(INVISIBLE, definition, what(activity))
+    inner = activity.tag in SUBPROCESSES or activity.tag == BPMN + "callActivity"
+    attached = tree.boundary.get(activity.get("id", ""), [])
+    if not inner and not any(has_trigger(tree, each, "compensate") for each in attached):
+        tree.say(NO_HANDLER, definition, what(activity))
+
+
+def _visible(event: etree._Element, activity: etree._Element) -> bool:
+    """Beside the event, or beside a subprocess in which it stands, at any depth."""
+    scope: etree._Element | None = event.getparent()
+    home = parent(activity)
+    while scope is not None and scope.tag in CONTAINERS:
+        if scope is home:
+            return True
+        scope = scope.getparent()
+    return False
+
+
+def _boundary(tree: Tree, event: etree._Element) -> None:
+    if not has_trigger(tree, event, "compensate"):
+        return
+    if tree.out(event):
+        tree.say(BOUNDARY_FLOW, event)
+    if is_false(event, "cancelActivity"):
+        tree.say(BOUNDARY_GOES_ON, event)
+    beside = tree.boundary.get(event.get("attachedToRef", ""), [])
+    if [each for each in beside if has_trigger(tree, each, "compensate")][:1] != [event]:
+        tree.say(TWO_EVENTS, event)
+    handlers = _associated(tree, event, ACTIVITIES)
+    if not handlers:
+        tree.say(NO_ASSOCIATION, event)
+    if len(handlers) > 1:
+        tree.say(TWO_HANDLERS, event, ", ".join(map(what, handlers)))
+    for handler in handlers:
+        if handler.getparent() is not event.getparent():
+            tree.say(HANDLER_ELSEWHERE, handler, f"{what(event)} leads to it")
+        if not is_true(handler, "isForCompensation"):
+            tree.say(HANDLER_UNMARKED, handler)
+
+
+def _associated(tree: Tree, element: etree._Element, tags: frozenset[str]) -> list[etree._Element]:
+    found: list[etree._Element] = []
+    for association in tree.associations.get(element.get("id", ""), []):
+        for attribute in ("sourceRef", "targetRef"):
+            other = tree.find(association, association.get(attribute, ""))
+            if other is not None and other is not element and other.tag in tags:
+                found.append(other)
+    return found
+
+
+def _handlers(tree: Tree) -> None:
+    if not tree.mentions("isForCompensation"):
+        return
+    for element in tree.root.iter(*ACTIVITIES):
+        if not is_true(element, "isForCompensation"):
+            continue
+        if tree.into(element):
+            tree.say(HANDLER_IN, element)
+        if tree.out(element):
+            tree.say(HANDLER_OUT, element)
+        by_event = is_true(element, "triggeredByEvent")
+        if not by_event and not _associated(tree, element, _BOUNDARY):
+            tree.say(HANDLER_UNUSED, element)
+
+
+TOPIC = Topic(
+    declared(globals()),
+    {"compensateEventDefinition": _definition, "boundaryEvent": _boundary},
+    (_handlers,),
+)

@@ -1,0 +1,128 @@
+"""Extension elements: m2pem's own, those that only look like them, and those of other programs."""
+
+from lxml import etree
+
+from m2pem.bpmn.names import BPMN, CAMUNDA, M2PEM, ZEEBE, a, kind, local
+from m2pem.bpmn.rules import own_rules
+from m2pem.bpmn.rules.rule import Topic
+from m2pem.bpmn.rules.tree import Tree, parent
+from m2pem.bpmn.vocabulary import ELEMENTS, PLACES, looks_like_own, strangers
+from m2pem.mission.near import did_you_mean
+
+_RULES = {rule.slug: rule for rule in own_rules.TOPIC.rules}
+_WRONG_NAMESPACE = _RULES["wrong-namespace"]
+_UNKNOWN = _RULES["unknown-extension"]
+_MISPLACED = _RULES["misplaced-extension"]
+_FOREIGN = _RULES["foreign-extension"]
+
+_OWN = M2PEM[1:-1]
+_EXTENSIONS = BPMN + "extensionElements"
+
+_READ = frozenset(
+    [CAMUNDA + name for name in ("properties", "in", "out")]
+    + [
+        ZEEBE + name
+        for name in (
+            "adHoc",
+            "calledElement",
+            "ioMapping",
+            "loopCharacteristics",
+            "subscription",
+            "taskDefinition",
+        )
+    ]
+)
+"""Other engines' elements that m2pem reads where they stand (docs/missions.md)."""
+
+_EDITORS = (
+    "http://www.omg.org/",
+    "http://bpmn.io/",
+    "http://camunda.org/schema/modeler/",
+    "http://www.signavio.com",
+    "http://www.trisotech.com/",
+    "http://www.yaoqiang.com/",
+    "http://www.sparxsystems.com/",
+    "http://sourceforge.net/bpmn/definitions/",
+    "http://flowable.org/design",
+    "http://www.activiti.com/modeler",
+    "http://b3mn.org/",
+    "http://www.eclipse.org/bpmn2/",
+    "http://org.eclipse.bpmn2/ext",
+    "http://www.bizagi.com/",
+)
+"""How the namespaces of editors begin which keep colours, sizes and the like in a file."""
+
+_SHOWN = 5
+"""Names of elements that one finding lists."""
+
+
+def _extensions(tree: Tree) -> None:
+    _declared(tree)
+    foreign: dict[str, list[etree._Element]] = {}
+    for outer in tree.root.iter(_EXTENSIONS):
+        for element in outer:
+            tag = element.tag
+            if tag.startswith(M2PEM):
+                _own(tree, element, parent(outer))
+                continue
+            namespace = _namespace(tag)
+            if namespace in ("", BPMN[1:-1]) and local(tag) in ELEMENTS:
+                right = f'did you mean <m2pem:{local(tag)}>, with xmlns:m2pem="{_OWN}"?'
+                tree.say(_WRONG_NAMESPACE, element, f"<{local(tag)}> has no prefix", right)
+            elif namespace and looks_like_own(element.prefix or "", namespace):
+                if namespace not in tree.root.nsmap.values():
+                    _say_wrong(tree, element, element.prefix or "", namespace)
+            elif _is_ignored(tag, namespace, parent(outer)):
+                foreign.setdefault(namespace, []).append(element)
+    for namespace, elements in foreign.items():
+        _say_foreign(tree, namespace, elements)
+
+
+def _declared(tree: Tree) -> None:
+    for prefix, namespace in tree.root.nsmap.items():
+        if looks_like_own(prefix or "", namespace):
+            _say_wrong(tree, tree.root, prefix or "", namespace)
+
+
+def _say_wrong(tree: Tree, element: etree._Element, prefix: str, namespace: str) -> None:
+    declared = f"xmlns:{prefix}" if prefix else "xmlns"
+    right = f'did you mean xmlns:m2pem="{_OWN}"?'
+    tree.say(_WRONG_NAMESPACE, element, f'{declared}="{namespace}"', right)
+
+
+def _own(tree: Tree, element: etree._Element, owner: etree._Element) -> None:
+    name = local(element.tag)
+    schema = ELEMENTS.get(name)
+    if schema is None:
+        right = did_you_mean(name, ELEMENTS, "delete it")
+        tree.say(_UNKNOWN, element, f"m2pem:{name}", right)
+        return
+    if local(owner.tag) not in schema.places:
+        places = [kind(place) for place in schema.places]
+        right = f"it is for: {', '.join(places)}" if places else f"put it into {_wrappers(name)}"
+        tree.say(_MISPLACED, element, f"m2pem:{name} on {a(kind(owner.tag))}", right)
+    for where, message, right in strangers(element):
+        tree.say(_UNKNOWN, where, message, right)
+
+
+def _wrappers(name: str) -> str:
+    return " or ".join(f"m2pem:{each.name}" for each in ELEMENTS.values() if name in each.children)
+
+
+def _namespace(tag: str) -> str:
+    return tag[1:].partition("}")[0] if tag.startswith("{") else ""
+
+
+def _is_ignored(tag: str, namespace: str, owner: etree._Element) -> bool:
+    return owner.tag in PLACES and tag not in _READ and not namespace.startswith(_EDITORS)
+
+
+def _say_foreign(tree: Tree, namespace: str, elements: list[etree._Element]) -> None:
+    names = list(dict.fromkeys(local(element.tag) for element in elements))
+    listed = ", ".join(names[:_SHOWN]) + (", ..." if len(names) > _SHOWN else "")
+    count = f"{len(elements):,} element" + ("" if len(elements) == 1 else "s")
+    whose = f"of the namespace {namespace}" if namespace else "without a namespace"
+    tree.say(_FOREIGN, elements[0], f"{count} {whose} from here on: {listed}")
+
+
+TOPIC = Topic((), {}, (_extensions,))

@@ -1,0 +1,183 @@
+"""Definitions, imports, extensions, relationships, ids and artifacts (BPMN 2.0.2, 8.2 to 8.4.1)."""
+
+from lxml import etree
+
+from m2pem.bpmn.names import BPMN, kind
+from m2pem.bpmn.rules.rule import Rule, Topic, W, declared
+from m2pem.bpmn.rules.tree import Tree, is_true, texts, what
+
+NAMESPACE = Rule(
+    8201,
+    "no-target-namespace",
+    "8.2.1",
+    W,
+    "definitions has no targetNamespace",
+    'add one, for example targetNamespace="urn:my-missions"',
+)
+IMPORT_TYPE = Rule(
+    8202,
+    "import-type",
+    "8.2.2",
+    W,
+    "the import does not say of which type the imported file is",
+    "add importType with the namespace of the file's format",
+)
+IMPORT_NAMESPACE = Rule(
+    8203,
+    "import-namespace",
+    "8.2.2",
+    W,
+    "the import does not say which namespace it imports",
+    "add the targetNamespace of the imported file as namespace",
+)
+INNER_ID = Rule(
+    8303,
+    "duplicate-inner-id",
+    "8.3.1",
+    W,
+    "the id is also that of another element",
+    "give one of the two another id",
+    same_as=("duplicate-id",),
+)
+MUST_UNDERSTAND = Rule(
+    8304,
+    "extension-not-understood",
+    "8.3.3",
+    W,
+    "the file says that an extension must be understood, and m2pem does not know it",
+    'write mustUnderstand="false" if the mission means the same without it',
+)
+RELATIONSHIP_TYPE = Rule(
+    8305,
+    "relationship-type",
+    "8.3.4",
+    W,
+    "the relationship has no type",
+    "add the type, or delete the relationship",
+)
+RELATIONSHIP_ENDS = Rule(
+    8306,
+    "relationship-ends",
+    "8.3.4",
+    W,
+    "the relationship lacks a source or a target",
+    "add source and target, or delete the relationship",
+)
+RELATIONSHIP_DIRECTION = Rule(
+    8307,
+    "relationship-direction",
+    "8.3.4",
+    W,
+    "the relationship's direction is none that BPMN has",
+    "write None, Forward, Backward or Both",
+)
+ASSOCIATION_END = Rule(
+    8401,
+    "association-end",
+    "8.4.1",
+    W,
+    "the association lacks a sourceRef or a targetRef",
+    "add what it joins, or delete it",
+)
+ASSOCIATION_NOWHERE = Rule(
+    8402,
+    "association-nowhere",
+    "8.4.1",
+    W,
+    "an end of the association names nothing",
+    "name an element of the file, or delete the association",
+)
+ASSOCIATION_DIRECTION = Rule(
+    8403,
+    "association-direction",
+    "8.4.1",
+    W,
+    "the association's direction is none that BPMN has",
+    "write None, One or Both",
+)
+
+_INNER = (
+    "ioSpecification dataInput dataOutput inputSet outputSet dataInputAssociation "
+    "dataOutputAssociation standardLoopCharacteristics multiInstanceLoopCharacteristics "
+    "resourceRole performer humanPerformer potentialOwner itemDefinition interface operation "
+    "endPoint resource association group textAnnotation category categoryValue "
+    "cancelEventDefinition compensateEventDefinition conditionalEventDefinition "
+    "errorEventDefinition escalationEventDefinition linkEventDefinition messageEventDefinition "
+    "signalEventDefinition terminateEventDefinition timerEventDefinition correlationProperty "
+    "correlationKey conversation subConversation callConversation conversationLink partnerRole "
+    "partnerEntity"
+)
+
+
+def _definitions(tree: Tree, element: etree._Element) -> None:
+    if not element.get("targetNamespace"):
+        tree.say(NAMESPACE, element)
+
+
+def _import(tree: Tree, element: etree._Element) -> None:
+    if not element.get("importType"):
+        tree.say(IMPORT_TYPE, element)
+    if not element.get("namespace"):
+        tree.say(IMPORT_NAMESPACE, element)
+
+
+def _extension(tree: Tree, element: etree._Element) -> None:
+    if is_true(element, "mustUnderstand"):
+        tree.say(MUST_UNDERSTAND, element, f"'{element.get('definition', '')}'")
+
+
+def _relationship(tree: Tree, element: etree._Element) -> None:
+    if not element.get("type"):
+        tree.say(RELATIONSHIP_TYPE, element)
+    if not texts(element, "source") or not texts(element, "target"):
+        tree.say(RELATIONSHIP_ENDS, element)
+    direction = element.get("direction", "None")
+    if direction not in ("None", "Forward", "Backward", "Both"):
+        tree.say(RELATIONSHIP_DIRECTION, element, f"'{direction}'")
+
+
+def _association(tree: Tree, element: etree._Element) -> None:
+    ends = [element.get("sourceRef", ""), element.get("targetRef", "")]
+    if not all(ends):
+        tree.say(ASSOCIATION_END, element)
+    for end in ends:
+        if end and tree.leads_nowhere(element, end, _anything(tree, element, end)):
+            tree.say(ASSOCIATION_NOWHERE, element, f"'{end}'")
+    direction = element.get("associationDirection", "None")
+    if direction not in ("None", "One", "Both"):
+        tree.say(ASSOCIATION_DIRECTION, element, f"'{direction}'")
+
+
+def _anything(tree: Tree, owner: etree._Element, name: str) -> frozenset[str]:
+    found = tree.find(owner, name)
+    return frozenset() if found is None else frozenset({found.tag})
+
+
+def _inner_ids(tree: Tree) -> None:
+    """Ids that no reader claims; flow nodes, flows and root elements are claimed there."""
+    seen: dict[str, etree._Element] = {}
+    for element in _inner(tree):
+        identifier = element.get("id")
+        if not identifier:
+            continue
+        first = seen.setdefault(identifier, element)
+        if first is not element:
+            tree.say(INNER_ID, element, f"{what(element)}, of a {kind(first.tag)}")
+
+
+def _inner(tree: Tree) -> list[etree._Element]:
+    """All elements whose ids only this module looks at."""
+    return list(tree.root.iter(*(BPMN + name for name in _INNER.split())))
+
+
+TOPIC = Topic(
+    declared(globals()),
+    {
+        "definitions": _definitions,
+        "import": _import,
+        "extension": _extension,
+        "relationship": _relationship,
+        "association": _association,
+    },
+    (_inner_ids,),
+)

@@ -1,0 +1,273 @@
+"""One file's XML tree with what the rules look up in it: ids, flows by their ends, containers.
+
+Everything is indexed at most once, and only when a rule asks for it: most files need little.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from lxml import etree
+
+from m2pem.bpmn.names import BPMN, local
+from m2pem.bpmn.rules.rule import Rule
+from m2pem.findings import Severity
+
+if TYPE_CHECKING:
+    from m2pem.bpmn.report import Report
+
+_NOTHING = " "
+"""What no reference names."""
+
+Flows = Mapping[str, list[etree._Element]]
+
+
+def names(text: str) -> frozenset[str]:
+    """The tags of BPMN elements by their local names, in one text."""
+    return frozenset(BPMN + name for name in text.split())
+
+
+SUBPROCESSES = names("subProcess transaction adHocSubProcess")
+CONTAINERS = SUBPROCESSES | names("process")
+TASKS = names(
+    "task userTask manualTask scriptTask serviceTask sendTask receiveTask businessRuleTask"
+)
+ACTIVITIES = TASKS | SUBPROCESSES | names("callActivity")
+GATEWAYS = names(
+    "exclusiveGateway inclusiveGateway parallelGateway complexGateway eventBasedGateway"
+)
+CATCHING = names("startEvent intermediateCatchEvent boundaryEvent")
+THROWING = names("endEvent intermediateThrowEvent")
+EVENTS = CATCHING | THROWING
+NODES = ACTIVITIES | GATEWAYS | EVENTS
+
+_OUTER = CONTAINERS | names(
+    "definitions collaboration choreography globalConversation laneSet childLaneSet "
+    "subConversation category"
+)
+_PARTS = names(
+    "standardLoopCharacteristics multiInstanceLoopCharacteristics ioSpecification ioBinding "
+    "dataInputAssociation dataOutputAssociation resourceRole performer humanPerformer "
+    "potentialOwner correlationSubscription"
+)
+_NAMED_BY_READERS = NODES | names("sequenceFlow process")
+_TRUE = frozenset({"true", "1"})
+
+
+def named(text: str) -> str:
+    """The id that a reference names, without the prefix of its namespace."""
+    return text.rpartition(":")[2] if ":" in text else text
+
+
+class Tree:
+    """The tree, and the findings about it."""
+
+    def __init__(self, root: etree._Element, report: "Report", source: bytes) -> None:
+        self.root = root
+        self._report = report
+        self._source = source
+        self._target = root.get("targetNamespace", "")
+        self._owners: dict[str, set[etree._Element]] = {}
+
+    # --- what is there --------------------------------------------------------------------------
+
+    def mentions(self, name: str) -> bool:
+        """Whether the name may stand in the file: a rare attribute is not looked for in vain."""
+        return name.encode() in self._source or b"\0" in self._source[:100]  # UTF-16, UTF-32
+
+    def has_one_before(self, element: etree._Element) -> bool:
+        """Whether it is not the first of its tag in its parent; elements come in their order."""
+        owners = self._owners.setdefault(element.tag, set())
+        owner = parent(element)
+        if owner in owners:
+            return True
+        owners.add(owner)
+        return False
+
+    @cached_property
+    def ids(self) -> dict[str, etree._Element]:
+        """BPMN elements by id; of those that share one, the first."""
+        found: dict[str, etree._Element] = {}
+        for element in self.root.iter(BPMN + "*"):
+            identifier = element.get("id")
+            if identifier:
+                found.setdefault(identifier, element)
+        return found
+
+    @cached_property
+    def flows(self) -> list[etree._Element]:
+        """All sequence flows."""
+        return list(self.root.iter(BPMN + "sequenceFlow"))
+
+    @cached_property
+    def _ends(self) -> tuple[Flows, Flows]:
+        into: dict[str, list[etree._Element]] = {}
+        out: dict[str, list[etree._Element]] = {}
+        for flow in self.flows:
+            out.setdefault(named(flow.get("sourceRef", "")), []).append(flow)
+            into.setdefault(named(flow.get("targetRef", "")), []).append(flow)
+        return into, out
+
+    def into(self, element: etree._Element) -> list[etree._Element]:
+        """The sequence flows that name the element as their target."""
+        return self._ends[0].get(element.get("id") or _NOTHING, [])
+
+    def out(self, element: etree._Element) -> list[etree._Element]:
+        """The sequence flows that name the element as their source."""
+        return self._ends[1].get(element.get("id") or _NOTHING, [])
+
+    @cached_property
+    def boundary(self) -> Flows:
+        """Boundary events by the id of what they are attached to."""
+        return self._by_reference("boundaryEvent", "attachedToRef")
+
+    @cached_property
+    def associations(self) -> Flows:
+        """Associations by the id of either end."""
+        found: dict[str, list[etree._Element]] = {}
+        for association in self.root.iter(BPMN + "association"):
+            for attribute in ("sourceRef", "targetRef"):
+                name = association.get(attribute, "").rpartition(":")[2]
+                found.setdefault(name, []).append(association)
+        return found
+
+    def _by_reference(self, name: str, attribute: str) -> Flows:
+        found: dict[str, list[etree._Element]] = {}
+        for element in self.root.iter(BPMN + name):
+            found.setdefault(element.get(attribute, "").rpartition(":")[2], []).append(element)
+        return found
+
+    # --- references -----------------------------------------------------------------------------
+
+    def find(self, owner: etree._Element, text: str) -> etree._Element | None:
+        """What a reference names in this file."""
+        text = text.strip()
+        found = self.ids.get(text)
+        if found is None and ":" in text and not self._foreign(owner, text):
+            found = self.ids.get(text.rpartition(":")[2])
+        return found
+
+    def leads_nowhere(self, owner: etree._Element, text: str, tags: frozenset[str]) -> bool:
+        """Whether a reference that is no expression names nothing with these tags.
+
+        What a prefix of another namespace names is in another file, and is not looked for.
+        """
+        text = text.strip()
+        if "{" in text or text.startswith("="):
+            return False
+        found = self.find(owner, text)
+        if found is None:
+            return not self._foreign(owner, text)
+        return found.tag not in tags
+
+    def _foreign(self, owner: etree._Element, text: str) -> bool:
+        prefix, colon, _ = text.partition(":")
+        if not colon:
+            return False
+        namespace = owner.nsmap.get(prefix)
+        return namespace is not None and namespace != self._target
+
+    # --- findings -------------------------------------------------------------------------------
+
+    @cached_property
+    def _said(self) -> dict[tuple[int, str], set[str]]:
+        said: dict[tuple[int, str], set[str]] = {}
+        for finding in self._report.findings:
+            for name in (finding.element, ""):
+                said.setdefault((finding.line, name), set()).add(finding.rule)
+        return said
+
+    def say(self, rule: Rule, element: etree._Element, detail: str = "", right: str = "") -> None:
+        """Note that the rule is broken at an element, unless a reader has said so."""
+        identifier = place(element)
+        line = self._report.line(element)
+        said = self._said.get((line, identifier))
+        if said is not None and not said.isdisjoint((rule.slug, *rule.same_as)):
+            return
+        add = self._report.error if rule.severity is Severity.ERROR else self._report.warning
+        message = f"{rule.wrong}: {detail}" if detail else rule.wrong
+        add(line, identifier, rule.slug, message, right or rule.right)
+
+
+def place(element: etree._Element) -> str:
+    """The id that a finding about an element shows: that of what is drawn, or of a root element.
+
+    Where that has none (the readers make one up), the element's own, or "".
+    """
+    found: etree._Element | None = element
+    while found is not None:
+        parent = found.getparent()
+        outside = parent is None or parent.tag in _OUTER
+        named = found.get("id") or found.tag in _NAMED_BY_READERS
+        if outside and named and found.tag not in _PARTS:
+            break
+        found = parent
+    drawn = "" if found is None else found.get("id", "")
+    return drawn or element.get("id", "")
+
+
+def children(element: etree._Element, text: str) -> Iterator[etree._Element]:
+    """The children that have one of the local names in a text."""
+    return element.iterchildren(*(BPMN + name for name in text.split()))
+
+
+def texts(element: etree._Element, name: str) -> list[str]:
+    """What children with a local name say, without the space around it."""
+    return ["".join(map(str, child.itertext())).strip() for child in children(element, name)]
+
+
+def has(element: etree._Element, text: str) -> bool:
+    """Whether a child has one of the local names in a text."""
+    return next(children(element, text), None) is not None
+
+
+def parent(element: etree._Element) -> etree._Element:
+    """The parent of an element; the root, which has none, is its own."""
+    found: etree._Element | None = element.getparent()
+    return element if found is None else found
+
+
+def is_true(element: etree._Element, name: str) -> bool:
+    """Whether an attribute is there and true."""
+    return element.get(name, "").strip() in _TRUE
+
+
+def is_false(element: etree._Element, name: str) -> bool:
+    """Whether an attribute is there and false."""
+    return element.get(name, "").strip() in ("false", "0")
+
+
+def what(element: etree._Element) -> str:
+    """An element as a finding names it."""
+    return f"'{element.get('id', '')}'"
+
+
+def name_of(element: etree._Element) -> str:
+    """The local name of an element's tag."""
+    return local(element.tag)
+
+
+def triggers(tree: Tree, event: etree._Element) -> list[etree._Element]:
+    """The definitions of an event, also those that it refers to."""
+    found: list[etree._Element] = []
+    for child in event:
+        tag = child.tag
+        if not tag.startswith(BPMN):
+            continue
+        if tag.endswith("EventDefinition"):
+            found.append(child)
+        elif tag == BPMN + "eventDefinitionRef":
+            referred = tree.find(child, child.text or "")
+            if referred is not None and referred.tag.endswith("EventDefinition"):
+                found.append(referred)
+    return found
+
+
+def trigger_name(definition: etree._Element) -> str:
+    """The kind of a definition: "message", "compensate", ..."""
+    return local(definition.tag).removesuffix("EventDefinition")
+
+
+def has_trigger(tree: Tree, event: etree._Element, kind: str) -> bool:
+    """Whether an event has a definition of a kind."""
+    return any(trigger_name(each) == kind for each in triggers(tree, event))

@@ -1,0 +1,110 @@
+"""The children of one element by tag, checked against what BPMN allows there."""
+
+from dataclasses import dataclass, field
+
+from lxml import etree
+
+from m2pem.bpmn.names import BPMN, M2PEM, a, kind, local
+from m2pem.bpmn.reading import Reading, text_of
+from m2pem.bpmn.schema import SHAPES, Shape
+from m2pem.mission.near import did_you_mean
+
+DOCUMENTATION = BPMN + "documentation"
+EXTENSIONS = BPMN + "extensionElements"
+_FLOW_REFERENCES = frozenset({BPMN + "incoming", BPMN + "outgoing"})
+_UNREAD = Shape(frozenset(), {})
+
+
+@dataclass(slots=True)
+class Scan:
+    """One element's id and children; flow references are left out, since the flows say it all."""
+
+    element: etree._Element
+    id: str
+    children: dict[str, list[etree._Element]] = field(default_factory=dict)
+
+    def of(self, name: str) -> list[etree._Element]:
+        """The BPMN children with this local name."""
+        return self.children.get(BPMN + name, [])
+
+    def documentation(self) -> str:
+        """The text of the first documentation."""
+        found = self.children.get(DOCUMENTATION)
+        return text_of(found[0]) if found else ""
+
+    def extensions(self) -> list[etree._Element]:
+        """What stands in its extension elements."""
+        return [each for outer in self.children.get(EXTENSIONS, []) for each in outer]
+
+
+def scan(reading: Reading, element: etree._Element, identifier: str) -> Scan:
+    """Look at the attributes and children of an element, once."""
+    shape = SHAPES.get(element.tag, _UNREAD)
+    reading.check_attributes(element, shape, identifier)
+    result = Scan(element, identifier)
+    order = Order()
+    for child in element:
+        name = child.tag
+        rank = shape.ranks.get(name)
+        if rank is None or rank < order.reached:
+            order.check(reading, element, child, shape, identifier)
+        else:
+            order.reached = rank
+            order.last = name
+        if name not in _FLOW_REFERENCES:
+            result.children.setdefault(name, []).append(child)
+    return result
+
+
+@dataclass(slots=True)
+class Order:
+    """How far the children of one element have come in BPMN's order; warns once."""
+
+    reached: int = -1
+    last: str = ""
+    warned: bool = False
+
+    def check(
+        self,
+        reading: Reading,
+        parent: etree._Element,
+        child: etree._Element,
+        shape: Shape,
+        identifier: str,
+    ) -> None:
+        """Warn of a child that BPMN does not know there, or that comes too late."""
+        name = child.tag
+        rank = shape.ranks.get(name)
+        if rank is None:
+            if name.startswith(BPMN):
+                reading.report.warning(
+                    child,
+                    identifier or child.get("id", ""),
+                    "unknown-element",
+                    f"BPMN has no '{local(name)}' in {a(kind(parent.tag))}; it is ignored",
+                    did_you_mean(local(name), [local(each) for each in shape.ranks], "delete it"),
+                )
+        elif rank >= self.reached:
+            self.reached = rank
+            self.last = name
+        elif not self.warned:
+            self.warned = True
+            reading.report.warning(
+                child,
+                identifier,
+                "element-order",
+                f"'{local(name)}' comes after '{local(self.last)}', which BPMN's schema forbids",
+                f"move it before the first '{local(self.last)}'; some editors refuse the file",
+            )
+
+
+def own_extensions(found: Scan, used: frozenset[str]) -> dict[str, list[etree._Element]]:
+    """Those m2pem extension elements that the reader uses, by local name.
+
+    What the others are, rules say (`rules/extensions.py`).
+    """
+    result: dict[str, list[etree._Element]] = {}
+    for child in found.extensions():
+        if child.tag.startswith(M2PEM) and (name := local(child.tag)) in used:
+            result.setdefault(name, []).append(child)
+    return result

@@ -1,0 +1,312 @@
+"""What m2pem adds to BPMN: its elements and attributes, where they may be, what they mean.
+
+One table for all: the reader refuses what is not in it, and the descriptor of the web page's editor
+and docs/extensions.md are made of it (`vocabulary_page`).
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import lru_cache
+
+from lxml import etree
+
+from m2pem.bpmn.names import BPMN, M2PEM, a, attribute_names, kind, local
+from m2pem.mission.near import did_you_mean, near
+
+
+class Type(StrEnum):
+    """What the text of an attribute is."""
+
+    TEXT = "text"
+    NAME = "name"
+    EXPRESSION = "expression"
+    DURATION = "duration"
+    BOOLEAN = "true or false"
+
+
+@dataclass(frozen=True, slots=True)
+class Attribute:
+    """An attribute of m2pem's; `doc` says what it is for."""
+
+    name: str
+    type: Type
+    doc: str
+
+
+@dataclass(frozen=True, slots=True)
+class OwnElement:
+    """An element of m2pem's.
+
+    `places`: the BPMN elements in whose extension elements it has an effect. `children`: m2pem's
+    elements that it may contain. `text`: what its text is, "" when it has none. `prefixed`: its
+    attributes may have m2pem's prefix.
+    """
+
+    name: str
+    doc: str
+    attributes: tuple[Attribute, ...] = ()
+    children: tuple[str, ...] = ()
+    text: str = ""
+    places: tuple[str, ...] = ()
+    prefixed: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class OwnAttributes:
+    """m2pem's attributes of some BPMN elements; `name` is their type in the editor."""
+
+    name: str
+    places: tuple[str, ...]
+    attributes: tuple[Attribute, ...]
+
+
+_ASKING = ("userTask", "globalUserTask")
+_DATA = ("dataObject", "dataObjectReference", "dataStore", "dataStoreReference", "property")
+_SERVING = ("serviceTask", "businessRuleTask", "globalBusinessRuleTask")
+_COMMANDING = ("scriptTask", "globalScriptTask", "sendTask", *_SERVING)
+
+_PROMPT = (
+    Attribute("store", Type.NAME, "the name under which the answer is stored"),
+    Attribute("role", Type.TEXT, "the role of the operators who may answer"),
+    Attribute("timeout", Type.DURATION, "after it the task fails with PROMPT_TIMEOUT"),
+)
+_MAPPING = (
+    Attribute("source", Type.EXPRESSION, "what is passed"),
+    Attribute("target", Type.NAME, "the name that it gets"),
+)
+_CLASS = Attribute("class", Type.NAME, "the service's class")
+
+_TABLE = (
+    OwnElement(
+        "behavior",
+        "A behavior that vehicles, payloads or teams perform.",
+        (
+            Attribute("type", Type.NAME, "`vehicle`, `payload` or `team`"),
+            Attribute("name", Type.NAME, "the behavior's name in the catalogue"),
+        ),
+        ("property", "properties", "resources"),
+        places=_COMMANDING,
+    ),
+    OwnElement("properties", "The parameters of a behavior or service.", (), ("property",)),
+    OwnElement(
+        "property",
+        "One parameter.",
+        (
+            Attribute("id", Type.NAME, "an identifier for editors"),
+            Attribute("name", Type.NAME, "the parameter's name"),
+            Attribute("value", Type.EXPRESSION, "its value"),
+        ),
+        text="the value, where there is no `value`",
+        places=_SERVING,
+    ),
+    OwnElement("resources", "Who performs a behavior or service.", (), ("role",)),
+    OwnElement(
+        "role",
+        "One vehicle, payload or team, and its part.",
+        (
+            Attribute("name", Type.NAME, "the part that it takes"),
+            Attribute("vehicle", Type.NAME, "a vehicle of the fleet"),
+            Attribute("payload", Type.NAME, "a payload of the fleet, `vehicle/payload`"),
+            Attribute("team", Type.NAME, "a team of the fleet"),
+            Attribute("optional", Type.BOOLEAN, "whether the fleet may lack it"),
+            Attribute("requires", Type.TEXT, "reserved"),
+        ),
+        places=_SERVING,
+    ),
+    OwnElement(
+        "service",
+        "The service that a task calls.",
+        (_CLASS,),
+        ("property", "role", "properties", "resources"),
+        places=_SERVING,
+    ),
+    OwnElement(
+        "userTask",
+        "How operators are asked.",
+        _PROMPT,
+        ("prompt", "decision"),
+        places=(*_ASKING, *_DATA),
+    ),
+    OwnElement("prompt", "The question.", _PROMPT, text="the question", places=(*_ASKING, *_DATA)),
+    OwnElement(
+        "decision",
+        "One answer.",
+        (
+            Attribute("value", Type.TEXT, "what is stored"),
+            Attribute("label", Type.TEXT, "what operators read"),
+        ),
+        text="the value, where there is no `value`",
+        places=(*_ASKING, *_DATA),
+    ),
+    OwnElement(
+        "in",
+        "A value that a call passes into the called process.",
+        _MAPPING,
+        places=("callActivity",),
+        prefixed=False,
+    ),
+    OwnElement(
+        "out",
+        "A value that a call passes back.",
+        _MAPPING,
+        places=("callActivity",),
+        prefixed=False,
+    ),
+    OwnElement(
+        "requirement",
+        "What `m2pem verify` proves of the mission.",
+        (
+            Attribute("id", Type.NAME, "its name in reports"),
+            Attribute("ltl", Type.TEXT, "a formula of linear temporal logic"),
+            Attribute("pattern", Type.NAME, "a pattern of requirements"),
+            Attribute("text", Type.TEXT, "the requirement in words"),
+            Attribute("fair", Type.BOOLEAN, "whether decisions are assumed to be fair"),
+        ),
+        ("arg",),
+        places=("process",),
+        prefixed=False,
+    ),
+    OwnElement(
+        "arg",
+        "An argument of a requirement's pattern.",
+        (
+            Attribute("name", Type.NAME, "the pattern's name for it"),
+            Attribute("value", Type.TEXT, "what it is here"),
+        ),
+        prefixed=False,
+    ),
+)
+
+ELEMENTS = {element.name: element for element in _TABLE}
+"""m2pem's elements by name."""
+
+EXTENSIONS = (
+    OwnAttributes("AskingTask", _ASKING, _PROMPT),
+    OwnAttributes(
+        "ServingTask", _SERVING, (_CLASS, Attribute("service", Type.NAME, "the same as `class`"))
+    ),
+    OwnAttributes(
+        "Instances",
+        ("multiInstanceLoopCharacteristics",),
+        (
+            Attribute("collection", Type.EXPRESSION, "the list with an item for each instance"),
+            Attribute("elementVariable", Type.NAME, "the name of an instance's own item"),
+        ),
+    ),
+    OwnAttributes(
+        "Choice",
+        ("adHocSubProcess",),
+        (Attribute("activeElements", Type.EXPRESSION, "the list of ids to begin"),),
+    ),
+    OwnAttributes(
+        "Sent",
+        ("signal",),
+        (
+            Attribute("from", Type.NAME, "`operator`: operators throw it"),
+            Attribute("returned", Type.NAME, "the resource whose return throws it"),
+        ),
+    ),
+    OwnAttributes(
+        "Posted",
+        ("message",),
+        (
+            Attribute("from", Type.NAME, "`operator`: operators send it"),
+            Attribute("correlationKey", Type.EXPRESSION, "the key of sender and receiver"),
+        ),
+    ),
+)
+"""m2pem's attributes of BPMN elements."""
+
+ATTRIBUTES: dict[str, frozenset[str]] = {
+    place: frozenset(attribute.name for attribute in each.attributes)
+    for each in EXTENSIONS
+    for place in each.places
+}
+"""Names of m2pem's attributes by the BPMN element's local name."""
+
+ALL_ATTRIBUTES = frozenset().union(*ATTRIBUTES.values())
+"""Names of m2pem's attributes of any BPMN element."""
+
+PLACES = frozenset(BPMN + place for element in _TABLE for place in element.places)
+"""Tags of the BPMN elements in whose extension elements something of m2pem's has an effect."""
+
+_WRAPPED = {("behavior", "role")}
+"""Children that a reader names as misplaced: their wrapper was left out."""
+
+
+def strangers(element: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
+    """Attributes and children that m2pem does not know, in one of its elements, at any depth.
+
+    Each with where it is, what is wrong and what would be right. The element may be one of a
+    script, without a namespace or with BPMN's. What has another program's namespace is its own.
+    """
+    waiting = [element]
+    while waiting:
+        found = waiting.pop()
+        name = local(found.tag)
+        schema = ELEMENTS[name]
+        yield from _unknown_attributes(found, schema)
+        for child in found:
+            inner = local(child.tag)
+            if child.tag.startswith("{") and not child.tag.startswith((M2PEM, BPMN)):
+                continue
+            if inner in schema.children:
+                waiting.append(child)
+            elif (name, inner) not in _WRAPPED:
+                otherwise = _one_of("elements", schema.children) or f"{name} contains no elements"
+                yield (
+                    child,
+                    f"'{name}' has no element '{inner}'",
+                    did_you_mean(inner, schema.children, otherwise),
+                )
+
+
+def _unknown_attributes(
+    element: etree._Element, schema: OwnElement
+) -> Iterator[tuple[etree._Element, str, str]]:
+    known = [attribute.name for attribute in schema.attributes]
+    for key in attribute_names(element):
+        if key in known:
+            continue
+        name = key.removeprefix(M2PEM)
+        if name in known and not schema.prefixed:
+            yield element, f"'{schema.name}' takes '{name}' without a prefix", f"write {name}=..."
+        elif name not in known and not name.startswith("{"):
+            otherwise = _one_of("attributes", known) or f"{schema.name} has no attributes"
+            yield (
+                element,
+                f"'{schema.name}' has no attribute '{name}'",
+                did_you_mean(name, known, otherwise),
+            )
+
+
+def _one_of(what: str, names: list[str] | tuple[str, ...]) -> str:
+    return f"its {what} are: {', '.join(names)}" if names else ""
+
+
+def stranger_attribute(tag: str, name: str) -> tuple[bool, str, str] | None:
+    """What is wrong with an attribute `m2pem:name` of a BPMN element; None: it has an effect.
+
+    The first value is whether m2pem knows the name for other elements.
+    """
+    known = ATTRIBUTES.get(local(tag), frozenset())
+    if name in known:
+        return None
+    noun = a(kind(tag))
+    if name in ALL_ATTRIBUTES:
+        places = [kind(place) for place, names in ATTRIBUTES.items() if name in names]
+        return True, f"m2pem:{name} has no effect on {noun}", f"it is for: {', '.join(places)}"
+    remedy = did_you_mean(name, known or ALL_ATTRIBUTES, "delete it")
+    return False, f"m2pem has no attribute 'm2pem:{name}' for {noun}", remedy
+
+
+@lru_cache(maxsize=1024)
+def looks_like_own(prefix: str, namespace: str) -> bool:
+    """Whether a prefix, or the host of a namespace, is like m2pem's, and the namespace is not."""
+    if namespace == M2PEM[1:-1]:
+        return False
+    host = re.sub(r"^[a-z]+:/*(www\.)?", "", namespace.strip().lower()).split("/")[0]
+    labels = [label for label in re.split(r"[.:]", host) if label]
+    return any(near(name.lower(), ["m2pem"]) for name in (prefix, *labels) if name)

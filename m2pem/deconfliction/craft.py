@@ -1,0 +1,96 @@
+"""An aircraft as it is seen, in the plane and with the heights in which volumes are made."""
+
+import math
+from dataclasses import dataclass
+
+from m2pem.api.telemetry import VehicleState
+from m2pem.deconfliction.shapes import Hull, Place, hull
+from m2pem.mission.catalogue import ResourceId
+from m2pem.teams.plane import Plane
+
+GROUNDED_BELOW_M = 1.0
+"""Above home; lower than this, what is neither armed nor moving is on the ground."""
+
+STANDS_BELOW_M_S = 0.5
+REACTION_S = 1.0
+BRAKING_M_S2 = 2.0
+"""What is told to stop begins to within so long, and brakes with so much at least."""
+
+SNAP_M = 2.0
+"""Nearer than this to the height that it was sent to, an aircraft is taken to be there: none
+hovers to the centimetre."""
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Heights above mean sea level in metres, from the lowest to the highest."""
+
+    low_m: float
+    high_m: float
+
+    @property
+    def exact(self) -> bool:
+        """Whether it is one height."""
+        return self.low_m == self.high_m
+
+    def apart_m(self, other: "Span") -> float:
+        """The difference of height between two; 0 if they overlap."""
+        return max(0.0, self.low_m - other.high_m, other.low_m - self.high_m)
+
+    def to(self, other: "Span") -> "Span":
+        """All heights between two."""
+        return Span(min(self.low_m, other.low_m), max(self.high_m, other.high_m))
+
+
+@dataclass(frozen=True, slots=True)
+class Craft:
+    """`stop`: where it may be by the time at which it has stopped, at `span`. `home_m`: the height
+    of its home; None: not known. `homes`: where a return may lead to."""
+
+    vehicle: ResourceId
+    place: Place
+    stop: Hull
+    span: Span
+    home_m: float | None
+    flies: bool
+    stands: bool
+    homes: tuple[Place, ...] = ()
+
+
+def flies(state: VehicleState) -> bool:
+    """Whether an aircraft is in the air, or may be in a moment."""
+    height_m = state.altitude_above_home_m
+    low = height_m is None or height_m < GROUNDED_BELOW_M
+    return not (low and not state.armed and _speed_m_s(state) < STANDS_BELOW_M_S)
+
+
+def craft_of(
+    state: VehicleState, plane: Plane, nominal_m: float | None, homes: tuple[Place, ...]
+) -> Craft | None:
+    """None: its position is not known. `nominal_m`: the height that it was sent to last."""
+    if state.position is None:
+        return None
+    place = plane.level(state.position.latitude_deg, state.position.longitude_deg)
+    east, north, up = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
+    speed = _speed_m_s(state)
+    stands = speed < STANDS_BELOW_M_S
+    ahead_s = 0.0 if stands else REACTION_S + speed / (2 * BRAKING_M_S2)
+    height_m = state.position.altitude_m
+    if nominal_m is not None and abs(up) < STANDS_BELOW_M_S and abs(height_m - nominal_m) <= SNAP_M:
+        height_m, up = nominal_m, 0.0
+    then_m = height_m + up * ahead_s
+    above_m = state.altitude_above_home_m
+    return Craft(
+        state.resource,
+        place,
+        hull([place, (place[0] + east * ahead_s, place[1] + north * ahead_s)]),
+        Span(min(height_m, then_m), max(height_m, then_m)),
+        None if above_m is None else state.position.altitude_m - above_m,
+        flies(state),
+        stands,
+        homes,
+    )
+
+
+def _speed_m_s(state: VehicleState) -> float:
+    return math.hypot(*(state.velocity_enu_m_s or (0.0,)))

@@ -1,0 +1,220 @@
+"""From a behavior of one aircraft to the room that it takes up, by the shared catalogue's meaning.
+
+Whoever does it, it is somewhere in there: each way is as wide as its bends may be, and as high as
+from its beginning to its end. An aircraft on the ground is taken to rise straight up first.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+
+from m2pem.deconfliction.craft import Span
+from m2pem.deconfliction.shapes import Hull, Place, grown, hull
+from m2pem.deconfliction.volume import NOTHING_M, Piece, Volume
+from m2pem.deconfliction.wishes import Wishes
+
+BEND_M = 4.0
+"""How far from a route's corner a bend may pass it."""
+
+RADIUS_M = 30.0
+SURVEY_SPACING_M = 20.0
+"""What circles and surveys have when nobody says."""
+
+RETURN_HEIGHT_M = 30.0
+"""Above home: as high as an autopilot rises, if it is lower, before it returns by itself."""
+
+AT_HOME_M = 5.0
+
+
+def volume_of(behavior: str, wishes: Wishes, start_s: float, *, timed: bool = False) -> Volume:
+    """The room that a behavior takes up which starts at `start_s`. `timed`: say, where it can be
+    said, when the vehicle is where."""
+    if timed and (scheduled := _scheduled(behavior, wishes, start_s)) is not None:
+        return scheduled
+    return PLANS.get(behavior, _anything)(wishes)
+
+
+def ascent(wishes: Wishes, span: Span) -> tuple[list[Piece], Span]:
+    """How it comes from where it is to its way at some height: the column in which it takes off, if
+    it must, and at which heights the way to the first place is flown."""
+    craft = wishes.craft
+    column = craft.span.to(span) if not craft.flies else craft.span
+    pieces = [Piece(craft.stop, column.low_m, column.high_m)]
+    return pieces, span if not craft.flies else craft.span.to(span)
+
+
+def way_to(wishes: Wishes, area: Hull | None, span: Span) -> Volume:
+    """From where it is into an area, and anywhere in it."""
+    pieces, flown = ascent(wishes, span)
+    there = None if area is None else hull([*wishes.craft.stop, *area])
+    pieces.append(Piece(there, flown.low_m, flown.high_m))
+    return Volume(tuple(pieces), _end(span), wishes.unknown)
+
+
+def along(wishes: Wishes, places: Sequence[Place], spans: Sequence[Span], wide_m: float) -> Volume:
+    """From where it is to the first of some places, and on from each to the next."""
+    pieces, flown = ascent(wishes, spans[0])
+    pieces.append(Piece(grown([*wishes.craft.stop, places[0]], wide_m), flown.low_m, flown.high_m))
+    legs = zip(pairwise(places), pairwise(spans), strict=True)
+    for (begin, end), (first, second) in legs:
+        over = first.to(second)
+        pieces.append(Piece(grown([begin, end], wide_m), over.low_m, over.high_m))
+    return Volume(tuple(pieces), _end(spans[-1]), wishes.unknown)
+
+
+def _end(span: Span) -> float | None:
+    return span.low_m if span.exact and math.isfinite(span.low_m) else None
+
+
+def _scheduled(behavior: str, wishes: Wishes, start_s: float) -> Volume | None:
+    """A route or a way at one height, at a speed that is given; None: it is not one."""
+    craft, speed_m_s = wishes.craft, wishes.number("speed")
+    if behavior == "single_vehicle_routing" and wishes.route is not None:
+        places = [wishes.level(each) for each in wishes.route.waypoints]
+        spans = wishes.waypoint_spans(wishes.route)
+    elif behavior == "goto" and wishes.target_vehicle is None:
+        place, span = wishes.target()
+        places, spans = ([] if place is None else [place]), [span]
+    else:
+        return None
+    level = all(
+        span.exact and craft.span.exact and abs(span.low_m - craft.span.low_m) <= NOTHING_M
+        for span in spans
+    )
+    ready = craft.flies and craft.stands and wishes.parameters.get("loop") is not True
+    if not (places and level and ready and speed_m_s and not wishes.unknown):
+        return None
+    height_m, now_s = spans[0].low_m, start_s
+    wide_m = BEND_M if len(places) > 1 else 0.0
+    pieces = [Piece((craft.place,), height_m, height_m, to_s=start_s)]
+    for begin, end in pairwise([craft.place, *places]):
+        then_s = now_s + math.dist(begin, end) / speed_m_s
+        area = grown([begin, end], wide_m)
+        pieces.append(Piece(area, height_m, height_m, now_s, then_s, (begin, end), wide_m))
+        now_s = then_s
+    pieces.append(Piece((places[-1],), height_m, height_m, from_s=now_s))
+    return Volume(tuple(pieces), height_m)
+
+
+# --- one each -----------------------------------------------------------------------------------
+
+
+def _anything(wishes: Wishes) -> Volume:
+    wishes.unknown = "nobody can say where it flies"
+    return Volume((Piece(None, -math.inf, math.inf),), unknown=wishes.unknown)
+
+
+def _stay(wishes: Wishes) -> Volume:
+    if not wishes.craft.flies:
+        return Volume()
+    span = wishes.craft.span
+    return Volume((Piece(wishes.craft.stop, span.low_m, span.high_m),), _end(span))
+
+
+def _route(wishes: Wishes) -> Volume:
+    route = wishes.route
+    if route is None or not route.waypoints:
+        return _anything(wishes)
+    places, spans = [wishes.level(each) for each in route.waypoints], wishes.waypoint_spans(route)
+    if wishes.parameters.get("loop") is True:
+        places, spans = [*places, places[0]], [*spans, spans[0]]
+    return along(wishes, places, spans, BEND_M if len(places) > 1 else 0.0)
+
+
+def _to_target(wishes: Wishes) -> Volume:
+    place, span = wishes.target()
+    return way_to(wishes, None if place is None else (place,), span)
+
+
+def _around(wishes: Wishes) -> Volume:
+    place, span = wishes.target()
+    radius_m = wishes.number("radius") or RADIUS_M
+    return way_to(wishes, None if place is None else grown([place], radius_m), span)
+
+
+def _climb(wishes: Wishes) -> Volume:
+    return way_to(wishes, wishes.craft.stop, wishes.span())
+
+
+def _land(wishes: Wishes) -> Volume:
+    if not wishes.craft.flies:
+        return Volume()
+    return Volume((Piece(wishes.craft.stop, -math.inf, wishes.craft.span.high_m),))
+
+
+def _return(wishes: Wishes) -> Volume:
+    craft = wishes.craft
+    away_m = [math.dist(craft.place, home) for home in craft.homes]
+    at_home = max(away_m, default=math.inf) <= AT_HOME_M
+    if at_home and not craft.flies:
+        return Volume()
+    top_m = craft.span.high_m
+    if craft.home_m is None:
+        wishes.unknown, top_m = "the height of its home is not known", math.inf
+    elif not at_home:
+        top_m = max(top_m, craft.home_m + RETURN_HEIGHT_M)
+    if not craft.homes:
+        wishes.unknown = "where its home is is not known"
+        return Volume((Piece(None, -math.inf, top_m),), unknown=wishes.unknown)
+    low_m = craft.span.low_m if craft.flies else top_m
+    pieces = [Piece(craft.stop, craft.span.low_m, top_m)]
+    for home in craft.homes:
+        pieces.append(Piece(hull([*craft.stop, home]), low_m, top_m))
+        pieces.append(Piece((home,), -math.inf, top_m))
+    return Volume(tuple(pieces), unknown=wishes.unknown)
+
+
+def survey_area(wishes: Wishes) -> tuple[Hull, Span] | None:
+    """Where tracks over the parameter `area` may be; None: there is none."""
+    area = wishes.area
+    if area is None:
+        return None
+    spacing_m = wishes.number("spacing") or SURVEY_SPACING_M
+    reach_m = spacing_m / 2 + (wishes.number("overshoot") or 0.0)
+    corner_m = area.rings[0][0][2]
+    present = wishes.span() if corner_m is None else wishes.span(corner_m, area.altitude_frame)
+    if corner_m is not None:  # not everybody heeds the heights of an area
+        present = present.to(wishes.span())
+    return grown(wishes.ring(area), reach_m), present
+
+
+def _survey(wishes: Wishes) -> Volume:
+    found = survey_area(wishes)
+    return _anything(wishes) if found is None else way_to(wishes, *found)
+
+
+def observed(wishes: Wishes, reach_m: float) -> tuple[Hull | None, Span]:
+    """Around an area or a target, from `reach_m` away, or as far as its farthest corner."""
+    if wishes.area is None:
+        place, span = wishes.target()
+        return None if place is None else grown([place], reach_m), span
+    ring = wishes.ring(wishes.area)
+    centre = (
+        sum(east for east, _ in ring) / len(ring),
+        sum(north for _, north in ring) / len(ring),
+    )
+    reach_m = max(reach_m, *(math.dist(centre, corner) for corner in ring))
+    return grown([centre], reach_m), wishes.span()
+
+
+def _observe(wishes: Wishes) -> Volume:
+    return way_to(wishes, *observed(wishes, RADIUS_M))
+
+
+PLANS: Mapping[str, Callable[[Wishes], Volume]] = {
+    "single_vehicle_routing": _route,
+    "goto": _to_target,
+    "hold": _stay,
+    "drive_stop": _stay,
+    "set_speed": _stay,
+    "deploy": _stay,
+    "land": _land,
+    "return_to_launch": _return,
+    "takeoff": _climb,
+    "change_altitude": _climb,
+    "area_survey": _survey,
+    "orbit": _around,
+    "area_observe": _observe,
+    "follow": _to_target,
+}
+"""By behavior's name. Others may be anywhere."""

@@ -1,0 +1,145 @@
+"""The room that an aircraft takes up: polygons with a height from and to, perhaps for a time.
+
+Heights are metres above mean sea level, times seconds since the Unix epoch.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from m2pem.deconfliction.shapes import Hull, Place, apart_m
+
+NOTHING_M = 0.01
+"""What two ways to reckon one place may differ by."""
+
+OFF_M = 3.0
+"""How far from its way an aircraft may be seen that keeps to it."""
+
+_HALVINGS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Separation:
+    """Two aircraft are never nearer than both distances, or never within `time_s` of each other at
+    places that are; None: time does not help."""
+
+    vertical_m: float
+    horizontal_m: float
+    time_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A part of a volume. `area`: None is everywhere. `way`: it is flown from its first place to
+    its second, evenly, from `from_s` to `to_s`, and no more than `aside_m` beside; without one,
+    all of `area` is taken that long."""
+
+    area: Hull | None
+    low_m: float
+    high_m: float
+    from_s: float = -math.inf
+    to_s: float = math.inf
+    way: tuple[Place, Place] | None = None
+    aside_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Volume:
+    """`end_m`: the height that the vehicle keeps afterwards, if it is known. `unknown`: why some of
+    it is boundless; "" if nothing is."""
+
+    pieces: tuple[Piece, ...] = ()
+    end_m: float | None = None
+    unknown: str = ""
+
+    @property
+    def timed(self) -> bool:
+        """Whether it says when the vehicle is where."""
+        return any(piece.way is not None for piece in self.pieces)
+
+    def at_any_time(self) -> "Volume":
+        """The same, without saying when."""
+        pieces = [replace(each, from_s=-math.inf, to_s=math.inf, way=None) for each in self.pieces]
+        return replace(self, pieces=tuple(pieces))
+
+    def passes(self, place: Place, from_s: float, to_s: float) -> bool:
+        """Whether the vehicle is at a place at some time from then to then, if it keeps to it."""
+        for piece in self.pieces:
+            if piece.to_s < from_s or piece.from_s > to_s:
+                continue
+            area = piece.area
+            if piece.way is not None:
+                times = max(from_s, piece.from_s), min(to_s, piece.to_s)
+                area = tuple(_on(piece.way, _share(piece, time)) for time in times)
+            if apart_m((place,), area) <= piece.aside_m + OFF_M:
+                return True
+        return False
+
+
+def too_near(a: Volume, b: Volume, policy: Separation) -> tuple[Piece, Piece] | None:
+    """The first two pieces that come nearer than the policy allows; None: none do."""
+    for one in a.pieces:
+        for other in b.pieces:
+            if _near(one, other, policy):
+                return one, other
+    return None
+
+
+def _near(a: Piece, b: Piece, policy: Separation) -> bool:
+    if max(a.low_m - b.high_m, b.low_m - a.high_m) >= policy.vertical_m - NOTHING_M:
+        return False
+    reach_m = policy.horizontal_m - NOTHING_M
+    if apart_m(a.area, b.area) >= reach_m:
+        return False
+    if policy.time_s is None:
+        return True
+    (a_from, a_to), (b_from, b_to) = _when(a, b, reach_m), _when(b, a, reach_m)
+    return max(a_from - b_to, b_from - a_to) < policy.time_s
+
+
+def _when(piece: Piece, other: Piece, reach_m: float) -> tuple[float, float]:
+    """From when to when a piece is taken as far as it is within reach of another."""
+    way = piece.way
+    if way is None or other.area is None:
+        return piece.from_s, piece.to_s
+    reach_m += piece.aside_m
+
+    def off_m(share: float) -> float:
+        return apart_m((_on(way, share),), other.area)
+
+    # How far off it is, is a convex function of the way: the near part is one stretch.
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        left, right = low + (high - low) / 3, high - (high - low) / 3
+        if off_m(left) <= off_m(right):
+            high = right
+        else:
+            low = left
+    nearest = (low + high) / 2
+    if off_m(nearest) >= reach_m:  # only just not apart: nothing can be left out
+        return piece.from_s, piece.to_s
+    begin, end = _edge(off_m, nearest, 0.0, reach_m), _edge(off_m, nearest, 1.0, reach_m)
+    lasts_s = piece.to_s - piece.from_s
+    return piece.from_s + begin * lasts_s, piece.from_s + end * lasts_s
+
+
+def _edge(off_m: Callable[[float], float], near: float, far: float, reach_m: float) -> float:
+    if off_m(far) < reach_m:
+        return far
+    for _ in range(_HALVINGS):
+        middle = (near + far) / 2
+        if off_m(middle) < reach_m:
+            near = middle
+        else:
+            far = middle
+    return far
+
+
+def _on(way: tuple[Place, Place], share: float) -> Place:
+    (ae, an), (be, bn) = way
+    return ae + (be - ae) * share, an + (bn - an) * share
+
+
+def _share(piece: Piece, time_s: float) -> float:
+    lasts_s = piece.to_s - piece.from_s
+    return (time_s - piece.from_s) / lasts_s if lasts_s > 0 else 1.0

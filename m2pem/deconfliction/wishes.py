@@ -1,0 +1,102 @@
+"""What a behavior's parameters ask of an aircraft: places in the plane, and heights."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from m2pem.api.arbiter import ResolvedValue
+from m2pem.deconfliction.craft import Craft, Span
+from m2pem.deconfliction.shapes import Place
+from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
+from m2pem.teams.plane import Plane
+
+ANY_HEIGHT = Span(-math.inf, math.inf)
+
+
+@dataclass(slots=True)
+class Wishes:
+    """`height_of`: the height of another vehicle now. `unknown`: is set to why something that was
+    asked for is boundless."""
+
+    craft: Craft
+    parameters: Mapping[str, ResolvedValue]
+    plane: Plane
+    height_of: Callable[[str], float | None]
+    unknown: str = ""
+
+    def number(self, name: str) -> float | None:
+        """A parameter in SI; None if it is not given."""
+        value = self.parameters.get(name)
+        return float(value) if isinstance(value, int | float) else None
+
+    @property
+    def route(self) -> Route | None:
+        """The parameter `route`."""
+        value = self.parameters.get("route")
+        return value if isinstance(value, Route) else None
+
+    @property
+    def area(self) -> Area | None:
+        """The parameter `area`."""
+        value = self.parameters.get("area")
+        return value if isinstance(value, Area) else None
+
+    @property
+    def target_vehicle(self) -> str | None:
+        """The vehicle that `target` names, if it names one."""
+        value = self.parameters.get("target")
+        return value.vehicle if isinstance(value, VehiclePosition) else None
+
+    def level(self, place: Coordinate) -> Place:
+        """A coordinate in the plane."""
+        return self.plane.level(place[0], place[1])
+
+    def ring(self, area: Area) -> list[Place]:
+        """The corners of an area's outer ring, each once."""
+        return [self.level(corner) for corner in area.rings[0][:-1]]
+
+    def waypoint_spans(self, route: Route) -> list[Span]:
+        """The height at each waypoint of a route."""
+        return [self.span(each[2], route.altitude_frame) for each in route.waypoints]
+
+    def target(self) -> tuple[Place | None, Span]:
+        """Where `target` is, None if that is wherever a vehicle goes; and the height to be at."""
+        value = self.parameters.get("target")
+        if isinstance(value, Point):
+            return self.level(value.position), self.span(value.position[2], value.altitude_frame)
+        if not isinstance(value, VehiclePosition):
+            self.unknown = "it has no target that is known"
+            return None, ANY_HEIGHT
+        self.unknown = f"it goes wherever {value.vehicle} goes"
+        span = self.span()
+        target_m = self.height_of(value.vehicle)
+        if self.number("altitude") is None and target_m is not None and target_m > span.low_m:
+            span = span.to(Span(target_m, target_m))
+        return None, span
+
+    def span(self, own_m: float | None = None, own_frame: str = "relative") -> Span:
+        """The height to move at: as the parameters say, else as a place does, else as it is."""
+        altitude_m, frame = self.number("altitude"), self.parameters.get("altitude_frame")
+        if altitude_m is not None:
+            return self._lifted(altitude_m, str(frame or "relative"))
+        if own_m is not None:
+            return self._lifted(own_m, own_frame)
+        if self.craft.flies:
+            return self.craft.span
+        self.unknown = "nobody says how high it is to fly: give it an altitude"
+        return Span(self.craft.span.low_m, math.inf)
+
+    def _lifted(self, altitude_m: float, frame: str) -> Span:
+        home_m = self.craft.home_m
+        if frame == "terrain":
+            self.unknown = "its altitude is above the terrain, whose height is not known here"
+            return ANY_HEIGHT
+        if frame == "amsl":
+            up_m = altitude_m
+        elif home_m is None:
+            self.unknown = "the height of its home is not known, which its altitude counts from"
+            return ANY_HEIGHT
+        else:
+            up_m = home_m + altitude_m
+        # What would be below its home is flown there, or at home's height.
+        return Span(up_m, up_m if home_m is None else max(up_m, home_m))

@@ -1,0 +1,162 @@
+"""Events (BPMN 2.0.2, clauses 10.5 and 13.5)."""
+
+from m2pem.engine import records as r
+from m2pem.engine.arming import arm_entered
+from m2pem.engine.compensation import throw_compensation
+from m2pem.engine.data_flow import payload
+from m2pem.engine.elements.containers import finish
+from m2pem.engine.elements.flows import true_flows
+from m2pem.engine.execution import Execution
+from m2pem.engine.interruption import end_run
+from m2pem.engine.messaging import send
+from m2pem.engine.records import RunOutcome, TokenOutcome
+from m2pem.engine.scopes import empty
+from m2pem.engine.state import Token
+from m2pem.engine.throwing import throw_error, throw_escalation
+from m2pem.engine.transactions import cancel
+from m2pem.engine.triggering import collect_letters, throw_signal
+from m2pem.engine.waiting import arm
+from m2pem.mission.elements import (
+    Event,
+    IntermediateCatchEvent,
+    IntermediateThrowEvent,
+    StartEvent,
+)
+from m2pem.mission.events import (
+    CancelEventDefinition,
+    CompensateEventDefinition,
+    ErrorEventDefinition,
+    EscalationEventDefinition,
+    EventDefinition,
+    MessageEventDefinition,
+    SignalEventDefinition,
+    TerminateEventDefinition,
+)
+
+
+def complete(x: Execution, token: Token) -> None:
+    """The event has happened: leave by every flow."""
+    flows = true_flows(x, token, None)
+    if flows is not None:
+        x.proceed(token, flows)
+
+
+def start(x: Execution, token: Token) -> None:
+    """A plain start goes on at once; a typed one waits for its trigger (paper, section 4.1).
+
+    That of an instance, or of an event subprocess, which its trigger has made has happened already.
+    """
+    node = token.node
+    assert isinstance(node, StartEvent)
+    if node.definitions and not x.has_been_triggered(token):
+        catch(x, token)
+    elif not token.waits:  # else others of its triggers must still come
+        complete(x, token)
+
+
+def catch(x: Execution, token: Token) -> None:
+    """Wait for the trigger; the target of a link has none (table 10.98)."""
+    node = token.node
+    assert isinstance(node, Event)
+    if not node.definitions or (isinstance(node, IntermediateCatchEvent) and node.linked_from):
+        complete(x, token)
+        return
+    if all(arm(x, token, node, definition) for definition in node.definitions):
+        collect_letters(x, token)
+
+
+def throw(x: Execution, token: Token) -> None:
+    """Throw, and go on, unless what was thrown ended the scope."""
+    node = token.node
+    assert isinstance(node, Event)
+    for definition in node.definitions:
+        arm_entered(x)  # what the definition before has led to
+        if x.state.tokens.get(token.id) is not token:
+            return
+        _throw(x, token, definition)
+        if x.state.tokens.get(token.id) is not token:
+            return
+    if isinstance(node, IntermediateThrowEvent) and node.links_to is not None:
+        x.leave(token, TokenOutcome.COMPLETED)
+        x.enter(token.id, node.links_to, token.scope)
+    elif not token.compensations:
+        complete(x, token)
+
+
+def _throw(x: Execution, token: Token, definition: EventDefinition) -> None:
+    match definition:
+        case SignalEventDefinition():
+            signal(x, token, definition.signal.id)
+        case MessageEventDefinition():
+            send(x, token, definition.message.id)
+        case EscalationEventDefinition(escalation=escalation):
+            assert escalation is not None
+            throw_escalation(x, token, escalation)
+        case CompensateEventDefinition():
+            throw_compensation(x, token, definition)
+
+
+def signal(x: Execution, token: Token, signal_id: str) -> None:
+    """Broadcast a signal, with its data inputs, in the run."""
+    node = token.node
+    data = payload(x, token)
+    if data is None:
+        return
+    x.emit(r.SignalThrown(signal_id, token.id, x.process_of(node), node.id, token.scope.id))
+    throw_signal(x, signal_id, data)
+
+
+def boundary(x: Execution, token: Token) -> None:
+    """It has caught; its own flow begins."""
+    complete(x, token)
+
+
+def end(x: Execution, token: Token) -> None:
+    """The token ends here, perhaps throwing something."""
+    node = token.node
+    assert isinstance(node, Event)
+    for definition in sorted(node.definitions, key=_ends_the_scope):
+        arm_entered(x)  # what the definition before has led to
+        if x.state.tokens.get(token.id) is not token:
+            return
+        match definition:
+            case TerminateEventDefinition():
+                _terminate(x, token)
+                return
+            case CancelEventDefinition():
+                cancel(x, token)
+                return
+            case ErrorEventDefinition(error=error):
+                assert error is not None
+                throw_error(x, token, error.code, f"thrown by {node.label}", leaving=True)
+                return
+            case EscalationEventDefinition(escalation=escalation) if len(node.definitions) == 1:
+                assert escalation is not None
+                goes_on = throw_escalation(x, token, escalation, leaving=True)
+                if goes_on:
+                    x.look_later(token.scope)
+                return
+            case _:
+                _throw(x, token, definition)
+                if x.state.tokens.get(token.id) is not token:
+                    return
+    if not token.compensations:
+        x.consume(token)
+
+
+def _ends_the_scope(definition: EventDefinition) -> int:
+    """Of several results, those that end the scope come last, so that all are thrown."""
+    if isinstance(definition, TerminateEventDefinition | CancelEventDefinition):
+        return 2
+    return 1 if isinstance(definition, ErrorEventDefinition) else 0
+
+
+def _terminate(x: Execution, token: Token) -> None:
+    """End its scope at once (clause 13.5.6); in the process the run began with, end the run."""
+    scope = token.scope
+    x.leave(token, TokenOutcome.COMPLETED)
+    if scope is x.state.root:
+        end_run(x, RunOutcome.TERMINATED, f"terminated by {token.node.label}")
+        return
+    empty(x, scope, TokenOutcome.TERMINATED)
+    finish(x, scope, TokenOutcome.TERMINATED)

@@ -1,0 +1,298 @@
+"""The static check: whether a mission fits a fleet, before anything moves (paper, section 4.2)."""
+
+from collections.abc import Container, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from m2pem.findings import Finding, Severity
+from m2pem.fleet.allocation import resources_of
+from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.check_roles import TaskFindings, check_roles, place
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.graph import Catalogue, ResourceGraph
+from m2pem.fleet.nearmiss import did_you_mean
+from m2pem.fleet.parameters import ParameterProblem, examine
+from m2pem.fleet.team_needs import lacking
+from m2pem.fleet.units import Dimension, UnitError, article, quantity
+from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
+from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ResourceId
+from m2pem.mission.elements import (
+    Activity,
+    ScriptTask,
+    SendTask,
+    ServiceTask,
+)
+from m2pem.mission.mission import Mission
+
+DETECTOR_SERVICE = "Detector"
+
+FAST = 5
+"""A speed of more than so many times that at which the vehicle cruises is a finding."""
+
+
+def check_mission(
+    mission: Mission,
+    fleet: Fleet,
+    catalogue: Catalogue,
+    simulated: bool = False,
+    handed_over: Container[str] = (),
+) -> list[Finding]:
+    """Everything about a mission's roles, behaviors and parameters that does not fit the fleet.
+
+    `catalogue` is what the arbiter of a resource offers; with `simulated` it is that of the
+    simulated arbiter, which then stands in for all. Findings come in the order of the mission.
+    `handed_over`: names of geometries that operators have handed over already. Another one that the
+    fleet lacks is a warning if the fleet says that operators hand it over, else an error.
+    """
+    graph = ResourceGraph(fleet, catalogue)
+    check = _Check(mission, fleet, graph, catalogue, simulated, handed_over)
+    findings = [finding for task in mission.activities() for finding in check.task(task)]
+    return [*findings, *_returned(mission, fleet)]
+
+
+def _returned(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
+    """Signals that are thrown when a resource is given back: the fleet must have it."""
+    known = [*fleet.vehicles, *fleet.payloads]
+    for signal in mission.signals.values():
+        if signal.returned and signal.returned not in known:
+            yield Finding(
+                Severity.ERROR,
+                mission.file_of(signal),
+                signal.line,
+                signal.id,
+                "unknown-resource",
+                f"m2pem:returned='{signal.returned}': {fleet.file} has no such vehicle or payload",
+                did_you_mean(signal.returned, known),
+            )
+
+
+def _member_lacks(name: str, offered: Sequence[BehaviorSpec], allowed: Sequence[str] | None) -> str:
+    """What keeps a vehicle out of a team behavior that is made of behaviors of each member."""
+    alone = [spec.name for spec in offered if spec.type is BehaviorType.VEHICLE]
+    if needed := lacking(name, alone):
+        return f"a member needs {' and '.join(needed)}, which it does not offer either"
+    if needed := lacking(name, alone if allowed is None else allowed):
+        return f"a member needs {' and '.join(needed)}, which the fleet does not let it do"
+    return ""
+
+
+def check_named(mission: Mission) -> list[Finding]:
+    """Behaviors that name nothing to perform them: wrong whatever the fleet."""
+    found: list[Finding] = []
+    for task in mission.activities():
+        if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior:
+            findings = TaskFindings(mission.file_of(task), task)
+            _check_named(task.behavior, findings)
+            found += findings.found
+    return found
+
+
+def _check_named(behavior: Behavior, findings: TaskFindings) -> bool:
+    """Whether a role names what the behavior's type wants; all vehicles hold without one."""
+    wanted = behavior.type.value
+    if any(role.kind.value == wanted for role in behavior.roles):
+        return True
+    if not behavior.roles and behavior.name == "hold" and wanted == BehaviorType.VEHICLE.value:
+        return True
+    message = f"the {wanted} behavior {behavior.name} has no role"
+    if behavior.roles:
+        message += f" with a {wanted}"
+    findings.add("no-role", message, f"name a {wanted} for it", line=behavior.line)
+    return False
+
+
+@dataclass(frozen=True, slots=True)
+class _Taker:
+    """How a behavior takes its parameters, and on whose account: the first that takes them so."""
+
+    spec: BehaviorSpec
+    role: str
+    place: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Check:
+    mission: Mission
+    fleet: Fleet
+    graph: ResourceGraph
+    catalogue: Catalogue
+    simulated: bool
+    handed_over: Container[str]
+
+    def task(self, task: Activity) -> list[Finding]:
+        findings = TaskFindings(self.mission.file_of(task), task)
+        if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior:
+            self._behavior(task.behavior, findings)
+        elif isinstance(task, ServiceTask) and task.call:
+            self._service(task.call, findings)
+        return findings.found
+
+    def _behavior(self, behavior: Behavior, findings: TaskFindings) -> None:
+        filled = check_roles(behavior.roles, self.fleet, findings)
+        matching = [role for role in filled if role.kind.value == behavior.type.value]
+        self._check_role_kinds(behavior, filled, findings)
+        takers: list[_Taker] = []
+        for role in matching:
+            for resource in resources_of(role, self.fleet):
+                self._check_manned(behavior, role, resource, findings)
+                spec = self.graph.spec(resource, behavior.name, behavior.type)
+                if spec is None:
+                    message, remedy, rule = self._not_offered(behavior, resource)
+                    findings.add(rule, message, remedy, line=behavior.line, role=role.name)
+                elif all(spec != taker.spec for taker in takers):
+                    takers.append(_Taker(spec, role.name, f"{place(self.fleet, resource)}: "))
+        shared = SHARED.get((behavior.name, behavior.type))
+        if not takers and shared:
+            takers = [_Taker(shared, behavior.roles[0].name if behavior.roles else "")]
+        if not takers and not behavior.roles:
+            findings.add(
+                "unknown-behavior",
+                f"there is no {behavior.type} behavior '{behavior.name}'",
+                self._near_behavior(behavior, SHARED.values()),
+                line=behavior.line,
+            )
+        for taker in takers:
+            self._check_parameters(behavior, taker, findings)
+        for role in matching:
+            for resource in resources_of(role, self.fleet):
+                self._check_speed(behavior, role, resource, findings)
+
+    def _check_role_kinds(
+        self, behavior: Behavior, filled: Sequence[Role], findings: TaskFindings
+    ) -> None:
+        wanted = behavior.type.value
+        what = f"the {wanted} behavior {behavior.name}"
+        if not _check_named(behavior, findings) or not behavior.roles:
+            return
+        if not any(role.kind.value == wanted for role in filled) and all(
+            role.optional for role in behavior.roles if role.kind.value == wanted
+        ):
+            message = f"{self.fleet.file} fills none of the optional roles of {what}"
+            findings.add("no-role", message, "at least one is needed", line=behavior.line)
+        for role in filled:
+            if role.kind.value != wanted and role.kind is not RoleKind.PAYLOAD:
+                findings.add(
+                    "idle-role",
+                    f"{role.resource} is held while {what} runs, but takes no part in it",
+                    line=role.line,
+                    role=role.name,
+                    severity=Severity.WARNING,
+                )
+
+    def _check_manned(
+        self, behavior: Behavior, role: Role, resource: ResourceId, findings: TaskFindings
+    ) -> None:
+        vehicle = self.fleet.vehicles.get(resource)
+        if vehicle and vehicle.manned:
+            message = f"{place(self.fleet, resource)} is manned and cannot be commanded"
+            remedy = "a target may be manned, a role may not"
+            findings.add("manned", message, remedy, line=role.line, role=role.name)
+
+    def _check_speed(
+        self, behavior: Behavior, role: Role, resource: ResourceId, findings: TaskFindings
+    ) -> None:
+        """A speed far beyond that at which a vehicle cruises is likely in another unit."""
+        vehicle = self.fleet.vehicles.get(resource)
+        spec = self.graph.spec(resource, behavior.name, behavior.type)
+        if vehicle is None or vehicle.cruise_speed_m_s is None or spec is None:
+            return
+        speeds = {each.name for each in spec.parameters if each.kind is ParameterKind.SPEED}
+        for parameter in behavior.parameters:
+            if parameter.name not in speeds or not isinstance(parameter.value, str):
+                continue
+            try:
+                speed = quantity(parameter.value, Dimension.SPEED)
+            except UnitError:
+                continue  # a finding of its own
+            if speed > FAST * vehicle.cruise_speed_m_s:
+                findings.add(
+                    "fast",
+                    f"parameter '{parameter.name}': {speed:g} m/s is more than {FAST} times the "
+                    f"{vehicle.cruise_speed_m_s:g} m/s at which {place(self.fleet, resource)} "
+                    "cruises",
+                    "is the unit right?",
+                    line=parameter.line,
+                    role=role.name,
+                    severity=Severity.WARNING,
+                )
+
+    def _not_offered(self, behavior: Behavior, resource: ResourceId) -> tuple[str, str, str]:
+        """Message, remedy and rule for a behavior that a resource does not take."""
+        offered = self.catalogue(resource)
+        holder = self.fleet.vehicles.get(resource) or self.fleet.payloads[resource]
+        name, wanted = behavior.name, behavior.type
+        if any(spec.name == name and spec.type is wanted for spec in offered):
+            allowed = ", ".join(holder.behaviors or ()) or "none"
+            message = f"the fleet does not let {place(self.fleet, resource)} do '{name}'"
+            return message, f"it allows: {allowed}", "behavior-not-allowed"
+        types = {s.type for s in (*offered, *SHARED.values()) if s.name == name} - {wanted}
+        if types:
+            other = sorted(types)[0]
+            message = f"'{name}' is {article(f'{other} behavior')}, not {article(wanted)} behavior"
+            return message, f'set type="{other}" and name a {other}', "wrong-type"
+        arbiter = "the simulated arbiter" if self.simulated else f"arbiter '{holder.arbiter}'"
+        message = f"{arbiter} of {place(self.fleet, resource)} offers no {wanted} behavior '{name}'"
+        if wanted is BehaviorType.TEAM and (
+            remedy := _member_lacks(name, offered, holder.behaviors)
+        ):
+            return message, remedy, "unknown-behavior"
+        return message, self._near_behavior(behavior, offered), "unknown-behavior"
+
+    def _near_behavior(self, behavior: Behavior, offered: Iterable[BehaviorSpec]) -> str:
+        names = [spec.name for spec in offered if spec.type is behavior.type]
+        hint = did_you_mean(behavior.name, names)
+        others = self.graph.offering(behavior.name, behavior.type)
+        if others and not hint:
+            return f"it is offered on {', '.join(others[:3])}"
+        return hint or f"it offers: {', '.join(sorted(names)) or 'nothing'}"
+
+    def _check_parameters(self, behavior: Behavior, taker: _Taker, findings: TaskFindings) -> None:
+        lines = {parameter.name: parameter.line for parameter in behavior.parameters}
+        literal = {p.name: p.value for p in behavior.parameters if isinstance(p.value, str)}
+        deferred = [p.name for p in behavior.parameters if not isinstance(p.value, str)]
+        geometry = self.fleet.geometries.get
+        _, problems = examine(
+            taker.spec, literal, geometry, self.fleet.vehicles, deferred, self.fleet.origin
+        )
+        for problem in problems:
+            line = lines.get(problem.name, behavior.line)
+            if problem.rule == "unknown-geometry":
+                self._unknown_geometry(problem, literal[problem.name], line, taker, findings)
+            else:
+                message = taker.place + problem.message
+                findings.add(problem.rule, message, problem.remedy, line=line, role=taker.role)
+
+    def _unknown_geometry(
+        self, problem: ParameterProblem, name: str, line: int, taker: _Taker, findings: TaskFindings
+    ) -> None:
+        """An operator may still hand it over, if the fleet says so."""
+        if name in self.handed_over:
+            return
+        message = f"{taker.place}{problem.message} in {self.fleet.file}"
+        if name in self.fleet.handed_over:
+            remedy = "an operator must hand it over before the task starts"
+            severity = Severity.WARNING
+        else:
+            hint = problem.remedy or did_you_mean(name, self.fleet.geometries)
+            listed = "if an operator hands it over, list it in the fleet's 'handed_over'"
+            remedy = f"{hint} {listed}" if hint else listed
+            severity = Severity.ERROR
+        findings.add(problem.rule, message, remedy, line=line, role=taker.role, severity=severity)
+
+    def _service(self, call: ServiceCall, findings: TaskFindings) -> None:
+        filled = check_roles(call.roles, self.fleet, findings)
+        if call.service != DETECTOR_SERVICE:
+            return
+        detectors = ", ".join(self.fleet.detectors) or "none"
+        remedy = f"detectors of the fleet: {detectors}"
+        for role in filled:
+            if role.resource not in self.fleet.detectors:
+                message = f"{place(self.fleet, role.resource)} is no detector payload"
+                findings.add("no-detector", message, remedy, line=role.line, role=role.name)
+        if not call.roles and not self.fleet.detectors:
+            findings.add(
+                "no-detector",
+                f"{self.fleet.file} has no detector payload for service {call.service}",
+                "mark one with 'detector: true'",
+                line=call.line,
+                severity=Severity.WARNING,
+            )

@@ -1,0 +1,139 @@
+"""The fleet's fence: whether a way stays within it, and if not, where and by how far it does not.
+
+The fence is a polygon; its holes are places where nobody may go. It has no ceiling.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from typing import TypeAlias
+
+from m2pem.mission.geometry import Area
+
+LatLon: TypeAlias = tuple[float, float]
+"""Latitude and longitude in WGS-84 degrees."""
+
+_Level: TypeAlias = tuple[float, float]
+"""East and north of the fence's first corner, in metres."""
+
+MARGIN_M = 0.1
+"""A way may run along the fence."""
+
+_LOOKS = 8
+"""At so many places of a part that lies outside is measured how far outside it is."""
+
+
+class Fence:
+    """An area that may not be left."""
+
+    def __init__(self, area: Area) -> None:
+        self._touches = area.rings[0][0][:2]
+        self._edges: list[tuple[_Level, _Level]] = []
+        for ring in area.rings:
+            levels = [self._level(corner[:2]) for corner in ring]
+            self._edges += pairwise(levels)
+
+    def outside_m(self, place: LatLon) -> float:
+        """How far a place is from where one may be; 0 inside."""
+        return self._outside_m(self._level(place))
+
+    def breach(
+        self,
+        way: Sequence[LatLon],
+        start: LatLon | None = None,
+        name: Callable[[int], str] = lambda index: f"waypoint {index + 1}",
+    ) -> str:
+        """Where a way of straight lines leaves the fence; "" if it does not.
+
+        `start`: where the vehicle is. One that is outside already may come back. `name`: what
+        people call a point of the way.
+        """
+        levels = [self._level(place) for place in way]
+        for index, (place, level) in enumerate(zip(way, levels, strict=True)):
+            if (by_m := self._outside_m(level)) > MARGIN_M:
+                return f"{name(index)}, {_text(place)}, is {_by(by_m)} outside the fleet's fence"
+        if start is not None and levels:
+            began = self._level(start)
+            if self._outside_m(began) <= MARGIN_M and (out := self._worst(began, levels[0])):
+                return f"the way to {name(0)} leaves the fleet's fence {self._told(*out)}"
+        for index, (a, b) in enumerate(pairwise(levels)):
+            if out := self._worst(a, b):
+                ends = f"{name(index)} and {name(index + 1)}"
+                return f"the way between {ends} leaves the fleet's fence {self._told(*out)}"
+        return ""
+
+    def _level(self, place: LatLon) -> _Level:
+        import pymap3d  # noqa: PLC0415  # it loads NumPy, and few fleets have a fence
+
+        east, north, _ = pymap3d.geodetic2enu(*place, 0.0, *self._touches, 0.0)
+        return float(east), float(north)
+
+    def _place(self, level: _Level) -> LatLon:
+        import pymap3d  # noqa: PLC0415
+
+        latitude, longitude, _ = pymap3d.enu2geodetic(*level, 0.0, *self._touches, 0.0)
+        return float(latitude), float(longitude)
+
+    def _told(self, level: _Level, by_m: float) -> str:
+        return f"by {_by(by_m)} at {_text(self._place(level))}"
+
+    def _outside_m(self, level: _Level) -> float:
+        if _inside(self._edges, level):
+            return 0.0
+        return min(_distance(level, a, b) for a, b in self._edges)
+
+    def _worst(self, a: _Level, b: _Level) -> tuple[_Level, float] | None:
+        """Of the parts of a line that lie outside, the point farthest out, and how far."""
+        worst: tuple[_Level, float] | None = None
+        cuts = sorted({0.0, 1.0, *self._cuts(a, b)})
+        for low, high in pairwise(cuts):
+            if _inside(self._edges, _between(a, b, (low + high) / 2)):
+                continue
+            for look in range(_LOOKS + 1):
+                level = _between(a, b, low + (high - low) * look / _LOOKS)
+                by_m = self._outside_m(level)
+                if by_m > MARGIN_M and (worst is None or by_m > worst[1]):
+                    worst = (level, by_m)
+        return worst
+
+    def _cuts(self, a: _Level, b: _Level) -> Iterator[float]:
+        """Where a line crosses edges, as parts of its length."""
+        de, dn = b[0] - a[0], b[1] - a[1]
+        for c, d in self._edges:
+            ce, cn = d[0] - c[0], d[1] - c[1]
+            cross = de * cn - dn * ce
+            if cross == 0.0:
+                continue
+            along = ((c[0] - a[0]) * cn - (c[1] - a[1]) * ce) / cross
+            across = ((c[0] - a[0]) * dn - (c[1] - a[1]) * de) / cross
+            if 0.0 < along < 1.0 and 0.0 <= across <= 1.0:
+                yield along
+
+
+def _inside(edges: Sequence[tuple[_Level, _Level]], level: _Level) -> bool:
+    """By counting the edges that a ray to the east crosses; holes are outside."""
+    east, north = level
+    odd = False
+    for (ae, an), (be, bn) in edges:
+        if (an > north) != (bn > north) and east < (be - ae) * (north - an) / (bn - an) + ae:
+            odd = not odd
+    return odd
+
+
+def _distance(level: _Level, a: _Level, b: _Level) -> float:
+    de, dn = b[0] - a[0], b[1] - a[1]
+    length2 = de * de + dn * dn
+    part = ((level[0] - a[0]) * de + (level[1] - a[1]) * dn) / length2 if length2 else 0.0
+    return math.dist(level, _between(a, b, max(0.0, min(1.0, part))))
+
+
+def _between(a: _Level, b: _Level, part: float) -> _Level:
+    return a[0] + (b[0] - a[0]) * part, a[1] + (b[1] - a[1]) * part
+
+
+def _by(metres: float) -> str:
+    return f"{metres:.1f} m" if metres < 10 else f"{metres:.0f} m"
+
+
+def _text(place: LatLon) -> str:
+    return f"[{place[0]:.6f}, {place[1]:.6f}]"

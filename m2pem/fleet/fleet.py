@@ -1,0 +1,105 @@
+"""The fleet: vehicles, their payloads, teams and named geometries. Read by `fleet_file`.
+
+All numbers are SI (seconds, metres), positions WGS-84 degrees and metres.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Geometry
+
+
+class Domain(StrEnum):
+    """Where a vehicle moves."""
+
+    GROUND = "ground"
+    AIR = "air"
+    SURFACE = "surface"
+    SUBSURFACE = "subsurface"
+
+
+class LostMemberPolicy(StrEnum):
+    """What a team's behavior does when a member is lost."""
+
+    STOP = "stop"
+    CONTINUE = "continue"
+
+
+@dataclass(frozen=True, slots=True)
+class Payload:
+    """A payload mounted on a vehicle. `id` is "vehicle/name". `settings` has the vehicle's
+    connection settings below its own. `behaviors` None: all that its arbiter offers."""
+
+    id: ResourceId
+    vehicle: ResourceId
+    arbiter: str
+    settings: Mapping[str, Any]
+    behaviors: tuple[str, ...] | None = None
+    detector: bool = False
+    line: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """A vehicle. `payloads`: the ids of what is mounted on it. `cruise_speed_m_s`: how fast it goes
+    when nobody says; `endurance_s`: how long it can, with a full battery. None: not said."""
+
+    id: ResourceId
+    domain: Domain
+    arbiter: str
+    settings: Mapping[str, Any]
+    behaviors: tuple[str, ...] | None = None
+    payloads: tuple[ResourceId, ...] = ()
+    manned: bool = False
+    sitl: bool = False
+    lost_after_s: float | None = None
+    failsafe: str = ""
+    cruise_speed_m_s: float | None = None
+    endurance_s: float | None = None
+    line: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Team:
+    """Vehicles that a team behavior commands together. `lead` is one of `members`."""
+
+    name: str
+    members: tuple[ResourceId, ...]
+    lead: ResourceId
+    on_lost_member: LostMemberPolicy = LostMemberPolicy.STOP
+    line: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Fleet:
+    """A whole fleet file, with the geometries that it names read in.
+
+    `origin`: of the local ENU frame, (latitude deg, longitude deg, altitude m above mean sea
+    level). `fence`: name of an area that no vehicle may leave, or "". `vertical_separation_m`: of
+    aircraft that are nearer than `horizontal_separation_m`; None: nobody keeps them apart.
+    `time_separation_s`: between aircraft at a place of crossing routes; None: these conflict.
+    `handed_over`: names of geometries that missions may use and operators hand over.
+    """
+
+    name: str
+    file: str
+    vehicles: Mapping[ResourceId, Vehicle]
+    payloads: Mapping[ResourceId, Payload] = field(default_factory=dict)
+    teams: Mapping[str, Team] = field(default_factory=dict)
+    geometries: Mapping[str, Geometry] = field(default_factory=dict)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    max_outage_s: float | None = None
+    steps_between_waits: int = 200_000
+    fence: str = ""
+    vertical_separation_m: float | None = None
+    horizontal_separation_m: float = 20.0
+    time_separation_s: float | None = None
+    handed_over: tuple[str, ...] = ()
+
+    @property
+    def detectors(self) -> tuple[ResourceId, ...]:
+        """The payloads marked `detector: true`, in the file's order."""
+        return tuple(payload.id for payload in self.payloads.values() if payload.detector)

@@ -1,0 +1,218 @@
+"""Loads a fleet file: YAML 1.2, its shape, the names in it, and the geometries that it names."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from m2pem.errors import FleetError
+from m2pem.fleet.distance import NO_ORIGIN, Origin, geometry_out_of_reach
+from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy, Payload, Team, Vehicle
+from m2pem.fleet.fleet_schema import DeconflictionModel, FleetModel, VehicleModel
+from m2pem.fleet.geofiles import GeometryError, read_geometry
+from m2pem.fleet.nearmiss import suggest
+from m2pem.fleet.shape_findings import note_shape_findings
+from m2pem.fleet.yaml_source import YamlSource, read_yaml
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
+
+_GEOMETRY_KINDS = {"routes": "route", "areas": "area", "points": "point"}
+
+
+def load_fleet(path: str | Path) -> Fleet:
+    """Read a fleet file and the geometry files that it names.
+
+    Relative paths in it are relative to the file. Durations come out in seconds, distances in
+    metres, positions as WGS-84 degrees.
+
+    Raises:
+        FleetError: with every finding, each with its line and the dotted path of the key.
+    """
+    path = Path(path)
+    source = read_yaml(path)
+    model: FleetModel | None = None
+    geometries: dict[str, Geometry] = {}
+    if source.data is None and not source.findings:
+        source.error((), "empty", "is empty", "a fleet begins with 'version: 1'")
+    elif source.data is not None:
+        try:
+            model = FleetModel.model_validate(source.data)
+        except ValidationError as error:
+            note_shape_findings(source, error, FleetModel)
+        _check_names(source)
+        _check_teams(source)
+        geometries = _read_geometries(source, path.parent)
+        _check_fence(source)
+        if model is not None:
+            _check_distances(source, model, geometries)
+    if source.findings or model is None:
+        findings = sorted(source.findings, key=lambda finding: finding.line)
+        raise FleetError(f"{path} cannot be used as a fleet", findings)
+    return _build(source, model, geometries)
+
+
+# The checks look at the file's values as they were read, not at the models, so that a mistake in
+# one corner does not hide the ones in another.
+
+
+def _check_names(source: YamlSource) -> None:
+    _check_one_space(source, ("vehicles", "teams"))
+    _check_one_space(source, ("routes", "areas", "points"))
+    # A position is the name of a point or of a vehicle.
+    for name in source.mapping("points").keys() & source.mapping("vehicles").keys():
+        _note_taken(source, "points", name, ("vehicles", name))
+
+
+def _check_one_space(source: YamlSource, sections: tuple[str, ...]) -> None:
+    owners: dict[str, str] = {}
+    for section in sections:
+        for name in source.mapping(section):
+            if name in owners:
+                _note_taken(source, section, name, (owners[name], name))
+            owners.setdefault(name, section)
+
+
+def _note_taken(source: YamlSource, section: str, name: str, first: tuple[str, str]) -> None:
+    message = f"the name '{name}' is taken by {first[0]} (line {source.line(first)})"
+    source.error((section, name), "duplicate-name", message, "choose another name")
+
+
+def _check_teams(source: YamlSource) -> None:
+    vehicles = source.mapping("vehicles")
+    for name in source.mapping("teams"):
+        team = source.mapping("teams", name)
+        members = team.get("members")
+        members = members if isinstance(members, list) else []
+        for index, member in enumerate(members):
+            path = ("teams", name, "members", index)
+            if not isinstance(member, str):
+                continue
+            if member not in vehicles:
+                hint = suggest(member, vehicles, "vehicles")
+                source.error(path, "unknown-vehicle", f"no vehicle is named '{member}'", hint)
+            elif member in members[:index]:
+                source.error(path, "duplicate-member", f"'{member}' is a member already")
+        lead = team.get("lead")
+        if isinstance(lead, str) and lead not in members:
+            hint = suggest(lead, [m for m in members if isinstance(m, str)], "members")
+            message = f"the lead '{lead}' is not one of the members"
+            source.error(("teams", name, "lead"), "lead-not-member", message, hint)
+
+
+def _check_fence(source: YamlSource) -> None:
+    fence = source.mapping().get("fence")
+    if isinstance(fence, str) and fence not in source.mapping("areas"):
+        hint = suggest(fence, source.mapping("areas"), "areas")
+        source.error(("fence",), "unknown-area", f"no area is named '{fence}'", hint)
+
+
+def _check_distances(
+    source: YamlSource, model: FleetModel, geometries: dict[str, Geometry]
+) -> None:
+    origin = _origin(model, geometries)
+    for section in _GEOMETRY_KINDS:
+        for name in source.mapping(section):
+            geometry = geometries.get(name)
+            if geometry and (wrong := geometry_out_of_reach(geometry, origin)):
+                file = source.mapping(section)[name]
+                source.error((section, name), "out-of-reach", f"{file}: {wrong[0]}", wrong[1])
+
+
+def _read_geometries(source: YamlSource, folder: Path) -> dict[str, Geometry]:
+    geometries: dict[str, Geometry] = {}
+    for section, kind in _GEOMETRY_KINDS.items():
+        for name, file in source.mapping(section).items():
+            if not isinstance(file, str) or not file:
+                continue
+            try:
+                geometries[name] = read_geometry(folder / file, kind)
+            except GeometryError as error:
+                source.error((section, name), "geometry", str(error))
+    return geometries
+
+
+def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry]) -> Fleet:
+    vehicles: dict[ResourceId, Vehicle] = {}
+    payloads: dict[ResourceId, Payload] = {}
+    for name, vehicle in model.vehicles.items():
+        own = list(_payloads(source, name, vehicle))
+        payloads.update((payload.id, payload) for payload in own)
+        vehicles[ResourceId(name)] = Vehicle(
+            id=ResourceId(name),
+            domain=Domain(vehicle.domain),
+            arbiter=vehicle.arbiter,
+            settings=dict(vehicle.connection),
+            behaviors=_names(vehicle.behaviors),
+            payloads=tuple(payload.id for payload in own),
+            manned=vehicle.manned,
+            sitl=vehicle.sitl,
+            lost_after_s=vehicle.lost_after,
+            failsafe=vehicle.failsafe or "",
+            cruise_speed_m_s=vehicle.cruise_speed,
+            endurance_s=vehicle.endurance,
+            line=source.line(("vehicles", name)),
+        )
+    teams = {
+        name: Team(
+            name=name,
+            members=tuple(ResourceId(member) for member in team.members),
+            lead=ResourceId(team.lead or team.members[0]),
+            on_lost_member=LostMemberPolicy(team.on_lost_member),
+            line=source.line(("teams", name)),
+        )
+        for name, team in model.teams.items()
+    }
+    apart = model.deconfliction
+    return Fleet(
+        name=model.name or Path(source.file).stem,
+        file=source.file,
+        vehicles=vehicles,
+        payloads=payloads,
+        teams=teams,
+        geometries=geometries,
+        origin=_origin(model, geometries),
+        max_outage_s=model.max_outage,
+        steps_between_waits=model.steps_between_waits,
+        fence=model.fence or "",
+        vertical_separation_m=apart.vertical if apart else None,
+        horizontal_separation_m=(apart or DeconflictionModel()).horizontal,
+        time_separation_s=apart.time if apart else None,
+        handed_over=tuple(model.handed_over),
+    )
+
+
+def _payloads(source: YamlSource, vehicle: str, model: VehicleModel) -> Iterator[Payload]:
+    for name, payload in model.payloads.items():
+        settings: dict[str, Any] = {**model.connection, **payload.connection}
+        yield Payload(
+            id=ResourceId(f"{vehicle}/{name}"),
+            vehicle=ResourceId(vehicle),
+            arbiter=payload.arbiter or model.arbiter,
+            settings=settings,
+            behaviors=_names(payload.behaviors),
+            detector=payload.detector,
+            line=source.line(("vehicles", vehicle, "payloads", name)),
+        )
+
+
+def _names(names: list[str] | None) -> tuple[str, ...] | None:
+    return None if names is None else tuple(names)
+
+
+def _origin(model: FleetModel, geometries: dict[str, Geometry]) -> Origin:
+    if model.origin is not None:
+        return (model.origin.lat, model.origin.lon, model.origin.alt)
+    for geometry in geometries.values():
+        latitude, longitude, _ = _first_position(geometry)
+        return (latitude, longitude, 0.0)
+    return NO_ORIGIN
+
+
+def _first_position(geometry: Geometry) -> Coordinate:
+    if isinstance(geometry, Point):
+        return geometry.position
+    if isinstance(geometry, Route):
+        return geometry.waypoints[0]
+    assert isinstance(geometry, Area)  # a file holds no vehicle's position
+    return geometry.rings[0][0]

@@ -1,0 +1,201 @@
+"""The shape of a fleet file, as pydantic models, and the JSON Schema that editors complete from.
+
+Unknown keys are refused. Names in one file that refer to each other are checked by `fleet_file`.
+"""
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
+from pydantic.json_schema import WithJsonSchema
+
+from m2pem.fleet.units import UNITS, Dimension, quantity
+
+
+def _reader(dimension: Dimension) -> Callable[[object], float]:
+    def read(value: object) -> float:
+        result = quantity(value, dimension)
+        if result <= 0.0:
+            raise ValueError(f"{value!r} is not above 0")
+        return result
+
+    return read
+
+
+def _quantity_schema(dimension: Dimension) -> dict[str, Any]:
+    units = "|".join(UNITS[dimension])
+    number = r"[0-9]+(\.[0-9]*)?([eE][+-]?[0-9]+)?"
+    si = next(iter(UNITS[dimension]))
+    return {
+        "anyOf": [
+            {"type": "number", "exclusiveMinimum": 0},
+            {"type": "string", "pattern": rf"^\s*\+?{number}\s*({units})?\s*$"},
+        ],
+        "description": f"A {dimension.value}, for example '5 {si}'; a bare number is in {si}.",
+    }
+
+
+Duration = Annotated[
+    float,
+    BeforeValidator(_reader(Dimension.DURATION)),
+    WithJsonSchema(_quantity_schema(Dimension.DURATION)),
+]
+Distance = Annotated[
+    float,
+    BeforeValidator(_reader(Dimension.DISTANCE)),
+    WithJsonSchema(_quantity_schema(Dimension.DISTANCE)),
+]
+Speed = Annotated[
+    float,
+    BeforeValidator(_reader(Dimension.SPEED)),
+    WithJsonSchema(_quantity_schema(Dimension.SPEED)),
+]
+Name = Annotated[str, StringConstraints(pattern=r"^[^\s/]+$")]
+"""What missions call something: no white space, no "/"."""
+
+Text = Annotated[str, StringConstraints(min_length=1)]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class OriginModel(_Model):
+    """Origin of the local ENU frame."""
+
+    lat: Annotated[float, Field(ge=-90.0, le=90.0, description="Degrees (WGS-84).")]
+    lon: Annotated[float, Field(ge=-180.0, le=180.0, description="Degrees (WGS-84).")]
+    alt: Annotated[
+        float, Field(allow_inf_nan=False, description="Metres above mean sea level.")
+    ] = 0.0
+
+
+class PayloadModel(_Model):
+    """Something mounted on a vehicle that behaviors can command."""
+
+    arbiter: Annotated[
+        Text | None, Field(description="Which arbiter commands it; the vehicle's if left out.")
+    ] = None
+    connection: Annotated[
+        dict[str, Any], Field(description="Settings of the arbiter, over the vehicle's own.")
+    ] = {}
+    behaviors: Annotated[
+        list[Text] | None,
+        Field(description="What missions may ask; all that is offered if left out."),
+    ] = None
+    detector: Annotated[
+        bool, Field(description="Its detections complete the service Detector.")
+    ] = False
+
+
+class VehicleModel(_Model):
+    """A vehicle."""
+
+    domain: Literal["ground", "air", "surface", "subsurface"]
+    arbiter: Annotated[Text, Field(description="Which arbiter commands it: sim, ros, mavlink, ...")]
+    connection: Annotated[dict[str, Any], Field(description="Settings of the arbiter.")] = {}
+    behaviors: Annotated[
+        list[Text] | None,
+        Field(description="What missions may ask; all that is offered if left out."),
+    ] = None
+    payloads: Annotated[
+        dict[Name, PayloadModel], Field(description="Missions call a payload vehicle/payload.")
+    ] = {}
+    manned: Annotated[bool, Field(description="A person drives it: it is never commanded.")] = False
+    sitl: Annotated[
+        bool, Field(description="Software in the loop: not real, so that it may run at --speed.")
+    ] = False
+    lost_after: Annotated[
+        Duration | None, Field(description="Silence after which the link counts as lost.")
+    ] = None
+    failsafe: Annotated[
+        Text | None, Field(description="What the vehicle does by itself when its link is lost.")
+    ] = None
+    cruise_speed: Annotated[
+        Annotated[Speed, Field(gt=0)] | None,
+        Field(description="How fast it goes when nobody says."),
+    ] = None
+    endurance: Annotated[
+        Annotated[Duration, Field(gt=0)] | None,
+        Field(description="How long it can go at that speed, with a full battery."),
+    ] = None
+
+
+class TeamModel(_Model):
+    """Vehicles that a team behavior commands together."""
+
+    members: Annotated[list[Name], Field(min_length=1, description="Names of vehicles.")]
+    lead: Annotated[
+        Name | None, Field(description="One of the members; the first if left out.")
+    ] = None
+    on_lost_member: Literal["stop", "continue"] = "stop"
+
+
+class DeconflictionModel(_Model):
+    """How far apart aircraft are planned: one of the distances is always kept."""
+
+    vertical: Annotated[
+        Distance, Field(gt=0, description="Least difference of height between aircraft.")
+    ] = 10.0
+    horizontal: Annotated[
+        Distance, Field(gt=0, description="Least distance on the map between aircraft.")
+    ] = 20.0
+    time: Annotated[
+        Annotated[Duration, Field(gt=0)] | None,
+        Field(
+            description="Least time between aircraft at a place of crossing routes. Without it "
+            "routes may not cross at one height.",
+        ),
+    ] = None
+
+
+class FleetModel(_Model):
+    """A fleet of m2pem: vehicles, payloads, teams and named geometries."""
+
+    version: Literal[1]
+    name: Annotated[Text | None, Field(description="The file's name if left out.")] = None
+    origin: Annotated[
+        OriginModel | None,
+        Field(description="Of the local ENU frame; where the first geometry begins if left out."),
+    ] = None
+    max_outage: Annotated[
+        Duration | None,
+        Field(description="A run that was down for longer holds and asks before it goes on."),
+    ] = None
+    steps_between_waits: Annotated[
+        int,
+        Field(
+            ge=1000,
+            description="A run that executes more elements without waiting once is paused.",
+        ),
+    ] = 200_000
+    vehicles: dict[Name, VehicleModel] = {}
+    teams: dict[Name, TeamModel] = {}
+    routes: Annotated[
+        dict[Name, Text], Field(description="Files of LineStrings or waypoints.")
+    ] = {}
+    areas: Annotated[dict[Name, Text], Field(description="Files of Polygons.")] = {}
+    points: Annotated[dict[Name, Text], Field(description="Files of Points.")] = {}
+    handed_over: Annotated[
+        list[Name],
+        Field(description="Routes, areas and points that operators hand over while missions run."),
+    ] = []
+    fence: Annotated[
+        Name | None, Field(description="Name of the area that no vehicle may leave.")
+    ] = None
+    deconfliction: DeconflictionModel | None = None
+
+
+def fleet_schema() -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of fleet files, for editors: `m2pem fleet --schema`."""
+    schema = FleetModel.model_json_schema()
+    models = (schema, *schema["$defs"].values())
+    for properties in [p for model in models for p in model["properties"].values()]:
+        if "patternProperties" in properties:  # keys that are no names: pydantic lets them pass
+            properties["additionalProperties"] = False
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": "https://m2pem.org/schema/1/fleet.schema.json",
+        **schema,
+        "title": "m2pem fleet",
+    }

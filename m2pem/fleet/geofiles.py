@@ -1,0 +1,80 @@
+"""Reads the file of a route, area or point: GeoJSON, CSV, QGroundControl `.plan`, `.waypoints`."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+from m2pem.findings import unreadable_remedy
+from m2pem.fleet.csv_waypoints import parse_csv
+from m2pem.fleet.geojson import GeometryError, kind_of, parse_geojson
+from m2pem.fleet.qgroundcontrol import parse_plan, parse_waypoints
+from m2pem.fleet.units import article
+from m2pem.mission.geometry import Area, Point, Route
+
+__all__ = ["GeometryError", "parse_geojson", "read_geometry"]
+
+MAX_BYTES = 5_000_000
+
+_SUFFIXES = (".geojson", ".json", ".plan", ".waypoints", ".csv")
+
+
+def read_geometry(path: Path, kind: str) -> Point | Route | Area:
+    """Read `path` as a geometry of `kind`: "route", "area" or "point".
+
+    Raises:
+        GeometryError: unreadable, not what its suffix says, or another kind of geometry; the
+            message begins with the path (and the line, where there is one).
+    """
+    try:
+        geometry = _read(path, kind)
+    except GeometryError as error:
+        raise GeometryError(f"{path}: {error}") from None
+    if kind_of(geometry) != kind:
+        found = article(kind_of(geometry))
+        raise GeometryError(f"{path}: holds {found}; {article(kind)} is expected")
+    return geometry
+
+
+def _read(path: Path, kind: str) -> Point | Route | Area:
+    if path.suffix.lower() not in _SUFFIXES:
+        raise GeometryError(f"has another suffix than {', '.join(_SUFFIXES)}")
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        remedy = unreadable_remedy(error)
+        raise GeometryError(f"cannot be read: {error.strerror}; {remedy}") from None
+    if len(content) > MAX_BYTES:
+        raise GeometryError(f"is larger than {MAX_BYTES:,} bytes")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise GeometryError("is not UTF-8 text") from None
+    if path.suffix.lower() == ".waypoints":
+        return parse_waypoints(text)
+    if path.suffix.lower() == ".csv":
+        return parse_csv(text, kind)
+    value = _json(text)
+    if not isinstance(value, Mapping):
+        raise GeometryError("a JSON object is expected")
+    if path.suffix.lower() == ".plan":
+        return parse_plan(value, area=kind == "area")
+    return parse_geojson(value)
+
+
+def _json(text: str) -> Any:
+    try:
+        return json.loads(text, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        raise GeometryError(f"line {error.lineno}: is not JSON: {error.msg}") from None
+    except RecursionError:
+        raise GeometryError("is nested too deep") from None
+    except GeometryError:
+        raise
+    except ValueError as error:  # a whole number of thousands of digits
+        raise GeometryError(f"is not JSON: {error}") from None
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise GeometryError(f"holds {name}, which is not a finite number")

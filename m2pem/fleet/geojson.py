@@ -1,0 +1,177 @@
+"""Geometries as GeoJSON (RFC 7946): how fleets, editors and operators name places.
+
+Positions are WGS-84 `[longitude, latitude, altitude]`, in degrees and metres. Altitudes are
+relative to home unless a Feature's properties say `"altitude_frame": "amsl"` or `"terrain"`.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from m2pem.errors import M2pemError
+from m2pem.fleet.nearmiss import suggest
+from m2pem.fleet.rings import ring_problem
+from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
+
+ALTITUDE_FRAMES = ("relative", "amsl", "terrain")
+
+_TYPES = ("LineString", "MultiPoint", "Polygon", "Point", "Feature", "FeatureCollection")
+
+
+class GeometryError(M2pemError, ValueError):
+    """A geometry cannot be used; the message says where in it, why, and what would be right."""
+
+    exit_status = 2
+
+
+def parse_geojson(value: Mapping[str, Any]) -> Point | Route | Area:
+    """Read a GeoJSON geometry, Feature, or FeatureCollection of one feature.
+
+    A LineString or MultiPoint is a `Route`, a Polygon an `Area`, a Point a `Point`.
+
+    Raises:
+        GeometryError: not GeoJSON, another type, a position out of range, a ring not closed.
+    """
+    return _parse(value, "relative", depth=0)
+
+
+def as_geojson(geometry: Point | Route | Area) -> dict[str, Any]:
+    """The GeoJSON Feature that `parse_geojson` reads back as the same geometry."""
+    if isinstance(geometry, Point):
+        kind, coordinates = "Point", _written(geometry.position)
+    elif isinstance(geometry, Route):
+        kind = "LineString" if len(geometry.waypoints) > 1 else "MultiPoint"
+        coordinates = [_written(each) for each in geometry.waypoints]
+    else:
+        kind = "Polygon"
+        coordinates = [[_written(each) for each in ring] for ring in geometry.rings]
+    return {
+        "type": "Feature",
+        "properties": {"altitude_frame": geometry.altitude_frame},
+        "geometry": {"type": kind, "coordinates": coordinates},
+    }
+
+
+def _written(place: Coordinate) -> list[Any]:
+    latitude_deg, longitude_deg, altitude_m = place
+    level = [longitude_deg, latitude_deg]
+    return level if altitude_m is None else [*level, altitude_m]
+
+
+def _parse(value: object, altitude_frame: str, depth: int) -> Point | Route | Area:
+    if not isinstance(value, Mapping):
+        raise GeometryError("is not GeoJSON: an object with 'type' is expected")
+    _check_crs(value)
+    kind = value.get("type")
+    if kind == "FeatureCollection" and depth == 0:
+        features = value.get("features")
+        if not isinstance(features, list) or len(features) != 1:
+            count = len(features) if isinstance(features, list) else "no"
+            raise GeometryError(f"has {count} features; one geometry is expected")
+        return _parse(features[0], altitude_frame, depth=1)
+    if kind == "Feature" and depth <= 1:
+        return _parse(value.get("geometry"), _frame(value.get("properties")), depth=2)
+    coordinates = value.get("coordinates")
+    if kind == "Point":
+        return Point(position(coordinates, "coordinates"), altitude_frame)
+    if kind in ("LineString", "MultiPoint"):
+        waypoints = _positions(coordinates, "coordinates", 2 if kind == "LineString" else 1)
+        return Route(waypoints, altitude_frame)
+    if kind == "Polygon":
+        if not isinstance(coordinates, list | tuple) or not coordinates:
+            raise GeometryError("coordinates: a Polygon is a list of rings")
+        rings = tuple(_ring(ring, f"coordinates[{i}]") for i, ring in enumerate(coordinates))
+        return Area(checked(rings), altitude_frame)
+    hint = suggest(str(kind), _TYPES, "types")
+    raise GeometryError(f"GeoJSON type {kind!r} is not a route, area or point; {hint}")
+
+
+def _check_crs(value: Mapping[str, Any]) -> None:
+    crs = value.get("crs")
+    if crs is not None and not any(name in str(crs) for name in ("CRS84", "4326", "4979")):
+        raise GeometryError("its 'crs' is not WGS-84; export it as WGS-84 longitude and latitude")
+
+
+def _frame(properties: object) -> str:
+    frame = properties.get("altitude_frame") if isinstance(properties, Mapping) else None
+    if frame is None:
+        return "relative"
+    if frame not in ALTITUDE_FRAMES:
+        hint = suggest(str(frame), ALTITUDE_FRAMES, "frames")
+        raise GeometryError(f"altitude_frame {frame!r} is not known; {hint}")
+    return str(frame)
+
+
+def _ring(value: object, where: str) -> tuple[Coordinate, ...]:
+    ring = _positions(value, where, 4)
+    if ring[0][:2] != ring[-1][:2]:
+        raise GeometryError(f"{where}: a ring ends where it begins; repeat its first position")
+    if len({corner[:2] for corner in ring}) < 3:
+        raise GeometryError(f"{where}: a ring has at least three different corners")
+    return ring
+
+
+def checked(rings: tuple[tuple[Coordinate, ...], ...]) -> tuple[tuple[Coordinate, ...], ...]:
+    """The closed rings of an area.
+
+    Raises:
+        GeometryError: an edge crosses another or the antimeridian, or a hole lies outside.
+    """
+    if problem := ring_problem(rings):
+        raise GeometryError(problem)
+    return rings
+
+
+def _positions(value: object, where: str, minimum: int) -> tuple[Coordinate, ...]:
+    if not isinstance(value, list | tuple) or len(value) < minimum:
+        raise GeometryError(f"{where}: at least {minimum} positions are expected")
+    return tuple(position(item, f"{where}[{index}]") for index, item in enumerate(value))
+
+
+def position(value: object, where: str) -> Coordinate:
+    """Read a GeoJSON position `[longitude, latitude, altitude]`; `where` is for the error."""
+    if not isinstance(value, list | tuple) or not 2 <= len(value) <= 3:
+        raise GeometryError(f"{where}: a position is [longitude, latitude] or with an altitude")
+    longitude, latitude = value[0], value[1]
+    altitude = value[2] if len(value) == 3 else None
+    swapped = "; GeoJSON positions are [longitude, latitude]"
+    return coordinate(latitude, longitude, altitude, where, hint=swapped)
+
+
+def coordinate(
+    latitude: object, longitude: object, altitude: object, where: str, hint: str = ""
+) -> Coordinate:
+    """Check a WGS-84 position in degrees and metres; `altitude` None: not given.
+
+    Raises:
+        GeometryError: not numbers, not finite, latitude beyond 90 or longitude beyond 180 deg.
+    """
+    latitude_deg = _number(latitude, "latitude", where)
+    longitude_deg = _number(longitude, "longitude", where)
+    if abs(latitude_deg) > 90.0:
+        raise GeometryError(f"{where}: latitude {latitude_deg:g} is not within -90..90{hint}")
+    if abs(longitude_deg) > 180.0:
+        raise GeometryError(f"{where}: longitude {longitude_deg:g} is not within -180..180{hint}")
+    altitude_m = None if altitude is None else _number(altitude, "altitude", where)
+    return (latitude_deg, longitude_deg, altitude_m)
+
+
+def _number(value: object, what: str, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise GeometryError(f"{where}: {what} {value!r} is not a number")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise GeometryError(f"{where}: {what} {value!r} is not finite")
+    return number
+
+
+def kind_of(geometry: Geometry) -> str:
+    """What people call it: "route", "area", "point" or "vehicle"."""
+    if isinstance(geometry, Route):
+        return "route"
+    if isinstance(geometry, Area):
+        return "area"
+    return "point" if isinstance(geometry, Point) else "vehicle"

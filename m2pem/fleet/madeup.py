@@ -1,0 +1,179 @@
+"""A fleet made up from a mission (`--fleet sim`), so that any mission can be rehearsed at once.
+
+Everything has its place near one fixed origin, by the order in which the mission names it; the same
+mission always gives the same fleet.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.check import DETECTOR_SERVICE
+from m2pem.fleet.fleet import Domain, Fleet, Payload, Team, Vehicle
+from m2pem.fleet.local_positions import is_local
+from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
+from m2pem.mission.catalogue import ParameterKind, ResourceId
+from m2pem.mission.elements import ScriptTask, SendTask, ServiceTask
+from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
+from m2pem.mission.mission import Mission
+
+ORIGIN = (38.1075, -77.3192, 60.0)
+ARBITER = "sim"
+TEAM_SIZE = 3
+SPACING_M = 10.0
+
+_METRES_PER_DEGREE = 111_195.0
+_AIR_BEHAVIORS = frozenset({"takeoff", "land", "return_to_launch", "change_altitude", "orbit"})
+_KIND_BY_NAME = {
+    "route": ParameterKind.ROUTE,
+    "area": ParameterKind.AREA,
+    "target": ParameterKind.POSITION,
+}
+"""For behaviors that only some arbiter knows."""
+
+
+def fleet_for(mission: Mission) -> Fleet:
+    """A fleet of simulated vehicles, payloads, teams and geometries that fits a mission.
+
+    A vehicle flies if one of its behaviors only makes sense in the air, or takes an altitude; it
+    drives otherwise. A team has members of its own (`section_1`, ...). A name that the mission
+    reads from its data while it runs cannot be known here.
+    """
+    draft = _Draft()
+    tasks = list(_tasks(mission))
+    for task in tasks:
+        for role in task.roles:
+            draft.add_role(role, task)
+    for task in tasks:
+        if isinstance(task, Behavior):
+            draft.add_targets(task)
+    for task in tasks:
+        if isinstance(task, Behavior):
+            draft.add_geometries(task)
+        elif task.service == DETECTOR_SERVICE and not task.roles:
+            draft.add_any_detector()
+    return draft.fleet()
+
+
+def _tasks(mission: Mission) -> Iterator[Behavior | ServiceCall]:
+    for task in mission.activities():
+        if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior:
+            yield task.behavior
+        elif isinstance(task, ServiceTask) and task.call:
+            yield task.call
+
+
+@dataclass(slots=True)
+class _Draft:
+    domains: dict[str, Domain] = field(default_factory=dict)
+    payloads: dict[str, bool] = field(default_factory=dict)  # id -> whether it is a detector
+    teams: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    geometries: dict[str, Geometry] = field(default_factory=dict)
+
+    def add_role(self, role: Role, task: Behavior | ServiceCall) -> None:
+        if role.requires or not role.resource:
+            return
+        if role.kind is RoleKind.PAYLOAD:
+            vehicle, _, payload = role.resource.partition("/")
+            self.domains.setdefault(vehicle, Domain.GROUND)
+            if payload:
+                detects = isinstance(task, ServiceCall) and task.service == DETECTOR_SERVICE
+                self.payloads[role.resource] = self.payloads.get(role.resource, False) or detects
+            return
+        names: tuple[str, ...] = (role.resource,)
+        if role.kind is RoleKind.TEAM:
+            names = tuple(f"{role.resource}_{number}" for number in range(1, TEAM_SIZE + 1))
+            self.teams[role.resource] = names
+        for name in names:
+            if isinstance(task, Behavior) and _flies(task):
+                self.domains[name] = Domain.AIR
+            self.domains.setdefault(name, Domain.GROUND)
+
+    def add_any_detector(self) -> None:
+        if not any(self.payloads.values()):
+            vehicle = next(iter(self.domains), "vehicle_1")
+            self.domains.setdefault(vehicle, Domain.GROUND)
+            self.payloads[f"{vehicle}/detector"] = True
+
+    def add_targets(self, behavior: Behavior) -> None:
+        for name, kind in _names(behavior):
+            if kind is ParameterKind.VEHICLE:
+                self.domains.setdefault(name, Domain.GROUND)
+
+    def add_geometries(self, behavior: Behavior) -> None:
+        for name, kind in _names(behavior):
+            if name in self.geometries:
+                continue
+            if kind is ParameterKind.ROUTE:
+                self.geometries[name] = Route(self._route())
+            elif kind is ParameterKind.AREA:
+                self.geometries[name] = Area((self._square(),))
+            elif kind is ParameterKind.POSITION and name not in self.domains:
+                self.geometries[name] = Point(self._far(150.0))
+
+    def _route(self) -> tuple[Coordinate, ...]:
+        return (_at(0.0, 20.0), self._far(100.0), self._far(200.0), self._far(300.0))
+
+    def _square(self) -> tuple[Coordinate, ...]:
+        east, north = self._far_m(200.0)
+        corners = ((-50.0, -50.0), (50.0, -50.0), (50.0, 50.0), (-50.0, 50.0), (-50.0, -50.0))
+        return tuple(_at(east + x, north + y) for x, y in corners)
+
+    def _far(self, distance_m: float) -> Coordinate:
+        return _at(*self._far_m(distance_m))
+
+    def _far_m(self, distance_m: float) -> tuple[float, float]:
+        """(east, north) of a place in the next geometry's own direction, 40 degrees further on."""
+        heading_rad = math.radians(40.0 * len(self.geometries))
+        return distance_m * math.sin(heading_rad), distance_m * math.cos(heading_rad)
+
+    def fleet(self) -> Fleet:
+        payloads = {
+            ResourceId(name): Payload(
+                ResourceId(name), ResourceId(name.partition("/")[0]), ARBITER, {}, detector=detector
+            )
+            for name, detector in self.payloads.items()
+        }
+        vehicles: dict[ResourceId, Vehicle] = {}
+        for number, (name, domain) in enumerate(self.domains.items()):
+            latitude_deg, longitude_deg, _ = _at(SPACING_M * number, 0.0)
+            vehicle = ResourceId(name)
+            vehicles[vehicle] = Vehicle(
+                vehicle,
+                domain,
+                ARBITER,
+                {"home": [latitude_deg, longitude_deg]},
+                payloads=tuple(p.id for p in payloads.values() if p.vehicle == vehicle),
+            )
+        teams = {
+            name: Team(name, tuple(map(ResourceId, members)), ResourceId(members[0]))
+            for name, members in self.teams.items()
+        }
+        return Fleet("sim", "sim", vehicles, payloads, teams, self.geometries, ORIGIN)
+
+
+def _flies(behavior: Behavior) -> bool:
+    altitude = any(parameter.name == "altitude" for parameter in behavior.parameters)
+    commands_vehicles = behavior.type is not BehaviorType.PAYLOAD
+    return commands_vehicles and (altitude or behavior.name in _AIR_BEHAVIORS)
+
+
+def _names(behavior: Behavior) -> Iterator[tuple[str, ParameterKind | None]]:
+    """Parameter values that may be names (no expressions, no coordinates), and of what."""
+    spec = SHARED.get((behavior.name, behavior.type))
+    for parameter in behavior.parameters:
+        value = parameter.value
+        if not isinstance(value, str) or value.lstrip().startswith("[") or is_local(value):
+            continue
+        if spec is None:
+            yield value, _KIND_BY_NAME.get(parameter.name)
+        elif parameter.name in spec.by_name:
+            yield value, spec.by_name[parameter.name].kind
+
+
+def _at(east_m: float, north_m: float) -> Coordinate:
+    """A position near the origin; the earth is flat and round enough for a few hundred metres."""
+    latitude_deg = ORIGIN[0] + north_m / _METRES_PER_DEGREE
+    longitude_deg = ORIGIN[1] + east_m / (_METRES_PER_DEGREE * math.cos(math.radians(ORIGIN[0])))
+    return (round(latitude_deg, 7), round(longitude_deg, 7), None)

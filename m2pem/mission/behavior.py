@@ -1,0 +1,136 @@
+"""What tasks carry: behaviors (paper, Figure 3), prompts, service calls, assignments."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from m2pem.mission.expression import Expression
+
+
+class BehaviorType(StrEnum):
+    """What a behavior commands: the paper's Vehicle and Payload tasks, and teams of vehicles."""
+
+    VEHICLE = "vehicle"
+    PAYLOAD = "payload"
+    TEAM = "team"
+
+
+class RoleKind(StrEnum):
+    """What a role's static allocation names."""
+
+    VEHICLE = "vehicle"
+    PAYLOAD = "payload"
+    TEAM = "team"
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """One role of a behavior with its static allocation.
+
+    `resource` is the id in the fleet: a vehicle ("evsg1"), a payload ("evsg2/ptz") or a team.
+    `requires` is the text of a dynamic allocation (reserved; a finding refuses it).
+    """
+
+    name: str
+    kind: RoleKind
+    resource: str
+    line: int
+    optional: bool = False
+    requires: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A key-value parameter of a behavior.
+
+    `value` is the text as written ("5 m/s", "route_alpha"), or an expression that is read from
+    the data store when the task starts (`${mission.speed}`).
+    """
+
+    name: str
+    value: str | Expression
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Behavior:
+    """A behavior that a task commands: which, with what parameters, on what resources."""
+
+    type: BehaviorType
+    name: str
+    line: int
+    parameters: tuple[Parameter, ...] = ()
+    roles: tuple[Role, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """`key = expression`."""
+
+    key: str
+    expression: Expression
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class ThrowError:
+    """`throw error CODE`."""
+
+    code: str
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Script:
+    """Statements of a script task (`scriptFormat="m2pem"`), run in order."""
+
+    statements: tuple[Assignment | ThrowError, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """One choice of a prompt: `value` is stored, `label` is shown."""
+
+    value: str
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class Prompt:
+    """What a user task asks an operator (paper, section 4.1).
+
+    `store`: the key that receives the decision's value. `timeout`: ISO 8601 duration after which
+    the task ends with error PROMPT_TIMEOUT. `role`: which operator role may answer ("" = any).
+    """
+
+    text: str
+    decisions: tuple[Decision, ...]
+    store: str = "user.decision"
+    role: str = ""
+    timeout: Expression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceCall:
+    """A service task's registered class (paper, section 4.1), its roles and properties."""
+
+    service: str
+    line: int
+    roles: tuple[Role, ...] = ()
+    properties: tuple[Parameter, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    """One value passed into or out of a called process."""
+
+    source: Expression
+    target: str
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Mappings:
+    """What passes into and out of a call activity; nothing else does."""
+
+    inputs: tuple[Mapping, ...] = field(default=())
+    outputs: tuple[Mapping, ...] = field(default=())

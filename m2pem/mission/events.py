@@ -1,0 +1,147 @@
+"""Event definitions and the root elements they refer to (BPMN 2.0.2, clauses 8.4 and 10.5.5)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from m2pem.mission.expression import Expression
+
+
+@dataclass(frozen=True, slots=True)
+class RootElement:
+    """An element of `definitions` that event definitions refer to by id."""
+
+    id: str
+    name: str
+    line: int
+    file: str = field(init=False, repr=False, compare=False, default="")
+    """The file that declares it; "" for one that an event of the mission's own file made up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Signal(RootElement):
+    """A broadcast (clause 10.5.5). `from_operator`: operators are expected to send it.
+
+    `returned`: the resource whose return by an operator throws it; "" for none.
+    """
+
+    from_operator: bool = False
+    returned: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Message(RootElement):
+    """Something sent to one receiver (clause 8.4.11). `from_operator` as for signals.
+
+    `correlation_key`: what sender and receiver must agree on, each by its own data; None: nothing.
+    """
+
+    from_operator: bool = False
+    correlation_key: Expression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CorrelationProperty(RootElement):
+    """What messages are matched by (clause 8.4.2).
+
+    `retrieve`: by message id, where a message carries it, as an expression over what it carries.
+    """
+
+    retrieve: Mapping[str, Expression]
+
+
+@dataclass(frozen=True, slots=True)
+class Error(RootElement):
+    """What an activity can end with when it fails (clause 8.4.8). `code` defaults to the id."""
+
+    code: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Escalation(RootElement):
+    """A non-critical notice to an outer scope (clause 8.4.8). `code` defaults to the id."""
+
+    code: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class EventDefinition:
+    """What triggers, or results from, an event."""
+
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class SignalEventDefinition(EventDefinition):
+    signal: Signal
+
+
+@dataclass(frozen=True, slots=True)
+class MessageEventDefinition(EventDefinition):
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorEventDefinition(EventDefinition):
+    """`error` None catches every error; a throw always names one."""
+
+    error: Error | None
+
+
+@dataclass(frozen=True, slots=True)
+class EscalationEventDefinition(EventDefinition):
+    """`escalation` None catches every escalation; a throw always names one."""
+
+    escalation: Escalation | None
+
+
+class TimerKind(StrEnum):
+    """The three ways to say when (BPMN 2.0.2, table 10.101)."""
+
+    DATE = "timeDate"
+    DURATION = "timeDuration"
+    CYCLE = "timeCycle"
+
+
+@dataclass(frozen=True, slots=True)
+class TimerEventDefinition(EventDefinition):
+    """`expression` evaluates to a text that `m2pem.mission.duration` or `m2pem.mission.cycle` reads."""
+
+    kind: TimerKind
+    expression: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class TerminateEventDefinition(EventDefinition):
+    """Ends its own scope at once (clause 13.5.6)."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionalEventDefinition(EventDefinition):
+    """Triggered when the condition becomes true (table 10.95)."""
+
+    condition: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class LinkEventDefinition(EventDefinition):
+    """Joins a source to the target of the same name in one container (table 10.98)."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class CancelEventDefinition(EventDefinition):
+    """Cancels a transaction, or catches that it was cancelled (clause 10.5.6)."""
+
+
+@dataclass(frozen=True, slots=True)
+class CompensateEventDefinition(EventDefinition):
+    """Undoes completed activities (table 10.94, clause 13.5.5).
+
+    `activity`: the id of the one to undo, "" for all of the scope. `wait`: the throwing event
+    waits until that is done.
+    """
+
+    activity: str = ""
+    wait: bool = True

@@ -1,0 +1,199 @@
+"""What a call means in each dialect: a listed function, or what the other dialects write without.
+
+JUEL: methods of texts and lists, Camunda's `execution.getVariable('x')`, and Flowable's
+`var:equals(x, 1)`. XPath: the functions that BPMN adds to it (BPMN 2.0.2, clause 10.4.3).
+"""
+
+import difflib
+from collections.abc import Callable
+
+from m2pem.mission.expression.dialect import Dialect
+from m2pem.mission.expression.functions import FEEL_NAMES, FUNCTIONS
+from m2pem.mission.expression.tree import (
+    And,
+    Call,
+    Compare,
+    Comparison,
+    If,
+    Index,
+    Literal,
+    Name,
+    Node,
+    Not,
+    Or,
+)
+
+Arguments = tuple[Node, ...]
+Build = Callable[..., Node]
+
+
+class CallError(Exception):
+    """There is no such call; the message says what there is."""
+
+
+def meaning(name: str, arguments: Arguments, dialect: Dialect) -> Node:
+    """The tree of a call.
+
+    Raises:
+        CallError: the dialect has no such function, or it takes other arguments.
+    """
+    match dialect:
+        case Dialect.JUEL if ":" in name:
+            return _of_variable(name, arguments)
+        case Dialect.JUEL if name in _EXECUTION:
+            return _built(name, _EXECUTION[name], (_variable(name, arguments),))
+        case Dialect.JUEL if "." in name:
+            receiver, _, method = name.rpartition(".")
+            return method_call(Name(receiver), method, arguments)
+        case Dialect.XPATH:
+            name = name.rpartition(":")[2]
+            if name in XPATH_DATA:
+                return _variable(name, arguments[-1:])
+            if name in _XPATH_SHAPES:
+                return _built(name, _XPATH_SHAPES[name], arguments)
+            name = XPATH_NAMES.get(name, name)
+        case Dialect.FEEL:
+            name = FEEL_NAMES.get(name, name)
+    return _function(name, arguments)
+
+
+def method_call(receiver: Node, method: str, arguments: Arguments) -> Node:
+    """A method of a text or list, as JUEL has them.
+
+    Raises:
+        CallError: it is none of those that m2pem reads.
+    """
+    if method in _METHOD_SHAPES:
+        return _built(method, _METHOD_SHAPES[method], (receiver, *arguments))
+    if method in METHODS:
+        return _function(METHODS[method], (receiver, *arguments))
+    known = ", ".join(sorted({*METHODS, *_METHOD_SHAPES}))
+    raise CallError(
+        f"'{method[:40]}()' would run a method of an object, which m2pem does not; the methods "
+        f"that it reads are {known}"
+    )
+
+
+def _function(name: str, arguments: Arguments) -> Node:
+    function = FUNCTIONS.get(name)
+    if function is None:
+        if "." in name:
+            raise CallError(f"{name[:40]!r} would run a method of an object, which m2pem does not")
+        near = difflib.get_close_matches(name, FUNCTIONS, n=1)
+        hint = f"did you mean {near[0]}?" if near else "there are " + ", ".join(FUNCTIONS)
+        raise CallError(f"there is no function {name[:40]!r}; {hint}")
+    if not function.accepts(len(arguments)):
+        raise CallError(f"expected {function.signature}, found {len(arguments)} arguments")
+    return Call(function.name, arguments)
+
+
+def _built(name: str, build: Build, arguments: Arguments) -> Node:
+    try:
+        return build(*arguments)
+    except TypeError:
+        raise CallError(f"{name}() takes another number of arguments") from None
+
+
+def _variable(name: str, arguments: Arguments) -> Name:
+    """The variable that a call names, by a text or as it stands."""
+    match arguments:
+        case (Literal(str(key)),) if key.strip():
+            return Name(key)
+        case (Name() as variable,):
+            return variable
+    raise CallError(f"{name}() takes the name of a variable")
+
+
+def _of_variable(name: str, arguments: Arguments) -> Node:
+    """Flowable's functions, which take a variable's name first."""
+    function = name.partition(":")[2]
+    if function not in FLOWABLE:
+        raise CallError(
+            f"there is no function {name[:40]!r}; after 'var:' there are {', '.join(FLOWABLE)}"
+        )
+    return _built(name, FLOWABLE[function], (_variable(name, arguments[:1]), *arguments[1:]))
+
+
+def _comparing(operator: Comparison) -> Build:
+    return lambda left, right: Compare(operator, left, right)
+
+
+def _lower(node: Node) -> Node:
+    return Call("lower", (node,))
+
+
+def _exists(node: Node) -> Node:
+    return Call("exists", (node,))
+
+
+def _empty(node: Node) -> Node:
+    return Call("is_empty", (node,))
+
+
+def _contains(container: Node, item: Node, *more: Node) -> tuple[Node, ...]:
+    return tuple(Call("contains", (container, each)) for each in (item, *more))
+
+
+METHODS = {
+    "contains": "contains",
+    "endsWith": "ends_with",
+    "isEmpty": "is_empty",
+    "length": "length",
+    "size": "length",
+    "startsWith": "starts_with",
+    "toLowerCase": "lower",
+    "toString": "text",
+    "toUpperCase": "upper",
+}
+"""Methods that are functions of their object."""
+
+_METHOD_SHAPES: dict[str, Build] = {
+    "equals": _comparing(Comparison.EQUAL),
+    "equalsIgnoreCase": lambda a, b: Compare(Comparison.EQUAL, _lower(a), _lower(b)),
+    "get": Index,
+}
+_EXECUTION: dict[str, Build] = {
+    "execution.getVariable": lambda x: x,
+    "execution.hasVariable": _exists,
+}
+FLOWABLE: dict[str, Build] = {
+    "get": lambda x: x,
+    "getOrDefault": lambda x, default: If(_exists(x), x, default),
+    "exists": _exists,
+    "empty": _empty,
+    "isEmpty": _empty,
+    "notEmpty": lambda x: Not(_empty(x)),
+    "isNotEmpty": lambda x: Not(_empty(x)),
+    "contains": lambda x, *items: And(_contains(x, *items)),
+    "containsAny": lambda x, *items: Or(_contains(x, *items)),
+    "equals": _comparing(Comparison.EQUAL),
+    "eq": _comparing(Comparison.EQUAL),
+    "notEquals": _comparing(Comparison.NOT_EQUAL),
+    "ne": _comparing(Comparison.NOT_EQUAL),
+    "lowerThan": _comparing(Comparison.LESS),
+    "lt": _comparing(Comparison.LESS),
+    "lowerThanOrEquals": _comparing(Comparison.LESS_EQUAL),
+    "lte": _comparing(Comparison.LESS_EQUAL),
+    "greaterThan": _comparing(Comparison.GREATER),
+    "gt": _comparing(Comparison.GREATER),
+    "greaterThanOrEquals": _comparing(Comparison.GREATER_EQUAL),
+    "gte": _comparing(Comparison.GREATER_EQUAL),
+}
+"""What follows `var:`, `vars:` or `variables:`."""
+
+XPATH_DATA = frozenset({"getDataInput", "getDataObject", "getDataOutput", "getProcessProperty"})
+"""They name what they read last; the process may stand before it."""
+
+_XPATH_SHAPES: dict[str, Build] = {
+    "true": lambda: Literal(True),
+    "false": lambda: Literal(False),
+    "not": Not,
+}
+XPATH_NAMES = {
+    "ceiling": "ceil",
+    "count": "length",
+    "starts-with": "starts_with",
+    "string": "text",
+    "string-length": "length",
+}
+"""What XPath 1.0 calls the functions; it may use the names of `FUNCTIONS` too."""

@@ -1,0 +1,160 @@
+"""The value of a syntax tree over the data store: the tree is walked, nothing is made of it first.
+
+Most expressions of a mission are evaluated once or never, so that preparing them costs more than it
+saves.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from m2pem.errors import ExpressionError
+from m2pem.mission.expression.binding import bind
+from m2pem.mission.expression.functions import FUNCTIONS
+from m2pem.mission.expression.literals import describe
+from m2pem.mission.expression.operators import (
+    ARITHMETIC,
+    COMPARISONS,
+    bounded_list,
+    contains,
+    index,
+    join,
+    negate,
+    truth,
+)
+from m2pem.mission.expression.tree import (
+    And,
+    Arithmetic,
+    Call,
+    Compare,
+    Comparison,
+    If,
+    In,
+    Index,
+    Join,
+    ListOf,
+    Literal,
+    Name,
+    Negate,
+    Node,
+    Not,
+    Or,
+    Some,
+)
+from m2pem.mission.values import ReadValue, Value
+
+
+def evaluate(node: Node, read: ReadValue) -> Value:
+    """The tree's value; it raises ExpressionError."""
+    return _RULES[type(node)](node, read)
+
+
+def _holds(node: Node, read: ReadValue, what: str) -> bool:
+    value = _RULES[type(node)](node, read)
+    return value if value is True or value is False else truth(value, what)
+
+
+def _literal(node: Literal, read: ReadValue) -> Value:
+    return node.value
+
+
+def _name(node: Name, read: ReadValue) -> Value:
+    return read(node.name)
+
+
+def _not(node: Not, read: ReadValue) -> Value:
+    return not _holds(node.operand, read, "'not'")
+
+
+def _and(node: And, read: ReadValue) -> Value:
+    for operand in node.operands:  # noqa: SIM110  # a generator costs more than all of it
+        if not _holds(operand, read, "'and'"):
+            return False
+    return True
+
+
+def _or(node: Or, read: ReadValue) -> Value:
+    for operand in node.operands:  # noqa: SIM110  # a generator costs more than all of it
+        if _holds(operand, read, "'or'"):
+            return True
+    return False
+
+
+def _compare(node: Compare, read: ReadValue) -> Value:
+    operator, right = node.operator, node.right
+    value = _RULES[type(node.left)](node.left, read)
+    if type(right) is Literal:
+        other = right.value
+        # What conditions mostly are; for a text or null, Python's `==` is already ours.
+        if other is None or type(other) is str:
+            if operator is Comparison.EQUAL:
+                return value == other
+            if operator is Comparison.NOT_EQUAL:
+                return value != other
+        return COMPARISONS[operator](value, other)
+    return COMPARISONS[operator](value, _RULES[type(right)](right, read))
+
+
+def _in(node: In, read: ReadValue) -> Value:
+    container = evaluate(node.container, read)
+    return contains(container, evaluate(node.item, read))
+
+
+def _negate(node: Negate, read: ReadValue) -> Value:
+    return negate(evaluate(node.operand, read))
+
+
+def _arithmetic(node: Arithmetic, read: ReadValue) -> Value:
+    left = _RULES[type(node.left)](node.left, read)
+    return ARITHMETIC[node.operator](left, _RULES[type(node.right)](node.right, read))
+
+
+def _index(node: Index, read: ReadValue) -> Value:
+    container = evaluate(node.container, read)
+    return index(container, evaluate(node.key, read))
+
+
+def _if(node: If, read: ReadValue) -> Value:
+    chosen = node.then if _holds(node.condition, read, "a condition") else node.otherwise
+    return evaluate(chosen, read)
+
+
+def _some(node: Some, read: ReadValue) -> Value:
+    items = evaluate(node.collection, read)
+    if items is None:
+        return False
+    if not isinstance(items, list):
+        raise ExpressionError(f"'some' and 'every' take a list, not {describe(items)}")
+    return any(
+        _holds(node.condition, bind(node.variable, item, read), "a condition") for item in items
+    )
+
+
+def _list(node: ListOf, read: ReadValue) -> Value:
+    return bounded_list([evaluate(item, read) for item in node.items])
+
+
+def _call(node: Call, read: ReadValue) -> Value:
+    return FUNCTIONS[node.function].call([evaluate(each, read) for each in node.arguments])
+
+
+def _join(node: Join, read: ReadValue) -> Value:
+    return join([evaluate(part, read) for part in node.parts])
+
+
+_RULES: dict[type[Node], Callable[[Any, ReadValue], Value]] = {
+    Literal: _literal,
+    Name: _name,
+    ListOf: _list,
+    Not: _not,
+    And: _and,
+    Or: _or,
+    Compare: _compare,
+    In: _in,
+    Negate: _negate,
+    Arithmetic: _arithmetic,
+    Call: _call,
+    If: _if,
+    Index: _index,
+    Some: _some,
+    Join: _join,
+}

@@ -1,0 +1,129 @@
+"""A parsed expression, and the ways to get one from text."""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NoReturn
+
+from m2pem.errors import ExpressionError
+from m2pem.mission.expression.dialect import Dialect, Span, locate, split
+from m2pem.mission.expression.evaluate import evaluate
+from m2pem.mission.expression.feel import FeelParser
+from m2pem.mission.expression.literals import shorten, show_scalar
+from m2pem.mission.expression.operators import truth
+from m2pem.mission.expression.parser import Parser
+from m2pem.mission.expression.tree import Join, Literal, Node, names
+from m2pem.mission.values import ReadValue, Value
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Expression:
+    """A parsed expression; never changes. Equal to another of the same text and dialect.
+
+    `text` is what was written, `tree` what it means, `names` the dotted names that it reads.
+    """
+
+    text: str
+    dialect: Dialect
+    tree: Node
+    names: frozenset[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "names", names(self.tree))
+
+    @property
+    def constant(self) -> bool:
+        """Whether it reads nothing, so that its value is always the same."""
+        return not self.names
+
+    def evaluate(self, read: ReadValue) -> Value:
+        """Its value over the data store.
+
+        Raises:
+            ExpressionError: a wrong type, a division by zero, or a result beyond the limits.
+        """
+        try:
+            return evaluate(self.tree, read)
+        except ExpressionError as error:
+            self._explain(error)
+
+    def holds(self, read: ReadValue) -> bool:
+        """Its truth: null is false.
+
+        Raises:
+            ExpressionError: as `evaluate`, and when the value is neither a boolean nor null.
+        """
+        try:
+            value = evaluate(self.tree, read)
+            return value if value is True or value is False else truth(value, "a condition")
+        except ExpressionError as error:
+            self._explain(error)
+
+    def _explain(self, error: ExpressionError) -> NoReturn:
+        raise ExpressionError(f"{error}, in {shorten(self.text.strip())!r}") from error
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Expression):
+            return NotImplemented
+        return self.text == other.text and self.dialect is other.dialect
+
+    def __hash__(self) -> int:
+        return hash((self.text, self.dialect))
+
+    def __repr__(self) -> str:
+        return f"<Expression {self.text!r}>"
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@lru_cache(maxsize=1024)  # missions repeat their conditions, and an expression never changes
+def parse(text: str, language: str | None = None) -> Expression:
+    """Parse one expression: `${...}` (Camunda 7), a leading `=` (FEEL), else bare.
+
+    `language` is the XML's `language` or `expressionLanguage`: none, "juel", "FEEL" or a URI that
+    ends in it, or "m2pem", which admits the bare dialect alone.
+
+    Raises:
+        ExpressionSyntaxError: it is none, is beyond the limits, or is in another language.
+    """
+    dialect, span = locate(text, language)
+    return Expression(text, dialect, _tree(text, span, dialect))
+
+
+def _tree(text: str, span: Span, dialect: Dialect) -> Node:
+    if dialect is Dialect.FEEL:
+        return FeelParser(text, span).parse()
+    return Parser(text, span, dialect).parse()
+
+
+def template(text: str) -> Expression:
+    """Parse a parameter's value: a whole `${...}` or a leading `=` is that expression; other text
+    with `${...}` parts is a text that they are written into; anything else is itself.
+
+    Raises:
+        ExpressionSyntaxError: an expression in it cannot be parsed.
+    """
+    stripped = text.strip()
+    if stripped.startswith("="):
+        return parse(text)
+    parts = split(text)
+    spans = [part for part in parts if isinstance(part, slice)]
+    if not spans:
+        return Expression(text, Dialect.TEXT, Literal("".join(map(str, parts))))
+    if len(spans) == 1 and text[spans[0].start - 2 : spans[0].stop + 1] == stripped:
+        return parse(text)
+    nodes = tuple(
+        _tree(text, part, Dialect.JUEL) if isinstance(part, slice) else Literal(part)
+        for part in parts
+    )
+    return Expression(text, Dialect.TEMPLATE, Join(nodes))
+
+
+def literal(value: bool | int | float | str | None) -> Expression:
+    """The expression that is always `value`."""
+    if value is None:
+        return Expression("null", Dialect.BARE, Literal(None))
+    if isinstance(value, str):
+        return Expression(value, Dialect.TEXT, Literal(value))
+    text = repr(value) if isinstance(value, float) else show_scalar(value)
+    return Expression(text, Dialect.BARE, Literal(value))

@@ -1,0 +1,241 @@
+"""The functions that expressions may call; docs/conditions.md lists the same ones (a test)."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from decimal import ROUND_HALF_UP, Decimal
+from typing import Any
+
+import m2pem.mission.duration as times  # imports this package too: only its name is bound yet
+from m2pem.errors import ExpressionError, ExpressionSyntaxError
+from m2pem.mission.expression.literals import NUMBER, describe, read_number
+from m2pem.mission.expression.operators import (
+    bounded,
+    bounded_text,
+    equal,
+    kind,
+    text_of,
+)
+from m2pem.mission.values import Value
+
+EARTH_RADIUS_M = 6_371_008.8
+"""Mean radius of the WGS-84 ellipsoid (2a + b) / 3."""
+
+_ANY = ("null", "boolean", "number", "text", "list", "map")
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """A function: what it takes, and what computes it.
+
+    `takes` holds the kinds of each parameter; with `rest` the last one may be repeated. Unless a
+    parameter takes null, a null argument makes the result null.
+    """
+
+    signature: str
+    takes: tuple[tuple[str, ...], ...]
+    compute: Callable[..., Value]
+    rest: bool = False
+
+    @property
+    def name(self) -> str:
+        """What expressions call it."""
+        return self.signature.partition("(")[0]
+
+    def accepts(self, count: int) -> bool:
+        """Whether it may be called with so many arguments."""
+        return count >= len(self.takes) if self.rest else count == len(self.takes)
+
+    def call(self, arguments: list[Value]) -> Value:
+        """Its value; raises ExpressionError."""
+        null = False
+        for index, argument in enumerate(arguments):
+            kinds = self.takes[min(index, len(self.takes) - 1)]
+            if argument is None and "null" not in kinds:
+                null = True
+            elif kind(argument) not in kinds:
+                wanted = " or ".join(kinds)
+                raise ExpressionError(f"{self.name}() takes a {wanted}, not {describe(argument)}")
+        return None if null else self.compute(*arguments)
+
+
+def _finite(name: str, value: int | float) -> int | float:
+    return bounded(value, f"{name}()", value)
+
+
+def _abs(x: int | float) -> Value:
+    return bounded(abs(x), "abs()", x)
+
+
+def _floor(x: int | float) -> Value:
+    return bounded(math.floor(_finite("floor", x)), "floor()", x)
+
+
+def _ceil(x: int | float) -> Value:
+    return bounded(math.ceil(_finite("ceil", x)), "ceil()", x)
+
+
+def _round(x: int | float) -> Value:
+    # Python's round() takes halves to the even number, which surprises people.
+    whole = int(Decimal(_finite("round", x)).to_integral_value(ROUND_HALF_UP))
+    return bounded(whole, "round()", x)
+
+
+def _sqrt(x: int | float) -> Value:
+    if x < 0:
+        raise ExpressionError(f"sqrt() takes a number from 0 on, not {describe(x)}")
+    return math.sqrt(_finite("sqrt", x))
+
+
+def _mod(x: int | float, y: int | float) -> Value:
+    if y == 0:
+        raise ExpressionError(f"mod() divides {describe(x)} by zero")
+    try:
+        result = x % y
+    except OverflowError:
+        result = math.inf
+    return bounded(result, "mod()", x, y)
+
+
+def _extreme(name: str, pick: Callable[[Any], Any]) -> Callable[..., Value]:
+    def compute(*arguments: Value) -> Value:
+        values: list[Value] = list(arguments)
+        if isinstance(arguments[0], list):
+            if len(arguments) > 1:
+                raise ExpressionError(f"{name}() takes numbers, or one list of numbers")
+            values = arguments[0]
+        if not values or any(value is None for value in values):
+            return None
+        for value in values:
+            if kind(value) != "number":
+                raise ExpressionError(f"{name}() takes numbers, not {describe(value)}")
+        return bounded(pick(values), f"{name}()")
+
+    return compute
+
+
+def _contains(container: list[Value] | str, item: Value) -> Value:
+    if isinstance(container, list):
+        return any(equal(each, item) for each in container)
+    if item is None:
+        return None
+    if not isinstance(item, str):
+        raise ExpressionError(f"contains() looks for a text in a text, not {describe(item)}")
+    return item in container
+
+
+def _upper(text: str) -> Value:
+    return bounded_text(text.upper(), "upper()")
+
+
+def _lower(text: str) -> Value:
+    return bounded_text(text.lower(), "lower()")
+
+
+def _number(value: int | float | str) -> Value:
+    if not isinstance(value, str):
+        return value
+    digits = value.strip()
+    if not NUMBER.fullmatch(digits.removeprefix("-")):
+        raise ExpressionError(f"number() cannot read {describe(value)}")
+    try:
+        return read_number(digits)
+    except ValueError as error:
+        raise ExpressionError(f"number() cannot read {describe(value)}: {error}") from None
+
+
+def _sum(values: list[Value]) -> Value:
+    total: int | float = 0
+    for value in values:
+        if value is None:
+            return None
+        if not isinstance(value, (int, float)) or isinstance(value, bool):
+            raise ExpressionError(f"sum() takes numbers, not {describe(value)}")
+        total = bounded(total + value, "sum()")
+    return total
+
+
+def _date(text: str) -> Value:
+    return _seconds("date", lambda: times.date_us(text))
+
+
+def _duration(text: str) -> Value:
+    if any(sign in text.partition("T")[0] for sign in "YM"):
+        raise ExpressionError("duration() has no years and months: how long they are is not known")
+    return _seconds("duration", lambda: times.duration_us(text, 0))
+
+
+def _seconds(name: str, read_us: Callable[[], int]) -> Value:
+    try:
+        return read_us() / 1_000_000
+    except ExpressionSyntaxError as error:
+        raise ExpressionError(f"{name}(): {error}") from None
+
+
+def _degrees(position: list[Value]) -> tuple[float, float]:
+    if len(position) in (2, 3) and all(kind(each) == "number" for each in position[:2]):
+        latitude, longitude = position[:2]
+        assert isinstance(latitude, (int, float))
+        assert isinstance(longitude, (int, float))
+        if -90 <= latitude <= 90 and -180 <= longitude <= 180:
+            return float(latitude), float(longitude)
+    raise ExpressionError(
+        "distance() takes positions, [latitude, longitude] or [latitude, longitude, altitude]"
+        f" in degrees and metres, not [{', '.join(describe(each) for each in position[:3])}]"
+    )
+
+
+def _distance(a: list[Value], b: list[Value]) -> Value:
+    (lat_a, lon_a), (lat_b, lon_b) = _degrees(a), _degrees(b)
+    half_north = math.sin(math.radians(lat_b - lat_a) / 2)
+    half_east = math.sin(math.radians(lon_b - lon_a) / 2)
+    h = half_north**2 + math.cos(math.radians(lat_a)) * math.cos(math.radians(lat_b)) * half_east**2
+    return 2 * EARTH_RADIUS_M * math.asin(min(1.0, math.sqrt(h)))
+
+
+_NUMBER = ("number",)
+_TEXT = ("text",)
+
+FUNCTIONS: dict[str, Function] = {
+    function.name: function
+    for function in (
+        Function("abs(x)", (_NUMBER,), _abs),
+        Function("min(x, ...)", (("number", "list"),), _extreme("min", min), rest=True),
+        Function("max(x, ...)", (("number", "list"),), _extreme("max", max), rest=True),
+        Function("round(x)", (_NUMBER,), _round),
+        Function("floor(x)", (_NUMBER,), _floor),
+        Function("ceil(x)", (_NUMBER,), _ceil),
+        Function("sqrt(x)", (_NUMBER,), _sqrt),
+        Function("mod(x, y)", (_NUMBER, _NUMBER), _mod),
+        Function("number(x)", (("number", "text"),), _number),
+        Function("text(x)", (("boolean", "number", "text"),), text_of),
+        Function("length(x)", (("text", "list", "map"),), len),
+        Function("contains(x, y)", (("text", "list"), _ANY), _contains),
+        Function("starts_with(x, y)", (_TEXT, _TEXT), str.startswith),
+        Function("ends_with(x, y)", (_TEXT, _TEXT), str.endswith),
+        Function("upper(x)", (_TEXT,), _upper),
+        Function("lower(x)", (_TEXT,), _lower),
+        Function("exists(x)", (_ANY,), lambda x: x is not None),
+        Function("is_empty(x)", (_ANY,), lambda x: x is None or x in ("", [], {})),
+        Function("sum(x)", (("list",),), _sum),
+        Function("date(x)", (_TEXT,), _date),
+        Function("duration(x)", (_TEXT,), _duration),
+        Function("distance(a, b)", (("list",), ("list",)), _distance),
+    )
+}
+
+FEEL_NAMES = {
+    "ceiling": "ceil",
+    "count": "length",
+    "date and time": "date",
+    "ends with": "ends_with",
+    "is defined": "exists",
+    "list contains": "contains",
+    "lower case": "lower",
+    "modulo": "mod",
+    "starts with": "starts_with",
+    "string": "text",
+    "string length": "length",
+    "upper case": "upper",
+}
+"""What FEEL calls them (DMN 1.3, clause 10.3.4); it may use the names above too."""

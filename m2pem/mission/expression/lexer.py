@@ -1,0 +1,187 @@
+"""Splits an expression into tokens."""
+
+import re
+from typing import NamedTuple, NoReturn
+
+from m2pem.errors import ExpressionSyntaxError
+from m2pem.mission.expression.dialect import Dialect, Span
+from m2pem.mission.expression.literals import NUMBER, unescape
+from m2pem.mission.expression.vocabulary import LOWEST, MEANINGS, SYMBOLS, UNSUPPORTED
+
+
+class Token(NamedTuple):
+    """A "number", "constant", "name", "operator" or the "end".
+
+    An "operator" may also be a bracket, a comma or one of the words `and or not in`. `text` is
+    its name in the bare dialect; of others, what was written. `position` is the offset in the
+    whole text. `strength`: how strongly it binds as an operator after a value.
+    """
+
+    kind: str
+    text: str
+    position: int
+    strength: int
+
+
+_new = tuple.__new__  # takes half as long as calling the class
+
+_HINTS = {
+    "=": "'=' compares nothing here; write '==' (or a leading '=' for FEEL)",
+    "&": "write 'and'",
+    "|": "write 'or'",
+    "!": "write 'not'",
+    "%": "write mod(x, y) for the remainder",
+    "^": "there is no power operator",
+    "?": "write 'if a then b else c'",
+    "/": "paths into XML are not read; a division is written 'div'",
+    "@": "paths into XML are not read",
+    "{": "maps cannot be written",
+    "$": "put the whole expression into one '${...}', or write it without '${' and '}'",
+    "#": "put the whole expression into one '${...}', or write it without '#{' and '}'",
+    "\N{LEFT DOUBLE QUOTATION MARK}": "write straight quotes",
+    "\N{RIGHT DOUBLE QUOTATION MARK}": "write straight quotes",
+    "\N{LEFT SINGLE QUOTATION MARK}": "write straight quotes",
+    "\N{RIGHT SINGLE QUOTATION MARK}": "write straight quotes",
+}
+
+_CALLED = {
+    Dialect.FEEL: r"date and time(?=\s*\()",
+    Dialect.JUEL: r"(?:var|vars|variables):\w+(?=\s*\()",
+    Dialect.XPATH: r"(?!(?:and|or|div)\s*+\()(?:[^\W\d][\w.-]*+:)?+[^\W\d][\w-]*+(?=\s*+\()",
+}
+"""Names of functions that are no names of the store."""
+
+_ASCII_NAME = re.compile(r"(?a:[A-Za-z_]\w*+(?:\.\w++)*+)")
+_QUOTED = r"""'[^'\\]*+(?:\\[nt'"\\][^'\\]*+)*+'|"[^"\\]*+(?:\\[nt'"\\][^"\\]*+)*+\""""
+_NOTHING = "(?!)"
+_ALONE = r"(?![\w.]|[^\x00-\x7f])"
+
+
+def _pattern(dialect: Dialect) -> re.Pattern[str]:
+    """Space and the token after it, whose kind is the group's name.
+
+    It does not match what is left to `_Closely`: a name or number right before a point or a
+    character beyond ASCII, a word that is not supported, a wrong text, and what is no token.
+    """
+    called = _CALLED.get(dialect, _NOTHING)
+    unsupported = "|".join(UNSUPPORTED.get(dialect, ())) or _NOTHING
+    symbols = sorted(map(re.escape, SYMBOLS[dialect]), key=len, reverse=True)
+    return re.compile(
+        rf"\s*+(?:(?P<called>{called})"
+        rf"|(?!(?:{unsupported})\b)(?P<name>{_ASCII_NAME.pattern}){_ALONE}"
+        rf"|(?P<number>{NUMBER.pattern}){_ALONE}"
+        rf"|(?P<constant>{_QUOTED})"
+        rf"|(?!\.[0-9])(?P<operator>{'|'.join(symbols)}))"
+    )
+
+
+_PATTERNS = {dialect: _pattern(dialect) for dialect in SYMBOLS}
+
+
+def scan_name(text: str, position: int, end: int) -> int:
+    """The end of the dotted name that starts at `position`; `position` when none does.
+
+    Parts are letters, digits and `_` of any script; the first part begins with no digit.
+    """
+    if text.isascii():
+        name = _ASCII_NAME.match(text, position, end)
+        return name.end() if name else position
+    if position >= end or not text[position].isidentifier():
+        return position
+    while True:
+        while position < end and _continues_name(text[position]):
+            position += 1
+        if position + 1 < end and text[position] == "." and _continues_name(text[position + 1]):
+            position += 1
+        else:
+            return position
+
+
+def _continues_name(character: str) -> bool:
+    return ("_" + character).isidentifier()
+
+
+def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
+    """The tokens of `text` within `span`, closed by the end.
+
+    Raises:
+        ExpressionSyntaxError: something that is no token.
+    """
+    match, meanings = _PATTERNS[dialect].match, MEANINGS[dialect]
+    tokens: list[Token] = []
+    position = span.start
+    end = len(text[: span.stop].rstrip())
+    while position < end:
+        found = match(text, position, end)
+        if found is None:
+            kind, start, position = _Closely(text, end, dialect).read(position)
+        else:
+            kind = found.lastgroup or ""
+            start, position = found.span(kind)
+        written = text[start:position]
+        strength = LOWEST
+        if kind == "called":
+            kind = "name"
+        elif written in meanings:
+            kind, written, strength = meanings[written]
+        tokens.append(_new(Token, (kind, written, start, strength)))
+    tokens.append(_new(Token, ("end", "the end", span.stop, LOWEST)))
+    return tokens
+
+
+class _Closely:
+    """Reads a token that only a closer look tells from a mistake, or says what the mistake is."""
+
+    def __init__(self, text: str, end: int, dialect: Dialect) -> None:
+        self._text = text
+        self._end = end
+        self._dialect = dialect
+
+    def read(self, start: int) -> tuple[str, int, int]:
+        """The kind of the token after the space at `start`, its start and its end."""
+        while self._text[start].isspace():
+            start += 1
+        name_end = scan_name(self._text, start, self._end)
+        if name_end > start:
+            return "name", start, self._word(start, name_end)
+        if number := NUMBER.match(self._text, start, self._end):
+            return "number", start, self._number(number.end())
+        character = self._text[start]
+        if character in "'\"":
+            self._quoted(start)
+        hint = _HINTS.get(character)
+        self._fail(f"unexpected {character!r}" + (f": {hint}" if hint else ""), start)
+
+    def _word(self, start: int, end: int) -> int:
+        word = self._text[start:end]
+        if self._text.startswith(".", end) and end < self._end and not self._is_range(end):
+            self._fail("a part of the name is missing after '.'", end)
+        if word in UNSUPPORTED.get(self._dialect, ()):
+            self._fail(f"FEEL's '{word}' is not supported", start)
+        return end
+
+    def _number(self, end: int) -> int:
+        following = self._text[end] if end < self._end and not self._is_range(end) else ""
+        if following and (_continues_name(following) or following == "."):
+            self._fail(f"a number cannot be followed by {following!r}", end)
+        return end
+
+    def _is_range(self, position: int) -> bool:
+        """Whether the `..` between two ends of a range stands there."""
+        return ".." in SYMBOLS[self._dialect] and self._text.startswith("..", position)
+
+    def _quoted(self, start: int) -> None:
+        """Says what is wrong with a text."""
+        quote = self._text[start]
+        end = start + 1
+        while end < self._end and self._text[end] != quote:
+            end += 2 if self._text[end] == "\\" else 1
+        if end >= self._end:
+            self._fail(f"the text is not closed by {quote}", start)
+        try:
+            unescape(self._text[start + 1 : end])
+        except ValueError as error:
+            self._fail(str(error), start)
+
+    def _fail(self, message: str, position: int) -> NoReturn:
+        raise ExpressionSyntaxError(message, self._text, position)

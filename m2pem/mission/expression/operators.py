@@ -1,0 +1,225 @@
+"""What the operators do with values (docs/conditions.md). Errors are ExpressionError."""
+
+import math
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from m2pem.errors import ExpressionError
+from m2pem.mission.expression.literals import (
+    MAX_INTEGER,
+    MIN_INTEGER,
+    describe,
+    show_scalar,
+)
+from m2pem.mission.expression.tree import Comparison, Operation
+from m2pem.mission.values import Value
+
+MAX_SIZE = 100_000
+"""How large a computed text or list may be: its characters and values, nested ones included."""
+
+MAX_VALUE_DEPTH = 100
+"""How deep lists and maps may nest in each other."""
+
+Binary = Callable[[Value, Value], Value]
+Test = Callable[[Value, Value], bool]
+
+_NUMBERS = frozenset({int, float})
+
+
+def kind(value: Value) -> str:
+    """The type of a value as messages and the docs call it."""
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return "boolean"
+        case int() | float():
+            return "number"
+        case str():
+            return "text"
+        case list():
+            return "list"
+        case dict():
+            return "map"
+    return type(value).__name__
+
+
+def truth(value: Value, what: str) -> bool:
+    """The boolean, null being false. `what` names whoever asks, for the message."""
+    if value is True or value is False:
+        return value
+    if value is None:
+        return False
+    raise ExpressionError(f"{what} takes true or false, not {describe(value)}")
+
+
+def equal(left: Value, right: Value) -> bool:
+    """Same kind and same value; integers and doubles compare by exact value."""
+    return _equal(left, right, MAX_VALUE_DEPTH)
+
+
+def _equal(left: Value, right: Value, depth: int) -> bool:
+    if isinstance(left, list) and isinstance(right, list):
+        if depth == 0:
+            raise ExpressionError(f"'==' compares lists nested deeper than {MAX_VALUE_DEPTH}")
+        return len(left) == len(right) and all(
+            _equal(a, b, depth - 1) for a, b in zip(left, right, strict=True)
+        )
+    if isinstance(left, dict) and isinstance(right, dict):
+        if depth == 0:
+            raise ExpressionError(f"'==' compares maps nested deeper than {MAX_VALUE_DEPTH}")
+        return left.keys() == right.keys() and all(
+            _equal(value, right[key], depth - 1) for key, value in left.items()
+        )
+    if type(left) is type(right):
+        return left == right
+    return kind(left) == kind(right) and left == right
+
+
+def contains(container: Value, item: Value) -> bool:
+    """`item in container`; nothing is in null."""
+    if isinstance(container, list):
+        return any(equal(each, item) for each in container)
+    if container is None:
+        return False
+    hint = "; use contains(text, part)" if isinstance(container, str) else ""
+    raise ExpressionError(f"'in' takes a list on its right, not {describe(container)}{hint}")
+
+
+def index(container: Value, key: Value) -> Value:
+    """`container[key]`; null for what is not there."""
+    if container is None or key is None:
+        return None
+    if isinstance(container, list) and isinstance(key, int) and not isinstance(key, bool):
+        return container[key] if -len(container) <= key < len(container) else None
+    if isinstance(container, dict) and isinstance(key, str):
+        return container.get(key)
+    raise ExpressionError(f"{describe(container)} has no item under {describe(key)}")
+
+
+def _ordering(symbol: Comparison, compare: Callable[[Any, Any], bool]) -> Test:
+    def test(left: Value, right: Value) -> bool:
+        if type(left) in _NUMBERS and type(right) in _NUMBERS:
+            return compare(left, right)
+        kinds = {kind(left), kind(right)}
+        if kinds in ({"number"}, {"text"}):
+            return compare(left, right)
+        if "null" in kinds or len(kinds) > 1:
+            return False
+        raise ExpressionError(f"'{symbol}' cannot order {describe(left)} and {describe(right)}")
+
+    return test
+
+
+COMPARISONS: dict[Comparison, Test] = {
+    Comparison.EQUAL: equal,
+    Comparison.NOT_EQUAL: lambda left, right: not equal(left, right),
+    Comparison.LESS: _ordering(Comparison.LESS, operator.lt),
+    Comparison.LESS_EQUAL: _ordering(Comparison.LESS_EQUAL, operator.le),
+    Comparison.GREATER: _ordering(Comparison.GREATER, operator.gt),
+    Comparison.GREATER_EQUAL: _ordering(Comparison.GREATER_EQUAL, operator.ge),
+}
+
+
+def bounded(value: int | float, what: str, *operands: Value) -> int | float:
+    """The result of `what` on the operands, when it is a 64-bit integer or a finite double."""
+    if MIN_INTEGER <= value <= MAX_INTEGER if isinstance(value, int) else math.isfinite(value):
+        return value
+    problem = "does not fit into a 64-bit integer" if isinstance(value, int) else "is not finite"
+    of = " of " + " and ".join(describe(operand) for operand in operands) if operands else ""
+    raise ExpressionError(f"the result of {what}{of} {problem}")
+
+
+def bounded_text(value: str, what: str) -> str:
+    """The text that an operation made, when it is not too long."""
+    if len(value) > MAX_SIZE:
+        raise ExpressionError(f"the result of {what} is longer than {MAX_SIZE} characters")
+    return value
+
+
+def bounded_list(items: list[Value]) -> list[Value]:
+    """A new list, when it is not too large: lists of lists could double with every step."""
+    size = 0
+    waiting: list[tuple[Value, int]] = [(items, 0)]
+    while waiting:
+        value, depth = waiting.pop()
+        size += 1
+        if isinstance(value, str):
+            size += len(value)
+        elif isinstance(value, list):
+            waiting.extend((each, depth + 1) for each in value)
+        elif isinstance(value, dict):
+            size += sum(len(key) for key in value)
+            waiting.extend((each, depth + 1) for each in value.values())
+        if size + len(waiting) > MAX_SIZE:
+            raise ExpressionError(f"the list is larger than {MAX_SIZE} values and characters")
+        if depth > MAX_VALUE_DEPTH:
+            raise ExpressionError(f"the list is nested deeper than {MAX_VALUE_DEPTH}")
+    return items
+
+
+def _arithmetic(
+    symbol: Operation, compute: Callable[[int | float, int | float], int | float]
+) -> Binary:
+    takes = "two numbers or two texts" if symbol is Operation.ADD else "two numbers"
+
+    def apply(left: Value, right: Value) -> Value:
+        if left is None or right is None:
+            return None
+        if (
+            isinstance(left, (int, float))
+            and isinstance(right, (int, float))
+            and not isinstance(left, bool)
+            and not isinstance(right, bool)
+        ):
+            try:
+                result = compute(left, right)
+            except ZeroDivisionError:
+                raise ExpressionError(f"'{symbol}' divides {describe(left)} by zero") from None
+            except OverflowError:
+                result = math.inf
+            return bounded(result, f"'{symbol}'", left, right)
+        if symbol is Operation.ADD and isinstance(left, str) and isinstance(right, str):
+            return bounded_text(left + right, "'+'")
+        hint = "; text(x) turns a value into a text" if "text" in (kind(left), kind(right)) else ""
+        raise ExpressionError(
+            f"'{symbol}' takes {takes}, not {describe(left)} and {describe(right)}"
+            + (hint if symbol is Operation.ADD else "")
+        )
+
+    return apply
+
+
+ARITHMETIC: dict[Operation, Binary] = {
+    Operation.ADD: _arithmetic(Operation.ADD, operator.add),
+    Operation.SUBTRACT: _arithmetic(Operation.SUBTRACT, operator.sub),
+    Operation.MULTIPLY: _arithmetic(Operation.MULTIPLY, operator.mul),
+    Operation.DIVIDE: _arithmetic(Operation.DIVIDE, operator.truediv),
+}
+
+
+def negate(value: Value) -> Value:
+    """`-value`."""
+    if value is None:
+        return None
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return bounded(-value, "'-'", value)
+    raise ExpressionError(f"'-' takes a number, not {describe(value)}")
+
+
+def text_of(value: bool | int | float | str) -> str:
+    """The value as a text."""
+    if isinstance(value, (int, float)):
+        bounded(value, "text()", value)
+    return show_scalar(value)
+
+
+def join(values: list[Value]) -> str:
+    """The values written one after the other: the value of a text with `${...}` parts."""
+    texts = []
+    for value in values:
+        if value is None or isinstance(value, (list, dict)):
+            raise ExpressionError(f"a '${{...}}' part of a text must not be {describe(value)}")
+        texts.append(text_of(value))
+    return bounded_text("".join(texts), "'${...}'")

@@ -1,0 +1,270 @@
+"""Parses tokens of any dialect to the one syntax tree, by precedence climbing.
+
+From weak to strong: `a ? b : c`, `or`, `and`, `not`, comparisons (which do not chain), `+ -`,
+`* /`, unary `-`. In the `${...}` dialect `not` (`!`) and `empty` bind like unary `-`, as in
+JUEL. Where that would change what a bare expression means, it is refused.
+"""
+
+import re
+from collections.abc import Callable
+from typing import NoReturn
+
+from m2pem.errors import ExpressionSyntaxError
+from m2pem.mission.expression.calls import CallError, meaning, method_call
+from m2pem.mission.expression.dialect import Dialect, Span
+from m2pem.mission.expression.lexer import Token, tokenize
+from m2pem.mission.expression.literals import read_number, unescape
+from m2pem.mission.expression.tree import (
+    MAX_DEPTH,
+    And,
+    Arithmetic,
+    Call,
+    Compare,
+    Comparison,
+    If,
+    In,
+    Index,
+    ListOf,
+    Literal,
+    Name,
+    Negate,
+    Node,
+    Not,
+    Operation,
+    Or,
+    walk,
+)
+from m2pem.mission.expression.vocabulary import (
+    AND,
+    COMPARISON,
+    CONSTANTS,
+    LOWEST,
+    NOT,
+    UNARY,
+)
+
+MAX_ITEMS = 1_000
+"""Items of a list as written, and arguments of a call."""
+
+MAX_PARTS = 20_000
+"""Nodes of a tree. A value in a range is there twice, so ranges in each other double it."""
+
+_IDENTIFIER = re.compile(r"[^\W\d]\w*")
+_COMPARISONS = {each.value: each for each in Comparison}
+_OPERATIONS = {each.value: each for each in Operation}
+
+
+class Parser:
+    """Reads one expression, which stands in `text` at `span`; FEEL's own words are `FeelParser`'s.
+
+    Raises:
+        ExpressionSyntaxError: it is none, or is beyond the limits.
+    """
+
+    def __init__(self, text: str, span: Span, dialect: Dialect) -> None:
+        self._text = text
+        self._length = span.stop - span.start
+        self._coming = iter(tokenize(text, span, dialect))
+        self._token = next(self._coming)
+        self._dialect = dialect
+        self._nesting = 0
+
+    def parse(self) -> Node:
+        """The tree."""
+        if self._token.kind == "end":
+            self._fail("an expression is missing")
+        node = self._expression(LOWEST)
+        if self._token.kind != "end":
+            spaces = "; a name has no spaces (in FEEL it may: begin with '=')"
+            hint = spaces if self._token.kind == "name" else ""
+            self._fail(f"expected an operator or the end, found {self._found}{hint}")
+        # Each level takes a character at least, and what doubles the parts takes ten.
+        if self._length > MAX_DEPTH:
+            self._limit(node)
+        return node
+
+    def _limit(self, node: Node) -> None:
+        for parts, (_, depth) in enumerate(walk(node)):
+            if depth > MAX_DEPTH:
+                self._fail(
+                    f"nested deeper than {MAX_DEPTH} levels; use parentheses or fewer operators"
+                )
+            if parts > MAX_PARTS:
+                self._fail("too large, written out; use fewer ranges in each other")
+
+    @property
+    def _found(self) -> str:
+        token = self._token
+        return token.text if token.kind == "end" else repr(token.text)
+
+    def _expression(self, minimum: int) -> Node:
+        """The longest expression whose operators bind more strongly than `minimum`."""
+        self._nesting += 1
+        if self._nesting > MAX_DEPTH:
+            self._fail(f"nested deeper than {MAX_DEPTH} levels")
+        node = self._prefix(minimum)
+        while (strength := self._token.strength) > minimum:
+            node = self._binary(node, strength)
+        if minimum == LOWEST and self._take("?"):
+            then = self._expression(LOWEST)
+            self._expect(":", "between the two values after '?'")
+            node = If(node, then, self._expression(LOWEST))
+        self._nesting -= 1
+        return node
+
+    def _binary(self, left: Node, strength: int) -> Node:
+        if strength <= AND:
+            word = self._token.text
+            operands = [left]
+            while self._take(word):
+                operands.append(self._expression(strength))
+            return Or(tuple(operands)) if word == "or" else And(tuple(operands))
+        operator = self._next().text
+        negated = operator == "not"
+        if negated:
+            self._expect("in", "after 'not'")
+        right = self._expression(strength)
+        if strength == COMPARISON:
+            self._refuse_chain()
+            if operator in ("in", "not"):
+                member = In(left, right)
+                return Not(member) if negated else member
+            return Compare(_COMPARISONS[operator], left, right)
+        return Arithmetic(_OPERATIONS[operator], left, right)
+
+    def _refuse_chain(self) -> None:
+        if self._token.strength == COMPARISON:
+            self._fail("comparisons do not chain; write 'a < b and b < c', or use parentheses")
+
+    def _prefix(self, minimum: int) -> Node:
+        token = self._next()
+        match token.kind:
+            case "name":
+                return self._inside(self._name(token))
+            case "number":
+                return self._number(token, "")
+            case "constant":
+                return Literal(_constant(token.text))
+            case "end":
+                self._fail("expected a value, found the end", token)
+        match token.text:
+            case "(":
+                node = self._expression(LOWEST)
+                self._expect(")", "to close '('", token)
+                return self._inside(node)
+            case "[":
+                return self._inside(ListOf(self._items("]", token)))
+            case "-":
+                number = self._token
+                if number.kind == "number":
+                    return self._number(self._next(), "-")
+                return Negate(self._expression(UNARY))
+            case "not":
+                return self._not(token, minimum)
+            case "empty":
+                node = Call("is_empty", (self._expression(UNARY),))
+                return self._unambiguous(node, token)
+        self._fail(f"expected a value, found {token.text!r}", token)
+
+    def _not(self, token: Token, minimum: int) -> Node:
+        if self._dialect is Dialect.BARE:
+            if minimum > NOT:
+                self._fail("put 'not ...' into parentheses here", token)
+            return Not(self._expression(NOT))
+        return self._unambiguous(Not(self._expression(UNARY)), token)
+
+    def _unambiguous(self, node: Node, token: Token) -> Node:
+        # JUEL reads '!a == b' as '(!a) == b', most people as '!(a == b)'.
+        if self._token.strength >= COMPARISON:
+            self._fail(
+                f"'{token.text}' is ambiguous before '{self._token.text}'; use parentheses", token
+            )
+        return node
+
+    def _number(self, token: Token, sign: str) -> Node:
+        try:
+            return Literal(read_number(sign + token.text))
+        except ValueError as error:
+            self._fail(str(error), token)
+
+    def _name(self, token: Token) -> Node:
+        name = token.text
+        if opening := self._take("("):
+            arguments = self._items(")", opening)
+            return self._meant(lambda: meaning(name, arguments, self._dialect), token)
+        return Name(name)
+
+    def _meant(self, read: Callable[[], Node], token: Token) -> Node:
+        try:
+            return read()
+        except CallError as error:
+            self._fail(str(error), token)
+
+    def _inside(self, node: Node) -> Node:
+        """What follows a value to take something out of it: `[0]`, `['key']`, `.key`."""
+        while self._token.text in ("[", "."):
+            opening = self._next()
+            if opening.text == "[":
+                key = self._key(opening)
+                self._expect("]", "to close '['", opening)
+                node = _taken(node, key)
+            else:
+                node = self._member(node)
+        return node
+
+    def _key(self, opening: Token) -> Node:
+        return self._expression(LOWEST)
+
+    def _member(self, node: Node) -> Node:
+        token = self._next()
+        if token.kind != "name":
+            self._fail("expected a name after '.'", token)
+        *keys, last = token.text.split(".")
+        for key in keys:
+            node = _taken(node, Literal(key))
+        if self._dialect is Dialect.JUEL and (opening := self._take("(")):
+            holder, arguments = node, self._items(")", opening)
+            return self._meant(lambda: method_call(holder, last, arguments), token)
+        return _taken(node, Literal(last))
+
+    def _items(self, closing: str, opening: Token) -> tuple[Node, ...]:
+        items: list[Node] = []
+        if self._take(closing):
+            return ()
+        while True:
+            if len(items) == MAX_ITEMS:
+                self._fail(f"more than {MAX_ITEMS} items")
+            items.append(self._expression(LOWEST))
+            if not self._take(","):
+                self._expect(closing, f"to close '{opening.text}'", opening)
+                return tuple(items)
+
+    def _next(self) -> Token:
+        token = self._token
+        self._token = next(self._coming, token)
+        return token
+
+    def _take(self, operator: str) -> Token | None:
+        token = self._token
+        return self._next() if token.text == operator and token.kind == "operator" else None
+
+    def _expect(self, operator: str, why: str, opening: Token | None = None) -> Token:
+        if token := self._take(operator):
+            return token
+        at = f" at column {opening.position + 1}" if opening else ""
+        self._fail(f"expected '{operator}' {why}{at}, found {self._found}")
+
+    def _fail(self, message: str, token: Token | None = None) -> NoReturn:
+        raise ExpressionSyntaxError(message, self._text, (token or self._token).position)
+
+
+def _constant(written: str) -> bool | str | None:
+    return unescape(written[1:-1]) if written[0] in "'\"" else CONSTANTS[written]
+
+
+def _taken(node: Node, key: Node) -> Node:
+    """`a['b']` is `a.b`: a map that was written as a whole is in the store by its keys."""
+    match node, key:
+        case Name(name), Literal(str(part)) if _IDENTIFIER.fullmatch(part):
+            return Name(f"{name}.{part}")
+    return Index(node, key)

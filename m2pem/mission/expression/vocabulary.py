@@ -1,0 +1,66 @@
+"""What words and symbols mean in each dialect. The operators of all get one name each here."""
+
+from m2pem.mission.expression.dialect import Dialect
+
+LOWEST, OR, AND, NOT, COMPARISON, SUM, PRODUCT, UNARY = range(8)
+_BINARY = {
+    "or": OR,
+    "and": AND,
+    **dict.fromkeys(("in", "between", "not"), COMPARISON),
+    **dict.fromkeys(("==", "!=", "<", "<=", ">", ">="), COMPARISON),
+    **dict.fromkeys("+-", SUM),
+    **dict.fromkeys("*/", PRODUCT),
+}
+"""How strongly an operator binds after a value; `not` there begins `not in`."""
+
+CONSTANTS = {"true": True, "false": False, "null": None}
+_SYMBOLS = {
+    s: s for s in ("!=", "<=", ">=", "<", ">", "+", "-", "*", "/", "(", ")", "[", "]", ",", ".")
+}
+_TERNARY = {"?": "?", ":": ":"}
+_WORDS = {"and": "and", "or": "or", "not": "not", "in": "in"}
+
+SYMBOLS = {
+    Dialect.BARE: {**_SYMBOLS, **_TERNARY, "==": "=="},
+    Dialect.JUEL: {**_SYMBOLS, **_TERNARY, "==": "==", "&&": "and", "||": "or", "!": "not"},
+    Dialect.FEEL: {**_SYMBOLS, "=": "==", "..": ".."},
+    Dialect.XPATH: {s: s for s in _SYMBOLS if s not in "/[]."} | {"=": "=="},
+}
+WORDS = {
+    Dialect.BARE: _WORDS,
+    Dialect.JUEL: {
+        **_WORDS,
+        "eq": "==",
+        "ne": "!=",
+        "lt": "<",
+        "le": "<=",
+        "gt": ">",
+        "ge": ">=",
+        "div": "/",
+        "empty": "empty",
+    },
+    Dialect.FEEL: {
+        **_WORDS,
+        **{word: word for word in ("between", "else", "every", "if", "satisfies", "some", "then")},
+    },
+    Dialect.XPATH: {"and": "and", "or": "or", "div": "/"},
+}
+UNSUPPORTED = {Dialect.FEEL: ("for", "function", "instance")}
+"""Words that are neither operators nor names."""
+
+
+def _meanings(dialect: Dialect) -> dict[str, tuple[str, str, int]]:
+    """The kind, text and strength of what is written, where it has a meaning of its own."""
+    operators = {**SYMBOLS[dialect], **WORDS[dialect]}
+    return {
+        **{w: ("operator", name, _BINARY.get(name, LOWEST)) for w, name in operators.items()},
+        **{word: ("constant", word, LOWEST) for word in CONSTANTS},
+    }
+
+
+MEANINGS = {dialect: _meanings(dialect) for dialect in SYMBOLS}
+
+
+def is_reserved(name: str, dialect: Dialect) -> bool:
+    """Whether a name can never be read because the dialect gives it a meaning."""
+    return name in MEANINGS[dialect]

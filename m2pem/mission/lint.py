@@ -1,0 +1,195 @@
+"""What is doubtful about a mission as a whole; what is wrong with one element, reading finds.
+
+The findings are warnings, but for elements that no start event can reach and loops that never wait
+and have no end: those load, and are errors of `check`.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+from m2pem.bpmn import collector
+from m2pem.bpmn.graph import unreachable
+from m2pem.bpmn.rules.registry import code
+from m2pem.findings import Finding, Severity
+from m2pem.mission.busy_loops import busy_loops
+from m2pem.mission.components import components
+from m2pem.mission.elements import (
+    Activity,
+    CallActivity,
+    Container,
+    EndEvent,
+    Event,
+    ExclusiveGateway,
+    FlowNode,
+    InclusiveGateway,
+    IntermediateThrowEvent,
+    Process,
+    ReceiveTask,
+    SendTask,
+    SubProcess,
+)
+from m2pem.mission.events import (
+    EventDefinition,
+    Message,
+    MessageEventDefinition,
+    Signal,
+    SignalEventDefinition,
+)
+from m2pem.mission.loops import MultiInstance
+from m2pem.mission.mission import Mission
+from m2pem.mission.names import unwritten
+from m2pem.mission.reach import unreached
+
+
+def lint(
+    mission: Mission,
+    known_names: Iterable[str] = (),
+    service_writes: Mapping[str, Sequence[str]] | None = None,
+    behavior_writes: Mapping[str, Sequence[str]] | None = None,
+) -> list[Finding]:
+    """Look over a whole mission; findings are sorted by file and line.
+
+    `known_names`: names that are written from outside (`--data`). `service_writes`: what each
+    registered service class writes; a class that is not there may write anything.
+    `behavior_writes`: what behaviors write, by their names.
+    """
+    with collector.paused():
+        findings = [
+            *_unreachable(mission),
+            *_undecided_gateways(mission),
+            *_outside_only(mission),
+            *_recursion(mission),
+            *busy_loops(mission, known_names),
+            *unwritten(mission, known_names, service_writes or {}, behavior_writes or {}),
+        ]
+    order = by_file(mission)
+    return sorted(findings, key=lambda finding: (order(finding), finding.line))
+
+
+def by_file(mission: Mission) -> Callable[[Finding], tuple[bool, str]]:
+    """Orders findings by file, the mission's own first."""
+    return lambda finding: (finding.file != mission.file, finding.file)
+
+
+def _warning(
+    mission: Mission, about: FlowNode | Signal | Message, rule: str, said: tuple[str, str]
+) -> Finding:
+    file = mission.file_of(about)
+    return Finding(Severity.WARNING, file, about.line, about.id, rule, *said, code(rule))
+
+
+def _unreachable(mission: Mission) -> Iterator[Finding]:
+    inner = [node for node in mission.nodes if isinstance(node, SubProcess)]
+    containers: list[Container] = [*mission.processes, *inner]
+    for container in containers:
+        for node in unreached(container):
+            yield unreachable(mission.file_of(node), node)
+
+
+def _undecided_gateways(mission: Mission) -> Iterator[Finding]:
+    for node in mission.nodes:
+        if (
+            isinstance(node, ExclusiveGateway | InclusiveGateway)
+            and len(node.outgoing) > 1
+            and all(flow.condition is None for flow in node.outgoing)
+        ):
+            what = (
+                f"it always takes the first, '{node.outgoing[0].id}'"
+                if isinstance(node, ExclusiveGateway) and node.default is None
+                else "it always takes the same ones"
+            )
+            yield _warning(
+                mission,
+                node,
+                "no-conditions",
+                (
+                    f"none of the gateway's {len(node.outgoing)} outgoing flows has a condition; "
+                    f"{what}",
+                    "give the flows conditions",
+                ),
+            )
+
+
+# --- signals and messages -----------------------------------------------------------------------
+
+
+def _outside_only(mission: Mission) -> Iterator[Finding]:
+    thrown: set[tuple[str, str]] = set()
+    caught: dict[tuple[str, str], tuple[Signal | Message, list[FlowNode]]] = {}
+    for node in mission.nodes:
+        if isinstance(node, Activity) and isinstance(node.loop, MultiInstance):
+            for root in _thrown_by_instances(node.loop):
+                thrown.add((type(root).__name__, root.id))
+        for root in _roots(node):
+            key = (type(root).__name__, root.id)
+            if isinstance(node, EndEvent | IntermediateThrowEvent | SendTask):
+                thrown.add(key)
+            else:
+                caught.setdefault(key, (root, []))[1].append(node)
+    for key, (root, catchers) in caught.items():
+        known = (mission.signals if isinstance(root, Signal) else mission.messages).get(root.id)
+        sent = root.from_operator or (known is not None and known.from_operator)
+        if key in thrown or sent or (isinstance(root, Signal) and root.returned):
+            continue
+        what = key[0].lower()
+        waiting = ", ".join(f"'{node.id}'" for node in catchers)
+        yield _warning(
+            mission,
+            root,
+            "outside-only",
+            (
+                f"{waiting} {'wait' if len(catchers) > 1 else 'waits'} for the {what} "
+                f"'{root.name or root.id}', which nothing in the file "
+                f"{'throws' if what == 'signal' else 'sends'}",
+                f'if operators send it, say so: <{what} id="{root.id}" m2pem:from="operator"/>',
+            ),
+        )
+
+
+def _roots(node: FlowNode) -> Iterator[Signal | Message]:
+    if isinstance(node, SendTask | ReceiveTask):
+        if node.message is not None:
+            yield node.message
+    elif isinstance(node, Event):
+        yield from _named(node.definitions)
+
+
+def _thrown_by_instances(loop: MultiInstance) -> Iterator[Signal | Message]:
+    yield from _named(loop.events)
+    for each in loop.complex:
+        yield from _named(each.events)
+
+
+def _named(definitions: Iterable[EventDefinition]) -> Iterator[Signal | Message]:
+    for definition in definitions:
+        if isinstance(definition, SignalEventDefinition):
+            yield definition.signal
+        elif isinstance(definition, MessageEventDefinition):
+            yield definition.message
+
+
+# --- calls --------------------------------------------------------------------------------------
+
+
+def _recursion(mission: Mission) -> Iterator[Finding]:
+    """One warning for each call through which a process can call itself."""
+    calls: dict[Process, list[CallActivity]] = {process: [] for process in mission.processes}
+    for node in mission.nodes:
+        if isinstance(node, CallActivity):
+            calls[node.container.process].append(node)
+    group = components(
+        {process: [call.called for call in inside] for process, inside in calls.items()}
+    )
+    for process, inside in calls.items():
+        for call in inside:
+            if group[call.called] == group[process]:
+                yield _warning(
+                    mission,
+                    call,
+                    "call-recursion",
+                    (
+                        f"process '{process.id}' calls itself through '{call.called.id}'"
+                        if call.called is not process
+                        else f"process '{process.id}' calls itself",
+                        "make sure that a decision before the call can end it",
+                    ),
+                )

@@ -1,0 +1,220 @@
+"""Which names of the data store each process reads and writes, as far as the file says."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from m2pem.bpmn.rules.registry import code
+from m2pem.findings import Finding, Severity
+from m2pem.mission.behavior import Assignment, Behavior, Parameter
+from m2pem.mission.behavior import Mapping as DataMapping
+from m2pem.mission.elements import (
+    Activity,
+    AdHocSubProcess,
+    CallActivity,
+    ComplexGateway,
+    Container,
+    Event,
+    FlowNode,
+    Process,
+    ScriptTask,
+    SendTask,
+    ServiceTask,
+    StartEvent,
+    SubProcess,
+    UserTask,
+)
+from m2pem.mission.events import ConditionalEventDefinition, TimerEventDefinition
+from m2pem.mission.expression import Expression
+from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
+from m2pem.mission.mission import Mission
+from m2pem.mission.near import did_you_mean
+
+
+class Read(NamedTuple):
+    """An expression that is evaluated over a process's data, and where it stands."""
+
+    expression: Expression
+    element: str
+    line: int
+
+
+@dataclass(slots=True)
+class _Store:
+    """What happens to the data of one process; embedded subprocesses share it."""
+
+    reads: list[Read] = field(default_factory=list)
+    written: set[str] = field(default_factory=set)
+    anything: bool = False
+    """Whether something may write any name: a service that nobody described."""
+
+    def has(self, name: str) -> bool:
+        """Whether the name, or a map that holds it, is written."""
+        if self.anything or name in self.written:
+            return True
+        parts = name.split(".")
+        return any(".".join(parts[:count]) in self.written for count in range(1, len(parts)))
+
+
+def unwritten(
+    mission: Mission,
+    known_names: Iterable[str],
+    service_writes: Mapping[str, Sequence[str]],
+    behavior_writes: Mapping[str, Sequence[str]],
+) -> Iterator[Finding]:
+    """A warning for each name that a process reads and nothing writes; it would be null."""
+    within: dict[Container, _Store] = {process: _Store() for process in mission.processes}
+    stores = {process: within[process] for process in mission.processes}
+    everywhere = {*known_names, *mission.associated}
+    for store in stores.values():
+        store.written |= everywhere
+    main = mission.process()
+    called = {node.called for node in mission.nodes if isinstance(node, CallActivity)}
+    for node in mission.nodes:
+        store = within[node.container]
+        if isinstance(node, SubProcess):
+            within[node] = store
+        for mapping in _data_mappings(node):
+            if mapping.source.text not in mapping.source.names:  # a copy may well copy nothing
+                store.reads.append(Read(mapping.source, node.id, mapping.line))
+        store.reads += _reads(node)
+        begins = isinstance(node, StartEvent) and isinstance(node.container, Process)
+        # A condition that begins a process reads the data of the main one.
+        of_main = begins and node.container not in called
+        if isinstance(node, Event):
+            (stores[main] if of_main else store).reads += _conditions(node)
+        store.written |= written_by(node)
+        if isinstance(node, ServiceTask) and node.call is not None:
+            writes = service_writes.get(node.call.service)
+            store.written.update(writes or ())
+            store.anything |= writes is None
+        behavior = getattr(node, "behavior", None)
+        if isinstance(behavior, Behavior):
+            store.written.update(behavior_writes.get(behavior.name, ()))
+        if isinstance(node, CallActivity):
+            _note_mappings(node, store, stores[node.called])
+    shared = {
+        name
+        for store in stores.values()
+        for name in store.written
+        if name in mission.data_stores or name.partition(".")[0] in mission.data_stores
+    }
+    for store in stores.values():
+        store.written |= shared
+    for process, store in stores.items():
+        yield from _findings(mission, process, store)
+
+
+def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Finding]:
+    said: set[tuple[str, str]] = set()
+    for read in store.reads:
+        if read.expression.names <= store.written:
+            continue
+        for name in sorted(name for name in read.expression.names if not store.has(name)):
+            if (read.element, name) in said:
+                continue
+            said.add((read.element, name))
+            reader = mission.elements.get(
+                read.element
+            )  # a call reads what another file's process has
+            yield Finding(
+                Severity.WARNING,
+                mission.file_of(reader if isinstance(reader, FlowNode) else process),
+                read.line,
+                read.element,
+                "unwritten-name",
+                f"'{name}' is read, but nothing in process '{process.id}' writes it; unless "
+                "--data or an operator does, it is null",
+                did_you_mean(name, store.written, "write it in a task before, or pass it in"),
+                code("unwritten-name"),
+            )
+
+
+def _data_mappings(node: FlowNode) -> tuple[DataMapping, ...]:
+    if isinstance(node, Activity | Event):
+        return (*node.data_flow.inputs, *node.data_flow.outputs)
+    return ()
+
+
+def _reads(node: FlowNode) -> Iterator[Read]:
+    if isinstance(node, AdHocSubProcess):
+        for expression in (node.completion, node.active_elements):
+            if expression is not None:
+                yield Read(expression, node.id, node.line)
+    if isinstance(node, ComplexGateway) and node.activation is not None:
+        yield Read(node.activation, node.id, node.line)
+    if isinstance(node, Activity) and node.loop is not None:
+        yield from _loop_reads(node, node.loop)
+    for flow in node.outgoing:
+        if flow.condition is not None:
+            yield Read(flow.condition, flow.id, flow.line)
+    if isinstance(node, ScriptTask | ServiceTask | SendTask) and node.behavior is not None:
+        yield from _parameters(node, node.behavior.parameters)
+    if isinstance(node, ScriptTask) and node.script is not None:
+        for statement in node.script.statements:
+            if isinstance(statement, Assignment):
+                yield Read(statement.expression, node.id, statement.line)
+    elif isinstance(node, ServiceTask) and node.call is not None:
+        yield from _parameters(node, node.call.properties)
+    elif isinstance(node, UserTask) and node.prompt is not None and node.prompt.timeout is not None:
+        yield Read(node.prompt.timeout, node.id, node.line)
+    elif isinstance(node, Event):
+        for definition in node.definitions:
+            if isinstance(definition, TimerEventDefinition):
+                yield Read(definition.expression, node.id, definition.line)
+
+
+def _conditions(node: Event) -> Iterator[Read]:
+    for definition in node.definitions:
+        if isinstance(definition, ConditionalEventDefinition):
+            yield Read(definition.condition, node.id, definition.line)
+
+
+def _loop_reads(node: Activity, loop: StandardLoop | MultiInstance) -> Iterator[Read]:
+    found: list[Expression | None]
+    if isinstance(loop, StandardLoop):
+        found = [loop.condition]
+    else:
+        found = [loop.cardinality, loop.collection, loop.completion]
+        found += [each.condition for each in loop.complex]
+        if loop.output is not None and loop.output.text not in loop.output.names:
+            found.append(loop.output)
+    for expression in found:
+        if expression is not None:
+            yield Read(expression, node.id, node.line)
+
+
+def _parameters(node: FlowNode, parameters: Iterable[Parameter]) -> Iterator[Read]:
+    for parameter in parameters:
+        if isinstance(parameter.value, Expression):
+            yield Read(parameter.value, node.id, parameter.line)
+
+
+def written_by(node: FlowNode) -> set[str]:
+    """The names that a node itself writes, without those of its service or behavior."""
+    written = {mapping.target for mapping in _data_mappings(node)}
+    if isinstance(node, Activity) and node.loop is not None:
+        written.add(LOOP_COUNTER)
+        if isinstance(node.loop, MultiInstance):
+            written |= {*INSTANCE_COUNTS, node.loop.item, node.loop.output_item}
+            written.add(node.loop.output_collection)
+    if isinstance(node, ScriptTask) and node.script is not None:
+        for statement in node.script.statements:
+            if isinstance(statement, Assignment):
+                written.add(statement.key)
+    elif isinstance(node, UserTask) and node.prompt is not None:
+        written.add(node.prompt.store)
+    elif isinstance(node, ComplexGateway):
+        written |= {"activationCount", "waitingForStart"}
+        written.update(flow.local_id for flow in node.incoming)
+    elif isinstance(node, CallActivity):
+        written.update(mapping.target for mapping in node.mappings.outputs)
+    return written
+
+
+def _note_mappings(call: CallActivity, caller: _Store, called: _Store) -> None:
+    for mapping in call.mappings.inputs:
+        caller.reads.append(Read(mapping.source, call.id, mapping.line))
+        called.written.add(mapping.target)
+    for mapping in call.mappings.outputs:
+        called.reads.append(Read(mapping.source, call.id, mapping.line))

@@ -1,0 +1,225 @@
+"""A scripted outside world: what operators, services and vehicles do in a rehearsal.
+
+An answers file (docs/rehearsal.md) lists for each element what happens at the first visit, the
+second, and so on. A visit is counted when its record is committed, and known by the id of its
+prompt, service or behavior from then on: so two instances of one element take their entries first
+come, first served, and a run that is taken up after a crash goes on with the next ones.
+"""
+
+import asyncio
+import logging
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from m2pem.api.clock import Clock
+from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId
+from m2pem.engine.inputs import MessageReceived, SignalReceived
+from m2pem.engine.records import (
+    BehaviorRequested,
+    InputDeferred,
+    MessageThrown,
+    PromptOpened,
+    Record,
+    RunResumed,
+    ServiceRequested,
+    SignalThrown,
+)
+from m2pem.errors import OperatorError
+from m2pem.executive.script import ScriptedBehavior, ScriptedService
+from m2pem.findings import Finding
+from m2pem.fleet.yaml_source import YamlSource
+from m2pem.mission.mission import Mission
+from m2pem.rehearsal.answers_check import check
+from m2pem.rehearsal.answers_file import AnswersModel, TimedEntry, read_answers
+
+log = logging.getLogger("m2pem.answers")
+
+BY_SCRIPT = "answers file"
+"""Who the journal says has answered a prompt or sent a signal that is scripted."""
+
+BY_DEFAULT = "default"
+"""Who has taken the first decision of a prompt without a script."""
+
+US_PER_S = 1_000_000
+
+
+class Answers:
+    """Implements `m2pem.executive.script.Script`; made by `load_answers`.
+
+    Each run counts its own visits.
+    """
+
+    def __init__(self, model: AnswersModel | None = None, source: YamlSource | None = None) -> None:
+        self.model = model or AnswersModel()
+        self.source = source or YamlSource("")
+        self._visits: dict[tuple[str, str, str], dict[str, int]] = {}
+        self._sent: Counter[tuple[str, str, str]] = Counter()
+        self._deferred: Counter[tuple[str, str, str]] = Counter()
+        self._to_send = len(self.model.signals) + len(self.model.messages)
+
+    # --- visits ---------------------------------------------------------------------------------
+
+    def seen(self, run: str, records: Sequence[Record]) -> None:
+        """Count visits and what was sent, in the order of the journal."""
+        for record in records:
+            match record:
+                case PromptOpened():
+                    self._visit(run, "answers", record.element, record.prompt)
+                case ServiceRequested():
+                    key = self._service(record.element, record.name)
+                    self._visit(run, "services", key, record.service)
+                case BehaviorRequested():
+                    self._visit(run, "behaviors", record.element, record.behavior)
+                case SignalThrown(by=by, signal=signal) if by == BY_SCRIPT:
+                    self._sent[run, "signals", signal] += 1
+                case MessageThrown(by=by, message=message) if by == BY_SCRIPT:
+                    self._sent[run, "messages", message] += 1
+                case InputDeferred(input=SignalReceived(by=by, signal=signal)) if by == BY_SCRIPT:
+                    self._deferred[run, "signals", signal] += 1
+                case InputDeferred(input=MessageReceived(by=by, message=name)) if by == BY_SCRIPT:
+                    self._deferred[run, "messages", name] += 1
+                case RunResumed():
+                    # They are thrown now, with records of their own.
+                    for late in [late for late in self._deferred if late[0] == run]:
+                        del self._deferred[late]
+                case _:
+                    pass
+
+    def service(self, run: str, element: str, name: str, service: str) -> ScriptedService | None:
+        """What a service task does on this visit; see `Script`."""
+        key = self._service(element, name)
+        place = self._visit(run, "services", key, service)
+        if place is None:
+            return None
+        entry = self.model.services[key][place]
+        return ScriptedService(entry.after, entry.write, entry.error or "")
+
+    def behavior(self, run: str, element: str, behavior: str) -> ScriptedBehavior | None:
+        """How a behavior ends on this visit; see `Script`."""
+        place = self._visit(run, "behaviors", element, behavior)
+        if place is None:
+            return None
+        entry = self.model.behaviors[element][place]
+        return ScriptedBehavior(entry.after, entry.end, entry.error or "")
+
+    def answer(self, run: str, element: str, prompt: str) -> str | None:
+        """The decision for a prompt of an element; None: nothing is scripted (any more)."""
+        place = self._visit(run, "answers", element, prompt)
+        return None if place is None else self.model.answers[element][place]
+
+    def _service(self, element: str, name: str) -> str:
+        """A service is scripted by its element, else by its class."""
+        return element if element in self.model.services else name
+
+    def _visit(self, run: str, section: str, key: str, visit: str) -> int | None:
+        """The place in its list of a visit, old or new; None when the list is used up."""
+        entries: dict[str, list[object]] = getattr(self.model, section)
+        if key not in entries:
+            return None
+        places = self._visits.setdefault((run, section, key), {})
+        # No more visits are remembered than there are entries: the run may last for months.
+        if visit not in places and len(places) < len(entries[key]):
+            places[visit] = len(places)
+        return places.get(visit)
+
+    # --- the operator and the world outside -----------------------------------------------------
+
+    @property
+    def to_send(self) -> int:
+        """How many signals and messages are still to come."""
+        return self._to_send
+
+    async def act(
+        self,
+        control: MissionControl,
+        run: RunId,
+        clock: Clock,
+        *,
+        default_first_decision: bool,
+    ) -> None:
+        """Answer prompts and send what is to be sent, until cancelled or the executive ends.
+
+        `default_first_decision`: a prompt without a script takes its first decision; else it is
+        left to an operator.
+        """
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self._send(control, run, clock), name="scripted signals")
+            group.create_task(
+                self._answer_prompts(control, run, default_first_decision),
+                name="scripted answers",
+            )
+
+    async def _answer_prompts(
+        self, control: MissionControl, run: RunId, default_first_decision: bool
+    ) -> None:
+        asked: set[str] = set()
+        while True:
+            notices = control.subscribe(run)
+            try:
+                async for notice in notices:
+                    if isinstance(notice, OpenPrompt) and notice.prompt not in asked:
+                        asked.add(notice.prompt)
+                        await self._answer(control, notice, default_first_decision)
+                    elif isinstance(notice, PromptClosed):
+                        asked.discard(notice.prompt)
+            except OperatorError:  # we were too slow; standing prompts come first in the next one
+                continue
+            return
+
+    async def _answer(
+        self, control: MissionControl, prompt: OpenPrompt, default_first_decision: bool
+    ) -> None:
+        by = BY_SCRIPT
+        decision = self.answer(prompt.run, prompt.element, prompt.prompt)
+        if decision is None:
+            if not default_first_decision:
+                return
+            by = BY_DEFAULT
+            decision = prompt.decisions[0].value
+        try:
+            await control.answer(prompt.run, prompt.prompt, decision, by=by)
+        except OperatorError as error:
+            # The first decision comes too late where others end the task; nobody scripted it.
+            level = logging.DEBUG if by == BY_DEFAULT else logging.WARNING
+            log.log(level, "%s: the answer %r: %s", prompt.element, decision, error)
+
+    async def _send(self, control: MissionControl, run: RunId, clock: Clock) -> None:
+        summary = next(each for each in await control.runs() if each.run == run)
+        skip = self._sent + self._deferred
+        for kind, entry in self._timed():
+            if skip[run, kind, entry.id] > 0:
+                skip[run, kind, entry.id] -= 1
+            else:
+                await clock.sleep_until(summary.started_us + round(entry.at * US_PER_S))
+                await self._send_one(control, run, kind, entry)
+            self._to_send -= 1
+
+    def _timed(self) -> list[tuple[str, TimedEntry]]:
+        """Signals and messages by time; at the same time, in the order of the file."""
+        events = [("signals", entry) for entry in self.model.signals]
+        events += [("messages", entry) for entry in self.model.messages]
+        return sorted(events, key=lambda event: event[1].at)
+
+    async def _send_one(
+        self, control: MissionControl, run: RunId, kind: str, entry: TimedEntry
+    ) -> None:
+        send = control.signal if kind == "signals" else control.message
+        try:
+            await send(entry.id, run=run, data=entry.data, by=BY_SCRIPT)
+        except OperatorError as error:
+            log.warning("scripted %s %s at %g s: %s", kind[:-1], entry.id, entry.at, error)
+
+
+def load_answers(answers: str | Path | bytes) -> Answers:
+    """Read an answers file, or its text.
+
+    Raises:
+        AnswersError: with every finding.
+    """
+    return Answers(*read_answers(answers if isinstance(answers, bytes) else Path(answers)))
+
+
+def check_answers(answers: Answers, mission: Mission) -> list[Finding]:
+    """What in the answers does not fit the mission: elements, decisions, signals, messages."""
+    return check(answers.model, answers.source, mission)

@@ -1,0 +1,323 @@
+"""Rehearses a mission: the whole executive on simulated vehicles, in virtual time.
+
+    result = rehearse(Path("mission.bpmn"), load_fleet("fleet.yaml"), plugins=PluginManager())
+
+The same mission, fleet and answers give the same records, byte for byte.
+"""
+
+import asyncio
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from m2pem.api.authoring import MissionSource
+from m2pem.api.control import (
+    RunStatus,
+    RunSummary,
+    SimulationResult,
+    StampedRecord,
+    TelemetrySample,
+)
+from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.engine.inputs import GiveUp
+from m2pem.engine.records import Record, ServiceEnded, ServiceWithdrawn
+from m2pem.engine.state import BehaviorPhase
+from m2pem.engine.state import RunStatus as EngineStatus
+from m2pem.errors import AnswersError
+from m2pem.executive.clock import US_PER_S, VirtualClock, run_virtual
+from m2pem.executive.executive import Executive
+from m2pem.executive.loading import load_source
+from m2pem.executive.runner import Runner
+from m2pem.executive.script import ScriptedBehavior, ScriptedService
+from m2pem.findings import has_errors
+from m2pem.fleet.check import DETECTOR_SERVICE
+from m2pem.fleet.fleet import Fleet
+from m2pem.journal.base import Entry
+from m2pem.journal.memory import MemoryJournal
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
+from m2pem.plugins import PluginManager
+from m2pem.rehearsal.answers import Answers, check_answers, load_answers
+from m2pem.rehearsal.no_fleet import NO_FLEET, refuse_commands
+from m2pem.rehearsal.sampling import Sampler
+from m2pem.simulation.arbiters import SimArbiter
+
+START_US = 1_767_225_600_000_000
+"""2026-01-01T00:00:00Z, when a rehearsal begins unless said otherwise."""
+
+MAX_STEPS = 10_000_000
+
+SEARCH_US = 3600 * US_PER_S
+"""How long a vehicle whose motion has no end may go on looking for something to detect."""
+
+SETTINGS = {"telemetry_hz": 0, "state": ""}
+"""Of every simulated resource: telemetry tells of changes alone, and nothing outlives the run."""
+
+EXIT_STATUS = {
+    RunStatus.COMPLETED: 0,
+    RunStatus.TERMINATED: 0,
+    RunStatus.FAILED: 1,
+    RunStatus.STOPPED: 130,
+}
+
+OnRecord = Callable[[StampedRecord], None]
+
+
+@dataclass(frozen=True, slots=True)
+class RehearsalResult(SimulationResult):
+    """`records` is empty when they were told to `on_record` instead."""
+
+    @property
+    def exit_status(self) -> int:
+        """What `m2pem simulate` ends with (docs/cli.md)."""
+        return EXIT_STATUS[self.summary.status]
+
+
+def rehearse(
+    mission: MissionSource | Mission,
+    fleet: Fleet | None,
+    *,
+    plugins: PluginManager,
+    process: str | None = None,
+    data: Mapping[str, Value] | None = None,
+    answers: Answers | Path | str | bytes | None = None,
+    start_us: int = START_US,
+    max_steps: int = MAX_STEPS,
+    on_record: OnRecord | None = None,
+    observed: bool = True,
+    search_path: Sequence[Path] = (),
+    telemetry_every_s: float | None = None,
+) -> RehearsalResult:
+    """Run a mission to its end on a virtual clock that begins at `start_us` (since the epoch).
+
+    `mission`: a path, a `file:` or `http:` URL, BPMN bytes, or one that was loaded. `fleet` None:
+    for a mission that commands no resource. `answers`: a file, its text as bytes, or one that was
+    loaded and has not been used. `on_record` gets each record as soon as it is committed; what it
+    raises ends the rehearsal. `observed`: whether observers among the plugins are told.
+    `search_path`: folders of processes that the mission calls. `telemetry_every_s`: of mission
+    time, how often the result tells where the vehicles are; None: never.
+
+    Raises:
+        MissionError: the mission cannot be loaded, does not fit the fleet, or needs one.
+        AnswersError: the answers cannot be used, or do not fit the mission.
+        FleetError: the fleet cannot be simulated.
+    """
+    loaded = mission if isinstance(mission, Mission) else load_source(mission, search_path)
+    if fleet is None:
+        refuse_commands(loaded)
+        fleet = NO_FLEET
+    script = answers if isinstance(answers, Answers) else _load(answers)
+    _refuse_misfits(script, loaded)
+    collected: list[StampedRecord] = []
+    rehearsal = _Rehearsal(
+        loaded,
+        fleet,
+        plugins,
+        script,
+        max_steps,
+        on_record or collected.append,
+        observed,
+        telemetry_every_s,
+    )
+    summary = run_virtual(lambda clock: rehearsal.run(clock, process, data), start_us)
+    return RehearsalResult(
+        summary, tuple(collected), tuple(rehearsal.samples), tuple(loaded.files())
+    )
+
+
+async def rehearse_async(
+    mission: MissionSource | Mission, fleet: Fleet | None, **options: Any
+) -> RehearsalResult:
+    """As `rehearse`, with its options, in a thread: the event loop goes on meanwhile.
+
+    `on_record` is called in that thread. A rehearsal whose caller is cancelled goes on to its end,
+    or to `max_steps`.
+    """
+    return await asyncio.to_thread(rehearse, mission, fleet, **options)
+
+
+def _load(answers: Path | str | bytes | None) -> Answers:
+    return Answers() if answers is None else load_answers(answers)
+
+
+def _refuse_misfits(answers: Answers, mission: Mission) -> None:
+    findings = check_answers(answers, mission)
+    if has_errors(findings):
+        raise AnswersError(f"{answers.source.file} does not fit {mission.file}", findings)
+
+
+class _Rehearsal:
+    """One run, from its beginning to its end."""
+
+    def __init__(
+        self,
+        mission: Mission,
+        fleet: Fleet,
+        plugins: PluginManager,
+        answers: Answers,
+        max_steps: int,
+        on_record: OnRecord,
+        observed: bool,
+        telemetry_every_s: float | None,
+    ) -> None:
+        self.samples: Sequence[TelemetrySample] = ()
+        self._every_s = telemetry_every_s
+        self._mission = mission
+        self._fleet = fleet
+        self._plugins = plugins
+        self._answers = answers
+        self._script = _Script(answers)
+        self._max_steps = max_steps
+        self._observed = observed
+        self._on_record = on_record
+        self._quiet_since_us: int | None = None
+
+    async def run(
+        self, clock: VirtualClock, process: str | None, data: Mapping[str, Value] | None
+    ) -> RunSummary:
+        journal = _TellingJournal(self._on_record)
+        executive = Executive(
+            self._fleet,
+            journal,
+            self._plugins,
+            clock,
+            simulated=True,
+            settings=SETTINGS,
+            script=self._script,
+            watch_links=False,
+            max_steps=self._max_steps,
+            observed=self._observed,
+        )
+        process_id = executive.admit(self._mission, process, data)
+        async with executive:
+            run = await executive.begin(self._mission, process_id, data, "")
+            runner = executive.runner(run)
+            sampler = self._sampler(executive, clock)
+
+            def before_a_jump(ahead_s: float | None) -> bool:
+                if self._give_up(executive, runner, ahead_s):
+                    return True
+                if sampler is not None and ahead_s is not None:
+                    sampler.before(clock.now_us() + round(ahead_s * US_PER_S))
+                return False
+
+            clock.when_idle(before_a_jump)
+            acting = asyncio.ensure_future(
+                self._answers.act(executive.control, run, clock, default_first_decision=True)
+            )
+            ending = asyncio.ensure_future(executive.control.wait(run))
+            try:
+                await asyncio.wait(
+                    (acting, ending, journal.broken), return_when=asyncio.FIRST_COMPLETED
+                )
+                for first in (journal.broken, acting):
+                    if first.done():
+                        first.result()
+                summary = await ending
+                if sampler is not None:
+                    sampler.at(clock.now_us())
+                    self.samples = sampler.samples
+                return summary
+            finally:
+                acting.cancel()
+                ending.cancel()
+
+    def _sampler(self, executive: Executive, clock: VirtualClock) -> Sampler | None:
+        if self._every_s is None:
+            return None
+
+        def states_at(time_us: int) -> Iterator[VehicleState | PayloadState]:
+            return chain.from_iterable(
+                each.broadcast.all_at(time_us) for each in _arbiters(executive)
+            )
+
+        return Sampler(self._every_s, clock.now_us(), states_at)
+
+    # --- nothing can happen any more ------------------------------------------------------------
+
+    def _give_up(self, executive: Executive, runner: Runner, ahead_s: float | None) -> bool:
+        """Called when nothing is ready: end the run if nothing that is scheduled can change it."""
+        if runner.run.state.status is not EngineStatus.RUNNING:
+            return False
+        if self._expects(executive, runner):
+            self._quiet_since_us = None
+            return False
+        if ahead_s is not None and any(arbiter.searching for arbiter in _arbiters(executive)):
+            now_us = executive.clock.now_us()
+            if self._quiet_since_us is None:
+                self._quiet_since_us = now_us
+            if now_us + ahead_s * US_PER_S <= self._quiet_since_us + SEARCH_US:
+                return False
+        runner.post(GiveUp("nothing that is scheduled can happen any more"))
+        return True
+
+    def _expects(self, executive: Executive, runner: Runner) -> bool:
+        state = runner.run.state
+        return (
+            runner.run.next_due_us is not None
+            or self._answers.to_send > 0
+            or bool(self._script.ending)
+            or any(
+                behavior.phase is BehaviorPhase.CANCELLING for behavior in state.behaviors.values()
+            )
+            or executive.arbiters.teams.expects
+            or any(arbiter.expects for arbiter in _arbiters(executive))
+        )
+
+
+def _arbiters(executive: Executive) -> list[SimArbiter]:
+    return [each for each in executive.arbiters.by_name.values() if isinstance(each, SimArbiter)]
+
+
+class _Script:
+    """The answers; and a service without one completes, except a Detector, which waits.
+
+    `ending`: the services under way that will end by themselves.
+    """
+
+    def __init__(self, answers: Answers) -> None:
+        self._answers = answers
+        self.ending: set[str] = set()
+
+    def seen(self, run: str, records: Sequence[Record]) -> None:
+        self._answers.seen(run, records)
+        for record in records:
+            if isinstance(record, ServiceEnded | ServiceWithdrawn):
+                self.ending.discard(record.service)
+
+    def service(self, run: str, element: str, name: str, service: str) -> ScriptedService | None:
+        scripted = self._answers.service(run, element, name, service)
+        if scripted is None and name != DETECTOR_SERVICE:
+            scripted = ScriptedService()
+        if scripted is not None:
+            self.ending.add(service)
+        return scripted
+
+    def behavior(self, run: str, element: str, behavior: str) -> ScriptedBehavior | None:
+        return self._answers.behavior(run, element, behavior)
+
+
+class _TellingJournal(MemoryJournal):
+    """Keeps nothing, and tells of each record when it is committed.
+
+    `broken`: is done, with the error, when the listener raised; it is told nothing after that.
+    """
+
+    def __init__(self, on_record: OnRecord) -> None:
+        super().__init__(keep=1)
+        self._on_record = on_record
+        self.broken: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+    async def append(self, entries: Sequence[Entry]) -> None:
+        await super().append(entries)
+        if self.broken.done():
+            return
+        try:
+            for entry in entries:
+                for place, record in enumerate(entry.records):
+                    seq = entry.seq + place
+                    self._on_record(StampedRecord(entry.run, seq, entry.t_us / US_PER_S, record))
+        except Exception as error:  # it is the caller's, who gets it back
+            self.broken.set_exception(error)

@@ -1,0 +1,406 @@
+"""The simulated arbiter: commands behaviors on vehicles and payloads that exist only in it."""
+
+import asyncio
+import json
+import math
+from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from m2pem.api.arbiter import (
+    ArbiterContext,
+    BehaviorId,
+    BehaviorReport,
+    BehaviorRequest,
+    Connection,
+    Limits,
+    ResolvedValue,
+)
+from m2pem.api.epochs import Epochs
+from m2pem.api.telemetry import Detection, PayloadState, VehicleState
+from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.simulation.agenda import Agenda
+from m2pem.simulation.broadcast import DEFAULT_HZ, Broadcast
+from m2pem.simulation.conductor import Conductor
+from m2pem.simulation.detectors import Detectors
+from m2pem.simulation.effects import Effect
+from m2pem.simulation.executions import Body, Execution, Strike
+from m2pem.simulation.faults import Fault, FaultList
+from m2pem.simulation.frame import Frame
+from m2pem.simulation.launch import Launcher
+from m2pem.simulation.links import Links
+from m2pem.simulation.memory import Memory
+from m2pem.simulation.payloads import SimPayload
+from m2pem.simulation.reach import Reach
+from m2pem.simulation.settings import own_faults, read_settings
+from m2pem.simulation.statefile import StateFile
+from m2pem.simulation.track import Warp
+from m2pem.simulation.vehicles import SimVehicle, carrier_of
+
+LOST_AFTER_S = 3.0
+
+
+class SimArbiter:
+    """Implements `m2pem.api.AdjustingArbiter` and `SightedArbiter`; settings: docs/simulation.md.
+
+    `telemetry_hz`: of every resource that does not say its own; 0 tells of changes alone, so that
+    nothing happens while nothing moves, and then links can't be watched by silence.
+
+    Beside the protocol, tests and rehearsals look at `effects`, `expects`, `searching` and
+    `broadcast`, and use `script`, `inject`, `lose_link` and `restore_link`.
+    """
+
+    def __init__(
+        self,
+        connections: Mapping[ResourceId, Connection],
+        context: ArbiterContext,
+        telemetry_hz: float | None = None,
+    ) -> None:
+        self._connections = dict(connections)
+        self._clock = context.clock
+        self._logger = context.logger
+        self._context = context
+        now_us = context.clock.now_us()
+        self._frame = frame = Frame(context.origin)
+        self._settings = {
+            resource: read_settings(connection, context.origin)
+            for resource, connection in connections.items()
+        }
+        self._bodies: dict[ResourceId, Body] = {}
+        for resource, connection in connections.items():
+            settings = self._settings[resource]
+            if "/" in resource:
+                self._bodies[resource] = SimPayload(connection, settings, now_us)
+            else:
+                place = sum("/" not in other for other in self._bodies)
+                self._bodies[resource] = SimVehicle(connection, settings, frame, place, now_us)
+        default_hz = DEFAULT_HZ if telemetry_hz is None else telemetry_hz
+        self._rates_hz = {
+            resource: default_hz if settings.telemetry_hz is None else settings.telemetry_hz
+            for resource, settings in self._settings.items()
+        }
+        self._agenda = Agenda(context.clock, context.logger)
+        self._links = Links()
+        self._memory = Memory()
+        self.broadcast = Broadcast(self._bodies, self._rates_hz, frame, self._agenda, self._audible)
+        self._launcher = Launcher(self._connections, context, frame, self._bodies)
+        self._conductor = Conductor(
+            agenda=self._agenda,
+            memory=self._memory,
+            bodies=self._bodies,
+            launcher=self._launcher,
+            links=self._links,
+            logger=context.logger,
+            changed=self._moved,
+            lose_link=self._lose_link,
+        )
+        self._reach = Reach(
+            self._links, self._agenda, self._memory, self._conductor, self._lost_after_s
+        )
+        self._detectors = Detectors(
+            self._bodies, frame, self._agenda, self._detected, self._keep_found
+        )
+        self._epochs = Epochs()
+        self._faults = {
+            resource: FaultList(own_faults(resource, self._settings)) for resource in self._bodies
+        }
+        self._scripts: dict[BehaviorId, Strike] = {}
+        self._connected = False
+        self._late: list[tuple[SimPayload, Detection]] = []
+        self._listener: asyncio.Task[None] | None = None
+
+    # --- the protocol ---------------------------------------------------------------------------
+
+    def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+        """What the resource can do."""
+        return self._launcher.catalogue(resource)
+
+    def limits(self, resource: ResourceId) -> Limits:
+        """The bounds that hold for the resource: how long it takes to stop from full speed."""
+        stopping_s = 0.0
+        if "/" not in resource:
+            stopping_s = self._settings[resource].kinematics.stopping_s
+        silent = self._rates_hz[resource] == 0
+        return Limits(
+            lost_after_s=math.inf if silent else self._lost_after_s(resource),
+            hold_within_s=stopping_s + 1.0,
+            cancel_timeout_s=stopping_s + 5.0,
+        )
+
+    def addresses(self, resource: ResourceId) -> Sequence[str]:
+        """A vehicle is what its state file says; without one it exists only here."""
+        state = self._settings[resource].state
+        return [f"{Path(state).resolve()}: {resource}"] if state else []
+
+    async def connect(self) -> None:
+        """Begin to simulate. What a state file knows goes on as if it had never been left.
+
+        Raises:
+            StateFileError: a state file cannot be used.
+        """
+        now_us = self._clock.now_us()
+        began_us, known = self._open_files(now_us)
+        self._detectors.begin(began_us, lambda payload: known.get(payload, ()))
+        self._links.muted = True
+        self._agenda.run_due(now_us)
+        self._links.muted = False
+        self.broadcast.begin(now_us)
+        for payload, detection in self._late:
+            self.broadcast.tell(payload, now_us, (detection,))
+        self._late.clear()
+        self._connected = True
+        self._agenda.wake()
+        if self._detectors.strangers:
+            self._listener = asyncio.get_running_loop().create_task(self._listen())
+
+    async def start(self, request: BehaviorRequest) -> None:
+        """Start a behavior; see `BehaviorRequest`."""
+        now_us = self._catch_up()
+        if not self._epochs.admit(request.id, request.epoch):
+            self._logger.warning("start of %s ignored: epoch %d is past", request.id, request.epoch)
+            return
+        known = self._memory.executions.get(request.id)
+        if known is not None and (not known.ended or request.epoch <= known.epoch):
+            known.epoch = max(known.epoch, request.epoch)
+            return
+        execution = Execution(
+            request.id, request.epoch, request.behavior, request.resources, Warp(now_us)
+        )
+        execution.number = known.number if known is not None else 0
+        self._memory.register(execution)
+        self._reach.command(
+            execution, "start", lambda at_us: self._start(execution, request, at_us), now_us
+        )
+
+    async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
+        """End a behavior: a vehicle slows down first, a payload ends at once."""
+        now_us = self._catch_up()
+        if not self._epochs.admit(behavior, epoch):
+            self._logger.warning("cancel of %s ignored: epoch %d is past", behavior, epoch)
+            return
+        execution = self._memory.executions.get(behavior)
+        if execution is None or execution.ended:
+            return
+        self._reach.command(
+            execution, "cancel", lambda at_us: self._conductor.cancel(execution, at_us), now_us
+        )
+
+    async def adjust(
+        self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
+    ) -> None:
+        """Go on at another `speed`, in m/s; other parameters stay."""
+        now_us = self._catch_up()
+        speed = parameters.get("speed")
+        execution = self._memory.executions.get(behavior)
+        if not self._epochs.admit(behavior, epoch):
+            self._logger.warning("adjust of %s ignored: epoch %d is past", behavior, epoch)
+        elif execution is None or execution.ended:
+            return
+        elif isinstance(speed, int | float) and speed > 0:
+            wished = float(speed)
+            self._reach.command(
+                execution,
+                "adjust",
+                lambda at_us: self._conductor.adjust(execution, wished, at_us),
+                now_us,
+            )
+
+    async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
+        """The report that holds now; UNKNOWN, with number 0, if the behavior is not known."""
+        self._catch_up()
+        execution = self._memory.executions.get(behavior)
+        if execution is None or execution.last is None:
+            reason = "the simulation knows no such behavior"
+            return BehaviorReport(behavior, 0, BehaviorState.UNKNOWN, reason=reason)
+        return replace(execution.last, held=any(part.body.held for part in execution.parts))
+
+    async def hold(self, resource: ResourceId) -> None:
+        """Stop the resource, keeping its behavior. A vehicle brakes on its path."""
+        self._turn(resource, "hold")
+
+    async def resume(self, resource: ResourceId) -> None:
+        """Let the resource go on."""
+        self._turn(resource, "resume")
+
+    def reports(self) -> AsyncIterator[BehaviorReport]:
+        """Reports as they come, for one reader, until `close`."""
+        return self._links.reports.read()
+
+    def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
+        """States as they come, for one reader, until `close`; a slow one misses old states."""
+        return self.broadcast.states.read()
+
+    async def close(self) -> None:
+        """Stop simulating. Without a state file the vehicles are gone."""
+        await self._agenda.close()
+        listener, self._listener = self._listener, None
+        if listener is not None:
+            listener.cancel()
+            await asyncio.gather(listener, return_exceptions=True)
+        self._links.reports.close()
+        self.broadcast.states.close()
+        for file in dict.fromkeys(self._memory.files.values()):
+            file.close()
+        self._memory.files = {}
+
+    def sight(self, resource: ResourceId) -> VehicleState | None:
+        """How a vehicle is now, if its link is up."""
+        body = self._bodies.get(resource)
+        if not isinstance(body, SimVehicle) or not self._audible(resource):
+            return None
+        return body.state(self._catch_up(), self._frame)
+
+    # --- for tests and rehearsals ---------------------------------------------------------------
+
+    @property
+    def effects(self) -> list[Effect]:
+        """What physically happened, oldest first; the newest 10,000."""
+        return list(self._memory.effects)
+
+    @property
+    def expects(self) -> bool:
+        """Whether anything is to come by itself: a behavior's end, a planned detection, a fault.
+
+        Not what may go on for ever: motion without an end, batteries that drain, telemetry.
+        """
+        return self._agenda.expected > 0
+
+    @property
+    def searching(self) -> bool:
+        """Whether a vehicle at work may yet come near something that its detector finds."""
+        return self._detectors.searching
+
+    def script(self, behavior: BehaviorId, after_s: float, end: str, error: str = "") -> None:
+        """Say, before it starts, how a behavior ends, instead of by its motion.
+
+        `end`: "failed", "succeeded", "stalled" or "lost". A pause does not count in `after_s`.
+        """
+        if end not in ("failed", "succeeded", "stalled", "lost"):
+            raise ValueError(f"a behavior ends failed, succeeded, stalled or lost, not {end!r}")
+        self._scripts[behavior] = Strike(after_s, end, error, sole=True)
+
+    def inject(self, resource: ResourceId, fault: Fault) -> None:
+        """Let a fault strike the next behaviors of a resource."""
+        self._faults[resource].add(fault)
+
+    def lose_link(self, resource: ResourceId) -> None:
+        """Cut the link to a vehicle and its payloads. It goes on with what it does; its behaviors
+        are LOST, and it stops, when its `lost_after` is over."""
+        self._reach.lose(carrier_of(resource), self._catch_up())
+
+    def restore_link(self, resource: ResourceId) -> None:
+        """Mend the link: what could not be said or commanded meanwhile is now."""
+        now_us = self._catch_up()
+        vehicle = carrier_of(resource)
+        self._links.mend(vehicle, now_us)
+        for body in self._of_vehicle(vehicle):
+            self.broadcast.tell(body, now_us)
+
+    # --- behind it ------------------------------------------------------------------------------
+
+    def _catch_up(self) -> int:
+        now_us = self._clock.now_us()
+        self._agenda.run_due(now_us)
+        return now_us
+
+    def _start(self, execution: Execution, request: BehaviorRequest, now_us: int) -> None:
+        execution.watch = Warp(now_us)
+        strike = self._scripts.pop(request.id, None)
+        fault = self._take_fault(request) if strike is None else None
+        if fault is not None and fault.kind == "reject":
+            reason = "as the simulation was told"
+            self._conductor.reject(execution, fault.error or "REJECTED", reason, now_us)
+            return
+        if fault is not None:
+            end = {"fail": "failed", "stall": "stalled", "lose_link": "lose_link"}[fault.kind]
+            strike = Strike(fault.after_s, end, fault.error)
+        self._conductor.start(execution, request, strike, now_us)
+
+    def _take_fault(self, request: BehaviorRequest) -> Fault | None:
+        for resource in request.resources:
+            if resource in self._faults:
+                fault = self._faults[resource].take(request.behavior)
+                if fault is not None:
+                    return fault
+        return None
+
+    def _turn(self, resource: ResourceId, command: str) -> None:
+        now_us = self._catch_up()
+        if resource not in self._bodies:
+            self._logger.warning("%s of %s ignored: it is not simulated here", command, resource)
+            return
+        act = self._conductor.hold if command == "hold" else self._conductor.resume
+        vehicle = carrier_of(resource)
+        if self._links.up(vehicle):
+            act(resource, now_us)
+        else:
+            # Of hold and resume the newest counts.
+            self._links.defer(vehicle, f"turn {resource}", lambda at_us: act(resource, at_us))
+
+    def _lose_link(self, vehicle: ResourceId, now_us: int) -> None:
+        self._reach.lose(vehicle, now_us)
+
+    def _lost_after_s(self, resource: ResourceId) -> float:
+        own = self._connections[resource].lost_after_s if resource in self._connections else None
+        return LOST_AFTER_S if own is None else own
+
+    def _of_vehicle(self, vehicle: ResourceId) -> Iterable[Body]:
+        return [body for body in self._bodies.values() if carrier_of(body.id) == vehicle]
+
+    def _audible(self, resource: ResourceId) -> bool:
+        return self._links.up(carrier_of(resource))
+
+    def _moved(self, body: Body, now_us: int) -> None:
+        self.broadcast.tell(body, now_us)
+        if isinstance(body, SimVehicle):
+            self._detectors.moved(body.id, now_us)
+
+    def _detected(self, payload: SimPayload, detection: Detection, now_us: int) -> None:
+        if not self._connected:
+            # What was found while nobody was there is told when somebody is.
+            self._late.append((payload, detection))
+        elif self._links.up(payload.carrier):
+            self.broadcast.tell(payload, now_us, (detection,))
+        else:
+            self._links.defer(
+                payload.carrier,
+                f"detection {payload.id} {detection.time_us} {detection.type}",
+                lambda at_us: self._detected(payload, detection, at_us),
+            )
+
+    async def _listen(self) -> None:
+        async for state in self._context.bus.subscribe():
+            if isinstance(state, VehicleState) and state.position is not None:
+                self._detectors.heard(state.resource, state.position, self._clock.now_us())
+
+    # --- state files ----------------------------------------------------------------------------
+
+    def _open_files(self, now_us: int) -> tuple[int, Mapping[ResourceId, Sequence[int]]]:
+        """Read what the files know; when the simulation began, and what detectors had found."""
+        files: dict[str, StateFile] = {}
+        by_resource: dict[ResourceId, StateFile] = {}
+        for resource, settings in self._settings.items():
+            if settings.state:
+                file = files.get(settings.state)
+                file = file or StateFile(settings.state, str(self._context.journal))
+                files[settings.state] = by_resource[resource] = file
+        began_us = now_us
+        found: dict[ResourceId, Sequence[int]] = {}
+        executions: list[Execution] = []
+        for file in files.values():
+            began_us = min(began_us, int(file.meta("began_us", str(now_us))))
+            file.load_bodies(self._bodies)
+            executions += file.load_behaviors(self._bodies)
+        for resource, file in by_resource.items():
+            found[resource] = json.loads(file.meta(f"found {resource}", "[]"))
+        self._memory.files = by_resource
+        for execution in executions:
+            self._epochs.admit(execution.id, execution.epoch)
+        self._links.muted = True
+        self._conductor.restore(executions, now_us)
+        return began_us, found
+
+    def _keep_found(self, payload: ResourceId, found: Iterable[int]) -> None:
+        file = self._memory.files.get(payload)
+        if file is not None:
+            file.set_meta(f"found {payload}", json.dumps(sorted(found)))

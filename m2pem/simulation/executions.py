@@ -1,0 +1,131 @@
+"""A behavior being executed: what is known of it, and the share of each resource in it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias, Union
+
+import msgspec
+
+from m2pem.api.arbiter import BehaviorId, BehaviorReport
+from m2pem.mission.catalogue import BehaviorState, ResourceId
+from m2pem.mission.values import Value
+from m2pem.simulation.agenda import Entry
+from m2pem.simulation.payloads import SimPayload
+from m2pem.simulation.phases import Vector
+from m2pem.simulation.pursuit import Pursuit
+from m2pem.simulation.shots import Shots
+from m2pem.simulation.track import Warp
+from m2pem.simulation.vehicles import SimVehicle, carrier_of
+
+Body: TypeAlias = Union[SimVehicle, SimPayload]
+
+
+class Aim(msgspec.Struct, frozen=True, tag=True):
+    """What a payload keeps in view: a vehicle, or ("") a place."""
+
+    vehicle: str
+    place: Vector = (0.0, 0.0, 0.0)
+
+
+Chase: TypeAlias = Union[Pursuit, Aim]
+
+
+class Outcome(msgspec.Struct, frozen=True):
+    """How a behavior ended. `outputs`: what it writes to the mission's data store."""
+
+    state: BehaviorState
+    code: str = ""
+    reason: str = ""
+    outputs: dict[str, Value] = msgspec.field(default_factory=dict)
+
+
+class Strike(msgspec.Struct, frozen=True):
+    """What cuts a behavior short, `after_s` into it; holding it stops that time too.
+
+    `end` is "failed", "succeeded", "stalled", "lost" or "lose_link". `sole`: the behavior lasts
+    until then, even if its motion is over.
+    """
+
+    after_s: float
+    end: str
+    error: str = ""
+    sole: bool = False
+
+
+@dataclass(slots=True)
+class Part:
+    """The share of one body. After its plan it keeps up `chase`, for ever, if there is one.
+
+    `idle`: the body is held by the behavior but has nothing to do in it.
+    """
+
+    body: Body
+    chase: Chase | None = None
+    idle: bool = False
+    chasing: bool = False
+    done: bool = False
+    timer: Entry | None = None
+
+
+@dataclass(slots=True)
+class Execution:
+    """One behavior. `watch` is its own time, which stops while its first body is held.
+
+    `last`: the report given last, `number` its number. `outcome`: what physically became of it,
+    which may not have been reported yet; None while it lasts. `deaf`: it stalled. `shots`: what it
+    takes.
+    """
+
+    id: BehaviorId
+    epoch: int
+    behavior: str
+    resources: tuple[ResourceId, ...]
+    watch: Warp
+    parts: list[Part] = field(default_factory=list)
+    strike: Strike | None = None
+    limit_s: float | None = None
+    number: int = 0
+    last: BehaviorReport | None = None
+    outcome: Outcome | None = None
+    deaf: bool = False
+    cancelling: bool = False
+    timer: Entry | None = None
+    shots: Shots | None = None
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing of it happens any more."""
+        return self.outcome is not None
+
+    @property
+    def carriers(self) -> Sequence[ResourceId]:
+        """The vehicles whose links matter to it."""
+        return tuple(dict.fromkeys(carrier_of(resource) for resource in self.resources))
+
+    @property
+    def reported_end(self) -> bool:
+        """Whether its terminal report was given."""
+        return self.last is not None and self.last.state.terminal
+
+    def next_report(self, outcome: Outcome) -> BehaviorReport:
+        """Make and remember the next report."""
+        self.number += 1
+        self.last = BehaviorReport(
+            self.id,
+            self.number,
+            outcome.state,
+            outcome.code,
+            outcome.reason,
+            native_ref=self.id,
+            outputs=outcome.outputs,
+        )
+        return self.last
+
+    def forget_timers(self) -> None:
+        """Nothing more is scheduled for it."""
+        for entry in (self.timer, *(part.timer for part in self.parts)):
+            if entry is not None:
+                entry.cancel()
+        self.timer = None
+        for part in self.parts:
+            part.timer = None

@@ -1,0 +1,260 @@
+"""What a single vehicle does for each behavior: a plan, and perhaps a pursuit after it."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+from m2pem.fleet.lawn_mower import lawn_mower, longest_edge_yaw
+from m2pem.mission.geometry import Area
+from m2pem.simulation.course import Course, Craft
+from m2pem.simulation.phases import Pose, Vector
+from m2pem.simulation.pursuit import Pursuit
+from m2pem.simulation.track import Plan
+from m2pem.simulation.wishes import RefusedError, Wishes
+
+SURVEY_SPACING_M = 20.0
+ORBIT_RADIUS_M = 30.0
+STANDOFF_M = 20.0
+FOLLOW_OFFSET_M = 15.0
+REVERSE_M = 5.0
+ACTUATOR_S = 2.0
+"""What a behavior's parameters are when nobody says."""
+
+
+@dataclass(frozen=True, slots=True)
+class Manoeuvre:
+    """What a vehicle does. After `plan`, if any, it keeps up `pursuit`, if any, for ever.
+
+    `cruise_m_s`: the vehicle's own speed from now on.
+    """
+
+    plan: Plan[Pose] | None
+    pursuit: Pursuit | None = None
+    cruise_m_s: float | None = None
+
+
+def yaw_of(heading_rad: float) -> float:
+    """Yaw (from east, counter-clockwise) of a heading (from north, clockwise)."""
+    return math.pi / 2 - heading_rad
+
+
+def under_way(craft: Craft, up_m: float | None) -> Course:
+    """A course that begins by stopping, and by taking off if need be, to `up_m` or as usual."""
+    course = Course(craft)
+    if craft.flies and not craft.aloft:
+        course.climb_to(
+            craft.home[2] + craft.kinematics.default_altitude_m if up_m is None else up_m
+        )
+    return course
+
+
+def flying_height(craft: Craft, wishes: Wishes) -> float:
+    """The height to move at: as wished, else the present one, else that of a take-off."""
+    wished = wishes.height(craft)
+    if wished is not None:
+        return wished
+    if craft.flies and not craft.aloft:
+        return craft.home[2] + craft.kinematics.default_altitude_m
+    return craft.pose.place[2]
+
+
+def _route(craft: Craft, wishes: Wishes) -> Manoeuvre:
+    route = wishes.route()
+    if route is None:
+        raise RefusedError("parameter 'route': there is none")
+    up = flying_height(craft, wishes)
+    places = wishes.places(craft, route, up)
+    speed = wishes.number("speed")
+    course = under_way(craft, places[0][2]).through(places, speed)
+    if not wishes.flag("loop"):
+        return Manoeuvre(course.plan())
+    first_leg = next((p for p in places if math.dist(p[:2], places[0][:2]) > 0.1), None)
+    if first_leg is None:
+        raise RefusedError("parameter 'loop': a route of one place cannot be repeated")
+    course.through([places[0]], speed)
+    course.turn_to(math.atan2(first_leg[1] - places[0][1], first_leg[0] - places[0][0]))
+    lap = course.steps
+    course.through([*places[1:], places[0]], speed)
+    course.turn_to(math.atan2(first_leg[1] - places[0][1], first_leg[0] - places[0][0]))
+    return Manoeuvre(course.plan(cycle_from=lap))
+
+
+def _goto(craft: Craft, wishes: Wishes) -> Manoeuvre:
+    target = wishes.target(craft, flying_height(craft, wishes))
+    course = under_way(craft, target[2]).through([target], wishes.number("speed"))
+    heading = wishes.number("heading")
+    if heading is not None:
+        course.turn_to(yaw_of(heading))
+    return Manoeuvre(course.plan())
+
+
+def _hold(craft: Craft, wishes: Wishes) -> Manoeuvre:
+    return Manoeuvre(Course(craft).stand(wishes.number("duration") or 0.0).plan())
+
+
+def _stop(craft: Craft, _: Wishes) -> Manoeuvre:
+    return Manoeuvre(Course(craft).plan())
+
+
+def _land(craft: Craft, _: Wishes) -> Manoeuvre:
+    return Manoeuvre(Course(craft).climb_to(craft.home[2]).plan())
+
+
+def _return(craft: Craft, _: Wishes) -> Manoeuvre:
+    course = Course(craft)
+    if not craft.flies:
+        return Manoeuvre(course.through([craft.home]).plan())
+    east, north, ground = craft.home
+    if math.dist(course.place[:2], (east, north)) > 0.1:
+        course.climb_to(max(course.place[2], ground + craft.kinematics.default_altitude_m))
+        course.through([(east, north, course.place[2])])
+    return Manoeuvre(course.climb_to(ground).plan())
+
+
+def _reverse(craft: Craft, wishes: Wishes) -> Manoeuvre:
+    distance = wishes.number("distance")
+    distance = REVERSE_M if distance is None else distance
+    return Manoeuvre(Course(craft).back_up(distance, wishes.number("speed")).plan())
+
+
+def _climb(craft: Craft, wishes: Wishes) -> Manoeuvre:
+    return Manoeuvre(Course(craft).climb_to(flying_height(craft, wishes)).plan())
+
+
+def _survey(craft: Craft, wishes: Wishes) -> Manoeuvre:
+    """Drive or fly the passes over an area; each is driven to its very end."""
+    area = wishes.area()
+    if area is None:
+        raise RefusedError("parameter 'area': there is none")
+    rings = wishes.rings(area)
+    heading = wishes.number("heading")
+    yaw = longest_edge_yaw(rings[0]) if heading is None else yaw_of(heading)
+    try:
+        tracks = lawn_mower(
+            rings,
+            wishes.number("spacing") or SURVEY_SPACING_M,
+            yaw,
+            wishes.number("overshoot") or 0.0,
+        )
+    except ValueError as error:
+        raise RefusedError(f"parameter 'spacing': {error}") from None
+    up = flying_height(craft, wishes)
+    places: list[Vector] = [(east, north, up) for east, north in tracks]
+    course = under_way(craft, up).through(places, wishes.number("speed"), radius_m=0.0)
+    return Manoeuvre(course.plan())
+
+
+def _orbit(craft: Craft, wishes: Wishes) -> Manoeuvre:
+    centre = wishes.target(craft, flying_height(craft, wishes))
+    radius = wishes.number("radius") or ORBIT_RADIUS_M
+    speed = wishes.number("speed")
+    course = _onto_circle(craft, centre, radius, speed)
+    turns, seconds = wishes.number("turns"), wishes.number("duration")
+    if turns is None and seconds is not None:
+        course.circle(centre[:2], speed, seconds=seconds)
+    else:
+        course.circle(centre[:2], speed, sweep_rad=math.tau * (1.0 if turns is None else turns))
+    return Manoeuvre(course.plan())
+
+
+def _onto_circle(craft: Craft, centre: Vector, radius_m: float, speed_m_s: float | None) -> Course:
+    """A course to the nearest point of a circle."""
+    course = under_way(craft, centre[2])
+    angle_rad = math.atan2(course.place[1] - centre[1], course.place[0] - centre[0])
+    east = centre[0] + radius_m * math.cos(angle_rad)
+    north = centre[1] + radius_m * math.sin(angle_rad)
+    return course.through([(east, north, centre[2])], speed_m_s)
+
+
+def _observe(craft: Craft, wishes: Wishes) -> Manoeuvre:
+    """Watch an area: from a circle above it when flying, else standing at its edge."""
+    up = flying_height(craft, wishes)
+    area = wishes.area()
+    seconds = wishes.number("duration")
+    centre = wishes.target(craft, up) if area is None else (*_middle(wishes, area), up)
+    if craft.flies:
+        course = _onto_circle(craft, centre, ORBIT_RADIUS_M, None)
+        course.circle(centre[:2], seconds=seconds)
+        return Manoeuvre(course.plan(course.steps - 1 if seconds is None else None))
+    if area is None:
+        course = _onto_circle(craft, centre, STANDOFF_M, None)
+    else:
+        course = Course(craft)
+        course.through([(*nearest_edge(wishes.rings(area)[0], course.place), up)])
+    course.turn_to(math.atan2(centre[1] - course.place[1], centre[0] - course.place[0]))
+    return Manoeuvre(course.stand(math.inf if seconds is None else seconds).plan())
+
+
+def _middle(wishes: Wishes, area: Area) -> tuple[float, float]:
+    corners = wishes.rings(area)[0][:-1]
+    return (
+        sum(east for east, _ in corners) / len(corners),
+        sum(north for _, north in corners) / len(corners),
+    )
+
+
+def nearest_edge(ring: list[tuple[float, float]], place: Vector) -> tuple[float, float]:
+    """The point of a ring's edges that is nearest to a place on the map."""
+    candidates = []
+    for (ae, an), (be, bn) in pairwise(ring):
+        de, dn = be - ae, bn - an
+        length2 = de * de + dn * dn
+        part = ((place[0] - ae) * de + (place[1] - an) * dn) / length2 if length2 else 0.0
+        part = max(0.0, min(1.0, part))
+        candidates.append((ae + de * part, an + dn * part))
+    return min(candidates, key=lambda point: math.dist(point, place[:2]))
+
+
+def _follow(craft: Craft, wishes: Wishes) -> Manoeuvre:
+    vehicle = wishes.target_vehicle()
+    if vehicle is None or vehicle == craft.name:
+        raise RefusedError("parameter 'target': another vehicle is expected")
+    offset, bearing = wishes.number("offset"), wishes.number("bearing")
+    up = flying_height(craft, wishes)
+    wishes.pose_of(vehicle)  # refused here if nobody knows where it is
+    pursuit = Pursuit(
+        vehicle,
+        FOLLOW_OFFSET_M if offset is None else offset,
+        math.pi if bearing is None else bearing,
+        up,
+        craft.kinematics.max_speed_m_s,
+    )
+    # What moves already is steered on from its speed; only a landed one must rise first.
+    landed = craft.flies and not craft.aloft
+    return Manoeuvre(under_way(craft, up).plan() if landed else None, pursuit)
+
+
+def _teleop(craft: Craft, wishes: Wishes) -> Manoeuvre:
+    timeout = wishes.number("timeout")
+    return Manoeuvre(Course(craft).stand(math.inf if timeout is None else timeout).plan())
+
+
+def _set_speed(craft: Craft, wishes: Wishes) -> Manoeuvre:
+    speed = min(wishes.number("speed") or math.inf, craft.kinematics.max_speed_m_s)
+    return Manoeuvre(Course(craft).plan(), cruise_m_s=speed)
+
+
+def _deploy(craft: Craft, _: Wishes) -> Manoeuvre:
+    return Manoeuvre(Course(craft).stand(ACTUATOR_S).plan())
+
+
+MANOEUVRES: Mapping[str, Callable[[Craft, Wishes], Manoeuvre]] = {
+    "single_vehicle_routing": _route,
+    "goto": _goto,
+    "hold": _hold,
+    "drive_stop": _stop,
+    "land": _land,
+    "return_to_launch": _return,
+    "reverse": _reverse,
+    "takeoff": _climb,
+    "change_altitude": _climb,
+    "area_survey": _survey,
+    "orbit": _orbit,
+    "area_observe": _observe,
+    "follow": _follow,
+    "teleop": _teleop,
+    "set_speed": _set_speed,
+    "deploy": _deploy,
+}
+"""By behavior's name, for one vehicle."""

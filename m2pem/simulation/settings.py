@@ -1,0 +1,306 @@
+"""What a fleet file may say about a simulated vehicle or payload, in its `connection`.
+
+Keys that are not named here belong to other arbiters and are left alone, so that fleets can be
+simulated as they are. A map named `sim`, if there is one, is read instead of the whole.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from m2pem.api.arbiter import Connection
+from m2pem.errors import FleetError
+from m2pem.findings import Finding, Severity
+from m2pem.fleet.distance import NO_ORIGIN, Origin, out_of_reach
+from m2pem.fleet.units import Dimension, quantity
+from m2pem.mission.catalogue import ResourceId
+from m2pem.simulation.domains import DEFAULTS, Kinematics
+from m2pem.simulation.faults import FAULT_KINDS, Fault
+
+Coordinates = tuple[float, float, float | None]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedDetection:
+    """A detection `at_s` after the arbiter connected; where the vehicle is, if not said."""
+
+    at_s: float
+    type: str
+    position: Coordinates | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Something that a detector finds when it comes near."""
+
+    type: str
+    position: Coordinates
+
+
+@dataclass(frozen=True, slots=True)
+class Gimbal:
+    """Bounds of a payload, in rad, rad/s and s. Zoom 1 has the whole `view_rad`."""
+
+    slew_rate_rad_s: float = math.radians(60)
+    pan_limit_rad: float = math.pi
+    tilt_low_rad: float = -math.pi / 2
+    tilt_high_rad: float = math.pi / 2
+    zoom_max: float = 30.0
+    zoom_rate_s: float = 5.0
+    view_rad: float = math.radians(30)
+    shutter_s: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """All that is said about one resource; vehicles and payloads use what concerns them."""
+
+    kinematics: Kinematics
+    gimbal: Gimbal = field(default_factory=Gimbal)
+    home: Coordinates | None = None
+    heading_rad: float = 0.0
+    battery: float = 1.0
+    kind: str = ""
+    detection_range_m: float = 5.0
+    detections: tuple[PlannedDetection, ...] = ()
+    targets: tuple[Target, ...] = ()
+    faults: tuple[Fault, ...] = ()
+    telemetry_hz: float | None = None
+    state: str = ""
+
+
+KINDS = ("ptz", "camera", "gpr")
+"""Kinds of payload that `kind` may say; without it a payload can do all that payloads can."""
+
+_KINEMATICS = {
+    "max_speed": ("max_speed_m_s", Dimension.SPEED),
+    "cruise_speed": ("cruise_speed_m_s", Dimension.SPEED),
+    "acceleration": ("acceleration_m_s2", Dimension.ACCELERATION),
+    "deceleration": ("deceleration_m_s2", Dimension.ACCELERATION),
+    "turn_rate": ("turn_rate_rad_s", Dimension.ANGULAR_SPEED),
+    "turn_radius": ("turn_radius_m", Dimension.DISTANCE),
+    "climb_rate": ("climb_rate_m_s", Dimension.SPEED),
+    "endurance": ("endurance_s", Dimension.DURATION),
+    "default_altitude": ("default_altitude_m", Dimension.DISTANCE),
+}
+_GIMBAL = {
+    "slew_rate": ("slew_rate_rad_s", Dimension.ANGULAR_SPEED),
+    "pan_limit": ("pan_limit_rad", Dimension.ANGLE),
+    "tilt_low": ("tilt_low_rad", Dimension.ANGLE),
+    "tilt_high": ("tilt_high_rad", Dimension.ANGLE),
+    "zoom_max": ("zoom_max", None),
+    "zoom_rate": ("zoom_rate_s", None),
+    "view": ("view_rad", Dimension.ANGLE),
+    "shutter": ("shutter_s", Dimension.DURATION),
+}
+_MAY_BE_ZERO = {"turn_radius", "climb_rate", "default_altitude", "tilt_low", "tilt_high", "shutter"}
+
+
+def read_settings(connection: Connection, origin: Origin) -> Settings:
+    """Read the settings of one resource; positions must be near the fleet's `origin`.
+
+    Raises:
+        FleetError: with every value that cannot be used.
+    """
+    reader = _Reader(connection, origin)
+    default = DEFAULTS.get(connection.domain, DEFAULTS["ground"])
+    said = {"cruise_speed_m_s": connection.cruise_speed_m_s, "endurance_s": connection.endurance_s}
+    default = dataclasses.replace(default, **{key: v for key, v in said.items() if v is not None})
+    settings = Settings(
+        kinematics=dataclasses.replace(default, **reader.numbers(_KINEMATICS)),
+        gimbal=dataclasses.replace(Gimbal(), **reader.numbers(_GIMBAL)),
+        home=reader.position("home"),
+        heading_rad=reader.number("heading", Dimension.ANGLE, 0.0),
+        battery=reader.fraction("battery", 1.0),
+        kind=reader.choice("kind", KINDS),
+        detection_range_m=reader.number("range", Dimension.DISTANCE, 5.0),
+        detections=reader.items("detections", _detection),
+        targets=reader.items("targets", _target),
+        faults=reader.items("faults", _fault),
+        telemetry_hz=reader.rate("telemetry_hz"),
+        state=reader.text("state"),
+    )
+    reader.finish()
+    return settings
+
+
+def own_faults(resource: ResourceId, known: Mapping[ResourceId, Settings]) -> Sequence[Fault]:
+    """A payload inherits its vehicle's settings, but not the vehicle's faults."""
+    faults = known[resource].faults
+    vehicle = ResourceId(resource.partition("/")[0])
+    inherited = vehicle != resource and vehicle in known
+    return () if inherited and faults == known[vehicle].faults else faults
+
+
+class _Reader:
+    """Reads values and gathers what is wrong with them."""
+
+    def __init__(self, connection: Connection, origin: Origin) -> None:
+        self._connection = connection
+        self._origin = origin
+        own = connection.settings.get("sim")
+        self._settings = own if isinstance(own, Mapping) else connection.settings
+        self._findings: list[Finding] = []
+
+    def finish(self) -> None:
+        if self._findings:
+            what = f"{self._connection.resource} cannot be simulated"
+            raise FleetError(what, self._findings)
+
+    def wrong(self, key: str, problem: object, remedy: str = "") -> None:
+        element = f"{self._connection.resource}.connection.{key}"
+        rule = "bad-simulation-setting"
+        self._findings.append(
+            Finding(Severity.ERROR, "fleet", 0, element, rule, str(problem), remedy)
+        )
+
+    def near(self, key: str, place: Coordinates | None) -> None:
+        """Note a position that is too far from the fleet's origin."""
+        if place is not None and (wrong := out_of_reach(place, self._origin)):
+            if self._origin == NO_ORIGIN:
+                wrong = ("the fleet has no origin", "set the fleet's `origin` near its vehicles")
+            self.wrong(key, *wrong)
+
+    def numbers(self, keys: Mapping[str, tuple[str, Dimension | None]]) -> dict[str, float]:
+        found = {}
+        for key, (name, dimension) in keys.items():
+            if key in self._settings:
+                value = self.number(key, dimension, 1.0)
+                if value <= 0 and not (key in _MAY_BE_ZERO and (value == 0 or "tilt" in key)):
+                    self.wrong(key, f"{self._settings[key]!r} is not above 0")
+                found[name] = value
+        return found
+
+    def number(self, key: str, dimension: Dimension | None, default: float) -> float:
+        value = self._settings.get(key)
+        if value is None:
+            return default
+        if key == "endurance" and value == math.inf:
+            return math.inf
+        try:
+            return _plain(value) if dimension is None else quantity(value, dimension)
+        except ValueError as error:
+            self.wrong(key, error)
+            return default
+
+    def rate(self, key: str) -> float | None:
+        if self._settings.get(key) is None:
+            return None
+        rate = self.number(key, None, 0.0)
+        if rate < 0:
+            self.wrong(key, f"{rate:g} is below 0")
+        return rate
+
+    def fraction(self, key: str, default: float) -> float:
+        value = self._settings.get(key)
+        if value is None:
+            return default
+        try:
+            if isinstance(value, str) and value.strip().endswith("%"):
+                number = float(value.strip()[:-1]) / 100
+            else:
+                number = _plain(value)
+        except ValueError:
+            number = math.nan
+        if not 0 <= number <= 1:
+            self.wrong(key, f"{value!r} is neither a percentage ('80 %') nor a fraction (0.8)")
+            return default
+        return number
+
+    def text(self, key: str) -> str:
+        value = self._settings.get(key, "")
+        if not isinstance(value, str):
+            self.wrong(key, f"{value!r} is not a text")
+            return ""
+        return value
+
+    def choice(self, key: str, choices: Sequence[str]) -> str:
+        value = self.text(key)
+        if value and value not in choices:
+            self.wrong(key, f"{value!r} is not one of {', '.join(choices)}")
+        return value
+
+    def position(self, key: str) -> Coordinates | None:
+        value = self._settings.get(key)
+        if value is None:
+            return None
+        try:
+            place = _coordinates(value)
+        except ValueError as error:
+            self.wrong(key, error)
+            return None
+        self.near(key, place)
+        return place
+
+    def items(self, key: str, read: Any) -> tuple[Any, ...]:
+        value = self._settings.get(key)
+        if value is None:
+            return ()
+        if not isinstance(value, list | tuple):
+            self.wrong(key, "is not a list")
+            return ()
+        found = []
+        for index, item in enumerate(value):
+            if not isinstance(item, Mapping):
+                self.wrong(f"{key}[{index}]", f"{item!r} is not a map")
+                continue
+            try:
+                found.append(read(item))
+                self.near(f"{key}[{index}].position", getattr(found[-1], "position", None))
+            except KeyError as error:
+                self.wrong(f"{key}[{index}]", f"{error} is missing")
+            except ValueError as error:
+                self.wrong(f"{key}[{index}]", error)
+        return tuple(found)
+
+
+def _plain(value: object) -> float:
+    try:
+        number = math.nan if isinstance(value, bool) else float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{value!r} is not a number")
+    return number
+
+
+def _coordinates(value: object) -> Coordinates:
+    if isinstance(value, Mapping):
+        value = [value.get("lat"), value.get("lon"), *([value["alt"]] if "alt" in value else [])]
+    if not isinstance(value, list | tuple) or len(value) not in (2, 3):
+        raise ValueError(f"{value!r} is not a position; write [lat, lon] or [lat, lon, alt]")
+    latitude, longitude = _plain(value[0]), _plain(value[1])
+    if abs(latitude) > 90 or abs(longitude) > 180:
+        raise ValueError(f"{list(value)} is not a position: latitude comes first, in degrees")
+    return latitude, longitude, _plain(value[2]) if len(value) == 3 else None
+
+
+def _detection(item: Mapping[str, Any]) -> PlannedDetection:
+    position = item.get("position")
+    return PlannedDetection(
+        quantity(item["at"], Dimension.DURATION),
+        str(item["type"]),
+        None if position is None else _coordinates(position),
+    )
+
+
+def _target(item: Mapping[str, Any]) -> Target:
+    return Target(str(item["type"]), _coordinates(item["position"]))
+
+
+def _fault(item: Mapping[str, Any]) -> Fault:
+    kind = item["kind"]
+    if kind not in FAULT_KINDS:
+        raise ValueError(f"kind: {kind!r} is not one of {', '.join(FAULT_KINDS)}")
+    times = item.get("times", 1)
+    if isinstance(times, bool) or not isinstance(times, int) or times < 1:
+        raise ValueError(f"times: {times!r} is not a whole number above 0")
+    return Fault(
+        kind=kind,
+        behavior=str(item.get("behavior", "")),
+        after_s=quantity(item.get("after", 0.0), Dimension.DURATION),
+        error=str(item.get("error", "")),
+        times=times,
+    )

@@ -1,0 +1,174 @@
+"""Turns telemetry into faults: a resource is no longer heard, or a vehicle's battery is low.
+
+`Watch` decides and knows no clock; `watch` feeds it from the bus. Each fault is said once and, by
+hysteresis, again only after the resource had recovered: it was heard again for as long as its
+bound, or its battery rose above the upper level. A payload is watched by itself: its vehicle's
+link and battery are not its own.
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import isfinite
+
+from m2pem.api.bus import FleetBus
+from m2pem.api.clock import Clock
+from m2pem.api.telemetry import LinkState, PayloadState, TeamState, VehicleState
+from m2pem.engine.inputs import ResourceFault
+from m2pem.mission.catalogue import ResourceId
+
+US_PER_S = 1_000_000
+STALL_US = 500_000
+"""A check that comes later than this says that we did not listen, not that nobody spoke."""
+
+
+@dataclass(slots=True)
+class _Link:
+    """`steady_since_us`: while lost, since when it has been heard again without a gap."""
+
+    bound_us: int
+    heard_us: int
+    never_heard: bool = True
+    lost: bool = False
+    steady_since_us: int | None = None
+
+
+class Watch:
+    """Times are microseconds since the Unix epoch.
+
+    `lost_after_s`: for each resource the longest silence, in seconds (its arbiter's or the fleet's
+    bound); a resource that is missing here, or whose bound is infinite, may be silent for ever.
+    `since_us`: when the arbiters were connected; silence counts from then. `critical`, `recovered`:
+    fractions of a full battery.
+    """
+
+    def __init__(
+        self,
+        lost_after_s: Mapping[ResourceId, float],
+        since_us: int,
+        *,
+        critical: float = 0.15,
+        recovered: float = 0.20,
+    ) -> None:
+        if not 0 <= critical <= recovered <= 1:
+            raise ValueError(
+                f"battery levels are fractions, the critical one ({critical}) not above the "
+                f"recovered one ({recovered})"
+            )
+        if silent := [resource for resource, bound in lost_after_s.items() if not bound > 0]:
+            raise ValueError(f"the bound of a link is above 0 s: {', '.join(silent)}")
+        self._critical = critical
+        self._recovered = recovered
+        self._low: set[ResourceId] = set()
+        self._links = {
+            resource: _Link(round(bound_s * US_PER_S), since_us)
+            for resource, bound_s in lost_after_s.items()
+            if isfinite(bound_s)
+        }
+        self._next_check_us = self._first_due(since_us)
+        self._stalled = False
+
+    @property
+    def next_check_us(self) -> int | None:
+        """When `check` must be called next; None: never."""
+        return self._next_check_us
+
+    def heard(self, state: VehicleState | PayloadState, now_us: int) -> list[ResourceFault]:
+        """A state came in at `now_us`; its own `time_us` is another machine's and not trusted."""
+        faults: list[ResourceFault] = []
+        link = self._links.get(state.resource)
+        if state.link is LinkState.LOST:
+            if link is not None:
+                link.steady_since_us = None
+                if not link.lost:
+                    faults.append(self._lose(state.resource, link, "its arbiter lost the link"))
+        elif link is not None:
+            self._hear(link, now_us)
+        if isinstance(state, VehicleState) and state.battery_fraction is not None:
+            faults += self._battery(state.resource, state.battery_fraction)
+        return faults
+
+    def check(self, now_us: int) -> list[ResourceFault]:
+        """Time has passed: who has been silent beyond the bound?"""
+        if self._next_check_us is None or now_us < self._next_check_us:
+            return []
+        if now_us - self._next_check_us > STALL_US and not self._stalled:
+            # We stood still ourselves: what was said meanwhile still waits to be heard. Only once
+            # in a row, as on a fast clock every check is late.
+            self._stalled = True
+            self._next_check_us = now_us + STALL_US
+            return []
+        self._stalled = False
+        faults = []
+        for resource, link in self._links.items():
+            silence_us = now_us - link.heard_us
+            if not link.lost and silence_us > link.bound_us:
+                what = "never heard since connecting" if link.never_heard else "not heard"
+                reason = f"{what} for {silence_us / US_PER_S:.1f} s"
+                faults.append(self._lose(resource, link, reason))
+        self._next_check_us = self._first_due(now_us)
+        return faults
+
+    def _hear(self, link: _Link, now_us: int) -> None:
+        gap_us = now_us - link.heard_us
+        link.heard_us = now_us
+        link.never_heard = False
+        if not link.lost:
+            return
+        if link.steady_since_us is None or gap_us > link.bound_us:
+            link.steady_since_us = now_us
+        elif now_us - link.steady_since_us >= link.bound_us:
+            link.lost = False
+
+    @staticmethod
+    def _lose(resource: ResourceId, link: _Link, reason: str) -> ResourceFault:
+        link.lost = True
+        link.steady_since_us = None
+        return ResourceFault(resource, "LINK_LOST", reason, reachable=False)
+
+    def _battery(self, resource: ResourceId, fraction: float) -> list[ResourceFault]:
+        if fraction > self._recovered:
+            self._low.discard(resource)
+        elif fraction < self._critical and resource not in self._low:
+            self._low.add(resource)
+            reason = f"battery at {fraction:.0%}, below {self._critical:.0%}"
+            return [ResourceFault(resource, "BATTERY_LOW", reason, reachable=True)]
+        return []
+
+    def _first_due(self, now_us: int) -> int | None:
+        # A lost resource may recover and fall silent before its next check: look at it at least
+        # once in its bound. Hearing somebody only puts off what is due, so `heard` need not ask.
+        due = (
+            (now_us if link.lost else link.heard_us) + link.bound_us + 1
+            for link in self._links.values()
+        )
+        return min(due, default=None)
+
+
+async def watch(
+    bus: FleetBus,
+    clock: Clock,
+    sink: Callable[[ResourceFault], None],
+    rules: Watch,
+    size: int = 10_000,
+) -> None:
+    """Hand every fault to `sink` until the bus is closed or this is cancelled.
+
+    `size`: how many states may wait while the process is busy.
+    """
+
+    async def check() -> None:
+        while (due_us := rules.next_check_us) is not None:
+            await clock.sleep_until(due_us)
+            for fault in rules.check(clock.now_us()):
+                sink(fault)
+
+    states = bus.subscribe(size)
+    async with asyncio.TaskGroup() as group:
+        checking = group.create_task(check(), name="watch links")
+        async for state in states:
+            if isinstance(state, TeamState):
+                continue
+            for fault in rules.heard(state, clock.now_us()):
+                sink(fault)
+        checking.cancel()

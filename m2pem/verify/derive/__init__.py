@@ -1,7 +1,0 @@
-"""From a mission, and the fleet that it commands, to the rules that the checker searches."""
-
-from m2pem.verify.derive.bound import Bound, TooLargeError
-from m2pem.verify.derive.derive import derive
-from m2pem.verify.derive.options import Options
-
-__all__ = ["Bound", "Options", "TooLargeError", "derive"]

@@ -1,0 +1,125 @@
+"""What signals and messages bring to those who catch them.
+
+Where it goes, and under which names, is as in the engine. A constant that is sent within the
+mission is followed; anything else may be any value. What comes from outside brings only what the
+catcher's outputs, or the senders within the mission, give a name to: any value, or none.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from m2pem.errors import ExpressionError
+from m2pem.mission import elements as e
+from m2pem.mission.behavior import Mapping
+from m2pem.mission.events import EventDefinition, MessageEventDefinition, SignalEventDefinition
+from m2pem.mission.expression import Expression
+from m2pem.mission.expression.tree import Name
+from m2pem.mission.mission import Mission
+
+_SIMPLE = (bool, int, float, str)
+
+
+@dataclass(frozen=True, slots=True)
+class Brought:
+    """What a name may get: the value of a constant, or any (None). `perhaps`: or it stays."""
+
+    key: str
+    sources: tuple[Expression | None, ...]
+    perhaps: bool
+
+
+class Payloads:
+    """What all senders of a mission send."""
+
+    def __init__(self, mission: Mission, *, open_world: bool) -> None:
+        self._mission = mission
+        self._open_world = open_world
+        self._sent: dict[str, list[dict[str, Expression | None]]] = {}
+        for node in mission.nodes:
+            for ref in _sends(node):
+                assert isinstance(node, e.Activity | e.Event)
+                inputs = {m.target: _constant(m) for m in node.data_flow.inputs}
+                self._sent.setdefault(ref, []).append(inputs)
+
+    def brought(self, node: e.FlowNode) -> list[Brought]:
+        """What a catch event or receive task may get by any of its triggers."""
+        found: dict[str, Brought] = {}
+        refs = list(_catches(node))
+        for ref in refs:
+            for each in self._by(node, ref):
+                known = found.get(each.key)
+                sources = (*(known.sources if known else ()), *each.sources)
+                anything = any(source is None for source in sources)
+                found[each.key] = Brought(each.key, (None,) if anything else sources, each.perhaps)
+        if len(refs) > 1 or len(_definitions(node)) > len(refs):
+            return [Brought(each.key, each.sources, perhaps=True) for each in found.values()]
+        return list(found.values())
+
+    def _by(self, node: e.FlowNode, ref: str) -> Iterator[Brought]:
+        sent, outside = self._sent.get(ref, []), self._comes_from_outside(ref)
+        if isinstance(node, e.Event) and node.data_flow.outputs:
+            for mapping in node.data_flow.outputs:
+                alone = len(node.data_flow.outputs) == 1 and isinstance(mapping.source.tree, Name)
+                single = alone and not outside and all(len(each) == 1 for each in sent)
+                sources = [next(iter(each.values())) if single else None for each in sent]
+                if sources or outside:
+                    yield Brought(mapping.target, tuple(sources or [None]), perhaps=False)
+            return
+        if isinstance(node, e.ReceiveTask) and node.data_flow.outputs:
+            return  # its outputs say where it goes when it has completed
+        for key in dict.fromkeys(key for each in sent for key in each):
+            values = [each[key] for each in sent if key in each]
+            perhaps = outside or len(values) < len(sent)
+            yield Brought(key, (*values, None) if outside else tuple(values), perhaps)
+
+    def _comes_from_outside(self, ref: str) -> bool:
+        if self._open_world:
+            return True
+        signal = self._mission.signals.get(ref)
+        if signal is not None:
+            return bool(signal.from_operator or signal.returned)
+        message = self._mission.messages.get(ref)
+        strangers = any(
+            f.source_id not in self._mission.elements for f in self._mission.message_flows
+        )
+        return message is None or bool(message.from_operator) or strangers
+
+
+def _constant(mapping: Mapping) -> Expression | None:
+    if not mapping.source.constant:
+        return None
+    try:
+        value = mapping.source.evaluate(lambda _: None)
+    except ExpressionError:
+        return None
+    return mapping.source if isinstance(value, _SIMPLE) else None
+
+
+def _definitions(node: e.FlowNode) -> tuple[EventDefinition, ...]:
+    return node.definitions if isinstance(node, e.Event) else ()
+
+
+def _sends(node: e.FlowNode) -> list[str]:
+    if isinstance(node, e.SendTask) and node.message is not None:
+        return [node.message.id]
+    if isinstance(node, e.EndEvent | e.IntermediateThrowEvent):
+        return _refs(node.definitions)
+    return []
+
+
+def _catches(node: e.FlowNode) -> list[str]:
+    if isinstance(node, e.ReceiveTask):
+        return [node.message.id] if node.message is not None else []
+    if isinstance(node, e.EndEvent | e.IntermediateThrowEvent):
+        return []
+    return _refs(_definitions(node))
+
+
+def _refs(definitions: tuple[EventDefinition, ...]) -> list[str]:
+    found = []
+    for each in definitions:
+        if isinstance(each, SignalEventDefinition):
+            found.append(each.signal.id)
+        elif isinstance(each, MessageEventDefinition):
+            found.append(each.message.id)
+    return found

@@ -1,0 +1,64 @@
+"""The garbage collector while a mission is read."""
+
+import gc
+from collections.abc import Iterator
+
+import pytest
+
+from m2pem.bpmn import collector
+
+
+@pytest.fixture(autouse=True)
+def _on_again() -> Iterator[None]:
+    yield
+    gc.unfreeze()
+    gc.enable()
+    gc.collect()
+
+
+def test_it_is_off_meanwhile_and_on_again_after_an_error() -> None:
+    with pytest.raises(KeyError), collector.paused():
+        assert not gc.isenabled()
+        raise KeyError
+    assert gc.isenabled()
+
+
+def test_it_stays_off_where_it_was_off() -> None:
+    gc.disable()
+    with collector.paused():
+        pass
+    assert not gc.isenabled()
+
+
+def test_what_a_program_has_frozen_stays_frozen() -> None:
+    gc.freeze()
+    with collector.paused():
+        pass
+    assert gc.get_freeze_count() > 0
+
+
+class Circle:
+    """Garbage that only the collector finds."""
+
+    alive = 0
+
+    def __init__(self) -> None:
+        self.itself = self
+        Circle.alive += 1
+
+    def __del__(self) -> None:
+        Circle.alive -= 1
+
+
+@pytest.mark.parametrize(("circles", "times"), [(20, 500), (60, 50)])
+def test_what_is_read_and_dropped_again_and_again_does_not_stay(
+    monkeypatch: pytest.MonkeyPatch, circles: int, times: int
+) -> None:
+    monkeypatch.setattr(collector, "MANY", 50)  # the larger ones are many
+    monkeypatch.setattr(collector, "AT_MOST_UNSEARCHED", 500)
+    gc.collect()
+    for _ in range(times):
+        with collector.paused():
+            read = [Circle() for _ in range(circles)]
+        del read
+    assert Circle.alive < circles * times / 2

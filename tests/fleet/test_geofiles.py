@@ -1,0 +1,70 @@
+from pathlib import Path
+
+import pytest
+
+from m2pem.fleet import geofiles
+from m2pem.fleet.geofiles import GeometryError, read_geometry
+from m2pem.mission.geometry import Area, Point, Route
+
+from .fleets import LINE, POINT, SQUARE, write_json
+from .test_qgroundcontrol import SURVEY, WAYPOINTS, plan
+
+
+def test_the_suffix_says_how_to_read(tmp_path: Path) -> None:
+    (tmp_path / "a.waypoints").write_text(WAYPOINTS)
+    write_json(tmp_path / "a.plan", plan(SURVEY))
+    assert isinstance(read_geometry(tmp_path / "a.waypoints", "route"), Route)
+    assert isinstance(read_geometry(tmp_path / "a.plan", "area"), Area)
+    assert isinstance(read_geometry(write_json(tmp_path / "a.geojson", POINT), "point"), Point)
+    assert isinstance(read_geometry(write_json(tmp_path / "a.json", SQUARE), "area"), Area)
+    (tmp_path / "a.csv").write_text("lat_deg,lon_deg\n1,2\n")
+    assert isinstance(read_geometry(tmp_path / "a.csv", "point"), Point)
+
+
+def test_another_kind_of_geometry_is_refused(tmp_path: Path) -> None:
+    path = write_json(tmp_path / "a.geojson", LINE)
+    with pytest.raises(GeometryError, match=r"a\.geojson: holds a route; an area is expected"):
+        read_geometry(path, "area")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.kml", "", "has another suffix than .geojson"),
+        ("a.geojson", "{\n\n x}", "line 3: is not JSON"),
+        ("a.geojson", "[]", "a JSON object is expected"),
+        ("a.geojson", '{"type": "Point", "coordinates": [NaN, 1]}', "holds NaN"),
+        ("a.geojson", "[" * 100_000, "is nested too deep"),
+        ("a.geojson", '{"type": ' + "9" * 5000 + "}", "is not JSON"),
+        ("a.geojson", b"\xff", "is not UTF-8 text"),
+        ("a.plan", "{}", "is not a QGroundControl plan"),
+    ],
+)
+def test_an_unusable_file_is_named(
+    tmp_path: Path, name: str, content: str | bytes, message: str
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(GeometryError) as refused:
+        read_geometry(path, "route")
+    assert str(refused.value).startswith(f"{path}: ")
+    assert message in str(refused.value)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(GeometryError, match="cannot be read: No such file"):
+        read_geometry(tmp_path / "none.geojson", "route")
+
+
+def test_a_file_that_is_too_large_is_not_parsed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(geofiles, "MAX_BYTES", 20)
+    with pytest.raises(GeometryError, match="is larger than 20 bytes"):
+        read_geometry(write_json(tmp_path / "a.geojson", POINT), "point")
+
+
+def test_a_byte_order_mark_does_no_harm(tmp_path: Path) -> None:
+    path = tmp_path / "a.geojson"
+    path.write_text('{"type": "Point", "coordinates": [1, 2]}', encoding="utf-8-sig")
+    assert read_geometry(path, "point") == Point((2.0, 1.0, None))

@@ -1,0 +1,146 @@
+import contextlib
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from m2pem.fleet.geojson import GeometryError, as_geojson, kind_of, parse_geojson
+from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
+
+SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
+
+
+def test_a_line_string_is_a_route_with_latitude_first() -> None:
+    route = parse_geojson({"type": "LineString", "coordinates": [[-77, 38], [-77.5, 38.5, 12]]})
+    assert route == Route(((38.0, -77.0, None), (38.5, -77.5, 12.0)))
+
+
+def test_a_multi_point_is_a_route_of_even_one_waypoint() -> None:
+    assert parse_geojson({"type": "MultiPoint", "coordinates": [[1, 2]]}) == Route(
+        ((2.0, 1.0, None),)
+    )
+
+
+def test_a_polygon_is_an_area_with_its_holes() -> None:
+    hole = [[0.2, 0.2], [0.4, 0.2], [0.4, 0.4], [0.2, 0.2]]
+    area = parse_geojson({"type": "Polygon", "coordinates": [SQUARE, hole]})
+    assert isinstance(area, Area)
+    assert [len(ring) for ring in area.rings] == [5, 4]
+    assert area.rings[0][1] == (0.0, 1.0, None)
+
+
+def test_the_altitude_frame_is_a_property_of_the_feature() -> None:
+    feature = {
+        "type": "Feature",
+        "properties": {"altitude_frame": "amsl"},
+        "geometry": {"type": "Point", "coordinates": [1, 2, 3]},
+    }
+    expected = Point((2.0, 1.0, 3.0), "amsl")
+    assert parse_geojson(feature) == expected
+    assert parse_geojson({"type": "FeatureCollection", "features": [feature]}) == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ({"type": "Point", "coordinates": [38, -77]}, None),
+        ({"type": "Point", "coordinates": [-77, 138]}, "are [longitude, latitude]"),
+        ({"type": "Point", "coordinates": [181, 0]}, "longitude 181 is not within -180..180"),
+        ({"type": "Point", "coordinates": [0]}, "a position is [longitude, latitude]"),
+        ({"type": "Point", "coordinates": [0, "1"]}, "latitude '1' is not a number"),
+        ({"type": "Point", "coordinates": [0, True]}, "latitude True is not a number"),
+        ({"type": "Point", "coordinates": [0, 1, float("nan")]}, "altitude nan is not finite"),
+        ({"type": "Point", "coordinates": [10**400, 1]}, "is not finite"),
+        ({"type": "LineString", "coordinates": [[0, 0]]}, "at least 2 positions"),
+        ({"type": "LineString", "coordinates": [[0, 0], [0, 95]]}, "coordinates[1]: latitude 95"),
+        ({"type": "LineString"}, "at least 2 positions"),
+        ({"type": "Polygon", "coordinates": []}, "a list of rings"),
+        ({"type": "Polygon", "coordinates": [SQUARE[:-1]]}, "a ring ends where it begins"),
+        ({"type": "Polygon", "coordinates": [[[0, 0]] * 4]}, "three different corners"),
+        ({"type": "Poligon"}, "did you mean 'Polygon'"),
+        ({"type": "GeometryCollection", "geometries": []}, "is not a route, area or point"),
+        ({"type": ["Point"]}, "is not a route, area or point"),
+        ({}, "type None"),
+        ([], "an object with 'type' is expected"),
+        ({"type": "Feature", "geometry": None}, "an object with 'type' is expected"),
+        ({"type": "FeatureCollection", "features": []}, "has 0 features"),
+        ({"type": "FeatureCollection"}, "has no features"),
+        (
+            {
+                "type": "Feature",
+                "properties": {"altitude_frame": "msl"},
+                "geometry": {"type": "Point", "coordinates": [0, 0]},
+            },
+            "altitude_frame 'msl' is not known; did you mean 'amsl'?",
+        ),
+        (
+            {
+                "type": "Point",
+                "coordinates": [0, 0],
+                "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3857"}},
+            },
+            "is not WGS-84",
+        ),
+    ],
+)
+def test_what_is_no_place_on_earth_is_refused(value: Any, message: str | None) -> None:
+    if message is None:
+        parse_geojson(value)
+        return
+    with pytest.raises(GeometryError) as refused:
+        parse_geojson(value)
+    assert message in str(refused.value)
+
+
+def test_the_old_name_of_wgs_84_is_no_other_crs() -> None:
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}
+    assert parse_geojson({"type": "Point", "coordinates": [0, 0], "crs": crs})
+
+
+positions = st.tuples(
+    st.floats(-180, 180), st.floats(-90, 90), st.floats(-1e5, 1e5, allow_nan=False)
+).map(list)
+
+
+@given(st.lists(positions, min_size=2, max_size=20))
+def test_a_route_keeps_every_position_exactly(line: list[list[float]]) -> None:
+    written = json.loads(json.dumps({"type": "LineString", "coordinates": line}))
+    route = parse_geojson(written)
+    assert isinstance(route, Route)
+    assert [[lon, lat, alt] for lat, lon, alt in route.waypoints] == line
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=4),
+    max_leaves=12,
+)
+
+
+@given(st.sampled_from(["Point", "LineString", "MultiPoint", "Polygon", "Feature"]), json_values)
+def test_any_coordinates_are_read_or_refused(kind: str, value: Any) -> None:
+    with contextlib.suppress(GeometryError):
+        parse_geojson({"type": kind, "coordinates": value, "geometry": value, "properties": value})
+
+
+def test_kinds_have_the_names_that_people_use() -> None:
+    place = (0.0, 0.0, None)
+    assert kind_of(Point(place)) == "point"
+    assert kind_of(Route((place,))) == "route"
+    assert kind_of(Area(((place,),))) == "area"
+    assert kind_of(VehiclePosition("evsg1")) == "vehicle"
+
+
+@pytest.mark.parametrize(
+    "geometry",
+    [
+        Point((38.1, -77.3, None), "amsl"),
+        Route(((38.1, -77.3, 1.0), (38.2, -77.4, None)), "relative"),
+        Route(((38.1, -77.3, None),), "relative"),
+        Area((tuple((38.0 + x, -77.0, None) for x in (0, 0.1, 0.2, 0)),)),
+    ],
+)
+def test_a_geometry_is_read_back_as_it_was_written(geometry: Point | Route | Area) -> None:
+    assert parse_geojson(as_geojson(geometry)) == geometry

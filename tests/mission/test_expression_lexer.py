@@ -1,0 +1,97 @@
+"""How a text is taken apart, where one pattern does not say it all."""
+
+import pytest
+
+from m2pem.errors import ExpressionSyntaxError
+from m2pem.mission.expression.dialect import Dialect
+from m2pem.mission.expression.lexer import tokenize
+
+
+def tokens(text: str, dialect: Dialect = Dialect.BARE) -> list[tuple[str, str, int]]:
+    found = tokenize(text, slice(0, len(text)), dialect)
+    return [(token.kind, token.text, token.position) for token in found]
+
+
+@pytest.mark.parametrize(
+    "name", ["höhe", "höhe.x", "x.höhe", "a1.é2._", "hohe\u0301", "名前", "x\u00b7y", "π"]
+)
+def test_names_have_letters_of_any_script(name):
+    assert tokens(f"1+{name}<2") == [
+        ("number", "1", 0),
+        ("operator", "+", 1),
+        ("name", name, 2),
+        ("operator", "<", 2 + len(name)),
+        ("number", "2", 3 + len(name)),
+        ("end", "the end", 4 + len(name)),
+    ]
+
+
+def test_words_keep_their_meaning_beside_characters_beyond_ascii():
+    assert tokens("not\N{NO-BREAK SPACE}é\N{EM SPACE}and\N{NO-BREAK SPACE}true") == [
+        ("operator", "not", 0),
+        ("name", "é", 4),
+        ("operator", "and", 6),
+        ("constant", "true", 10),
+        ("end", "the end", 14),
+    ]
+
+
+@pytest.mark.parametrize("low", ["1", ".5", "a.b", "true", "for.x"])
+def test_a_range_ends_what_stands_before_its_points(low):
+    kinds = [kind for kind, _, _ in tokens(f"[{low}..2]", Dialect.FEEL)]
+    assert len(kinds) == 6
+    assert tokens(f"[{low}..2]", Dialect.FEEL)[2] == ("operator", "..", 1 + len(low))
+
+
+@pytest.mark.parametrize(
+    ("text", "position", "message"),
+    [
+        ("a + b.", 5, "a part of the name is missing after '.'"),
+        ("a + é.", 5, "a part of the name is missing after '.'"),
+        ("not.", 3, "a part of the name is missing after '.'"),
+        ("1 + 2x", 5, "a number cannot be followed by 'x'"),
+        ("1 + .5.", 6, "a number cannot be followed by '.'"),
+        ("12é", 2, "a number cannot be followed by 'é'"),
+        ("1..2", 1, "a number cannot be followed by '.'"),
+        ("a²", 1, "unexpected '²'"),
+        ("a + 'b", 4, "the text is not closed by '"),
+        ("a + 'b\\'", 4, "the text is not closed by '"),
+        ("a + 'b\\x'", 4, r"'\x' is no escape"),
+        ("a = 1", 2, "write '=='"),
+        ("a  %b", 3, "write mod"),
+    ],
+)
+def test_what_is_no_token_is_said_with_its_place(text, position, message):
+    with pytest.raises(ExpressionSyntaxError) as caught:
+        tokens(text)
+    assert message in str(caught.value)
+    assert caught.value.position == position
+
+
+@pytest.mark.parametrize("word", ["for", "function", "instance"])
+def test_feel_words_that_are_not_supported_are_names_elsewhere(word):
+    with pytest.raises(ExpressionSyntaxError, match=f"FEEL's '{word}' is not supported"):
+        tokens(word, Dialect.FEEL)
+    assert tokens(word)[0] == ("name", word, 0)
+    assert tokens(f"{word}s", Dialect.FEEL)[0] == ("name", f"{word}s", 0)
+    assert tokens(f"{word}.x", Dialect.FEEL)[0] == ("name", f"{word}.x", 0)
+
+
+def test_xpath_names_before_a_bracket_are_functions_but_for_operators():
+    assert [token[:2] for token in tokens("true() and (ns:a-b (x))", Dialect.XPATH)] == [
+        ("name", "true"),
+        ("operator", "("),
+        ("operator", ")"),
+        ("operator", "and"),
+        ("operator", "("),
+        ("name", "ns:a-b"),
+        ("operator", "("),
+        ("name", "x"),
+        ("operator", ")"),
+        ("operator", ")"),
+        ("end", "the end"),
+    ]
+
+
+def test_the_end_is_where_the_span_ends():
+    assert tokenize("a  }", slice(0, 3), Dialect.JUEL)[-1].position == 3

@@ -1,0 +1,108 @@
+"""Whatever is commanded when: motion is continuous, reports are in order, vehicles come free."""
+
+import asyncio
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from conftest import START_US, Fleet, make, place, route
+from m2pem.api.arbiter import ResolvedValue
+from m2pem.api.clock import Clock
+from m2pem.executive.clock import run_virtual
+from m2pem.mission.catalogue import BehaviorState, ResourceId
+from m2pem.mission.geometry import Point, VehiclePosition
+from m2pem.simulation.arbiters import SimArbiter
+from m2pem.simulation.vehicles import SimVehicle
+from m2pem.testing.contracts.bench import ArbiterBench
+
+STEP_S = 0.1
+VEHICLES = ("ugv", "uav")
+BEHAVIORS: list[tuple[str, dict[str, ResolvedValue]]] = [
+    ("goto", {"target": Point(place(60, 20, 30))}),
+    ("single_vehicle_routing", {"route": route((30, 0), (30, 40), (0, 40)), "loop": True}),
+    ("orbit", {"target": Point(place(0, 30)), "radius": 20.0}),
+    ("follow", {"target": VehiclePosition("lead")}),
+    ("drive_stop", {}),
+    ("hold", {"duration": 3.0}),
+    ("return_to_launch", {}),
+]
+
+commands = st.lists(
+    st.tuples(
+        st.floats(0, 15),
+        st.sampled_from(VEHICLES),
+        st.one_of(
+            st.sampled_from(["hold", "resume", "cancel"]), st.integers(0, len(BEHAVIORS) - 1)
+        ),
+    ),
+    min_size=1,
+    max_size=12,
+)
+
+
+async def watch(clock: Clock, arbiter: SimArbiter) -> None:
+    """Fail when a vehicle jumps, or is faster than it can be."""
+    bodies = [body for body in arbiter._bodies.values() if isinstance(body, SimVehicle)]
+    before = {body.id: body.pose(clock.now_us()).place for body in bodies}
+    while True:
+        await clock.sleep(STEP_S)
+        for body in bodies:
+            pose = body.pose(clock.now_us())
+            bound = math.hypot(body.kinematics.max_speed_m_s, body.kinematics.climb_rate_m_s)
+            assert pose.speed <= bound + 1e-6
+            assert math.dist(pose.place, before[body.id]) <= bound * STEP_S + 1e-6
+            before[body.id] = pose.place
+
+
+async def play(clock: Clock, script: list[tuple[float, str, str | int]]) -> None:
+    fleet: Fleet = {"ugv": ("ground", {}), "uav": ("air", {}), "lead": ("ground", {})}
+    arbiter = make(clock, fleet, telemetry_hz=0.0)
+    async with ArbiterBench(arbiter, clock) as bench:
+        watching = asyncio.create_task(watch(clock, arbiter))
+        await bench.start("r1.lead", "goto", "lead", target=Point(place(-200, 90)))
+        newest = dict.fromkeys(VEHICLES, "")
+        for number, (after_s, vehicle, command) in enumerate(script):
+            await clock.sleep(after_s)
+            if isinstance(command, int):
+                behavior, parameters = BEHAVIORS[command]
+                id_ = f"r1.b{number}"
+                # The engine takes over from what it has cancelled, and so do we.
+                preempts = (newest[vehicle],) if newest[vehicle] else ()
+                for old in preempts:
+                    await arbiter.cancel(old, 1)
+                await bench.start(id_, behavior, vehicle, preempts=preempts, **parameters)  # type: ignore[arg-type]
+                newest[vehicle] = id_
+            elif command == "cancel":
+                await arbiter.cancel(newest[vehicle], 1)
+            else:
+                act = arbiter.hold if command == "hold" else arbiter.resume
+                await act(ResourceId(vehicle))
+        for vehicle in VEHICLES:
+            await arbiter.resume(ResourceId(vehicle))
+            await arbiter.cancel(newest[vehicle], 1)
+        await clock.sleep(60)
+        assert not watching.done(), watching.exception()
+        watching.cancel()
+        for id_ in {report.id for report in bench.reports} - {"r1.lead"}:
+            states = bench.states_of(id_)
+            assert states[:2] == [BehaviorState.ACCEPTED, BehaviorState.RUNNING]
+            assert [state.terminal for state in states] == [False, False, True]
+            assert [report.number for report in bench.of(id_)] == [1, 2, 3]
+        for vehicle in VEHICLES:
+            await bench.start(f"r2.{vehicle}", "drive_stop", vehicle)
+            assert (await bench.ended(f"r2.{vehicle}", 30)).state is BehaviorState.SUCCEEDED
+
+
+@settings(max_examples=25, deadline=None)
+@given(commands)
+def test_any_commands_at_any_time(script: list[tuple[float, str, str | int]]) -> None:
+    run_virtual(lambda clock: play(clock, script), START_US)
+
+
+@pytest.mark.long
+@settings(max_examples=2000, deadline=None)
+@given(commands)
+def test_very_many_commands_at_any_time(script: list[tuple[float, str, str | int]]) -> None:
+    run_virtual(lambda clock: play(clock, script), START_US)

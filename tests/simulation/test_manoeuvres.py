@@ -1,0 +1,367 @@
+import math
+
+import pytest
+
+from conftest import START_US, Fleet, Simulate, area, local, place, route
+from m2pem.api.telemetry import VehicleState
+from m2pem.fleet.behaviors import SHARED
+from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.catalogue import BehaviorState, ResourceId
+from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
+from m2pem.simulation.arbiters import SimArbiter
+from m2pem.simulation.manoeuvres import MANOEUVRES
+from m2pem.testing.contracts.bench import ArbiterBench
+
+S = 1_000_000
+UGV: Fleet = {"ugv": ("ground", {}), "lead": ("ground", {})}
+UAV: Fleet = {"uav": ("air", {"endurance": "10 h"}), "lead": ("ground", {})}
+SQUARE = area((0, 0), (200, 0), (200, 100), (0, 100))
+
+
+def at(bench: ArbiterBench, vehicle: str) -> tuple[float, float, float]:
+    state = bench.latest(vehicle)
+    assert isinstance(state, VehicleState)
+    assert state.altitude_above_home_m is not None
+    return (*local(state.position), state.altitude_above_home_m)
+
+
+def heading(bench: ArbiterBench, vehicle: str) -> float:
+    state = bench.latest(vehicle)
+    assert isinstance(state, VehicleState)
+    assert state.yaw_rad is not None
+    return math.pi / 2 - state.yaw_rad
+
+
+def tracks(bench: ArbiterBench, vehicle: str) -> list[tuple[float, float, float]]:
+    return [
+        (*local(state.position), state.altitude_above_home_m or 0.0)
+        for state in bench.states
+        if isinstance(state, VehicleState) and state.resource == vehicle
+    ]
+
+
+async def do(bench: ArbiterBench, id_: str, behavior: str, vehicle: str, **wishes: object) -> float:
+    began_us = bench.clock.now_us()
+    await bench.start(id_, behavior, vehicle, **wishes)  # type: ignore[arg-type]
+    end = await bench.ended(id_, 36_000)
+    assert end.state is BehaviorState.SUCCEEDED, end
+    return (bench.clock.now_us() - began_us) / S
+
+
+def test_every_shared_vehicle_behavior_is_a_manoeuvre() -> None:
+    shared = {name for name, type_ in SHARED if type_ is BehaviorType.VEHICLE}
+    assert set(MANOEUVRES) == shared
+
+
+def test_a_landed_aircraft_takes_off_to_the_height_of_its_route(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        up = Route(route((50, 0, 40), (90, 0, 50)).waypoints)
+        await do(bench, "r1.b1", "single_vehicle_routing", "uav", route=up)
+        assert at(bench, "uav") == pytest.approx((90, 0, 50), abs=0.01)
+        assert all(height >= 39.9 for east, _, height in tracks(bench, "uav") if east > 1)
+
+    simulate(UAV, main, telemetry_hz=2.0)
+
+
+def test_altitudes_are_read_in_their_frame(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        await do(bench, "r1.b1", "takeoff", "uav", altitude=100.0, altitude_frame="amsl")
+        assert at(bench, "uav")[2] == pytest.approx(40.0)
+        await do(bench, "r1.b2", "change_altitude", "uav", altitude=25.0)
+        assert at(bench, "uav")[2] == pytest.approx(25.0)
+        target = Point(place(0, 0, 80), "amsl")
+        await do(bench, "r1.b3", "goto", "uav", target=target)
+        assert at(bench, "uav")[2] == pytest.approx(20.0)
+
+    simulate(UAV, main)
+
+
+def test_a_ground_vehicle_stays_on_the_ground(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        await do(bench, "r1.b1", "goto", "ugv", target=Point(place(50, 0, 90)), altitude=30.0)
+        assert at(bench, "ugv") == pytest.approx((50, 0, 0), abs=0.01)
+
+    simulate(UGV, main)
+
+
+def test_goto_ends_with_the_wished_heading(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        target = Point(place(50, 0))
+        await do(bench, "r1.b1", "goto", "ugv", target=target, heading=math.pi)
+        assert math.remainder(heading(bench, "ugv") - math.pi, math.tau) == pytest.approx(0)
+
+    simulate(UGV, main)
+
+
+def test_a_loop_passes_its_route_again_and_again(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+        await bench.start(
+            "r1.b1",
+            "single_vehicle_routing",
+            "ugv",
+            route=route((0, 0), (100, 0), (100, 100)),
+            loop=True,
+        )
+        await bench.clock.sleep(600)
+        visits = 0
+        before = math.inf
+        for east, north, _ in tracks(bench, "ugv"):
+            distance = math.dist((east, north), (100, 100))
+            visits += distance < 5 <= before
+            before = distance
+        assert visits >= 5
+        await arbiter.cancel("r1.b1", 1)
+        await bench.ended("r1.b1", 10)
+
+    simulate(UGV, main, telemetry_hz=2.0)
+
+
+def test_hold_ends_when_the_vehicle_stands_or_after_its_duration(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        assert await do(bench, "r1.b1", "hold", "ugv") == pytest.approx(0)
+        assert await do(bench, "r1.b2", "hold", "ugv", duration=30.0) == pytest.approx(30)
+
+    simulate(UGV, main)
+
+
+def test_reverse_goes_five_metres_back_unless_told(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        await do(bench, "r1.b1", "reverse", "ugv")
+        assert at(bench, "ugv") == pytest.approx((0, -5, 0), abs=0.01)
+        await do(bench, "r1.b2", "reverse", "ugv", distance=12.0, speed=1.0)
+        assert at(bench, "ugv") == pytest.approx((0, -17, 0), abs=0.01)
+
+    simulate(UGV, main)
+
+
+def test_an_aircraft_returns_high_and_lands_where_it_started(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        await do(bench, "r1.b1", "goto", "uav", target=Point(place(100, 50, 10)))
+        await do(bench, "r1.b2", "return_to_launch", "uav")
+        assert at(bench, "uav") == pytest.approx((0, 0, 0), abs=0.01)
+        flown = tracks(bench, "uav")
+        assert all(height > 29 for east, _, height in flown[len(flown) // 2 :] if 10 < east < 90)
+        state = bench.latest("uav")
+        assert isinstance(state, VehicleState)
+        assert state.mode == "landed"
+
+    simulate(UAV, main, telemetry_hz=2.0)
+
+
+def test_land_comes_down_where_it_is(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        await do(bench, "r1.b1", "goto", "uav", target=Point(place(40, 0, 30)))
+        await do(bench, "r1.b2", "land", "uav")
+        assert at(bench, "uav") == pytest.approx((40, 0, 0), abs=0.01)
+
+    simulate(UAV, main)
+
+
+def test_a_survey_passes_every_part_of_the_area(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        await do(bench, "r1.b1", "area_survey", "ugv", area=SQUARE, spacing=25.0)
+        driven = [(east, north) for east, north, _ in tracks(bench, "ugv")]
+        for east in range(5, 200, 10):
+            for north in range(5, 100, 10):
+                nearest = min(math.dist((east, north), p) for p in driven)
+                assert nearest <= 12.5 + 1.0, (east, north)
+
+    simulate(UGV, main, telemetry_hz=5.0)
+
+
+def test_the_heading_of_a_survey_is_that_of_its_passes(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        along_s = await do(bench, "r1.b1", "area_survey", "ugv", area=SQUARE, spacing=20.0)
+        across_s = await do(
+            bench, "r1.b2", "area_survey", "ugv", area=SQUARE, spacing=20.0, heading=0.0
+        )
+        assert across_s > along_s * 1.3
+        assert heading(bench, "ugv") % math.pi == pytest.approx(0, abs=1e-6)
+
+    simulate(UGV, main)
+
+
+def test_an_orbit_keeps_its_radius_for_its_turns(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        target = Point(place(100, 0))
+        await do(bench, "r1.b0", "goto", "uav", target=Point(place(60, 0, 30)))
+        before = len(bench.states)
+        seconds = await do(
+            bench, "r1.b1", "orbit", "uav", target=target, radius=40.0, turns=2.0, speed=8.0
+        )
+        radii = [
+            math.dist(local(state.position), (100, 0))
+            for state in bench.states[before:]
+            if isinstance(state, VehicleState) and state.resource == "uav"
+        ]
+        assert max(abs(radius - 40) for radius in radii) < 0.1
+        turning_s = math.pi
+        assert seconds == pytest.approx(2 * math.tau * 40 / 8 + 8 / 3 + turning_s, rel=0.1)
+
+    simulate(UAV, main, telemetry_hz=5.0)
+
+
+def test_the_duration_of_an_orbit_counts_from_arriving_on_it(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        target = Point(place(100, 0))
+        await do(bench, "r1.b0", "orbit", "uav", target=target, turns=0.0)
+        seconds = await do(bench, "r1.b1", "orbit", "uav", target=target, duration=120.0)
+        assert seconds == pytest.approx(120.0, abs=4)
+
+    simulate(UAV, main)
+
+
+@pytest.mark.parametrize("fleet", [UGV, UAV])
+def test_observing_lasts_until_cancelled_or_for_its_duration(
+    simulate: Simulate, fleet: Fleet
+) -> None:
+    vehicle = next(iter(fleet))
+
+    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+        await bench.start("r1.b1", "area_observe", vehicle, area=SQUARE)
+        await bench.clock.sleep(5000)
+        assert bench.states_of("r1.b1") == ["ACCEPTED", "RUNNING"]
+        await arbiter.cancel("r1.b1", 1)
+        assert (await bench.ended("r1.b1", 30)).state is BehaviorState.CANCELLED
+        there_s = await do(bench, "r1.b2", "area_observe", vehicle, area=SQUARE, duration=0.0)
+        seconds = await do(bench, "r1.b3", "area_observe", vehicle, area=SQUARE, duration=90.0)
+        assert seconds == pytest.approx(90.0, abs=10)
+        assert there_s < 60
+
+    simulate(fleet, main)
+
+
+def test_a_ground_vehicle_observes_from_the_edge_with_the_area_before_it(
+    simulate: Simulate,
+) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        field = area((-50, 80), (50, 80), (50, 180), (-50, 180))
+        await do(bench, "r1.b1", "area_observe", "ugv", area=field, duration=1.0)
+        assert at(bench, "ugv") == pytest.approx((0, 80, 0), abs=0.05)
+        assert heading(bench, "ugv") == pytest.approx(0, abs=0.01)
+
+    simulate(UGV, main)
+
+
+def test_set_speed_is_the_speed_of_what_follows(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        there, back = Point(place(0, 500)), Point(place(0, 0))
+        usual_s = await do(bench, "r1.b1", "goto", "ugv", target=there)
+        assert await do(bench, "r1.b2", "set_speed", "ugv", speed=10.0) == pytest.approx(0)
+        faster_s = await do(bench, "r1.b3", "goto", "ugv", target=back)
+        assert usual_s == pytest.approx(500 / 5 + 2.5, abs=0.1)
+        assert faster_s == pytest.approx(500 / 10 + 5 + math.pi / 0.5, abs=0.1)
+
+    simulate(UGV, main)
+
+
+def test_a_wished_speed_beyond_the_vehicles_own_is_its_own(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        await do(bench, "r1.b1", "goto", "ugv", target=Point(place(0, 500)), speed=99.0)
+        speeds = [
+            math.hypot(*state.velocity_enu_m_s)
+            for state in bench.states
+            if isinstance(state, VehicleState) and state.velocity_enu_m_s
+        ]
+        assert max(speeds) == pytest.approx(15.0)
+
+    simulate(UGV, main, telemetry_hz=5.0)
+
+
+def test_teleop_lasts_for_its_timeout(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        assert await do(bench, "r1.b1", "teleop", "ugv", timeout=45.0) == pytest.approx(45)
+
+    simulate(UGV, main)
+
+
+@pytest.mark.parametrize("fleet", [UGV, UAV])
+def test_following_keeps_its_station_while_the_target_moves_and_stands(
+    simulate: Simulate, fleet: Fleet
+) -> None:
+    follower = next(iter(fleet))
+
+    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+        await bench.start("r1.b1", "follow", follower, target=VehiclePosition("lead"), offset=20.0)
+        await bench.start(
+            "r1.b2", "single_vehicle_routing", "lead", route=route((0, 300), (300, 300))
+        )
+        await bench.clock.sleep(50)
+        assert math.dist(at(bench, follower)[:2], at(bench, "lead")[:2]) == pytest.approx(20, abs=8)
+        await bench.ended("r1.b2", 1000)
+        await bench.clock.sleep(60)
+        east, north, height = at(bench, follower)
+        assert (east, north) == pytest.approx((280, 300), abs=0.5)
+        assert height == pytest.approx(30.0 if follower == "uav" else 0.0, abs=0.5)
+        await arbiter.cancel("r1.b1", 1)
+        assert (await bench.ended("r1.b1", 10)).state is BehaviorState.CANCELLED
+
+    simulate(fleet, main, telemetry_hz=2.0)
+
+
+def test_a_held_follower_stands_and_catches_up_when_resumed(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+        await bench.start("r1.b1", "follow", "ugv", target=VehiclePosition("lead"))
+        await bench.start("r1.b2", "goto", "lead", target=Point(place(0, 400)))
+        await bench.clock.sleep(40)
+        await arbiter.hold(ResourceId("ugv"))
+        await bench.clock.sleep(10)
+        stood = at(bench, "ugv")
+        await bench.clock.sleep(200)
+        assert at(bench, "ugv") == stood
+        await arbiter.resume(ResourceId("ugv"))
+        await bench.clock.sleep(200)
+        assert at(bench, "ugv")[:2] == pytest.approx((0, 385), abs=0.5)
+
+    simulate(UGV, main, telemetry_hz=2.0)
+
+
+def test_a_target_elsewhere_is_followed_as_it_is_heard_on_the_bus(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+        frame = arbiter._launcher._frame
+        stranger = ResourceId("stranger")
+        arbiter._context.bus.publish(
+            VehicleState(stranger, START_US, frame.geo((200.0, 0.0, 0.0)), yaw_rad=0.0)
+        )
+        await bench.start("r1.b1", "follow", "ugv", target=VehiclePosition("stranger"), offset=10.0)
+        await bench.clock.sleep(120)
+        assert at(bench, "ugv")[:2] == pytest.approx((190, 0), abs=0.5)
+
+    simulate(UGV, main)
+
+
+def test_areas_with_holes_are_read(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        hole = area((80, 30), (120, 30), (120, 70), (80, 70))
+        both = Area((*SQUARE.rings, *hole.rings))
+        await do(bench, "r1.b1", "area_survey", "ugv", area=both, spacing=20.0)
+
+    simulate(UGV, main)
+
+
+def test_a_vehicle_begins_at_home_and_altitudes_count_from_there(simulate: Simulate) -> None:
+    latitude, longitude, _ = place(70, -30)
+    home = {"home": [latitude, longitude, 90.0], "heading": "180 deg"}
+
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        await do(bench, "r1.b1", "takeoff", "uav", altitude=12.0)
+        state = bench.latest("uav")
+        assert isinstance(state, VehicleState)
+        assert state.position is not None
+        assert local(state.position) == pytest.approx((70, -30), abs=0.01)
+        assert state.position.altitude_m == pytest.approx(102.0)
+        assert state.altitude_above_home_m == pytest.approx(12.0)
+        assert math.remainder(heading(bench, "uav") - math.pi, math.tau) == pytest.approx(0)
+
+    simulate({"uav": ("air", home)}, main)
+
+
+def test_goto_a_vehicle_goes_to_where_it_is_at_the_start(simulate: Simulate) -> None:
+    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+        await do(bench, "r1.b1", "goto", "lead", target=Point(place(90, 0)))
+        await do(bench, "r1.b2", "goto", "uav", target=VehiclePosition("lead"), altitude=15.0)
+        assert at(bench, "uav") == pytest.approx((90, 0, 15), abs=0.01)
+        await do(bench, "r1.b3", "goto", "lead", target=VehiclePosition("uav"))
+        assert at(bench, "lead") == pytest.approx((90, 0, 0), abs=0.01)
+
+    simulate(UAV, main)
