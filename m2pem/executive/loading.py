@@ -8,6 +8,7 @@ from urllib.parse import unquote, urlsplit
 
 from m2pem.api.authoring import Draft, MissionSource
 from m2pem.bpmn import parse_mission
+from m2pem.bpmn.lint import by_file, lint
 from m2pem.bpmn.rules.registry import code
 from m2pem.bpmn.search_path import SearchPath
 from m2pem.bpmn.size import max_bytes, too_large
@@ -17,7 +18,6 @@ from m2pem.findings import Finding, Severity, has_errors, lines, unreadable_reme
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import check_mission, check_named
 from m2pem.mission.elements import ServiceTask
-from m2pem.mission.lint import by_file, lint
 from m2pem.mission.mission import Mission
 from m2pem.mission.near import did_you_mean
 

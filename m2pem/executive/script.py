@@ -1,7 +1,7 @@
 """A scripted outside world, as an answers file tells it (docs/rehearsal.md).
 
-The executive asks it before it runs a service or starts a behavior; `m2pem.rehearsal.answers` reads one
-from a file.
+The executive asks it before it runs a service or starts a behavior; `m2pem.rehearsal.answers`
+reads one from a file.
 """
 
 from collections.abc import Mapping, Sequence

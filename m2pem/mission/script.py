@@ -1,7 +1,7 @@
 """Scripts of script tasks: one statement a line, `dotted.name = expression` or `throw error CODE`.
 
-Expressions are in the bare dialect of `m2pem.mission.expression`. Blank lines and what follows a `#`
-are skipped.
+Expressions are in the bare dialect of `m2pem.mission.expression`. Blank lines, and what follows a
+`#`, are skipped.
 """
 
 import re

@@ -1,1 +1,1 @@
-"""Rehearsals: a mission on a virtual clock, with scripted answers and simulated vehicles (docs/rehearsal.md)."""
+"""Rehearsals: a mission on a virtual clock, with scripted answers and simulated vehicles."""

@@ -3,9 +3,9 @@
 import pytest
 from bpmn_text import around, findings, flow, line_of, load, process, summary
 
+from m2pem.bpmn.lint import lint
 from m2pem.mission.elements import Event, IntermediateCatchEvent, SubProcess
 from m2pem.mission.events import ConditionalEventDefinition
-from m2pem.mission.lint import lint
 from m2pem.mission.mission import Mission
 
 TASK = '<task id="T"/>'

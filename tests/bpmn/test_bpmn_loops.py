@@ -3,11 +3,11 @@
 import pytest
 
 from m2pem.bpmn import parse_mission
+from m2pem.bpmn.lint import lint
 from m2pem.errors import MissionError
 from m2pem.findings import Finding, Severity
 from m2pem.mission.elements import Activity, BoundaryEvent
 from m2pem.mission.events import SignalEventDefinition
-from m2pem.mission.lint import lint
 from m2pem.mission.loops import InstanceBehavior, MultiInstance, StandardLoop
 from tests.bpmn.bpmn_text import around, definitions, line_of, load, process
 

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import pytest
 
 from m2pem.bpmn import parse_mission
+from m2pem.bpmn.lint import lint
 from m2pem.errors import MissionError
 from m2pem.findings import Severity
 from m2pem.mission.elements import CallActivity
 from m2pem.mission.library import KeptLibrary, LibraryError, Source
-from m2pem.mission.lint import lint
 from m2pem.mission.mission import Mission
 from tests.bpmn.bpmn_text import around, definitions, line_of
 

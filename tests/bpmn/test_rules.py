@@ -44,7 +44,7 @@ def test_every_rule_of_bpmn_has_a_case() -> None:
 
 @pytest.mark.parametrize("slug", sorted({*ELSEWHERE, *(rule.slug for rule in OWN)}))
 def test_every_other_rule_is_tested_by_name(slug: str) -> None:
-    tests = [*HERE.glob("test_*.py"), *(HERE.parent / "resources").glob("test_*.py")]
+    tests = [*HERE.glob("test_*.py"), *(HERE.parent / "fleet").glob("test_*.py")]
     assert any(f'"{slug}"' in each.read_text(encoding="utf-8") for each in tests)
 
 
@@ -80,7 +80,7 @@ def test_every_finding_of_the_readers_has_a_number() -> None:
 
 
 def test_slugs_in_the_code_of_the_readers_are_registered() -> None:
-    package = REPOSITORY / "m2pem" / "model" / "bpmn"
+    package = REPOSITORY / "m2pem" / "bpmn"
     raised = {
         slug
         for file in package.glob("*.py")

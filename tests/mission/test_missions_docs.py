@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from bpmn_text import definitions, load
 
+from m2pem.bpmn.lint import lint
 from m2pem.mission.elements import Activity, CallActivity, ServiceTask
-from m2pem.mission.lint import lint
 from m2pem.mission.loops import MultiInstance, StandardLoop
 
 DOCS = (Path(__file__).parent.parent.parent / "docs" / "missions.md").read_text()

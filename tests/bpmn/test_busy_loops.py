@@ -6,10 +6,10 @@ from itertools import pairwise
 import pytest
 from bpmn_text import definitions, flow, line_of, load, process
 
+from m2pem.bpmn.lint import lint
 from m2pem.engine.inputs import StartRun
 from m2pem.engine.run import MissionRun
 from m2pem.findings import Finding, Severity
-from m2pem.mission.lint import lint
 from m2pem.mission.mission import Mission
 
 RULES = ("endless-loop", "busy-loop")

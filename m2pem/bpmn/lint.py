@@ -7,10 +7,11 @@ and have no end: those load, and are errors of `check`.
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from m2pem.bpmn import collector
+from m2pem.bpmn.busy_loops import busy_loops
+from m2pem.bpmn.data_names import unwritten
 from m2pem.bpmn.graph import unreachable
 from m2pem.bpmn.rules.registry import code
 from m2pem.findings import Finding, Severity
-from m2pem.mission.busy_loops import busy_loops
 from m2pem.mission.components import components
 from m2pem.mission.elements import (
     Activity,
@@ -36,7 +37,6 @@ from m2pem.mission.events import (
 )
 from m2pem.mission.loops import MultiInstance
 from m2pem.mission.mission import Mission
-from m2pem.mission.names import unwritten
 from m2pem.mission.reach import unreached
 
 

@@ -7,9 +7,9 @@ import pytest
 from bpmn_text import around, definitions, flow, line_of, load, process
 
 from m2pem.bpmn import parse_mission
+from m2pem.bpmn.lint import lint
 from m2pem.bpmn.search_path import SearchPath
 from m2pem.findings import Severity
-from m2pem.mission.lint import lint
 
 
 def found(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
+from m2pem.bpmn.data_names import written_by
 from m2pem.bpmn.rules.registry import code
 from m2pem.findings import Finding, Severity
 from m2pem.mission.behavior import Assignment, ThrowError
@@ -51,7 +52,6 @@ from m2pem.mission.expression import Expression
 from m2pem.mission.expression import tree as t
 from m2pem.mission.loops import LOOP_COUNTER, StandardLoop
 from m2pem.mission.mission import Mission
-from m2pem.mission.names import written_by
 from m2pem.mission.reach import unreached
 
 _NAMED = 8
