@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         ResolvedValue,
         SightedArbiter,
     )
+    from m2pem.api.async_queue import AsyncQueue
     from m2pem.api.authoring import (
         DataName,
         Draft,
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
         SearchLimits,
         SearchProgress,
     )
+    from m2pem.api.behavior_tracker import BehaviorTracker
     from m2pem.api.bus import FleetBus
     from m2pem.api.clock import Clock
     from m2pem.api.control import (
@@ -51,8 +53,6 @@ if TYPE_CHECKING:
         TelemetrySample,
     )
     from m2pem.api.goals import GoalArbiter
-    from m2pem.api.ledger import Ledger
-    from m2pem.api.mailbox import Mailbox
     from m2pem.api.ocu import Ocu
     from m2pem.api.service import Service, ServiceContext, ServiceError
     from m2pem.api.telemetry import (
@@ -106,8 +106,8 @@ _MODULES = {
         " SimulationResult StampedRecord TelemetrySample"
     ),
     "m2pem.api.goals": "GoalArbiter",
-    "m2pem.api.ledger": "Ledger",
-    "m2pem.api.mailbox": "Mailbox",
+    "m2pem.api.behavior_tracker": "BehaviorTracker",
+    "m2pem.api.async_queue": "AsyncQueue",
     "m2pem.api.ocu": "Ocu",
     "m2pem.api.service": "Service ServiceContext ServiceError",
     "m2pem.api.telemetry": (
@@ -164,10 +164,10 @@ __all__ = [
     "GeoPosition",
     "GoalArbiter",
     "HandedOver",
-    "Ledger",
+    "BehaviorTracker",
     "Limits",
     "LinkState",
-    "Mailbox",
+    "AsyncQueue",
     "Mission",
     "MissionControl",
     "MissionFile",

@@ -14,8 +14,8 @@ from m2pem.api.arbiter import (
     Connection,
     Limits,
 )
-from m2pem.api.ledger import Ledger
-from m2pem.api.mailbox import Mailbox
+from m2pem.api.async_queue import AsyncQueue
+from m2pem.api.behavior_tracker import BehaviorTracker
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 
@@ -41,8 +41,8 @@ class GoalArbiter:
     ) -> None:
         self.connections = connections
         self.context = context
-        self._ledger = Ledger(self.catalogue, context.logger)
-        self._states: Mailbox[VehicleState | PayloadState] = Mailbox(STATES_WAITING)
+        self._ledger = BehaviorTracker(self.catalogue, context.logger)
+        self._states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(STATES_WAITING)
         self._behaviors: dict[str, BehaviorId] = {}
         self._goals: dict[ResourceId, str] = {}
         self._heard_us: dict[ResourceId, int] = {}

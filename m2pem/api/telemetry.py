@@ -4,7 +4,7 @@ Positions are WGS-84 (EPSG:4979): degrees, metres above mean sea level. Local ve
 (REP-103). `yaw_rad` is from east, counter-clockwise (REP-103); headings for people are made of it.
 A positive `roll_rad` has the right side down, a positive `pitch_rad` the bow (REP-103; autopilots,
 who speak NED, have the other sign of pitch).
-Telemetry is never journaled; `m2pem.telemetry.watch` turns what matters into inputs.
+Telemetry is never journaled; `m2pem.telemetry.link_monitor` turns what matters into inputs.
 """
 
 from dataclasses import dataclass

@@ -66,7 +66,7 @@ from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.plugins import PluginManager
 from m2pem.telemetry.bus import Bus
-from m2pem.telemetry.watch import Watch, watch
+from m2pem.telemetry.link_monitor import LinkMonitor, monitor_links
 
 log = logging.getLogger("m2pem.executive")
 
@@ -198,8 +198,10 @@ class Executive:
                 )
                 for vehicle in self.fleet.vehicles.values()
             }
-            rules = Watch(bounds, self.clock.now_us())
-            self._listen("link watch", partial(watch, self.bus, self.clock, self._fault, rules))
+            rules = LinkMonitor(bounds, self.clock.now_us())
+            self._listen(
+                "link monitor", partial(monitor_links, self.bus, self.clock, self._fault, rules)
+            )
         return self
 
     async def _connect(self) -> None:

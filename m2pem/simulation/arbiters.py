@@ -16,7 +16,7 @@ from m2pem.api.arbiter import (
     Limits,
     ResolvedValue,
 )
-from m2pem.api.epochs import Epochs
+from m2pem.api.epoch_fence import EpochFence
 from m2pem.api.telemetry import Detection, PayloadState, VehicleState
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.simulation.agenda import Agenda
@@ -100,7 +100,7 @@ class SimArbiter:
         self._detectors = Detectors(
             self._bodies, frame, self._agenda, self._detected, self._keep_found
         )
-        self._epochs = Epochs()
+        self._epochs = EpochFence()
         self._faults = {
             resource: FaultList(own_faults(resource, self._settings)) for resource in self._bodies
         }

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 
-from m2pem.api.mailbox import Mailbox
+from m2pem.api.async_queue import AsyncQueue
 from m2pem.api.telemetry import Detection, GeoPosition, PayloadState, VehicleState
 from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.agenda import Agenda, Entry
@@ -32,7 +32,7 @@ class Broadcast:
         audible: Callable[[ResourceId], bool],
     ) -> None:
         # A state that carries a detection must not be lost to a slow reader.
-        self.states: Mailbox[VehicleState | PayloadState] = Mailbox(
+        self.states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(
             WAITING_STATES, lambda state: isinstance(state, VehicleState) or not state.detections
         )
         self._bodies = bodies

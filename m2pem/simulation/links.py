@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from m2pem.api.arbiter import BehaviorReport
-from m2pem.api.mailbox import Mailbox
+from m2pem.api.async_queue import AsyncQueue
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.simulation.executions import Execution, Outcome
 
@@ -26,7 +26,7 @@ class Links:
     """
 
     def __init__(self) -> None:
-        self.reports: Mailbox[BehaviorReport] = Mailbox()
+        self.reports: AsyncQueue[BehaviorReport] = AsyncQueue()
         self.muted = False
         self._broken: dict[ResourceId, _Broken] = {}
         self._cuts: dict[ResourceId, int] = {}

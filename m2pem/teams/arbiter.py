@@ -12,8 +12,8 @@ from m2pem.api.arbiter import (
     BehaviorRequest,
     Limits,
 )
-from m2pem.api.ledger import Ledger
-from m2pem.api.mailbox import Mailbox
+from m2pem.api.async_queue import AsyncQueue
+from m2pem.api.behavior_tracker import BehaviorTracker
 from m2pem.api.telemetry import TeamMemberState, TeamState
 from m2pem.fleet.allocation import spelled_out
 from m2pem.fleet.fleet import Fleet, LostMemberPolicy
@@ -64,12 +64,12 @@ class Teams:
         self._context = context
         self._offers = offers
         self._scene = Scene(fleet, offers, context.bus, arbiter_of)
-        self._ledger = Ledger(self.catalogue, _log)
+        self._ledger = BehaviorTracker(self.catalogue, _log)
         self._behaviors: dict[BehaviorId, TeamBehavior] = {}
         self._requests: dict[BehaviorId, BehaviorRequest] = {}
         self._remains: dict[BehaviorId, _Remains] = {}
         self._scripts: dict[BehaviorId, tuple[float, str, str]] = {}
-        self._states: Mailbox[TeamState] = Mailbox(STATES_WAITING)
+        self._states: AsyncQueue[TeamState] = AsyncQueue(STATES_WAITING)
 
     # --- what can be done -----------------------------------------------------------------------
 

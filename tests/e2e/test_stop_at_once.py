@@ -29,16 +29,16 @@ def m2pem_records_committed(run_id, records):
 
 STALLING = """
 import os, time
-from m2pem.journal.ledger import Ledger
+from m2pem.journal.ledger import BehaviorTracker
 
-commit = Ledger.commit
+commit = BehaviorTracker.commit
 
 def stalled(self):
     while os.path.exists("stalled"):
         time.sleep(0.01)
     return commit(self)
 
-Ledger.commit = stalled
+BehaviorTracker.commit = stalled
 """
 
 

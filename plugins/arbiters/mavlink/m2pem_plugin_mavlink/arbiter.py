@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Protocol
 
 from m2pem.api import (
     ArbiterContext,
+    AsyncQueue,
     BehaviorId,
     BehaviorReport,
     BehaviorRequest,
     BehaviorSpec,
     BehaviorState,
+    BehaviorTracker,
     Connection,
     Fence,
-    Ledger,
     Limits,
     LinkState,
-    Mailbox,
     PayloadState,
     ResolvedValue,
     ResourceId,
@@ -112,8 +112,8 @@ class MavlinkArbiter:
         self._settings = read_settings(connections)
         self._make_station = make_station
         self._station: Station | None = None
-        self._ledger = Ledger(self._taken, context.logger)
-        self._states: Mailbox[VehicleState | PayloadState] = Mailbox(STATES_WAITING)
+        self._ledger = BehaviorTracker(self._taken, context.logger)
+        self._states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(STATES_WAITING)
         self._helms: dict[ResourceId, Helm] = {}
         self._watches: list[TakeoverWatch] = []
         self._fences: dict[ResourceId, Fence] = {}

@@ -10,7 +10,7 @@ import math
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from m2pem.api import BehaviorId, BehaviorState, Ledger, Limits
+from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, Limits
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError
 from m2pem_plugin_mavlink.behaviors.flight import Land, ReturnToLaunch, SetSpeed
 from m2pem_plugin_mavlink.behaviors.looking import (
@@ -58,7 +58,7 @@ class Helm:
         self,
         vehicle: Vehicle,
         watch: TakeoverWatch,
-        ledger: Ledger,
+        ledger: BehaviorTracker,
         limits: Limits,
         logger: logging.Logger,
     ) -> None:

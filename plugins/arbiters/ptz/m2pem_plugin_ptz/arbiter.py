@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 from m2pem.api import (
     ArbiterContext,
+    AsyncQueue,
     BehaviorId,
     BehaviorReport,
     BehaviorRequest,
     BehaviorSpec,
     BehaviorState,
+    BehaviorTracker,
     Connection,
-    Ledger,
     Limits,
     LinkState,
-    Mailbox,
     PayloadState,
     ResourceId,
     VehicleState,
@@ -62,8 +62,8 @@ class PtzArbiter:
         self._context = context
         self._settings = read_settings(connections)
         self._make_driver = make_driver
-        self._ledger = Ledger(self.catalogue, context.logger)
-        self._states: Mailbox[VehicleState | PayloadState] = Mailbox(STATES_WAITING)
+        self._ledger = BehaviorTracker(self.catalogue, context.logger)
+        self._states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(STATES_WAITING)
         self._cameras: dict[ResourceId, Camera] = {}
         self._drivers: list[CameraDriver] = []
         self._pending: dict[BehaviorId, Behavior] = {}

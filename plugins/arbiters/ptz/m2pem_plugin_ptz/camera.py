@@ -9,7 +9,7 @@ import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from m2pem.api import BehaviorId, BehaviorState, Ledger, Limits
+from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, Limits
 from m2pem_plugin_ptz.behaviors.behavior import TICK_S, Behavior, BehaviorFailedError
 from m2pem_plugin_ptz.drivers.driver import CameraError
 from m2pem_plugin_ptz.sight import Sight
@@ -36,7 +36,7 @@ class Camera:
     """Works a camera; what becomes of it goes to the ledger. `heard_us`: when it was heard last."""
 
     def __init__(
-        self, sight: Sight, ledger: Ledger, limits: Limits, logger: logging.Logger
+        self, sight: Sight, ledger: BehaviorTracker, limits: Limits, logger: logging.Logger
     ) -> None:
         self.sight = sight
         self.driver = sight.driver

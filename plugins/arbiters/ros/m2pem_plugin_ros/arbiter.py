@@ -8,16 +8,16 @@ from dataclasses import replace
 
 from m2pem.api import (
     ArbiterContext,
+    AsyncQueue,
     BehaviorId,
     BehaviorReport,
     BehaviorRequest,
     BehaviorSpec,
     BehaviorState,
+    BehaviorTracker,
     Connection,
-    Ledger,
     Limits,
     LinkState,
-    Mailbox,
     PayloadState,
     ResolvedValue,
     ResourceId,
@@ -86,8 +86,10 @@ class RosArbiter:
         self._make_driver = make_driver
         self._make_station = make_station
         self._station: Station | None = None
-        self._ledger = Ledger(self._taken, context.logger)
-        self._states: Mailbox[VehicleState | PayloadState] = Mailbox(STATES_WAITING, _may_be_missed)
+        self._ledger = BehaviorTracker(self._taken, context.logger)
+        self._states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(
+            STATES_WAITING, _may_be_missed
+        )
         self._vehicles: dict[ResourceId, Vehicle] = {}
         self._asked: set[BehaviorId] = set()
         self._unknown: dict[BehaviorId, tuple[Kept, str | None]] = {}

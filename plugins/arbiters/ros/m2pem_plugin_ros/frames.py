@@ -25,13 +25,13 @@ class AnyQuaternion(Protocol):
     """Ours, or geometry_msgs/Quaternion."""
 
     @property
-    def x(self) -> float: ...  # noqa: D102
+    def x(self) -> float: ...
     @property
-    def y(self) -> float: ...  # noqa: D102
+    def y(self) -> float: ...
     @property
-    def z(self) -> float: ...  # noqa: D102
+    def z(self) -> float: ...
     @property
-    def w(self) -> float: ...  # noqa: D102
+    def w(self) -> float: ...
 
 
 def to_local(position: GeoPosition, origin: Origin) -> tuple[float, float, float]:

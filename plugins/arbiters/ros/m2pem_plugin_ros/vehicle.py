@@ -12,8 +12,8 @@ from m2pem.api import (
     BehaviorId,
     BehaviorRequest,
     BehaviorState,
+    BehaviorTracker,
     Connection,
-    Ledger,
     Limits,
     LinkState,
     PayloadState,
@@ -55,7 +55,7 @@ class Post:
     connection: Connection
     settings: Settings
     context: ArbiterContext
-    ledger: Ledger
+    ledger: BehaviorTracker
     limits: Limits
 
 

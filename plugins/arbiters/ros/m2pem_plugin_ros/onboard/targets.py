@@ -4,7 +4,7 @@ import math
 from collections.abc import AsyncIterator
 from typing import Any
 
-from m2pem.api import GeoPosition, Mailbox, PayloadState, ResourceId, VehicleState
+from m2pem.api import AsyncQueue, GeoPosition, PayloadState, ResourceId, VehicleState
 from m2pem_plugin_ros.wire import WireError
 
 MOST_TARGETS = 1000
@@ -17,7 +17,7 @@ class Targets:
 
     def __init__(self) -> None:
         self._latest: dict[ResourceId, State] = {}
-        self._readers: list[Mailbox[State]] = []
+        self._readers: list[AsyncQueue[State]] = []
 
     def latest(self, resource: ResourceId) -> State | None:
         """The newest state heard, or None before the first."""
@@ -34,7 +34,7 @@ class Targets:
 
     async def subscribe(self, size: int = 100) -> AsyncIterator[State]:
         """States from now on, for one reader; `size` of them wait at most."""
-        reader: Mailbox[State] = Mailbox(size)
+        reader: AsyncQueue[State] = AsyncQueue(size)
         self._readers.append(reader)
         try:
             async for state in reader.read():

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 from m2pem.api import refusal as parameters
 from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
-from m2pem.api.epochs import Epochs
-from m2pem.api.mailbox import Mailbox
+from m2pem.api.async_queue import AsyncQueue
+from m2pem.api.epoch_fence import EpochFence
 from m2pem.fleet.nearmiss import suggest
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.mission.values import Value
@@ -28,7 +28,7 @@ class _Entry:
     last: BehaviorReport
 
 
-class Ledger:
+class BehaviorTracker:
     """Keeps what every arbiter promises of ids, numbers, epochs and refusals.
 
     An arbiter asks `admit` before it commands anything, and says what became of it with `progress`
@@ -44,10 +44,10 @@ class Ledger:
     ) -> None:
         self._catalogue = catalogue
         self._logger = logger
-        self._epochs = Epochs()
+        self._epochs = EpochFence()
         self._entries: dict[BehaviorId, _Entry] = {}
         self._holders: dict[ResourceId, BehaviorId] = {}
-        self._reports: Mailbox[BehaviorReport] = Mailbox()
+        self._reports: AsyncQueue[BehaviorReport] = AsyncQueue()
 
     # --- what the executive asks for ------------------------------------------------------------
 

@@ -1,9 +1,9 @@
-"""Turns telemetry into faults: a resource is no longer heard, or a vehicle's battery is low.
+"""Turns telemetry into faults: the telemetry of a resource stopped, or a battery is low.
 
-`Watch` decides and knows no clock; `watch` feeds it from the bus. Each fault is said once and, by
-hysteresis, again only after the resource had recovered: it was heard again for as long as its
-bound, or its battery rose above the upper level. A payload is watched by itself: its vehicle's
-link and battery are not its own.
+`LinkMonitor` decides and knows no clock; `monitor_links` feeds it from the bus. Each fault is
+reported once. Hysteresis: it is reported again only after the resource had recovered, that is,
+after its telemetry arrived again for as long as its bound, or its battery rose above the upper
+level. A payload is monitored by itself: its vehicle's link and battery are not its own.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ class _Link:
     steady_since_us: int | None = None
 
 
-class Watch:
+class LinkMonitor:
     """Times are microseconds since the Unix epoch.
 
     `lost_after_s`: for each resource the longest silence, in seconds (its arbiter's or the fleet's
@@ -145,11 +145,11 @@ class Watch:
         return min(due, default=None)
 
 
-async def watch(
+async def monitor_links(
     bus: FleetBus,
     clock: Clock,
     sink: Callable[[ResourceFault], None],
-    rules: Watch,
+    rules: LinkMonitor,
     size: int = 10_000,
 ) -> None:
     """Hand every fault to `sink` until the bus is closed or this is cancelled.

@@ -8,7 +8,7 @@ from m2pem.engine.inputs import ResourceFault
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.mission.catalogue import ResourceId
 from m2pem.telemetry.bus import Bus
-from m2pem.telemetry.watch import Watch, watch
+from m2pem.telemetry.link_monitor import LinkMonitor, monitor_links
 
 UGV, UAV, PTZ = ResourceId("evsg1"), ResourceId("uav1"), ResourceId("evsg1/ptz")
 S = 1_000_000
@@ -26,7 +26,7 @@ def lost(resource: ResourceId, reason: str) -> ResourceFault:
     return ResourceFault(resource, "LINK_LOST", reason, reachable=False)
 
 
-def run_checks(rules: Watch, until_us: int) -> list[ResourceFault]:
+def run_checks(rules: LinkMonitor, until_us: int) -> list[ResourceFault]:
     """Check whenever the watch asks for it, up to a time."""
     faults = []
     while (due := rules.next_check_us) is not None and due <= until_us:
@@ -38,34 +38,34 @@ def run_checks(rules: Watch, until_us: int) -> list[ResourceFault]:
 
 
 def test_silence_beyond_the_bound_is_one_fault() -> None:
-    rules = Watch({UGV: 3.0}, since_us=0)
+    rules = LinkMonitor({UGV: 3.0}, since_us=0)
     rules.heard(vehicle(), 10 * S)
     assert run_checks(rules, 13 * S) == []
     assert run_checks(rules, 60 * S) == [lost(UGV, "not heard for 3.0 s")]
 
 
 def test_a_resource_never_heard_is_lost_only_its_bound_after_connecting() -> None:
-    rules = Watch({UGV: 3.0}, since_us=100 * S)
+    rules = LinkMonitor({UGV: 3.0}, since_us=100 * S)
     assert rules.next_check_us == 103 * S + 1
     assert run_checks(rules, 103 * S) == []
     assert run_checks(rules, 104 * S) == [lost(UGV, "never heard since connecting for 3.0 s")]
 
 
 def test_each_resource_has_its_own_bound_and_faults_come_in_the_fleets_order() -> None:
-    rules = Watch({UAV: 5.0, UGV: 1.0, PTZ: 1.0}, since_us=0)
+    rules = LinkMonitor({UAV: 5.0, UGV: 1.0, PTZ: 1.0}, since_us=0)
     assert [fault.resource for fault in run_checks(rules, 2 * S)] == [UGV, PTZ]
     assert [fault.resource for fault in run_checks(rules, 6 * S)] == [UAV]
 
 
 def test_hearing_a_vehicle_is_not_hearing_its_payload() -> None:
-    rules = Watch({UGV: 1.0, PTZ: 1.0}, since_us=0)
+    rules = LinkMonitor({UGV: 1.0, PTZ: 1.0}, since_us=0)
     rules.heard(vehicle(), 1 * S)
     assert [fault.resource for fault in run_checks(rules, 1 * S + 1)] == [PTZ]
     assert rules.heard(PayloadState(PTZ, time_us=0), 2 * S) == []
 
 
 def test_the_same_loss_is_said_again_only_after_it_was_heard_for_its_bound() -> None:
-    rules = Watch({UGV: 2.0}, since_us=0)
+    rules = LinkMonitor({UGV: 2.0}, since_us=0)
     assert len(run_checks(rules, 3 * S)) == 1
     for second in (10, 11):  # heard for 1 s only
         rules.heard(vehicle(), second * S)
@@ -76,7 +76,7 @@ def test_the_same_loss_is_said_again_only_after_it_was_heard_for_its_bound() -> 
 
 
 def test_a_gap_begins_the_recovery_anew() -> None:
-    rules = Watch({UGV: 2.0}, since_us=0)
+    rules = LinkMonitor({UGV: 2.0}, since_us=0)
     assert len(run_checks(rules, 3 * S)) == 1
     for second in (10, 11, 14, 15):
         rules.heard(vehicle(), second * S)
@@ -84,7 +84,7 @@ def test_a_gap_begins_the_recovery_anew() -> None:
 
 
 def test_an_arbiter_that_lost_the_link_is_believed_at_once_and_once() -> None:
-    rules = Watch({UGV: 30.0}, since_us=0)
+    rules = LinkMonitor({UGV: 30.0}, since_us=0)
     rules.heard(vehicle(), 1 * S)
     gone = vehicle(link=LinkState.LOST)
     assert rules.heard(gone, 2 * S) == [lost(UGV, "its arbiter lost the link")]
@@ -93,33 +93,33 @@ def test_an_arbiter_that_lost_the_link_is_believed_at_once_and_once() -> None:
 
 
 def test_a_degraded_link_is_no_fault() -> None:
-    rules = Watch({UGV: 3.0}, since_us=0)
+    rules = LinkMonitor({UGV: 3.0}, since_us=0)
     assert rules.heard(vehicle(link=LinkState.DEGRADED), 2 * S) == []
     assert run_checks(rules, 5 * S) == []
 
 
 def test_a_resource_without_a_bound_may_be_silent_for_ever() -> None:
-    rules = Watch({UGV: math.inf}, since_us=0)
+    rules = LinkMonitor({UGV: math.inf}, since_us=0)
     assert rules.next_check_us is None
     assert rules.check(1000 * S) == []
     assert rules.heard(vehicle(UAV), 1 * S) == []
 
 
 def test_a_check_that_comes_late_first_lets_the_waiting_states_be_heard() -> None:
-    rules = Watch({UGV: 3.0, UAV: 3.0}, since_us=0)
+    rules = LinkMonitor({UGV: 3.0, UAV: 3.0}, since_us=0)
     assert rules.check(20 * S) == []
     rules.heard(vehicle(UGV), 20 * S)
     assert [fault.resource for fault in run_checks(rules, 21 * S)] == [UAV]
 
 
 def test_checks_that_always_come_late_still_find_who_is_silent() -> None:
-    rules = Watch({UGV: 3.0}, since_us=0)
+    rules = LinkMonitor({UGV: 3.0}, since_us=0)
     assert rules.check(20 * S) == []
     assert rules.check(40 * S) == [lost(UGV, "never heard since connecting for 40.0 s")]
 
 
 def test_a_check_before_its_time_changes_nothing() -> None:
-    rules = Watch({UGV: 3.0}, since_us=0)
+    rules = LinkMonitor({UGV: 3.0}, since_us=0)
     assert rules.check(1 * S) == []
     assert rules.next_check_us == 3 * S + 1
 
@@ -128,7 +128,7 @@ def test_a_check_before_its_time_changes_nothing() -> None:
 
 
 def test_a_low_battery_is_one_fault_of_a_vehicle_that_can_still_be_reached() -> None:
-    rules = Watch({}, since_us=0)
+    rules = LinkMonitor({}, since_us=0)
     assert rules.heard(vehicle(battery=0.15), S) == []
     assert rules.heard(vehicle(battery=0.14), S) == [
         ResourceFault(UGV, "BATTERY_LOW", "battery at 14%, below 15%", reachable=True)
@@ -137,14 +137,14 @@ def test_a_low_battery_is_one_fault_of_a_vehicle_that_can_still_be_reached() -> 
 
 
 def test_a_battery_is_low_again_only_after_it_rose_above_the_upper_level() -> None:
-    rules = Watch({}, since_us=0, critical=0.3, recovered=0.5)
+    rules = LinkMonitor({}, since_us=0, critical=0.3, recovered=0.5)
     levels = [0.29, 0.31, 0.29, 0.5, 0.29, None, 0.29, 0.51, 0.29]
     faults = [len(rules.heard(vehicle(battery=level), S)) for level in levels]
     assert faults == [1, 0, 0, 0, 0, 0, 0, 0, 1]
 
 
 def test_batteries_of_two_vehicles_are_apart() -> None:
-    rules = Watch({}, since_us=0)
+    rules = LinkMonitor({}, since_us=0)
     assert len(rules.heard(vehicle(UGV, battery=0.1), S)) == 1
     assert len(rules.heard(vehicle(UAV, battery=0.1), S)) == 1
 
@@ -152,12 +152,12 @@ def test_batteries_of_two_vehicles_are_apart() -> None:
 @pytest.mark.parametrize(("critical", "recovered"), [(0.3, 0.2), (-0.1, 0.2), (0.5, 1.5)])
 def test_levels_that_make_no_sense_are_refused(critical: float, recovered: float) -> None:
     with pytest.raises(ValueError, match="fractions"):
-        Watch({}, since_us=0, critical=critical, recovered=recovered)
+        LinkMonitor({}, since_us=0, critical=critical, recovered=recovered)
 
 
 def test_a_bound_that_makes_no_sense_is_refused() -> None:
     with pytest.raises(ValueError, match="above 0 s: evsg1"):
-        Watch({UGV: 0.0}, since_us=0)
+        LinkMonitor({UGV: 0.0}, since_us=0)
 
 
 # --- fed from the bus ---------------------------------------------------------------------------
@@ -171,8 +171,8 @@ def test_watch_hands_on_faults_at_the_time_they_come_true_until_the_bus_is_close
         def sink(fault: ResourceFault) -> None:
             seen.append((clock.now_us(), fault.resource, fault.code))
 
-        rules = Watch({UGV: 3.0, UAV: 3.0}, since_us=clock.now_us())
-        watching = asyncio.create_task(watch(bus, clock, sink, rules))
+        rules = LinkMonitor({UGV: 3.0, UAV: 3.0}, since_us=clock.now_us())
+        watching = asyncio.create_task(monitor_links(bus, clock, sink, rules))
         for second in range(10):
             await clock.sleep_until(second * S)
             bus.publish(vehicle(UAV, battery=0.1 if second == 7 else 0.9))
@@ -189,9 +189,9 @@ def test_watch_sees_a_vehicle_that_comes_back_and_is_lost_again() -> None:
     async def main(clock: VirtualClock) -> list[int]:
         bus = Bus()
         seen: list[int] = []
-        rules = Watch({UGV: 2.0}, since_us=0)
+        rules = LinkMonitor({UGV: 2.0}, since_us=0)
         watching = asyncio.create_task(
-            watch(bus, clock, lambda _: seen.append(clock.now_us()), rules)
+            monitor_links(bus, clock, lambda _: seen.append(clock.now_us()), rules)
         )
         for second in (0, 1, 10, 11, 12, 13):
             await clock.sleep_until(second * S)
@@ -206,8 +206,8 @@ def test_watch_sees_a_vehicle_that_comes_back_and_is_lost_again() -> None:
 
 def test_watch_can_be_cancelled() -> None:
     async def main(_: VirtualClock) -> bool:
-        rules = Watch({UGV: 2.0}, since_us=0)
-        watching = asyncio.create_task(watch(Bus(), _, lambda _: None, rules))
+        rules = LinkMonitor({UGV: 2.0}, since_us=0)
+        watching = asyncio.create_task(monitor_links(Bus(), _, lambda _: None, rules))
         await asyncio.sleep(0)
         watching.cancel()
         await asyncio.wait([watching])

@@ -7,8 +7,8 @@ from m2pem.api import (
     BehaviorRequest,
     BehaviorSpec,
     BehaviorState,
+    BehaviorTracker,
     BehaviorType,
-    Ledger,
     ParameterKind,
     ParameterSpec,
     ResourceId,
@@ -19,15 +19,15 @@ SPEED = ParameterSpec("speed", ParameterKind.SPEED, minimum=0.0)
 GO = BehaviorSpec("go", BehaviorType.VEHICLE, (SPEED,))
 
 
-def ledger() -> Ledger:
-    return Ledger(lambda _: (GO,), logging.getLogger("test"))
+def ledger() -> BehaviorTracker:
+    return BehaviorTracker(lambda _: (GO,), logging.getLogger("test"))
 
 
 def request(id_: str, epoch: int = 1, **options: object) -> BehaviorRequest:
     return BehaviorRequest(id_, epoch, "go", {}, (UGV1,), **options)  # type: ignore[arg-type]
 
 
-def reported(book: Ledger, virtual) -> list[BehaviorReport]:
+def reported(book: BehaviorTracker, virtual) -> list[BehaviorReport]:
     book.close()
 
     async def main(_):
@@ -71,7 +71,7 @@ def test_a_higher_epoch_starts_an_ended_behavior_again(virtual) -> None:
 
 
 def test_old_behaviors_are_forgotten_and_running_ones_are_not(monkeypatch) -> None:
-    monkeypatch.setattr("m2pem.api.ledger.REMEMBERED", 2)
+    monkeypatch.setattr("m2pem.api.behavior_tracker.REMEMBERED", 2)
     book = ledger()
     assert book.admit(request("r1.b1"))
     for number in range(2, 5):

@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 T = TypeVar("T")
 
 
-class Mailbox(Generic[T]):
+class AsyncQueue(Generic[T]):
     """Items as they come, until `close`, after which what waits is still read.
 
     `size`: more than this don't wait; the oldest that `droppable` says may go is dropped then.

@@ -5,7 +5,7 @@ from m2pem.api.arbiter import BehaviorId
 REMEMBERED = 10_000
 
 
-class Epochs:
+class EpochFence:
     """The highest epoch seen for each run; the runs seen longest ago are forgotten."""
 
     def __init__(self) -> None:
