@@ -1,25 +1,223 @@
-"""What an element does as soon as a token enters it, before anything else happens in the run.
+"""Arming catch events: who waits for which trigger, and until when.
+
+A wait belongs to a token: at its own node (catch event, receive task, typed start event), at
+a boundary event of its activity, or at an event after the event-based gateway that it is on. Or it
+belongs to a scope: for the start event of an event subprocess, or, in the scope that the run began
+with, for a timer or condition that begins another process. A wait ends when its trigger comes; what
+catches again is armed again.
 
 To enter a catch event is to wait for it (BPMN 2.0.2, clause 13.5.2), so that nothing thrown after
-record `TokenEntered` is missed. Tokens that enter such elements are in `Execution.entered`; all
-other steps come in their turn, from `Execution.queue`.
+record `TokenEntered` is missed. Tokens that enter such elements are in `Execution.entered` and are
+armed before any other step; all other steps come in their turn, from `Execution.queue`.
+
+A condition (table 10.95) is evaluated when its event is armed, and after every step that wrote
+data, before the next step. It fires when it is true. What catches again must first be false
+(table 10.84): its wait is spent until then.
 """
 
-from collections.abc import Callable
-
-from m2pem.engine.execution import Execution
-from m2pem.engine.state import Token
+from m2pem.engine import records as r
+from m2pem.engine.data import Place, reader
+from m2pem.engine.execution import Execution, definitions_of
+from m2pem.engine.records import Trigger
+from m2pem.engine.state import Scope, Token, Wait
+from m2pem.engine.throwing import throw_error, throw_error_in
+from m2pem.errors import ExpressionError, ExpressionSyntaxError
+from m2pem.mission.cycle import cycle, next_round
+from m2pem.mission.duration import date_us, duration_us
 from m2pem.mission.elements import FlowNode
+from m2pem.mission.events import (
+    ConditionalEventDefinition,
+    EventDefinition,
+    MessageEventDefinition,
+    SignalEventDefinition,
+    TimerEventDefinition,
+    TimerKind,
+)
+from m2pem.mission.expression import Expression
+from m2pem.mission.expression.literals import describe
 
-WHEN_ENTERED: dict[type[FlowNode], Callable[[Execution, Token], None]] = {}
-"""What happens at once when a token enters a kind of node; filled by the handlers."""
+
+class _NotATimeError(Exception):
+    """A timer's expression gave something that is not a time."""
+
+
+# --- arming -------------------------------------------------------------------------------------
+
+
+def arm(
+    x: Execution,
+    holder: Place,
+    node: FlowNode,
+    definition: EventDefinition,
+    *,
+    spent: bool = False,
+) -> bool:
+    """Have a token or scope wait for a trigger at `node`. False: a wrong timer's error was thrown.
+
+    What waits nowhere (errors, escalations, compensation, ...) looks for its catcher when thrown.
+    A condition is looked at after the step; `spent`: it has fired before.
+    """
+    match definition:
+        case SignalEventDefinition():
+            await_event(x, holder, node, Trigger.SIGNAL, definition.signal.id)
+        case MessageEventDefinition():
+            await_event(x, holder, node, Trigger.MESSAGE, definition.message.id)
+        case ConditionalEventDefinition():
+            text = definition.condition.text
+            await_event(x, holder, node, Trigger.CONDITION, text, spent=spent)
+            x.changed = True
+        case TimerEventDefinition():
+            try:
+                _arm_timer(x, holder, node, definition)
+            except (ExpressionError, ExpressionSyntaxError, _NotATimeError) as error:
+                reason = f"timer of {node.id}: {error}"
+                if isinstance(holder, Token):
+                    throw_error(x, holder, "EXPRESSION", reason)
+                else:
+                    throw_error_in(x, holder, "EXPRESSION", reason)
+                return False
+    return True
+
+
+def await_event(
+    x: Execution,
+    holder: Place,
+    node: FlowNode,
+    trigger: Trigger,
+    ref: str = "",
+    due_us: int = 0,
+    calendar: bool = False,
+    left: int = 0,
+    period: str = "",
+    spent: bool = False,
+) -> None:
+    """State that a token or scope waits for a trigger at `node`."""
+    scope = holder if isinstance(holder, Scope) else holder.scope
+    x.emit(
+        r.EventAwaited(
+            holder.id if isinstance(holder, Token) else 0,
+            x.process_of(node),
+            node.id,
+            scope.id,
+            x.state.last_wait + 1,
+            trigger,
+            ref,
+            due_us,
+            calendar,
+            left,
+            period,
+            spent,
+        )
+    )
+
+
+def due_after(x: Execution, holder: Place, expression: Expression) -> int:
+    """Mission time, in microseconds, at which a duration that starts now is over.
+
+    Raises:
+        ExpressionError, ExpressionSyntaxError: it is no duration.
+    """
+    text = expression.evaluate(reader(holder))
+    if not isinstance(text, str):
+        raise ExpressionError(
+            f"{expression.text!r} gives {describe(text)}, not an ISO 8601 duration"
+        )
+    return x.state.mission_time_us(x.now_us) + duration_us(text, x.now_us)
+
+
+def _arm_timer(
+    x: Execution, holder: Place, node: FlowNode, definition: TimerEventDefinition
+) -> None:
+    if definition.kind is TimerKind.DURATION:
+        due_us = due_after(x, holder, definition.expression)
+        await_event(x, holder, node, Trigger.TIMER, due_us=due_us)
+        return
+    text = definition.expression.evaluate(reader(holder))
+    if not isinstance(text, str):
+        raise _NotATimeError(
+            f"{definition.expression.text!r} gives {describe(text)}, not an ISO 8601 time"
+        )
+    if definition.kind is TimerKind.DATE:
+        await_event(x, holder, node, Trigger.TIMER, due_us=date_us(text), calendar=True)
+        return
+    rounds = cycle(text)
+    due_us, left = rounds.first(x.now_us)
+    if not rounds.dated:
+        due_us += x.state.mission_time_us(x.now_us) - x.now_us
+    await_event(x, holder, node, Trigger.TIMER, "", due_us, rounds.dated, left, rounds.period)
+
+
+def arm_again(x: Execution, wait: Wait) -> None:
+    """What does not interrupt catches as long as its activity, or its scope, lasts."""
+    holder = wait.token or wait.scope
+    if wait.trigger is not Trigger.TIMER:
+        spent = wait.trigger is Trigger.CONDITION
+        await_event(x, holder, wait.node, wait.trigger, wait.ref, spent=spent)
+        return
+    # A mission time as a date, because months are those of the calendar.
+    shift_us = 0 if wait.calendar else x.state.started_us
+    now_us = x.now_us if wait.calendar else x.state.mission_time_us(x.now_us) + shift_us
+    due_us = wait.due_us + shift_us
+    following = next_round(wait.cycle, due_us, now_us, wait.left, dated=wait.calendar)
+    if following is not None:
+        next_us, left = following[0] - shift_us, following[1]
+        await_event(
+            x, holder, wait.node, Trigger.TIMER, "", next_us, wait.calendar, left, wait.cycle
+        )
+
+
+# --- time ---------------------------------------------------------------------------------------
+
+
+def next_timer(x: Execution) -> tuple[int, Wait] | None:
+    """The timer that is due first, with its mission time."""
+    state = x.state
+    found: tuple[int, int] | None = None
+    offset_us = state.started_us + state.paused_total_us
+    for heap, shift_us in ((state.timers, 0), (state.dates, offset_us)):
+        if heap:
+            candidate = (heap[0][0] - shift_us, heap[0][1])
+            if found is None or candidate < found:
+                found = candidate
+    return None if found is None else (found[0], state.waits[found[1]])
+
+
+def definition_of(wait: Wait) -> ConditionalEventDefinition:
+    """The definition whose condition is awaited."""
+    return next(
+        definition
+        for definition in definitions_of(wait.node)
+        if isinstance(definition, ConditionalEventDefinition)
+        and definition.condition.text == wait.ref
+    )
+
+
+def comes_true(x: Execution, wait: Wait) -> bool:
+    """Whether an armed condition fires now; a spent one that is false may fire from now on.
+
+    One that cannot be evaluated throws error EXPRESSION where it is awaited.
+    """
+    holder = wait.token or wait.scope
+    try:
+        holds = definition_of(wait).condition.holds(reader(holder))
+    except ExpressionError as error:
+        reason = f"condition of {wait.node.id}: {error}"
+        if wait.token is not None:
+            throw_error(x, wait.token, "EXPRESSION", reason)
+        else:
+            throw_error_in(x, wait.scope, "EXPRESSION", reason)
+        return False
+    ready = x.state.conditions[wait.id]
+    if not holds and not ready:
+        x.emit(r.ConditionReset(wait.id))
+    return holds and ready
 
 
 def arm_next(x: Execution) -> None:
     """Arm what the first token that entered waits for, unless it has left already."""
     token = x.entered.popleft()
     if x.state.tokens.get(token.id) is token:
-        WHEN_ENTERED[type(token.node)](x, token)
+        x.handlers[type(token.node)].enter(x, token)
 
 
 def arm_entered(x: Execution) -> None:

@@ -13,7 +13,6 @@ from m2pem.engine.execution import Execution
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.scopes import close, compensates_around, compensator, open_scope
 from m2pem.engine.state import Compensation, Completion, Scope, Token
-from m2pem.engine.triggering import WHEN_TRIGGERED
 from m2pem.mission.elements import Activity, Element, SubProcess
 from m2pem.mission.events import CompensateEventDefinition
 
@@ -184,4 +183,4 @@ def _end(x: Execution, scope: Scope, compensation: Compensation) -> None:
     x.emit(r.CompensationEnded(compensation.id, scope.id))
     x.queue.append(scope)
     if waiter is not None and not waiter.compensations:
-        WHEN_TRIGGERED[type(waiter.node)](x, waiter)
+        x.handlers[type(waiter.node)].complete(x, waiter)

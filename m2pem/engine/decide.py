@@ -7,31 +7,34 @@ replays it. A handler that finds an input redundant calls `x.ignore` and does no
 from collections.abc import Callable
 from typing import Any
 
-from m2pem.engine import control
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
-from m2pem.engine.arming import arm_entered
+from m2pem.engine.arming import arm_entered, next_timer
 from m2pem.engine.data import flatten
-from m2pem.engine.elements.activities import answered
-from m2pem.engine.elements.ad_hoc import chosen
-from m2pem.engine.elements.completion import complete
-from m2pem.engine.elements.containers import begin
-from m2pem.engine.interruption import end_run
+from m2pem.engine.elements.activities import complete
+from m2pem.engine.elements.behaviors import (
+    behavior_missing,
+    behavior_reported,
+    control_returned,
+    control_taken,
+    recovery_answered,
+    resource_fault,
+)
+from m2pem.engine.elements.subprocesses import begin
 from m2pem.engine.lifecycle import Welcome, welcome
-from m2pem.engine.messaging import receive
 from m2pem.engine.records import RunOutcome
-from m2pem.engine.reports import fault, missing, reported, settle
+from m2pem.engine.scopes import end_run
 from m2pem.engine.state import BehaviorPhase
 from m2pem.engine.steps import Steps
 from m2pem.engine.throwing import throw_error
 from m2pem.engine.triggering import (
     arm_conditional_starts,
     arm_triggered_timers,
+    receive,
     throw_signal,
     trigger,
 )
-from m2pem.engine.waiting import next_timer
-from m2pem.mission.elements import Activity, AdHocSubProcess
+from m2pem.mission.elements import Activity
 
 _THROW_NOTHING = (i.Continue, i.StopRun, i.PauseRun, i.ClaimRun, i.GeometrySet)
 
@@ -168,11 +171,11 @@ def _answer(x: Steps, item: i.PromptAnswer) -> None:
         )
     )
     if prompt.behavior:
-        settle(x, x.state.behaviors[prompt.behavior], item)
-    elif isinstance(node, AdHocSubProcess):
-        chosen(x, token, item.decision)
-    else:
-        answered(x, token, item.decision)
+        recovery_answered(x, x.state.behaviors[prompt.behavior], item)
+        return
+    answer = x.handlers[type(node)].answer
+    assert answer is not None
+    answer(x, token, item.decision)
 
 
 def _why_no_answer(x: Steps, item: i.PromptAnswer) -> str:
@@ -242,8 +245,8 @@ def _note_id(x: Steps, number: str) -> None:
 
 
 _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
-    i.ControlTaken: control.taken,
-    i.ControlReturned: control.returned,
+    i.ControlTaken: control_taken,
+    i.ControlReturned: control_returned,
     i.StartRun: _start,
     i.ClaimRun: _claim,
     i.StopRun: _stop,
@@ -252,13 +255,13 @@ _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
     i.Tick: _tick,
     i.Continue: _continue,
     i.GiveUp: _give_up,
-    i.BehaviorReported: reported,
-    i.BehaviorMissing: missing,
+    i.BehaviorReported: behavior_reported,
+    i.BehaviorMissing: behavior_missing,
     i.PromptAnswer: _answer,
     i.ServiceCompleted: _service_completed,
     i.ServiceFailed: _service_failed,
     i.SignalReceived: _signal,
     i.MessageReceived: _message,
-    i.ResourceFault: fault,
+    i.ResourceFault: resource_fault,
     i.GeometrySet: _geometry,
 }

@@ -6,14 +6,17 @@ Every change is a record that is applied at once, so that what is decided next s
 """
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from enum import Enum
+from typing import ClassVar, TypeAlias
 
 from m2pem.engine import records as r
 from m2pem.engine.apply import apply
 from m2pem.engine.data import Store, flatten, store_for
 from m2pem.engine.records import Record, TokenOutcome
 from m2pem.engine.state import RunState, Scope, Token
+from m2pem.errors import InternalError
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.elements import (
     Activity,
@@ -56,8 +59,39 @@ class Waits(Enum):
     """Its boundary events are armed at once; its work begins in its turn."""
 
 
+Hook: TypeAlias = Callable[["Execution", Token], None]
+
+
+def _no_hook(x: "Execution", token: Token) -> None:
+    raise InternalError(f"{token.node.id}: {type(token.node).__name__} has no such hook")
+
+
+@dataclass(frozen=True, slots=True)
+class ElementHandler:
+    """The hooks of one kind of BPMN element. Each is called with the token on the element.
+
+    `activate`: its turn in the queue has come. `enter`: a token has entered it, before any other
+    step; only of elements that wait for events. `execute`: an activity does its own work, after
+    `activate` has armed its boundary events, begun its loop and filled its data inputs. `trigger`:
+    the event that the token waited for at the element has occurred. `complete`: its work is done.
+    `answer`: an operator has made a decision.
+
+    Interruption is the same for all elements: `m2pem.engine.scopes.withdraw`.
+    """
+
+    activate: Hook
+    enter: Hook = _no_hook
+    execute: Hook = _no_hook
+    trigger: Hook = _no_hook
+    complete: Hook = _no_hook
+    answer: Callable[["Execution", Token, str], None] | None = None
+
+
 class Execution:
     """The records of the input being decided, and the steps it still causes."""
+
+    handlers: ClassVar[Mapping[type[FlowNode], ElementHandler]]
+    """The handler of each kind of element: `m2pem.engine.elements.HANDLERS`."""
 
     __slots__ = (
         "_reach",

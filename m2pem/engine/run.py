@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from m2pem.engine.apply import apply
+from m2pem.engine.arming import next_timer
 from m2pem.engine.commands import Command
 from m2pem.engine.decide import decide
 from m2pem.engine.inputs import Input
@@ -18,7 +19,6 @@ from m2pem.engine.outbox import commands_of, outstanding
 from m2pem.engine.records import Record
 from m2pem.engine.state import RunState, RunStatus
 from m2pem.engine.steps import Steps
-from m2pem.engine.waiting import next_timer
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
 

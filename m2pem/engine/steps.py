@@ -4,24 +4,28 @@ from collections import deque
 from collections.abc import Iterator
 
 from m2pem.engine import records as r
-from m2pem.engine.arming import arm_next
-from m2pem.engine.conditions import comes_true
-from m2pem.engine.elements import EXECUTE, look_at
-from m2pem.engine.elements.beginning import has_entered
-from m2pem.engine.elements.joins import fire_joins
+from m2pem.engine.arming import arm_next, comes_true
+from m2pem.engine.elements import HANDLERS
+from m2pem.engine.elements.activities import has_entered
+from m2pem.engine.elements.gateways import fire_joins
+from m2pem.engine.elements.subprocesses import check_scope
 from m2pem.engine.execution import Execution, definitions_of
-from m2pem.engine.interruption import end_run
 from m2pem.engine.records import Record, RunOutcome
+from m2pem.engine.scopes import end_run
 from m2pem.engine.state import RunState, RunStatus, Scope, Token
 from m2pem.engine.triggering import trigger
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.events import MessageEventDefinition, SignalEventDefinition
+
+_ACTIVATE = {kind: handler.activate for kind, handler in HANDLERS.items()}
 
 
 class Steps(Execution):
     """An execution that can work its queue off."""
 
     __slots__ = ("batch", "done")
+
+    handlers = HANDLERS
 
     def __init__(self, state: RunState, fleet: Fleet | None, batch: int) -> None:
         super().__init__(state, fleet)
@@ -55,14 +59,15 @@ class Steps(Execution):
                 if not queue:
                     break
                 item = queue.popleft()
-                if not self._is_there(item):
-                    continue
-                self.left -= 1
+                # Written out, as this is the inner loop.
                 if type(item) is Token:
-                    EXECUTE[type(item.node)](self, item)
-                else:
+                    if state.tokens.get(item.id) is item:
+                        self.left -= 1
+                        _ACTIVATE[type(item.node)](self, item)
+                elif state.scopes.get(item.id) is item:
                     assert isinstance(item, Scope)
-                    look_at(self, item)
+                    self.left -= 1
+                    check_scope(self, item)
             if not fire_joins(self):
                 return
 

@@ -6,9 +6,8 @@ from typing import TypeVar
 
 from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
-from m2pem.engine.interruption import begin_event_subprocess, divert, end_run
 from m2pem.engine.records import RunOutcome, TokenOutcome
-from m2pem.engine.scopes import Failing, failing
+from m2pem.engine.scopes import Failing, begin_event_subprocess, divert, end_run, failing
 from m2pem.engine.state import Scope, Token
 from m2pem.mission.elements import Activity, BoundaryEvent, Event, StartEvent
 from m2pem.mission.events import (

@@ -1,17 +1,22 @@
-"""What happens when the trigger of a catch event comes."""
+"""What follows when the trigger of a catch event comes; signals and messages.
 
-from collections.abc import Callable
+A signal reaches every catcher in the run. A message goes to one receiver, the one that has waited
+longest of those that it is for (BPMN 2.0.2, clause 8.4.11; `m2pem.engine.correlation`). A message
+that nothing waits for yet is kept for the next receiver, as long as something in the mission can
+receive it at all.
+"""
 
 from m2pem.engine import records as r
-from m2pem.engine.conditions import comes_true, definition_of
-from m2pem.engine.correlation import fits, remember
+from m2pem.engine.arming import arm, arm_again, comes_true, definition_of
+from m2pem.engine.correlation import fits, keys_of, remember
 from m2pem.engine.data import Place
-from m2pem.engine.data_flow import receive_payload
+from m2pem.engine.data_flow import payload, receive_payload
 from m2pem.engine.execution import Execution, definitions_of
-from m2pem.engine.interruption import begin_event_subprocess, divert
 from m2pem.engine.records import Trigger
+from m2pem.engine.scopes import begin_event_subprocess, divert
 from m2pem.engine.state import Scope, Token, Wait
-from m2pem.engine.waiting import arm, arm_again
+from m2pem.engine.throwing import throw_error
+from m2pem.errors import ExpressionError
 from m2pem.mission.elements import (
     Activity,
     BoundaryEvent,
@@ -30,9 +35,6 @@ from m2pem.mission.events import (
     TimerEventDefinition,
 )
 from m2pem.mission.values import Value
-
-WHEN_TRIGGERED: dict[type[FlowNode], Callable[[Execution, Token], None]] = {}
-"""What a wait at a token's own node leads to, by kind of node; filled by the handlers."""
 
 
 def arm_boundary(x: Execution, token: Token, activity: Activity) -> bool:
@@ -150,7 +152,7 @@ def trigger(
         _in_scope(x, wait, data, keys or {})
     elif node is token.node:
         if receive_payload(x, token, data) and not _is_one_of_several(node, token.waits):
-            WHEN_TRIGGERED[type(node)](x, token)
+            x.handlers[type(node)].trigger(x, token)
     elif isinstance(node, BoundaryEvent):
         _at_boundary(x, wait, token, node, data)
     else:
@@ -253,7 +255,7 @@ def _behind_gateway(x: Execution, token: Token, node: FlowNode, data: dict[str, 
         x.proceed(token, [flow])
         moved = x.state.tokens[token.id]
     if receive_payload(x, moved, data):
-        WHEN_TRIGGERED[type(node)](x, moved)
+        x.handlers[type(node)].trigger(x, moved)
 
 
 # --- signals and messages -----------------------------------------------------------------------
@@ -346,7 +348,7 @@ def _begin_with(
         token = x.spawn(start, scope)
         remember(x, token, keys)
         if receive_payload(x, token, data):
-            WHEN_TRIGGERED[type(start)](x, token)
+            x.handlers[type(start)].trigger(x, token)
     else:
         gateway = start.incoming[0].source
         assert isinstance(gateway, EventBasedGateway)
@@ -356,3 +358,47 @@ def _begin_with(
             _behind_gateway(x, token, start, data)
             if x.state.tokens.get(token.id) is token:
                 collect_letters(x, token)
+
+
+def send(x: Execution, token: Token, message: str) -> None:
+    """Throw a message, with its data inputs, from the element that a token is on."""
+    node = token.node
+    data = payload(x, token)
+    if data is None:
+        return
+    try:
+        keys = keys_of(x, message, data, token)
+    except ExpressionError as error:
+        throw_error(x, token, "EXPRESSION", f"correlation of message {message}: {error}")
+        return
+    remember(x, token, keys)
+    receiver = message_receiver(x, message, keys)
+    kept = receiver is None and message in x.receivable
+    x.emit(
+        r.MessageThrown(
+            message,
+            token.id,
+            x.process_of(node),
+            node.id,
+            token.scope.id,
+            kept=kept,
+            data=data if kept else {},
+            keys=keys,
+        )
+    )
+    if receiver is not None:
+        deliver(x, receiver, message, data, keys)
+
+
+def receive(x: Execution, message: str, data: dict[str, Value], by: str) -> None:
+    """Take a message from outside; something in the mission receives it."""
+    try:
+        keys = keys_of(x, message, data, None)
+    except ExpressionError as error:
+        x.ignore(f"message {message} cannot be matched: {error}")
+        return
+    receiver = message_receiver(x, message, keys)
+    kept = receiver is None
+    x.emit(r.MessageThrown(message, by=by, kept=kept, data=data if kept else {}, keys=keys))
+    if receiver is not None:
+        deliver(x, receiver, message, data, keys)

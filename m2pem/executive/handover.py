@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from m2pem.api.control import TakeEffect
-from m2pem.engine.control import preview_taken
+from m2pem.engine.elements.behaviors import preview_control_taken
 from m2pem.engine.inputs import ControlReturned, ControlTaken
 from m2pem.errors import OperatorError
 from m2pem.executive.runner import Runner
@@ -66,7 +66,7 @@ class Handover:
             )
             for runner in runners
             if not runner.done.is_set() and (state := runner.run.state)
-            for behavior, catcher in preview_taken(state, resource)
+            for behavior, catcher in preview_control_taken(state, resource)
         ]
 
     async def give_back(self, name: str, by: str, runners: Iterable[Runner]) -> None:

@@ -2,8 +2,8 @@
 
 from collections.abc import Collection, Mapping
 
-from m2pem.engine.elements.ad_hoc import COMPLETE
-from m2pem.engine.reports import RECOVERY_DECISIONS
+from m2pem.engine.elements.behaviors import RECOVERY_DECISIONS
+from m2pem.engine.elements.subprocesses import COMPLETE
 from m2pem.findings import Finding
 from m2pem.fleet.nearmiss import suggest
 from m2pem.fleet.yaml_source import YamlSource

@@ -15,7 +15,7 @@ from typing import Any
 
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
-from m2pem.engine.conditions import definition_of
+from m2pem.engine.arming import definition_of
 from m2pem.engine.data import reader
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import BehaviorPhase, RunStatus, Token, Wait

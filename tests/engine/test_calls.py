@@ -1,7 +1,7 @@
 """Call activities of processes in other files, of global tasks, and without end."""
 
 from m2pem.bpmn import parse_mission
-from m2pem.engine.elements.containers import MAX_DEPTH
+from m2pem.engine.elements.subprocesses import MAX_DEPTH
 from m2pem.mission.library import KeptLibrary, Source
 from tests.engine.kit import Play
 from tests.engine.notation import xml

@@ -3,7 +3,7 @@
 import pytest
 
 from m2pem.bpmn import parse_mission
-from m2pem.engine.control import preview_taken
+from m2pem.engine.elements.behaviors import preview_control_taken
 from m2pem.engine.inputs import ControlReturned, ControlTaken
 from m2pem.engine.records import ErrorThrown
 from tests.engine.kit import CANCELLED, SUCCEEDED, Play
@@ -119,11 +119,11 @@ def test_the_preview_of_taking_a_vehicle_says_what_taking_it_then_does(
     text: str, catcher: str
 ) -> None:
     play = Play(text).start()
-    [(behavior, caught_by)] = preview_taken(play.run.state, "evsg1")
+    [(behavior, caught_by)] = preview_control_taken(play.run.state, "evsg1")
     assert (behavior.id, caught_by.id if caught_by else "") == ("r1.b1", catcher)
     play.give(ControlTaken("evsg1", "anna"))
     thrown = [each for each in play.steps[-1].records if isinstance(each, ErrorThrown)]
     assert [(each.code, each.caught_by) for each in thrown] == [("TAKEN_OVER", catcher)]
     assert play.ended == ("" if text is WAITS else "completed" if catcher else "failed")
-    assert preview_taken(play.run.state, "evsg1") == []
-    assert preview_taken(play.run.state, "evsg2") == []
+    assert preview_control_taken(play.run.state, "evsg1") == []
+    assert preview_control_taken(play.run.state, "evsg2") == []

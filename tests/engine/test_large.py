@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.engine.elements import joins
+from m2pem.engine.elements import gateways
 from m2pem.engine.inputs import Continue, StartRun
 from m2pem.engine.run import MissionRun
 from m2pem.mission.mission import Mission
@@ -75,14 +75,14 @@ def test_many_inclusive_joins_wait_without_being_asked_again_and_again(
 ) -> None:
     # Each answer concerns one of them; asking all would make this quadratic.
     asked = 0
-    more_can_come = joins._more_can_come
+    more_can_come = gateways._more_can_come
 
     def counting(*arguments: Any) -> bool:
         nonlocal asked
         asked += 1
         return more_can_come(*arguments)
 
-    monkeypatch.setattr(joins, "_more_can_come", counting)
+    monkeypatch.setattr(gateways, "_more_can_come", counting)
     calls = "\n".join(
         f'<callActivity id="c{n}" calledElement="P"/>\nfork -> c{n}' for n in range(100)
     )

@@ -3,7 +3,6 @@
 from heapq import heapify, heappop, heappush
 
 from m2pem.engine import records as r
-from m2pem.engine.apply.appliers import Appliers
 from m2pem.engine.state import (
     Letter,
     RunState,
@@ -26,7 +25,7 @@ def node_of(state: RunState, element: str) -> FlowNode:
     return node
 
 
-def _data_written(state: RunState, record: r.DataWritten) -> None:
+def data_written(state: RunState, record: r.DataWritten) -> None:
     if not record.own:
         store = state.scopes[record.store].data if record.store else state.shared.data
         store[record.key] = record.value
@@ -37,7 +36,7 @@ def _data_written(state: RunState, record: r.DataWritten) -> None:
     token.own[record.key] = record.value
 
 
-def _event_awaited(state: RunState, record: r.EventAwaited) -> None:
+def event_awaited(state: RunState, record: r.EventAwaited) -> None:
     holder: Token | Scope
     if record.token:
         holder = token = state.tokens[record.token]
@@ -94,7 +93,7 @@ def end_wait(state: RunState, wait: Wait) -> None:
         del state.catchers[key]
 
 
-def _event_triggered(state: RunState, record: r.EventTriggered) -> None:
+def event_triggered(state: RunState, record: r.EventTriggered) -> None:
     wait = state.waits[record.wait]
     end_wait(state, wait)
     if record.kept:
@@ -104,19 +103,10 @@ def _event_triggered(state: RunState, record: r.EventTriggered) -> None:
             del state.mailbox[wait.ref]
 
 
-def _condition_reset(state: RunState, record: r.ConditionReset) -> None:
+def condition_reset(state: RunState, record: r.ConditionReset) -> None:
     state.conditions[record.wait] = True
 
 
-def _message_thrown(state: RunState, record: r.MessageThrown) -> None:
+def message_thrown(state: RunState, record: r.MessageThrown) -> None:
     if record.kept:
         state.mailbox.setdefault(record.message, []).append(Letter(record.data, record.keys))
-
-
-APPLIERS: Appliers = {
-    r.DataWritten: _data_written,
-    r.EventAwaited: _event_awaited,
-    r.EventTriggered: _event_triggered,
-    r.ConditionReset: _condition_reset,
-    r.MessageThrown: _message_thrown,
-}

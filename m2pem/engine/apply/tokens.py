@@ -1,11 +1,11 @@
-"""What records about tokens do to the state."""
+"""What records about tokens and scopes do to the state."""
 
 from m2pem.engine import records as r
-from m2pem.engine.apply import compensation as undoing
-from m2pem.engine.apply.appliers import Appliers
+from m2pem.engine.apply import compensation
 from m2pem.engine.apply.events import end_wait, node_of
 from m2pem.engine.state import (
     Join,
+    Loop,
     RunState,
     Scope,
     Token,
@@ -13,11 +13,15 @@ from m2pem.engine.state import (
 from m2pem.mission.elements import (
     Activity,
     AdHocSubProcess,
+    CallActivity,
     ComplexGateway,
+    Container,
     FlowNode,
     InclusiveGateway,
     ParallelGateway,
+    Process,
     SequenceFlow,
+    SubProcess,
 )
 
 
@@ -34,7 +38,7 @@ def _is_choice(scope: Scope, node: FlowNode) -> bool:
     return node in scope.container.entries
 
 
-def _token_entered(state: RunState, record: r.TokenEntered) -> None:
+def token_entered(state: RunState, record: r.TokenEntered) -> None:
     node = node_of(state, record.element)
     scope = state.scopes[record.scope]
     flow: SequenceFlow | None = None
@@ -46,7 +50,7 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
     state.tokens[record.token] = token
     scope.tokens[record.token] = token
     state.last_token = max(state.last_token, record.token)
-    if scope.compensations and undoing.enter_to_undo(scope, token):
+    if scope.compensations and compensation.enter_to_undo(scope, token):
         return
     if flow is not None and _is_join(node):
         join = scope.joins.get(node)
@@ -63,21 +67,21 @@ def _token_entered(state: RunState, record: r.TokenEntered) -> None:
         scope.gathered.setdefault(node, []).append(token)
 
 
-def _gateway_activated(state: RunState, record: r.GatewayActivated) -> None:
+def gateway_activated(state: RunState, record: r.GatewayActivated) -> None:
     node = node_of(state, record.element)
     used = tuple(flow for flow in node.incoming if flow.id in record.flows)
     state.scopes[record.scope].activated[node] = used
 
 
-def _gateway_reset(state: RunState, record: r.GatewayReset) -> None:
+def gateway_reset(state: RunState, record: r.GatewayReset) -> None:
     del state.scopes[record.scope].activated[node_of(state, record.element)]
 
 
-def _activities_chosen(state: RunState, record: r.ActivitiesChosen) -> None:
+def activities_chosen(state: RunState, record: r.ActivitiesChosen) -> None:
     state.scopes[record.scope].chosen = [node_of(state, element) for element in record.elements]
 
 
-def _tokens_gathered(state: RunState, record: r.TokensGathered) -> None:
+def tokens_gathered(state: RunState, record: r.TokensGathered) -> None:
     _no_longer_gathered(state.tokens[record.token])
 
 
@@ -90,14 +94,14 @@ def _no_longer_gathered(token: Token) -> None:
             del gathered[token.node]
 
 
-def _token_left(state: RunState, record: r.TokenLeft) -> None:
+def token_left(state: RunState, record: r.TokenLeft) -> None:
     token = state.tokens.pop(record.token)
     scope = token.scope
     del scope.tokens[record.token]
     if token.waits is not None:
         for wait in list(token.waits.values()):
             end_wait(state, wait)
-    undoing.leave_compensation(token)
+    compensation.leave_compensation(token)
     if token.flow is not None and _is_join(token.node):
         join = scope.joins[token.node]
         arrived = join.by_flow[token.flow]
@@ -115,18 +119,72 @@ def _token_left(state: RunState, record: r.TokenLeft) -> None:
         _no_longer_gathered(token)
 
 
-def _instance_output(state: RunState, record: r.InstanceOutput) -> None:
+def instance_output(state: RunState, record: r.InstanceOutput) -> None:
     loop = state.scopes[record.scope].loop
     assert loop is not None
     loop.outputs[record.instance] = record.value
 
 
-APPLIERS: Appliers = {
-    r.TokenEntered: _token_entered,
-    r.TokenLeft: _token_left,
-    r.InstanceOutput: _instance_output,
-    r.ActivitiesChosen: _activities_chosen,
-    r.TokensGathered: _tokens_gathered,
-    r.GatewayActivated: _gateway_activated,
-    r.GatewayReset: _gateway_reset,
-}
+def scope_opened(state: RunState, record: r.ScopeOpened) -> None:
+    parent = state.scopes[record.parent] if record.parent is not None else None
+    owner = state.tokens[record.token] if record.token is not None else None
+    container: Container
+    element = state.mission.elements[record.element]
+    if record.instances is not None:
+        assert isinstance(element, Activity)
+        container = element.container
+    elif isinstance(element, CallActivity):
+        container = element.called
+    else:
+        assert isinstance(element, (Process, SubProcess))
+        container = element
+    depth = parent.depth + 1 if parent is not None else 0
+    scope = Scope(record.scope, container, parent, owner, depth, state.shared)
+    if record.instances is not None:
+        scope.loop = Loop(record.instances, record.items)
+        scope.depth -= 1  # its activity is one level, not two
+    state.scopes[record.scope] = scope
+    state.last_scope = record.scope
+    if owner is not None:
+        owner.inner = scope
+    if state.root is None:
+        state.root = scope
+
+
+def scope_closed(state: RunState, record: r.ScopeClosed) -> None:
+    scope = state.scopes.pop(record.scope)
+    for wait in list(scope.waits.values()) if scope.waits is not None else ():
+        end_wait(state, wait)
+    compensation.settle_owner(scope, record)
+
+
+def scope_interrupted(state: RunState, record: r.ScopeInterrupted) -> None:
+    scope = state.scopes[record.scope]
+    scope.interrupted = True
+    scope.activated.clear()  # no token comes any more for which a complex gateway would wait
+    compensation.drop_compensations(scope)
+    _disarm_event_subprocesses(state, scope)
+
+
+def scope_completing(state: RunState, record: r.ScopeCompleting) -> None:
+    scope = state.scopes[record.scope]
+    scope.completing = True
+    _disarm_event_subprocesses(state, scope)
+
+
+def _disarm_event_subprocesses(state: RunState, scope: Scope) -> None:
+    for wait in list(scope.waits.values()) if scope.waits is not None else ():
+        if isinstance(wait.node.container, SubProcess):
+            end_wait(state, wait)
+
+
+def transaction_cancelled(state: RunState, record: r.TransactionCancelled) -> None:
+    """The transaction is not active any more: nothing but its rollback can happen to it."""
+    scope = state.scopes[record.scope]
+    scope.cancelled = scope.interrupted = True
+    scope.activated.clear()
+    compensation.drop_compensations(scope)
+    for holder in (scope, scope.owner):
+        if holder is not None and holder.waits is not None:
+            for wait in list(holder.waits.values()):
+                end_wait(state, wait)

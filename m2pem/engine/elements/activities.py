@@ -1,165 +1,102 @@
-"""Tasks (BPMN 2.0.2, clause 10.3.3; paper, sections 4.1 and 4.2)."""
+"""What all activities have in common: how they begin and complete (BPMN 2.0.2, clause 13.3.2)."""
 
 from m2pem.engine import records as r
-from m2pem.engine.data import reader
-from m2pem.engine.elements.behaviors import request_behavior
-from m2pem.engine.elements.completion import complete
-from m2pem.engine.execution import Execution
-from m2pem.engine.messaging import send
-from m2pem.engine.records import Trigger
+from m2pem.engine.compensation import enable, undone
+from m2pem.engine.data_flow import give_out, take_in
+from m2pem.engine.elements.loops import begin_loop, instance_done
+from m2pem.engine.elements.sequence_flows import true_flows
+from m2pem.engine.execution import Execution, Waits, waits_when_entered
+from m2pem.engine.records import TokenOutcome
 from m2pem.engine.state import Token
-from m2pem.engine.throwing import throw_error
-from m2pem.engine.triggering import collect_letters
-from m2pem.engine.waiting import await_event, due_after
-from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.fleet.allocation import AllocationError, allocate
-from m2pem.mission.behavior import Assignment, ServiceCall
-from m2pem.mission.elements import (
-    ReceiveTask,
-    ScriptTask,
-    SendTask,
-    ServiceTask,
-    UserTask,
-)
-from m2pem.mission.expression import Expression
-from m2pem.mission.values import Value
+from m2pem.engine.triggering import arm_boundary
+from m2pem.mission.elements import Activity, AdHocSubProcess
+from m2pem.mission.reach import begins_by_itself
 
 
-def pass_through(x: Execution, token: Token) -> None:
-    """A task without work of its own, or with work that m2pem knows nothing of."""
-    complete(x, token)
+def _gather(x: Execution, token: Token, node: Activity) -> bool:
+    """Whether enough tokens have come to begin; all but this one are then consumed (table 10.3)."""
+    waiting = token.scope.gathered.get(node, [])
+    if token not in waiting:
+        return True
+    if len(waiting) < node.start_quantity:
+        return False
+    others = [other for other in waiting if other is not token]
+    for other in others[: node.start_quantity - 1]:
+        x.leave(other, TokenOutcome.CONSUMED)
+    x.emit(r.TokensGathered(token.id, x.process_of(node), node.id, token.scope.id))
+    return True
 
 
-def user_task(x: Execution, token: Token) -> None:
-    """Open the prompt; an operator's answer completes the task (paper, section 4.1)."""
+def enter_activity(x: Execution, token: Token) -> None:
+    """Arm an activity's boundary events; if it begins to wait with it, begin it."""
     node = token.node
-    assert isinstance(node, UserTask)
-    assert node.prompt is not None
-    prompt = node.prompt
-    if prompt.timeout is not None:
-        try:
-            due_us = due_after(x, token, prompt.timeout)
-        except (ExpressionError, ExpressionSyntaxError) as error:
-            throw_error(x, token, "EXPRESSION", f"timeout of {node.id}: {error}")
-            return
-        await_event(x, token, node, Trigger.TIMER, due_us=due_us)
-    x.emit(
-        r.PromptOpened(
-            token.id,
-            x.process_of(node),
-            node.id,
-            token.scope.id,
-            f"p{x.state.last_prompt + 1}",
-            prompt.text,
-            tuple({"value": d.value, "label": d.label} for d in prompt.decisions),
-            prompt.role,
-        )
-    )
+    assert isinstance(node, Activity)
+    instance = token.instance is not None
+    if waits_when_entered(node, instance=instance) is Waits.AT_ITSELF:
+        begin_activity(x, token)
+    elif not token.armed and (node.start_quantity <= 1 or _gather(x, token, node)):
+        arm_boundary(x, token, node)
 
 
-def prompt_timed_out(x: Execution, token: Token) -> None:
-    """Nobody answered in time: error PROMPT_TIMEOUT."""
-    throw_error(x, token, "PROMPT_TIMEOUT", f"no answer to {token.node.label!r} in time")
-
-
-def answered(x: Execution, token: Token, decision: str) -> None:
-    """An operator has decided."""
+def has_entered(token: Token) -> bool:
+    """Whether a token that waits for its turn has done what `enter_activity` does before it."""
     node = token.node
-    assert isinstance(node, UserTask)
-    assert node.prompt is not None
-    x.write(token, node.prompt.store, decision)
-    complete(x, token)
+    if not isinstance(node, Activity):
+        return False
+    return token.armed or len(token.scope.gathered.get(node, ())) in range(1, node.start_quantity)
 
 
-def script_task(x: Execution, token: Token) -> None:
-    """Command a behavior (paper, section 4.2), or run assignments."""
+def begin_activity(x: Execution, token: Token) -> None:
+    """Begin the work of an activity, whose boundary events are armed.
+
+    An instance of a loop or multi-instance activity only works: what else there is to an activity
+    is the whole's, once.
+    """
     node = token.node
-    assert isinstance(node, ScriptTask)
-    if node.behavior is not None:
-        request_behavior(x, token, node.behavior)
-    else:
-        _run_script(x, token, node)
-
-
-def _run_script(x: Execution, token: Token, node: ScriptTask) -> None:
-    for statement in node.script.statements if node.script is not None else ():
-        if isinstance(statement, Assignment):
-            try:
-                value = statement.expression.evaluate(reader(token))
-            except ExpressionError as error:
-                throw_error(x, token, "EXPRESSION", f"line {statement.line}: {error}")
-                return
-            x.write(token, statement.key, value)
-        else:
-            throw_error(x, token, statement.code, f"thrown at line {statement.line}")
-            return
-    complete(x, token)
-
-
-def service_task(x: Execution, token: Token) -> None:
-    """Run a registered service (paper, section 4.1), or command a behavior."""
-    node = token.node
-    assert isinstance(node, ServiceTask)
-    if node.behavior is not None:
-        request_behavior(x, token, node.behavior)
-    elif node.call is not None:
-        _request_service(x, token, node.call)
-    else:
-        complete(x, token)
-
-
-def _request_service(x: Execution, token: Token, call: ServiceCall) -> None:
-    node = token.node
-    properties: dict[str, Value] = {}
-    read = reader(token)
-    for item in call.properties:
-        if isinstance(item.value, Expression):
-            try:
-                properties[item.name] = item.value.evaluate(read)
-            except ExpressionError as error:
-                throw_error(x, token, "EXPRESSION", f"property {item.name}: {error}")
-                return
-        else:
-            properties[item.name] = item.value
-    try:
-        allocation = allocate(call, x.fleet)
-    except AllocationError as error:
-        throw_error(x, token, "RESOURCE_UNAVAILABLE", str(error))
+    assert isinstance(node, Activity)
+    if node.start_quantity > 1 and not _gather(x, token, node):
         return
-    x.emit(
-        r.ServiceRequested(
-            token.id,
-            x.process_of(node),
-            node.id,
-            token.scope.id,
-            f"s{x.state.last_service + 1}",
-            call.service,
-            {role: tuple(ids) for role, ids in allocation.roles.items()},
-            properties,
-        )
-    )
-
-
-def send_task(x: Execution, token: Token) -> None:
-    """Throw a message, or command a behavior."""
-    node = token.node
-    assert isinstance(node, SendTask)
-    if node.behavior is not None:
-        request_behavior(x, token, node.behavior)
-        return
-    if node.message is not None:
-        send(x, token, node.message.id)
-        if x.state.tokens.get(token.id) is not token:
+    if token.instance is None:
+        if node.boundary and not token.armed and not arm_boundary(x, token, node):
             return
-    complete(x, token)
-
-
-def receive_task(x: Execution, token: Token) -> None:
-    """Wait for a message; without one, there is nothing to wait for."""
-    node = token.node
-    assert isinstance(node, ReceiveTask)
-    if node.message is None:
-        complete(x, token)
+        if node.loop is not None and token.inner is None:
+            if begin_loop(x, token, node.loop):
+                pass_on(x, token)
+            return
+    if node.data_flow.inputs and not take_in(x, token):
         return
-    await_event(x, token, node, Trigger.MESSAGE, node.message.id)
-    collect_letters(x, token)
+    x.handlers[type(node)].execute(x, token)
+
+
+def complete(x: Execution, token: Token, outcome: TokenOutcome = TokenOutcome.COMPLETED) -> None:
+    """The work of an activity, or of one instance of it, is done.
+
+    `outcome` TERMINATED: by a terminate end event in it.
+    """
+    node = token.node
+    assert isinstance(node, Activity)
+    if node.data_flow.outputs and not give_out(x, token):
+        return
+    if token.instance is None:
+        pass_on(x, token)
+        return
+    for whole in instance_done(x, token, outcome):
+        pass_on(x, whole)
+
+
+def pass_on(x: Execution, token: Token) -> None:
+    """The activity as a whole is done: leave by every flow that is true.
+
+    What undoes another activity leaves by none: it is outside the normal flow (clause 10.7).
+    """
+    node = token.node
+    assert isinstance(node, Activity)
+    if token.undoes is not None:
+        undone(x, token)
+        return
+    flows = true_flows(x, token, node.default)
+    if flows is not None:
+        enable(x, token)
+        x.proceed(token, [*flows] * node.completion_quantity)
+        if isinstance(node.container, AdHocSubProcess) and not begins_by_itself(node):
+            x.queue.append(token.scope)

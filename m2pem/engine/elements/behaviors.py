@@ -1,17 +1,32 @@
-"""Behaviors of vehicles, payloads and teams (paper, section 4.2)."""
+"""Behaviors of vehicles, payloads and teams, from request to end (paper, section 4.2).
 
+A task requests a behavior. A terminal report of its arbiter completes the task or throws its error.
+A fault of one of its resources throws that error. After a restart, an operator or the resume policy
+says what becomes of a behavior that is not as it was (docs/architecture.md, section 6).
+
+When an operator takes control of a vehicle, its behavior ends with error TAKEN_OVER, so that the
+mission can wait or go on another way, as its author drew it. Until the operator releases control,
+a behavior for the vehicle is refused.
+"""
+
+from m2pem.engine import inputs as i
 from m2pem.engine import records as r
+from m2pem.engine.arming import await_event
 from m2pem.engine.data import reader
+from m2pem.engine.elements.activities import complete
 from m2pem.engine.execution import Execution
-from m2pem.engine.records import Trigger
-from m2pem.engine.state import BehaviorPhase, Token
-from m2pem.engine.throwing import throw_error
-from m2pem.engine.waiting import await_event
+from m2pem.engine.records import RunOutcome, Trigger
+from m2pem.engine.scopes import end_run
+from m2pem.engine.state import Behavior, BehaviorPhase, RunState, Token
+from m2pem.engine.throwing import catcher_of_error, throw_error
+from m2pem.engine.triggering import throw_signal
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.fleet.allocation import AllocationError, allocate
 from m2pem.fleet.units import Dimension, UnitError, quantity
-from m2pem.mission.behavior import Behavior
+from m2pem.mission.behavior import Behavior as BehaviorOfTask
+from m2pem.mission.catalogue import BehaviorState, ResumePolicy
 from m2pem.mission.duration import duration_us
+from m2pem.mission.elements import Event
 from m2pem.mission.expression import Expression
 from m2pem.mission.values import Value
 
@@ -19,7 +34,7 @@ YEAR_10000_US = 253_402_300_800_000_000
 """The end of the calendar, in microseconds since the Unix epoch: no timer runs longer."""
 
 
-def request_behavior(x: Execution, token: Token, behavior: Behavior) -> None:
+def request_behavior(x: Execution, token: Token, behavior: BehaviorOfTask) -> None:
     """Have the arbiters start a behavior; their terminal report completes the task.
 
     A resource that another behavior holds, and is not giving up, is RESOURCE_UNAVAILABLE at once.
@@ -29,7 +44,7 @@ def request_behavior(x: Execution, token: Token, behavior: Behavior) -> None:
     if parameters is None:
         return
     if not behavior.roles and behavior.name == "hold":
-        _wait(x, token, parameters.get("duration"))
+        _hold_for(x, token, parameters.get("duration"))
         return
     try:
         allocation = allocate(behavior, x.fleet)
@@ -70,7 +85,7 @@ def request_behavior(x: Execution, token: Token, behavior: Behavior) -> None:
     )
 
 
-def _evaluate(x: Execution, token: Token, behavior: Behavior) -> dict[str, Value] | None:
+def _evaluate(x: Execution, token: Token, behavior: BehaviorOfTask) -> dict[str, Value] | None:
     """Values of the parameters now; None: an error was thrown instead."""
     read = reader(token)
     values: dict[str, Value] = {}
@@ -86,7 +101,7 @@ def _evaluate(x: Execution, token: Token, behavior: Behavior) -> dict[str, Value
     return values
 
 
-def _wait(x: Execution, token: Token, duration: Value) -> None:
+def _hold_for(x: Execution, token: Token, duration: Value) -> None:
     """A `hold` without any role commands nothing: it is a wait of its duration."""
     due_us = x.state.mission_time_us(x.now_us)
     if duration is not None:
@@ -112,3 +127,198 @@ def wait_us(duration: Value, at_us: int) -> int:
     if at_us + seconds * 1_000_000 >= YEAR_10000_US:
         raise UnitError(f"{duration!r} ends after the year 9999")
     return round(seconds * 1_000_000)
+
+
+DEFAULT_CODES: dict[BehaviorState, str] = {
+    BehaviorState.FAILED: "FAILED",
+    BehaviorState.REJECTED: "REJECTED",
+    BehaviorState.CANCELLED: "FAILED",
+    BehaviorState.LOST: "LINK_LOST",
+    BehaviorState.UNKNOWN: "FAILED",
+}
+"""Error code of a task whose behavior ended so, where its arbiter gave none."""
+
+RECOVERY_DECISIONS: tuple[dict[str, str], ...] = (
+    {"value": "resume", "label": "Resume"},
+    {"value": "skip", "label": "Skip the task"},
+    {"value": "abort", "label": "Abort the mission"},
+)
+"""What an operator may say of a behavior that is not as it was after a restart."""
+
+
+def behavior_reported(x: Execution, item: i.BehaviorReported) -> None:
+    """An arbiter's word: a terminal one completes the task, or throws its error."""
+    behavior = x.state.behaviors.get(item.behavior)
+    if behavior is None:
+        x.ignore(f"{item.state.value} for {item.behavior}, which is not active")
+        return
+    if not item.state.terminal:
+        if item.number <= behavior.number:
+            x.ignore(f"report {item.number} of {item.behavior} came before")
+            return
+        x.emit(r.BehaviorProgressed(item.behavior, item.number, item.state, item.native_ref))
+        return
+    _ended(x, behavior, item.state, item.code, item.reason, item.outputs)
+
+
+def _ended(
+    x: Execution,
+    behavior: Behavior,
+    state: BehaviorState,
+    code: str = "",
+    reason: str = "",
+    outputs: dict[str, Value] | None = None,
+) -> None:
+    if state is BehaviorState.SUCCEEDED:
+        code = ""
+    elif state is not BehaviorState.CANCELLED or behavior.phase is not BehaviorPhase.CANCELLING:
+        code = code or DEFAULT_CODES[state]
+    token = x.state.tokens.get(behavior.token)
+    if token is not None and token.behavior != behavior.id:
+        token = None
+    if token is not None and token.prompt:
+        x.emit(r.PromptWithdrawn(token.prompt))
+    x.emit(
+        r.BehaviorEnded(
+            behavior.token,
+            behavior.process,
+            behavior.element,
+            behavior.scope,
+            behavior.id,
+            state,
+            code,
+            reason,
+        )
+    )
+    if token is None:
+        return
+    x.write_all(token, outputs or {})  # also of one that failed: the pictures it took are there
+    if state is BehaviorState.SUCCEEDED:
+        complete(x, token)
+    else:
+        throw_error(x, token, code, reason or f"{behavior.name} ended {state.value}")
+
+
+def behavior_missing(x: Execution, item: i.BehaviorMissing) -> None:
+    """After a restart it is not as it was: by its policy it starts again, fails, or is held."""
+    behavior = x.state.behaviors.get(item.behavior)
+    if behavior is None:
+        x.ignore(f"{item.behavior} is not active")
+        return
+    if behavior.phase is BehaviorPhase.CANCELLING:
+        _ended(x, behavior, BehaviorState.CANCELLED, "", item.reason)
+        return
+    if behavior.phase is BehaviorPhase.UNSETTLED:
+        x.ignore(f"an operator is asked about {item.behavior} already")
+        return
+    if item.policy is ResumePolicy.RESTART:
+        x.emit(r.BehaviorRestarted(behavior.id, x.state.epoch))
+    elif item.policy is ResumePolicy.FAIL:
+        _ended(x, behavior, BehaviorState.LOST, "FAILED", item.reason)
+    else:
+        _ask_what_to_do(x, behavior, item)
+
+
+def _ask_what_to_do(x: Execution, behavior: Behavior, item: i.BehaviorMissing) -> None:
+    token = x.state.tokens[behavior.token]
+    label = token.node.label
+    x.emit(r.BehaviorUnsettled(behavior.id, item.state, item.reason))
+    x.emit(
+        r.PromptOpened(
+            token.id,
+            behavior.process,
+            behavior.element,
+            behavior.scope,
+            f"p{x.state.last_prompt + 1}",
+            f"{label}: {behavior.name} of {', '.join(behavior.resources)} is not as it was"
+            f" ({item.reason or item.state.value}). Resume it, skip the task, or abort?",
+            RECOVERY_DECISIONS,
+            "",
+            behavior.id,
+        )
+    )
+
+
+def recovery_answered(x: Execution, behavior: Behavior, answer: i.PromptAnswer) -> None:
+    """An operator has said what to do with a behavior that was held after a restart."""
+    if answer.decision == "resume":
+        if behavior.state in (BehaviorState.RUNNING, BehaviorState.ACCEPTED):
+            x.emit(r.BehaviorContinued(behavior.id, answer.by))
+        else:
+            x.emit(r.BehaviorRestarted(behavior.id, x.state.epoch, answer.by))
+    elif answer.decision == "skip":
+        token = x.state.tokens[behavior.token]
+        x.emit(r.BehaviorCancelRequested(behavior.id, "", f"skipped by {answer.by}"))
+        complete(x, token)
+    else:
+        end_run(x, RunOutcome.STOPPED, f"aborted by {answer.by}")
+
+
+def resource_fault(x: Execution, item: i.ResourceFault) -> None:
+    """What a resource does for the run ends with the fault's error (`ResourceFault`)."""
+    told = False
+    for holder in list(x.state.held.get(item.resource, ())):
+        behavior = x.state.behaviors[holder]
+        if not item.reachable and len(behavior.resources) == 1:
+            _ended(x, behavior, BehaviorState.LOST, item.code, item.reason)
+        elif behavior.phase is not BehaviorPhase.CANCELLING:
+            fail_behavior(x, behavior, item.code, item.reason)
+        else:
+            continue  # it ends by its report, or when it has not answered its cancel in time
+        told = True
+    if not told:
+        x.ignore(f"{item.code} of {item.resource}, which does nothing for this run")
+
+
+def fail_behavior(x: Execution, behavior: Behavior, code: str, reason: str) -> None:
+    """Cancel it, for what can still be reached of its resources must stop."""
+    token = x.state.tokens[behavior.token]
+    if token.prompt:
+        x.emit(r.PromptWithdrawn(token.prompt))
+    x.emit(r.BehaviorCancelRequested(behavior.id, code, reason))
+    throw_error(x, token, code, reason)
+
+
+CODE = "TAKEN_OVER"
+
+
+def control_taken(x: Execution, item: i.ControlTaken) -> None:
+    """What the resource does for the run ends with TAKEN_OVER."""
+    if item.resource in x.state.taken:
+        x.ignore(f"{item.resource} is with {x.state.taken[item.resource]} already")
+        return
+    x.emit(r.OperatorTookControl(item.resource, item.by))
+    for behavior in _commanding(x.state, item.resource):
+        if behavior.phase is not BehaviorPhase.CANCELLING:  # as the behavior before it left it
+            fail_behavior(x, behavior, CODE, f"{item.resource} was taken by {item.by}")
+
+
+def preview_control_taken(state: RunState, resource: str) -> list[tuple[Behavior, Event | None]]:
+    """The behaviors that `control_taken` would end now, each with the event that catches its error.
+
+    None: no event catches it, so the run would fail.
+    """
+    return [
+        (behavior, catcher_of_error(state.tokens[behavior.token], CODE))
+        for behavior in _commanding(state, resource)
+    ]
+
+
+def _commanding(state: RunState, resource: str) -> list[Behavior]:
+    """The behaviors that command a resource and are not being cancelled."""
+    holders = [state.behaviors.get(each) for each in state.held.get(resource, ())]
+    return [
+        each for each in holders if each is not None and each.phase is not BehaviorPhase.CANCELLING
+    ]
+
+
+def control_returned(x: Execution, item: i.ControlReturned) -> None:
+    """The resource can be commanded again; signals that wait for it are thrown."""
+    if item.resource not in x.state.taken:
+        x.ignore(f"{item.resource} is not with an operator")
+        return
+    x.emit(r.OperatorGaveControlBack(item.resource, item.by))
+    for signal in x.mission.signals.values():
+        if signal.returned == item.resource:
+            x.emit(r.SignalThrown(signal.id, by=item.by))
+            throw_signal(x, signal.id, {})

@@ -1,21 +1,17 @@
 """Events (BPMN 2.0.2, clauses 10.5 and 13.5)."""
 
 from m2pem.engine import records as r
-from m2pem.engine.arming import arm_entered
+from m2pem.engine.arming import arm, arm_entered
 from m2pem.engine.compensation import throw_compensation
 from m2pem.engine.data_flow import payload
-from m2pem.engine.elements.containers import finish
-from m2pem.engine.elements.flows import true_flows
+from m2pem.engine.elements.sequence_flows import true_flows
+from m2pem.engine.elements.subprocesses import cancel, finish
 from m2pem.engine.execution import Execution
-from m2pem.engine.interruption import end_run
-from m2pem.engine.messaging import send
 from m2pem.engine.records import RunOutcome, TokenOutcome
-from m2pem.engine.scopes import empty
+from m2pem.engine.scopes import empty, end_run
 from m2pem.engine.state import Token
 from m2pem.engine.throwing import throw_error, throw_escalation
-from m2pem.engine.transactions import cancel
-from m2pem.engine.triggering import collect_letters, throw_signal
-from m2pem.engine.waiting import arm
+from m2pem.engine.triggering import collect_letters, send, throw_signal
 from m2pem.mission.elements import (
     Event,
     IntermediateCatchEvent,
@@ -104,11 +100,6 @@ def signal(x: Execution, token: Token, signal_id: str) -> None:
         return
     x.emit(r.SignalThrown(signal_id, token.id, x.process_of(node), node.id, token.scope.id))
     throw_signal(x, signal_id, data)
-
-
-def boundary(x: Execution, token: Token) -> None:
-    """It has caught; its own flow begins."""
-    complete(x, token)
 
 
 def end(x: Execution, token: Token) -> None:

@@ -1,10 +1,34 @@
-"""Exclusive, parallel and inclusive gateways (BPMN 2.0.2, clauses 10.6.2-10.6.4, 13.4.1-13.4.3)."""
+"""Gateways (BPMN 2.0.2, clauses 10.6 and 13.4).
 
-from m2pem.engine.elements.flows import true_flows
+Inclusive joins and complex gateways that reset must look at the tokens elsewhere: they wait for
+what can still arrive (tables 13.3 and 13.5).
+
+A complex gateway has two phases. Waiting for start, it is activated when its condition becomes
+true: it uses up one token of each incoming flow that has any, and splits like an inclusive gateway.
+Waiting to reset, it waits for tokens on the other flows as long as one can still come, uses those
+up, and splits again, this time only along conditions that are true. Where no other flow is left, as
+in a gateway that only splits, there is nothing to wait for and no second phase.
+"""
+
+from collections.abc import Container
+
+from m2pem.engine import records as r
+from m2pem.engine.data import reader
+from m2pem.engine.elements.sequence_flows import true_flows
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import TokenOutcome
-from m2pem.engine.state import Join, Token
-from m2pem.mission.elements import ExclusiveGateway, InclusiveGateway
+from m2pem.engine.state import Join, Scope, Token
+from m2pem.engine.throwing import throw_error, throw_error_in
+from m2pem.engine.triggering import await_behind, collect_letters
+from m2pem.errors import ExpressionError
+from m2pem.mission.elements import (
+    ComplexGateway,
+    ExclusiveGateway,
+    FlowNode,
+    InclusiveGateway,
+    SequenceFlow,
+)
+from m2pem.mission.values import ReadValue, Value
 
 
 def exclusive(x: Execution, token: Token) -> None:
@@ -35,7 +59,7 @@ def parallel(x: Execution, token: Token) -> None:
 
 
 def inclusive(x: Execution, token: Token) -> None:
-    """Joins at the next quiet moment (`m2pem.engine.elements.joins`); a split goes on at once."""
+    """A split goes on at once; a join, when no other step is left (`fire_joins`)."""
     node = token.node
     assert isinstance(node, InclusiveGateway)
     if len(node.incoming) <= 1:
@@ -53,3 +77,170 @@ def merge(x: Execution, last: Token, join: Join) -> None:
     """Consume one token of each flow that has any, but for `last`, which goes on."""
     for tokens in [tokens for flow, tokens in join.by_flow.items() if flow is not last.flow]:
         x.leave(tokens[0], TokenOutcome.COMPLETED)
+
+
+def event_based(x: Execution, token: Token) -> None:
+    """Wait for the events behind it; where one comes, `m2pem.engine.triggering` goes on."""
+    if token.waits is not None:
+        return  # it began its process: the first of its events has come
+    if await_behind(x, token):
+        collect_letters(x, token)
+
+
+ACTIVATION_COUNT = "activationCount"
+WAITING_FOR_START = "waitingForStart"
+
+
+def complex_gateway(x: Execution, token: Token) -> None:
+    """A token has come: perhaps it activates the gateway."""
+    node, scope = token.node, token.scope
+    assert isinstance(node, ComplexGateway)
+    if node in scope.activated:
+        return
+    read = _reader(scope, node, reader(token), waiting_for_start=True)
+    if node.activation is not None:
+        try:
+            active = node.activation.holds(read)
+        except ExpressionError as error:
+            throw_error(x, token, "EXPRESSION", f"activationCondition of {node.id}: {error}")
+            return
+        if not active:
+            return
+    flows = true_flows(x, token, node.default, read=read)
+    if flows is None:
+        return
+    used = _use(x, scope, node, keep=token)
+    if len(used) < len(node.incoming):
+        flow_ids = tuple(flow.id for flow in used)
+        x.emit(r.GatewayActivated(x.process_of(node), node.id, scope.id, flow_ids))
+    x.proceed(token, flows)
+
+
+def reset(x: Execution, scope: Scope, node: ComplexGateway) -> None:
+    """Every token that could still come has come: use them up, and begin anew.
+
+    A flow without a condition has had its token in the first phase, and gets none here.
+    """
+    read = _reader(scope, node, reader(scope), waiting_for_start=False)
+    flows: list[SequenceFlow] = []
+    for flow in node.outgoing:
+        if flow is node.default or flow.condition is None:
+            continue
+        try:
+            if flow.condition.holds(read):
+                flows.append(flow)
+        except ExpressionError as error:
+            throw_error_in(x, scope, "EXPRESSION", f"condition of {flow.id}: {error}")
+            return
+    if not flows and node.default is not None:
+        flows.append(node.default)
+    _use(x, scope, node, but=scope.activated[node])
+    process = x.process_of(node)
+    x.emit(r.GatewayReset(process, node.id, scope.id))
+    for flow in flows:
+        number = x.state.last_token + 1
+        x.emit(r.FlowTaken(number, process, node.id, scope.id, flow.id))
+        x.enter(number, flow.target, scope, flow)
+    for waiting in _waiting(scope, node):
+        x.queue.append(waiting)
+        break
+    x.look_later(scope)
+
+
+def _waiting(scope: Scope, node: ComplexGateway) -> list[Token]:
+    join = scope.joins.get(node)
+    return [tokens[0] for tokens in join.by_flow.values()] if join is not None else []
+
+
+def _use(
+    x: Execution,
+    scope: Scope,
+    node: ComplexGateway,
+    *,
+    keep: Token | None = None,
+    but: tuple[SequenceFlow, ...] = (),
+) -> list[SequenceFlow]:
+    """Consume the first token of each incoming flow, other than `keep` and those of `but`."""
+    used: list[SequenceFlow] = []
+    for token in _waiting(scope, node):
+        flow = token.flow
+        assert flow is not None
+        if flow in but:
+            continue
+        used.append(flow)
+        if keep is None or flow is not keep.flow:
+            x.leave(token, TokenOutcome.COMPLETED)
+    return used
+
+
+def _reader(
+    scope: Scope, node: ComplexGateway, outer: ReadValue, *, waiting_for_start: bool
+) -> ReadValue:
+    """Reads what its conditions may refer to besides the data."""
+    join = scope.joins.get(node)
+    by_flow = join.by_flow if join is not None else {}
+    own: dict[str, Value] = {
+        ACTIVATION_COUNT: len(by_flow),
+        WAITING_FOR_START: waiting_for_start,
+    }
+    for flow in node.incoming:
+        own[flow.local_id] = len(by_flow.get(flow, ()))
+
+    def read(name: str) -> Value:
+        return own[name] if name in own else outer(name)
+
+    return read
+
+
+def fire_joins(x: Execution) -> bool:
+    """Let joins go on that need to wait no more, one in each scope. False: none could.
+
+    Called when no other step is left, so that whatever can move without outside input has moved.
+    Whether a join is complete depends on the tokens of its scope alone.
+    """
+    moved = sorted(x.moved)
+    x.moved.clear()
+    fired = False
+    for number in moved:
+        scope = x.state.scopes.get(number)
+        if scope is not None and (scope.joins or scope.activated) and _fire_one(x, scope):
+            x.moved.add(number)  # what one has done may be what another waited for
+            fired = True
+    return fired
+
+
+def _fire_one(x: Execution, scope: Scope) -> bool:
+    for node, join in scope.joins.items():
+        if isinstance(node, InclusiveGateway) and not _more_can_come(x, scope, node, join.by_flow):
+            last = list(join.by_flow.values())[-1][0]
+            merge(x, last, join)
+            split(x, last, node)
+            return True
+    for node, used in scope.activated.items():
+        waiting = scope.joins[node].by_flow if node in scope.joins else {}
+        if not _more_can_come(x, scope, node, {*used, *waiting}):
+            assert isinstance(node, ComplexGateway)
+            reset(x, scope, node)
+            return True
+    return False
+
+
+def _more_can_come(
+    x: Execution, scope: Scope, node: FlowNode, taken: Container[SequenceFlow]
+) -> bool:
+    """Whether a flow that no token came by may still get one (the rule of table 13.3).
+
+    A token elsewhere in the scope keeps the join waiting when it can reach such a flow, along a
+    path that does not pass the join, unless it can also reach one that is taken already. Those
+    that wait at the join itself reach nothing, nor does one whose activity is being undone.
+    """
+    reach = x.upstream(node)
+    bits = 0
+    for place, flow in enumerate(node.incoming):
+        if flow in taken:
+            bits |= 1 << place
+    for token in scope.tokens.values():
+        reachable = 0 if token.is_reopened else reach.get(token.node, 0)
+        if reachable & ~bits and not reachable & bits:
+            return True
+    return False

@@ -43,21 +43,7 @@ from m2pem.engine.records.run import (
     RunStarted,
     RunYielded,
 )
-from m2pem.engine.records.tokens import (
-    ActivitiesChosen,
-    FlowTaken,
-    GatewayActivated,
-    GatewayReset,
-    InstanceOutput,
-    ScopeClosed,
-    ScopeCompleting,
-    ScopeInterrupted,
-    ScopeOpened,
-    TokenEntered,
-    TokenLeft,
-    TokensGathered,
-)
-from m2pem.engine.records.work import (
+from m2pem.engine.records.tasks import (
     BehaviorCancelRequested,
     BehaviorContinued,
     BehaviorEnded,
@@ -71,6 +57,20 @@ from m2pem.engine.records.work import (
     ServiceEnded,
     ServiceRequested,
     ServiceWithdrawn,
+)
+from m2pem.engine.records.tokens import (
+    ActivitiesChosen,
+    FlowTaken,
+    GatewayActivated,
+    GatewayReset,
+    InstanceOutput,
+    ScopeClosed,
+    ScopeCompleting,
+    ScopeInterrupted,
+    ScopeOpened,
+    TokenEntered,
+    TokenLeft,
+    TokensGathered,
 )
 
 __all__ = [

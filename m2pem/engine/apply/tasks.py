@@ -1,7 +1,6 @@
 """What records about behaviors, prompts and services do to the state."""
 
 from m2pem.engine import records as r
-from m2pem.engine.apply.appliers import Appliers
 from m2pem.engine.state import (
     Behavior,
     BehaviorPhase,
@@ -11,7 +10,7 @@ from m2pem.engine.state import (
 )
 
 
-def _behavior_requested(state: RunState, record: r.BehaviorRequested) -> None:
+def behavior_requested(state: RunState, record: r.BehaviorRequested) -> None:
     state.last_behavior += 1
     state.behaviors[record.behavior] = Behavior(
         record.behavior,
@@ -31,7 +30,7 @@ def _behavior_requested(state: RunState, record: r.BehaviorRequested) -> None:
     state.tokens[record.token].behavior = record.behavior
 
 
-def _behavior_progressed(state: RunState, record: r.BehaviorProgressed) -> None:
+def behavior_progressed(state: RunState, record: r.BehaviorProgressed) -> None:
     behavior = state.behaviors[record.behavior]
     behavior.number = record.number
     behavior.state = record.state
@@ -39,23 +38,23 @@ def _behavior_progressed(state: RunState, record: r.BehaviorProgressed) -> None:
         behavior.native_ref = record.native_ref
 
 
-def _behavior_cancel_requested(state: RunState, record: r.BehaviorCancelRequested) -> None:
+def behavior_cancel_requested(state: RunState, record: r.BehaviorCancelRequested) -> None:
     behavior = state.behaviors[record.behavior]
     behavior.phase = BehaviorPhase.CANCELLING
     _forget_behavior(state, behavior)
 
 
-def _behavior_unsettled(state: RunState, record: r.BehaviorUnsettled) -> None:
+def behavior_unsettled(state: RunState, record: r.BehaviorUnsettled) -> None:
     behavior = state.behaviors[record.behavior]
     behavior.phase = BehaviorPhase.UNSETTLED
     behavior.state = record.state
 
 
-def _behavior_continued(state: RunState, record: r.BehaviorContinued) -> None:
+def behavior_continued(state: RunState, record: r.BehaviorContinued) -> None:
     state.behaviors[record.behavior].phase = BehaviorPhase.ACTIVE
 
 
-def _behavior_restarted(state: RunState, record: r.BehaviorRestarted) -> None:
+def behavior_restarted(state: RunState, record: r.BehaviorRestarted) -> None:
     behavior = state.behaviors[record.behavior]
     behavior.phase = BehaviorPhase.ACTIVE
     behavior.state = None
@@ -63,7 +62,7 @@ def _behavior_restarted(state: RunState, record: r.BehaviorRestarted) -> None:
     behavior.native_ref = None
 
 
-def _behavior_ended(state: RunState, record: r.BehaviorEnded) -> None:
+def behavior_ended(state: RunState, record: r.BehaviorEnded) -> None:
     behavior = state.behaviors.pop(record.behavior)
     for resource in behavior.resources:
         holders = state.held[resource]
@@ -79,7 +78,7 @@ def _forget_behavior(state: RunState, behavior: Behavior) -> None:
         token.behavior = ""
 
 
-def _prompt_opened(state: RunState, record: r.PromptOpened) -> None:
+def prompt_opened(state: RunState, record: r.PromptOpened) -> None:
     token = state.tokens[record.token]
     state.last_prompt += 1
     state.prompts[record.prompt] = Prompt(
@@ -88,11 +87,11 @@ def _prompt_opened(state: RunState, record: r.PromptOpened) -> None:
     token.prompt = record.prompt
 
 
-def _prompt_ended(state: RunState, record: r.PromptAnswered | r.PromptWithdrawn) -> None:
+def prompt_ended(state: RunState, record: r.PromptAnswered | r.PromptWithdrawn) -> None:
     state.prompts.pop(record.prompt).token.prompt = ""
 
 
-def _service_requested(state: RunState, record: r.ServiceRequested) -> None:
+def service_requested(state: RunState, record: r.ServiceRequested) -> None:
     token = state.tokens[record.token]
     state.last_service += 1
     state.services[record.service] = Service(
@@ -101,22 +100,5 @@ def _service_requested(state: RunState, record: r.ServiceRequested) -> None:
     token.service = record.service
 
 
-def _service_ended(state: RunState, record: r.ServiceEnded | r.ServiceWithdrawn) -> None:
+def service_ended(state: RunState, record: r.ServiceEnded | r.ServiceWithdrawn) -> None:
     state.services.pop(record.service).token.service = ""
-
-
-APPLIERS: Appliers = {
-    r.BehaviorRequested: _behavior_requested,
-    r.BehaviorProgressed: _behavior_progressed,
-    r.BehaviorCancelRequested: _behavior_cancel_requested,
-    r.BehaviorUnsettled: _behavior_unsettled,
-    r.BehaviorContinued: _behavior_continued,
-    r.BehaviorRestarted: _behavior_restarted,
-    r.BehaviorEnded: _behavior_ended,
-    r.PromptOpened: _prompt_opened,
-    r.PromptAnswered: _prompt_ended,
-    r.PromptWithdrawn: _prompt_ended,
-    r.ServiceRequested: _service_requested,
-    r.ServiceEnded: _service_ended,
-    r.ServiceWithdrawn: _service_ended,
-}
