@@ -15,7 +15,7 @@ from bench.verification.works import CASES, OVERLAP, SHAPES, Case, subjects
 from m2pem.executive.loading import load_source
 from m2pem.fleet.madeup import fleet_for
 from m2pem.verify.check import check
-from m2pem.verify.results import Verdict
+from m2pem.verify.properties.results import Verdict
 
 PEER = REPOSITORY / "bench" / "peers" / "check_rust_bpmn_analyzer.py"
 

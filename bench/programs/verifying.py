@@ -26,23 +26,23 @@ from m2pem.executive.proving import Engine
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import search as search_as_it_does
-from m2pem.verify.explore import Exploration, Limits, explore
 from m2pem.verify.ltl import parse
-from m2pem.verify.product import Result as Answered
+from m2pem.verify.ltl.model_check import Result as Answered
+from m2pem.verify.net.petri_net import System
+from m2pem.verify.net.simplify import simplify
 from m2pem.verify.properties import ALL, Searched
-from m2pem.verify.reduction import StubbornSets
+from m2pem.verify.properties.results import Result, Verdict
 from m2pem.verify.requirements import Requirement
-from m2pem.verify.requirements.checking import (
+from m2pem.verify.requirements.check import (
     Answer,
     check_requirement,
     reduction_for,
     system_for,
 )
-from m2pem.verify.results import Result, Verdict
-from m2pem.verify.simplify import simplify
+from m2pem.verify.search.explore import Exploration, Limits, explore
+from m2pem.verify.search.stubborn_sets import StubbornSets
 from m2pem.verify.spin.search import search as search_with_spin
-from m2pem.verify.system import System
-from m2pem.verify.translate import derive
+from m2pem.verify.translate import translate
 
 T = TypeVar("T")
 LIMIT_S = 300.0
@@ -90,7 +90,7 @@ def searched(how: str, xml: str, limits: Limits, steps: Steps) -> tuple[int, str
 def _rules(xml: str, steps: Steps) -> tuple[Mission, System]:
     mission = steps.step("read_s", lambda: parse_mission(xml.encode(), "bench.bpmn"))
     fleet = fleet_for(mission)
-    return mission, steps.step("derive_s", lambda: simplify(derive(mission, fleet)))
+    return mission, steps.step("derive_s", lambda: simplify(translate(mission, fleet)))
 
 
 def _seen(how: str, system: System, limits: Limits) -> Exploration:
@@ -119,7 +119,7 @@ def checked(how: str, file: str, fleet: str | None, steps: Steps) -> tuple[int, 
     """What `m2pem verify` does; its steps are taken once before, to see what each of them takes."""
     asked = asked_of(load_source(file), fleet, None, {})
     system = steps.step(
-        "derive_s", lambda: simplify(derive(asked.mission, asked.fleet, options=asked.options))
+        "derive_s", lambda: simplify(translate(asked.mission, asked.fleet, options=asked.options))
     )
     limits = Limits(tokens=3)
     if how == "spin":

@@ -28,7 +28,7 @@ def replay_counterexample(
     from m2pem.cli.given import get_fleet
     from m2pem.cli.output import wants_colour
     from m2pem.cli.story import Story
-    from m2pem.verify.playing import NotPlayableError, Player
+    from m2pem.verify.conformance_run import NotPlayableError, Player
 
     report = _read(file)
     violation = _violation(file, report, number)

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from m2pem.executive.proving import Asked, Engine
     from m2pem.mission.mission import Mission
     from m2pem.mission.values import Value
-    from m2pem.verify.explore import Progress
     from m2pem.verify.report.findings import Findings
+    from m2pem.verify.search.explore import Progress
 
 _QUIET_S = 1.0
 """A search that takes less is over before anybody has read how far it is."""
@@ -59,11 +59,11 @@ def findings(asked: "Asked", engine: "Engine", *, strict: bool) -> "Findings":
 
 def promela(asked: "Asked") -> str:
     """The model that Spin would be given."""
-    from m2pem.verify.simplify import simplify
+    from m2pem.verify.net.simplify import simplify
     from m2pem.verify.spin.promela import text_of
-    from m2pem.verify.translate import derive
+    from m2pem.verify.translate import translate
 
-    system = derive(asked.mission, asked.fleet, process=asked.process, options=asked.options)
+    system = translate(asked.mission, asked.fleet, process=asked.process, options=asked.options)
     return text_of(simplify(system)).text
 
 

@@ -121,8 +121,8 @@ def verify(
     from m2pem.cli.proving import asked_of, findings, promela
     from m2pem.executive.loading import load_source
     from m2pem.executive.proving import Engine
-    from m2pem.verify.explore import Limits
     from m2pem.verify.report.data import as_data
+    from m2pem.verify.search.explore import Limits
 
     asked = asked_of(
         load_source(mission, search_path),

@@ -19,7 +19,7 @@ from m2pem.mission.elements import Activity
 from m2pem.mission.events import Message, Signal
 from m2pem.mission.library import Library
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
-from m2pem.verify.requirements.data_names import read_by, written_by
+from m2pem.verify.requirements.names import read_by, written_by
 
 _LISTED = (*DATA, "sequenceFlow")
 

@@ -82,8 +82,8 @@ def _work(content: bytes, tell: Tell) -> bytes:
     # What searches is loaded here: the executive has no use for it.
     from m2pem.executive.proving import Engine, asked_of, prove  # noqa: PLC0415
     from m2pem.plugins import PluginManager  # noqa: PLC0415
-    from m2pem.verify.explore import Limits, Progress  # noqa: PLC0415
     from m2pem.verify.report.data import as_data  # noqa: PLC0415
+    from m2pem.verify.search.explore import Limits, Progress  # noqa: PLC0415
 
     order = msgspec.msgpack.decode(content, type=Order)
     shown_at = 0.0

@@ -12,11 +12,11 @@ from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.verify.check import Report, check
-from m2pem.verify.explore import Limits, Progress
 from m2pem.verify.report.findings import Findings, findings_of
 from m2pem.verify.requirements import Names, Requirement, gather
 from m2pem.verify.requirements.results import with_requirements
-from m2pem.verify.spin.asking import Storage
+from m2pem.verify.search.explore import Limits, Progress
+from m2pem.verify.spin.queries import Storage
 from m2pem.verify.translate.options import Options
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def prove(
 
 def _report(asked: Asked, engine: Engine, progress: Callable[[Progress], None] | None) -> Report:
     if engine.name == "spin":
-        from m2pem.verify.spin.checking import check_with_spin  # noqa: PLC0415  # seldom wanted
+        from m2pem.verify.spin.check import check_with_spin  # noqa: PLC0415  # seldom wanted
 
         return check_with_spin(
             asked.mission,

@@ -1,5 +1,6 @@
-"""Proving a mission before it moves anything.
+"""Verification of a mission before it moves anything.
 
-`derive.derive(mission, fleet)` gives the mission's rules (`system.System`); `explore.explore`
-searches what they can lead to; `properties` says what that means for the mission's author.
+`translate.translate(mission, fleet)` gives the mission as a Petri net (`net.petri_net`).
+`search.explore` explores its state space, or `spin` does; `properties` and `requirements` say what
+that means for the mission's author, and `report` writes it down. `check.check` does all of that.
 """

@@ -7,16 +7,15 @@ from dataclasses import dataclass, replace
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
-from m2pem.verify.explore import Exploration, Limits, Progress, Stopped, explore
-from m2pem.verify.interruption import watch_interruptions
+from m2pem.verify.net.petri_net import Place, Role, Scope, System
+from m2pem.verify.net.simplify import simplify
+from m2pem.verify.net.size_limit import MOST_RULES
 from m2pem.verify.properties import ALL, Searched
-from m2pem.verify.properties.commands import INTERRUPTED
-from m2pem.verify.reduction import StubbornSets
-from m2pem.verify.results import Result, Verdict
-from m2pem.verify.simplify import simplify
-from m2pem.verify.system import Place, Role, Scope, System
-from m2pem.verify.translate import Bound, Options, TooLargeError, derive
-from m2pem.verify.translate.bound import MOST_RULES
+from m2pem.verify.properties.commands import INTERRUPTED, watch_interruptions
+from m2pem.verify.properties.results import Result, Verdict
+from m2pem.verify.search.explore import Exploration, Limits, Progress, Stopped, explore
+from m2pem.verify.search.stubborn_sets import StubbornSets
+from m2pem.verify.translate import Bound, Options, TooLargeError, translate
 
 FULL_STATES = 100_000
 """States up to which nothing is left out: that gives the shortest runs."""
@@ -85,7 +84,7 @@ def check(
     fleet = fleet or fleet_for(mission)
     try:
         bound = bound_of(limits)
-        system = derive(mission, fleet, process=process, options=options, bound=bound)
+        system = translate(mission, fleet, process=process, options=options, bound=bound)
         system = simplify(system, bound=bound)
     except TooLargeError as error:
         return too_large(mission, error, process)

@@ -10,7 +10,7 @@ from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse
 from m2pem.verify.check import check
 from m2pem.verify.report.findings import Findings, findings_of
-from m2pem.verify.spin.checking import check_with_spin
+from m2pem.verify.spin.check import check_with_spin
 from m2pem.verify.translate import Options
 from tests.broken.expected import EXPECTED, Expected
 from tests.broken.situations import Records, Situation, situations

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.verify.explore import Progress
+from m2pem.verify.search.explore import Progress
 from tests.cli.conftest import Invoke
 from tests.command_line import FLEET, MISSION, REPOSITORY, CommandLine
 from tests.engine.notation import xml
-from tests.verify.test_fair_completion import AGREE
+from tests.verify.test_fairness import AGREE
 from tests.verify.test_timers import WARNED_FIRST
 
 BROKEN = REPOSITORY / "docs" / "broken"

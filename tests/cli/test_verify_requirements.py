@@ -8,7 +8,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from m2pem.verify.explore import Progress
+from m2pem.verify.search.explore import Progress
 from tests.cli.conftest import Invoke
 from tests.cli.test_verify import wide
 from tests.command_line import REPOSITORY

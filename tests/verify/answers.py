@@ -4,15 +4,14 @@ from dataclasses import dataclass
 from random import Random
 from types import SimpleNamespace
 
-from m2pem.verify.explore import Exploration, Limits, explore
-from m2pem.verify.labels import Labels
 from m2pem.verify.ltl import formula as f
 from m2pem.verify.ltl import propositions
-from m2pem.verify.mission_runs import MissionRuns
-from m2pem.verify.product import Result, check
-from m2pem.verify.reduction import StubbornSets
-from m2pem.verify.simplify import simplify
-from m2pem.verify.system import Action, Kind, Role, System
+from m2pem.verify.ltl.model_check import Result, check
+from m2pem.verify.net.petri_net import Action, Kind, Role, System
+from m2pem.verify.net.simplify import simplify
+from m2pem.verify.requirements.propositions import Labels, MissionRuns
+from m2pem.verify.search.explore import Exploration, Limits, explore
+from m2pem.verify.search.stubborn_sets import StubbornSets
 
 FEW = Limits(states=1_500, tokens=3, seconds=1e9)
 NO_FEWER = Limits(states=2 * FEW.states, tokens=3, seconds=1e9)

@@ -9,9 +9,9 @@ from m2pem.engine.state import BehaviorPhase, RunStatus
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.mission import Mission
-from m2pem.verify.follow import Follower, look_of_run
-from m2pem.verify.replay import START_US
-from m2pem.verify.system import System
+from m2pem.verify.net.petri_net import System
+from tests.verify.conformance import START_US
+from tests.verify.trace_mapping import Follower, look_of_run
 
 CODES = ("FAILED", "LINK_LOST", "ROUTE_BLOCKED")
 

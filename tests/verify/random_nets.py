@@ -8,7 +8,17 @@ Then a few things are changed at random, so that tokens are doubled, lost or wai
 from dataclasses import dataclass, field, replace
 from random import Random
 
-from m2pem.verify.system import Action, Kind, Place, Role, Rule, Scope, Step, System, Variable
+from m2pem.verify.net.petri_net import (
+    Action,
+    Kind,
+    Place,
+    Role,
+    Rule,
+    Scope,
+    Step,
+    System,
+    Variable,
+)
 
 _ENDS = 3
 _FIRST = ("row", "fork", "fork", "scope", "scope", "loop")

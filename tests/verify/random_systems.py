@@ -2,7 +2,7 @@
 
 from random import Random
 
-from m2pem.verify.system import (
+from m2pem.verify.net.petri_net import (
     Action,
     Flag,
     Kind,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from hypothesis import strategies as st
 
 from m2pem.verify.ltl.formula import Proposition
-from m2pem.verify.product import Move, Run
+from m2pem.verify.ltl.model_check import Move, Run
 from tests.verify.formulas import ATOMS
 
 

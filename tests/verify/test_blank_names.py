@@ -2,7 +2,7 @@
 
 import pytest
 
-from m2pem.verify.report.words import Words
+from m2pem.verify.report.run_steps import Words
 from tests.engine.notation import mission
 
 MODEL = """<startEvent id="start"/> <exclusiveGateway id="which" name=" "/> <userTask id="u"/>

@@ -8,12 +8,12 @@ import pytest
 
 from m2pem.bpmn import parse_mission
 from m2pem.mission.mission import Mission
-from m2pem.verify import concurrency
 from m2pem.verify.check import check, search
-from m2pem.verify.explore import Limits, Stopped, explore
-from m2pem.verify.results import Verdict
-from m2pem.verify.simplify import simplify
-from m2pem.verify.translate import Bound, Options, TooLargeError, derive
+from m2pem.verify.net import concurrency
+from m2pem.verify.net.simplify import simplify
+from m2pem.verify.properties.results import Verdict
+from m2pem.verify.search.explore import Limits, Stopped, explore
+from m2pem.verify.translate import Bound, Options, TooLargeError, translate
 from tests.verify.models import branches
 
 SEARCHED = {"no-deadlock", "proper-completion", "can-complete", "no-dead-element", "one-token"}
@@ -80,7 +80,7 @@ def test_the_limit_of_time_holds_for_the_making_of_rules() -> None:
 
 def test_no_more_rules_are_made_than_fit_into_memory() -> None:
     with pytest.raises(TooLargeError, match="more than 100 rules"):
-        derive(row_of(200), bound=Bound(most_rules=100))
+        translate(row_of(200), bound=Bound(most_rules=100))
     report = check(row_of(2_000), limits=Limits(memory_mb=1))
     assert report.found.stopped is Stopped.RULES
 
@@ -101,13 +101,13 @@ def test_the_limit_of_time_holds_for_making_rules_fewer(
 ) -> None:
     if not proven:
         monkeypatch.setattr(concurrency, "MOST_PLACES", 0)
-    system = derive(branches(40))
+    system = translate(branches(40))
     with pytest.raises(TooLargeError, match="limit of time"):
         simplify(system, bound=Bound(until_s=time.monotonic() - 1))
 
 
 def test_what_may_fire_in_states_that_wait_counts_as_memory() -> None:
-    system = simplify(derive(branches(100)))
+    system = simplify(translate(branches(100)))
     tracemalloc.start()
     try:
         found = explore(system, Limits(states=100_000, memory_mb=20))
@@ -119,7 +119,7 @@ def test_what_may_fire_in_states_that_wait_counts_as_memory() -> None:
 
 
 def test_of_short_time_enough_is_left_for_a_search_that_leaves_orders_out() -> None:
-    system = simplify(derive(branches(12)))
+    system = simplify(translate(branches(12)))
     found = search(system, Limits(seconds=20, states=10_000_000))
     assert found.complete
     assert found.reduced

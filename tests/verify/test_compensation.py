@@ -6,17 +6,17 @@ import pytest
 
 from m2pem.fleet.madeup import fleet_for
 from m2pem.verify.check import check
-from m2pem.verify.explore import Limits, explore
-from m2pem.verify.follow import TooManyStatesError
-from m2pem.verify.results import Verdict
-from m2pem.verify.simplify import simplify
-from m2pem.verify.system import Action, Exactness, Kind, Role, System
-from m2pem.verify.translate import Options, derive
+from m2pem.verify.net.petri_net import Action, Exactness, Kind, Role, System
+from m2pem.verify.net.simplify import simplify
+from m2pem.verify.properties.results import Verdict
+from m2pem.verify.search.explore import Limits, explore
+from m2pem.verify.translate import Options, translate
 from tests.engine.notation import mission
 from tests.engine.random_compensation import with_compensation
 from tests.engine.random_missions import graph, structured
 from tests.verify.models import Walk
 from tests.verify.test_spin_agreement import one_answer, same
+from tests.verify.trace_mapping import TooManyStatesError
 
 OPEN = Options(open_world=True)
 EXACT = (30, 36, 87, 126, 154, 176, 206, 242, 261, 297, 309, 329, 339, 362, 387, 393)
@@ -160,7 +160,7 @@ def reached(system: System) -> set[str]:
 @pytest.mark.parametrize("text", MISSIONS.values(), ids=MISSIONS)
 def test_the_rules_can_do_what_the_engine_does(text: str) -> None:
     read = mission(text)
-    system = derive(read, options=OPEN)
+    system = translate(read, options=OPEN)
     assert not [a for a in system.approximations if a.exactness is Exactness.BOUNDED]
     for seed in range(12):
         assert Walk(read, fleet_for(read), system, seed).go() == ""
@@ -169,7 +169,7 @@ def test_the_rules_can_do_what_the_engine_does(text: str) -> None:
 @pytest.mark.parametrize("text", MISSIONS.values(), ids=MISSIONS)
 def test_spin_sees_the_same(text: str) -> None:
     read = mission(text)
-    same(derive(read, options=OPEN))
+    same(translate(read, options=OPEN))
     one_answer(read)
 
 
@@ -177,7 +177,7 @@ def test_spin_sees_the_same(text: str) -> None:
 def test_the_rules_can_do_what_the_engine_does_of_random_compensation(seed: int) -> None:
     dice = Random(seed)
     read, text = with_compensation((structured if seed % 3 else graph)(dice), dice)
-    system = derive(read, options=OPEN)
+    system = translate(read, options=OPEN)
     assert not [a for a in system.approximations if a.exactness is Exactness.BOUNDED]
     for walk in range(4):
         try:
@@ -192,26 +192,26 @@ def test_the_rules_can_do_what_the_engine_does_of_random_compensation(seed: int)
 
 
 def test_an_event_subprocess_undoes_what_has_completed_and_nothing_else() -> None:
-    assert {"undo", "us", "x", "ue"} <= reached(derive(mission(by_itself())))
+    assert {"undo", "us", "x", "ue"} <= reached(translate(mission(by_itself())))
     ended = by_itself().replace('<endEvent id="e"/>', '<endEvent id="e">terminate</endEvent>')
-    assert not {"undo", "us", "x", "ue"} & reached(derive(mission(ended)))
+    assert not {"undo", "us", "x", "ue"} & reached(translate(mission(ended)))
 
 
 def test_what_was_ended_early_is_not_undone() -> None:
-    assert "unA" in reached(derive(mission(DEFAULT.format("", ""))))
-    assert "unA" not in reached(derive(mission(DEFAULT.format("", "terminate"))))
-    assert "unSub" in reached(derive(mission(HANDLED), options=OPEN))
+    assert "unA" in reached(translate(mission(DEFAULT.format("", ""))))
+    assert "unA" not in reached(translate(mission(DEFAULT.format("", "terminate"))))
+    assert "unSub" in reached(translate(mission(HANDLED), options=OPEN))
     never = HANDLED.replace("signal S", "timer PT5S").replace(
         '<userTask id="a">ask on</userTask>',
         '<intermediateCatchEvent id="a">signal NEVER</intermediateCatchEvent>',
     )
-    found = reached(derive(mission(never)))
+    found = reached(translate(mission(never)))
     assert "back" in found
     assert "unSub" not in found
 
 
 def test_a_throw_does_not_wait_for_what_another_one_undoes() -> None:
-    system = derive(mission(TWO_THROWS))
+    system = translate(mission(TWO_THROWS))
     found = explore(system)
     rests = [
         {system.places[p].element for p in found.marking(state).tokens if _shows(system, p)}
@@ -227,7 +227,7 @@ def _shows(system: System, place: int) -> bool:
 
 def test_the_errors_of_what_undoes_pass_by_the_boundary_of_what_is_undone() -> None:
     read = mission(by_itself(FAILS, boundary=CATCHES))
-    assert "caught" not in reached(derive(read))
+    assert "caught" not in reached(translate(read))
     results = {each.property: each for each in check(read).results}
     (violation,) = results["errors-caught"].violations
     assert violation.elements[0] == "ue"

@@ -6,10 +6,10 @@ from random import Random
 
 import pytest
 
-from m2pem.verify.concurrency import Concurrency
-from m2pem.verify.explore import Limits, explore
-from m2pem.verify.simplify import simplify
-from m2pem.verify.system import System
+from m2pem.verify.net.concurrency import Concurrency
+from m2pem.verify.net.petri_net import System
+from m2pem.verify.net.simplify import simplify
+from m2pem.verify.search.explore import Limits, explore
 from tests.verify.random_nets import random_net
 from tests.verify.random_systems import random_system
 from tests.verify.test_overfull import START, WORK, fills

@@ -11,16 +11,16 @@ from m2pem.errors import MissionError
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import check
-from m2pem.verify.explore import Limits, explore
-from m2pem.verify.follow import TooManyStatesError
-from m2pem.verify.replay import play
-from m2pem.verify.results import Verdict
-from m2pem.verify.simplify import simplify
-from m2pem.verify.system import Exactness, System
-from m2pem.verify.translate import Options, derive
+from m2pem.verify.net.petri_net import Exactness, System
+from m2pem.verify.net.simplify import simplify
+from m2pem.verify.properties.results import Verdict
+from m2pem.verify.search.explore import Limits, explore
+from m2pem.verify.translate import Options, translate
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
+from tests.verify.conformance import play
 from tests.verify.models import Walk
+from tests.verify.trace_mapping import TooManyStatesError
 
 ROOT = Path(__file__).parents[2]
 OPEN = Options(open_world=True, service_writes={"Detector": ["detection.type"]})
@@ -58,8 +58,8 @@ def _explained(walk: Walk, system: System) -> bool:
 @pytest.mark.parametrize("file", MISSIONS, ids=lambda f: f"{f.parent.name}-{f.stem}")
 def test_the_rules_can_do_what_the_engine_does_of_a_mission(file: Path) -> None:
     mission = read_mission(file)
-    assert walked(mission, derive(mission, options=OPEN), range(8)) == ""
-    assert walked(mission, derive(mission, options=IN_ORDER), range(8, 12)) == ""
+    assert walked(mission, translate(mission, options=OPEN), range(8)) == ""
+    assert walked(mission, translate(mission, options=IN_ORDER), range(8, 12)) == ""
 
 
 @pytest.mark.parametrize("part", range(PARTS))
@@ -70,10 +70,10 @@ def test_the_rules_can_do_what_the_engine_does_of_every_case_of_the_standard(par
             mission = read_mission(file)
         except MissionError:
             continue
-        system = derive(mission, options=OPEN)
+        system = translate(mission, options=OPEN)
         found = walked(mission, system, range(2))
         if sum(rule.due_us is not None for rule in system.rules) > 1:
-            found = found or walked(mission, derive(mission, options=IN_ORDER), range(2, 4))
+            found = found or walked(mission, translate(mission, options=IN_ORDER), range(2, 4))
         if found:
             lost[file.stem] = found
     # Their data would have to be given at the start: without, they count for ever.
@@ -83,13 +83,13 @@ def test_the_rules_can_do_what_the_engine_does_of_every_case_of_the_standard(par
 @pytest.mark.parametrize("seed", range(40))
 def test_the_rules_can_do_what_the_engine_does_of_a_random_mission(seed: int) -> None:
     mission = notation((structured if seed % 2 else graph)(Random(seed)))
-    assert walked(mission, derive(mission, options=OPEN), range(2)) == ""
+    assert walked(mission, translate(mission, options=OPEN), range(2)) == ""
 
 
 @pytest.mark.parametrize("seed", range(40, 60))
 def test_the_engines_timers_come_in_order_in_a_random_mission(seed: int) -> None:
     mission = notation((structured if seed % 2 else graph)(Random(seed)))
-    assert walked(mission, derive(mission, options=IN_ORDER), range(3)) == ""
+    assert walked(mission, translate(mission, options=IN_ORDER), range(3)) == ""
 
 
 def test_the_runs_that_violate_a_property_can_be_played_to_the_engine() -> None:

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from m2pem.verify.explore import Exploration, Stopped, _Search, explore
-from m2pem.verify.reduction import StubbornSets
-from m2pem.verify.simplify import simplify
-from m2pem.verify.system import System
-from m2pem.verify.translate import derive
+from m2pem.verify.net.petri_net import System
+from m2pem.verify.net.simplify import simplify
+from m2pem.verify.search.explore import Exploration, Stopped, _Search, explore
+from m2pem.verify.search.stubborn_sets import StubbornSets
+from m2pem.verify.translate import translate
 from tests.verify.models import branches
 
 
@@ -43,7 +43,7 @@ def interrupted(system: System, at: int, *, reduced: bool) -> tuple[Exploration,
 
 @pytest.mark.parametrize("reduced", [False, True])
 def test_whatever_was_being_done_what_is_left_fits_together(reduced: bool) -> None:
-    system = simplify(derive(branches(2)))
+    system = simplify(translate(branches(2)))
     at, met = 1, True
     while met:
         found, met = interrupted(system, at, reduced=reduced)

@@ -15,7 +15,7 @@ import pytest
 
 from m2pem.bpmn import parse_mission
 from m2pem.verify.check import Report, check
-from m2pem.verify.results import Verdict
+from m2pem.verify.properties.results import Verdict
 
 if not os.environ.get("M2PEM_CORPORA"):
     pytest.skip("M2PEM_CORPORA names no folder of foreign BPMN files", allow_module_level=True)

@@ -7,10 +7,10 @@ import pytest
 from m2pem.bpmn import parse_mission
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import Report, check
-from m2pem.verify.results import Verdict
-from m2pem.verify.spin.checking import check_with_spin
-from m2pem.verify.system import Exactness
-from m2pem.verify.translate import derive
+from m2pem.verify.net.petri_net import Exactness
+from m2pem.verify.properties.results import Verdict
+from m2pem.verify.spin.check import check_with_spin
+from m2pem.verify.translate import translate
 
 WORK = (
     '<userTask id="{}"><extensionElements><m2pem:prompt>?</m2pem:prompt>'
@@ -81,7 +81,7 @@ def test_messages_that_nobody_reads_keep_no_mission_undecided() -> None:
 
 
 def test_it_is_said_that_only_so_many_messages_are_kept() -> None:
-    bounded = [a.what for a in derive(CHATTY).approximations if a.exactness is Exactness.BOUNDED]
+    bounded = [a.what for a in translate(CHATTY).approximations if a.exactness is Exactness.BOUNDED]
     assert "up to three copies of message News are kept" in bounded
 
 

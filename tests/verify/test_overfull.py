@@ -2,8 +2,8 @@
 
 import pytest
 
-from m2pem.verify.explore import Limits, Stopped, explore
-from m2pem.verify.system import Action, Kind, Place, Role, Rule, Scope, Step, System
+from m2pem.verify.net.petri_net import Action, Kind, Place, Role, Rule, Scope, Step, System
+from m2pem.verify.search.explore import Limits, Stopped, explore
 
 ENDS = tuple(Place(n, f"end{n}", f"end{n}", 0, Role.END) for n in range(3))
 START, REACHED, WORK = 3, 4, 5

@@ -3,10 +3,10 @@
 import pytest
 
 from m2pem.fleet.madeup import fleet_for
-from m2pem.verify.explore import explore
+from m2pem.verify.net.petri_net import Action
+from m2pem.verify.search.explore import explore
 from m2pem.verify.spin.search import search
-from m2pem.verify.system import Action
-from m2pem.verify.translate import derive
+from m2pem.verify.translate import translate
 from tests.engine.kit import Play
 from tests.engine.notation import mission as notation
 from tests.verify.models import Walk
@@ -56,7 +56,7 @@ def completed(text: str, element: str) -> tuple[bool, bool]:
     mission = notation(text)
     play = Play(text).start()
     lines = play.trace()
-    system = derive(mission)
+    system = translate(mission)
     found = explore(system)
     spins = search(system)
     assert spins.fired == found.fired.keys()

@@ -4,9 +4,9 @@ import pytest
 
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
-from m2pem.verify.explore import Limits, explore
-from m2pem.verify.system import System
-from m2pem.verify.translate import Options, derive
+from m2pem.verify.net.petri_net import System
+from m2pem.verify.search.explore import Limits, explore
+from m2pem.verify.translate import Options, translate
 from tests.engine.notation import mission
 from tests.engine.test_data_flow import into, out_of
 from tests.verify.models import Walk
@@ -97,7 +97,7 @@ def ends(system: System) -> set[str]:
 
 def followed(read: Mission) -> System:
     """Its rules, which can do what the engine does."""
-    system = derive(read)
+    system = translate(read)
     for seed in range(6):
         walk = Walk(read, fleet_for(read), system, seed)
         walk._things = _without_signals(walk)  # type: ignore[method-assign]
@@ -143,4 +143,4 @@ def test_a_receive_task_gets_what_a_send_task_sends() -> None:
 
 def test_what_comes_from_outside_may_bring_anything_that_is_named() -> None:
     constant = mission(SIGNAL.format(sends("v", CONSTANT), OUTPUT))
-    assert ends(derive(constant, options=Options(open_world=True))) == {"two", "other"}
+    assert ends(translate(constant, options=Options(open_world=True))) == {"two", "other"}

@@ -3,7 +3,7 @@
 import pytest
 
 from m2pem.verify.check import check
-from m2pem.verify.results import Verdict
+from m2pem.verify.properties.results import Verdict
 from tests.engine.notation import mission
 
 JOIN_FED_BY_ONE = """

@@ -9,7 +9,7 @@ from m2pem.bpmn import read_mission
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.plugins import PluginManager
 from m2pem.verify.check import check
-from m2pem.verify.results import Verdict
+from m2pem.verify.properties.results import Verdict
 from m2pem.verify.translate import Options
 
 ROOT = Path(__file__).parents[2]

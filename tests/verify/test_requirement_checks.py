@@ -2,14 +2,14 @@ import pytest
 
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
-from m2pem.verify.explore import Limits
-from m2pem.verify.labels import Labels
 from m2pem.verify.ltl import parse, propositions
-from m2pem.verify.product import Result
+from m2pem.verify.ltl.model_check import Result
+from m2pem.verify.net.petri_net import Action
 from m2pem.verify.requirements import Names, parse_spec
-from m2pem.verify.requirements.checking import Answer, check_mission
-from m2pem.verify.system import Action
-from m2pem.verify.translate import Options, derive
+from m2pem.verify.requirements.check import Answer, check_mission
+from m2pem.verify.requirements.propositions import Labels
+from m2pem.verify.search.explore import Limits
+from m2pem.verify.translate import Options, translate
 from tests.verify.missions import approval, in_a_row, pair, survey, task
 
 HOLDS, VIOLATED, UNDECIDED = Result.HOLDS, Result.VIOLATED, Result.UNDECIDED
@@ -121,7 +121,7 @@ def test_of_a_search_cut_short_what_is_broken_is_broken_and_the_rest_undecided()
 def test_rules_that_cannot_change_what_a_formula_asks_are_not_visible() -> None:
     mission = pair()
     fleet = fleet_for(mission)
-    system = derive(mission, fleet, options=CERTAIN)
+    system = translate(mission, fleet, options=CERTAIN)
     formula = parse("[](completed(North) -> <> commanded(uav1))")
     visible = Labels(system, mission, fleet, propositions(formula)).visible_rules()
     completing = {

@@ -6,18 +6,18 @@ from hypothesis import strategies as st
 
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
-from m2pem.verify.explore import Exploration, explore
-from m2pem.verify.ignoring import ignoring
 from m2pem.verify.ltl import parse
 from m2pem.verify.ltl.formula import Active, Completed, Formula, Proposition, rebuilt
-from m2pem.verify.product import Result
+from m2pem.verify.ltl.model_check import Result
 from m2pem.verify.requirements import Requirement
-from m2pem.verify.requirements.checking import (
+from m2pem.verify.requirements.check import (
     check_mission,
     check_requirement,
     reduction_for,
     system_for,
 )
+from m2pem.verify.search.explore import Exploration, explore
+from m2pem.verify.search.stubborn_sets import ignoring
 from m2pem.verify.translate import Options
 from tests.bpmn.bpmn_text import flow
 from tests.verify import formulas

@@ -3,8 +3,8 @@
 import pytest
 
 from m2pem.verify.check import Report, check
-from m2pem.verify.results import Verdict
-from m2pem.verify.system import Exactness
+from m2pem.verify.net.petri_net import Exactness
+from m2pem.verify.properties.results import Verdict
 from tests.bpmn.bpmn_text import flow
 from tests.verify.missions import mission
 

@@ -14,27 +14,26 @@ from m2pem.bpmn import read_mission
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import check
-from m2pem.verify.encoding import Marking
-from m2pem.verify.explore import Exploration, Limits, Stopped, explore
-from m2pem.verify.labels import Labels
 from m2pem.verify.ltl import Formula, propositions
 from m2pem.verify.ltl.formula import Active, Completed, needs_steps, rebuilt
-from m2pem.verify.mission_runs import MissionRuns
-from m2pem.verify.product import Result
-from m2pem.verify.product import check as check_formula
+from m2pem.verify.ltl.model_check import Result
+from m2pem.verify.ltl.model_check import check as check_formula
+from m2pem.verify.net.encoding import Marking
+from m2pem.verify.net.petri_net import Flag, System
+from m2pem.verify.net.simplify import simplify
 from m2pem.verify.properties import ALL
+from m2pem.verify.properties.results import Verdict
 from m2pem.verify.requirements import Names, parse_spec
-from m2pem.verify.requirements.checking import check_requirement, conditions
+from m2pem.verify.requirements.check import check_requirement, conditions
+from m2pem.verify.requirements.propositions import Labels, MissionRuns
 from m2pem.verify.requirements.requirement import Requirement
-from m2pem.verify.results import Verdict
-from m2pem.verify.simplify import simplify
-from m2pem.verify.spin import requiring
-from m2pem.verify.spin.asking import Asking, Told
-from m2pem.verify.spin.checking import check_with_spin
+from m2pem.verify.search.explore import Exploration, Limits, Stopped, explore
+from m2pem.verify.spin import ltl_claims
+from m2pem.verify.spin.check import check_with_spin
+from m2pem.verify.spin.queries import Asking, Told
 from m2pem.verify.spin.search import Found, Wanted, search
 from m2pem.verify.spin.trail import replay
-from m2pem.verify.system import Flag, System
-from m2pem.verify.translate import Options, derive
+from m2pem.verify.translate import Options, translate
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
 from tests.seeds import seeds_for
@@ -120,7 +119,7 @@ def one_answer(mission: Mission) -> Verdict:
 
 @pytest.mark.parametrize("file", ["vignette1.bpmn", "mehds_vignette_4.bpmn"])
 def test_the_rules_as_derived_have_the_same_states(file: str) -> None:
-    ours, _ = same(derive(read_mission(ROOT / "missions" / file)))
+    ours, _ = same(translate(read_mission(ROOT / "missions" / file)))
     assert len(ours.states) > 30
 
 
@@ -129,7 +128,7 @@ def test_the_rules_as_derived_have_the_same_states(file: str) -> None:
 
 def _random_mission(seed: int) -> System:
     text = (structured if seed % 2 else graph)(Random(seed))
-    return (simplify if seed % 3 else lambda system: system)(derive(notation(text)))
+    return (simplify if seed % 3 else lambda system: system)(translate(notation(text)))
 
 
 @pytest.mark.parametrize("seed", sorted({*range(FEW), *ODD_MISSIONS}))
@@ -183,12 +182,12 @@ def test_no_more_is_asked_when_the_time_is_over(monkeypatch: pytest.MonkeyPatch)
 def answers(mission: Mission, required: Sequence[Requirement]) -> list[tuple[Result, Result]]:
     fleet = fleet_for(mission)
     options = Options(failures=False, conditions=conditions(required))
-    system = derive(mission, fleet, options=options)
+    system = translate(mission, fleet, options=options)
     found, spins = explore(system), search(system)
     return [
         (
             check_requirement(found, mission, fleet, each).result,
-            requiring.check_requirement(spins, mission, fleet, each).result,
+            ltl_claims.check_requirement(spins, mission, fleet, each).result,
         )
         for each in required
     ]
@@ -248,7 +247,7 @@ def test_random_formulas_have_one_answer(formula: Formula, seed: int) -> None:
     assume(not needs_steps(formula))
     dice = Random(seed)
     mission = notation(structured(dice))
-    system = simplify(derive(mission))
+    system = simplify(translate(mission))
     found = explore(system, SMALL)
     assume(found.complete)
     elements = sorted(system.elements)
@@ -256,7 +255,7 @@ def test_random_formulas_have_one_answer(formula: Formula, seed: int) -> None:
     fleet = fleet_for(mission)
     labels = Labels(system, mission, fleet, propositions(asked))
     ours = check_formula(MissionRuns(found, labels), asked)
-    spins = requiring.check_requirement(
+    spins = ltl_claims.check_requirement(
         search(system, SMALL), mission, fleet, Requirement("r", asked, "")
     )
     assert spins.result is ours.result

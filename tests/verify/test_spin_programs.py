@@ -7,18 +7,17 @@ from pathlib import Path
 import pytest
 
 from m2pem.errors import InternalError
-from m2pem.verify.encoding import Encoding
-from m2pem.verify.explore import Limits, Progress, Stopped
-from m2pem.verify.simplify import simplify
-from m2pem.verify.spin import asking, programs
-from m2pem.verify.spin.asking import Storage
-from m2pem.verify.spin.output import Cut, Found, read
+from m2pem.verify.net.encoding import Encoding
+from m2pem.verify.net.petri_net import System
+from m2pem.verify.net.simplify import simplify
+from m2pem.verify.search.explore import Limits, Progress, Stopped
+from m2pem.verify.spin import programs, queries
 from m2pem.verify.spin.programs import SpinMissingError, Tools
+from m2pem.verify.spin.queries import Cut, Found, Storage, read
 from m2pem.verify.spin.search import search
 from m2pem.verify.spin.trail import Trail, replay
 from m2pem.verify.spin.trail import read as read_trail
-from m2pem.verify.system import System
-from m2pem.verify.translate import derive
+from m2pem.verify.translate import translate
 from tests.verify.models import branches
 
 WHOLE = """
@@ -47,7 +46,7 @@ def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def rows(count: int) -> System:
     """4 ** count states, about."""
-    return simplify(derive(branches(count)))
+    return simplify(translate(branches(count)))
 
 
 # --- what a checker prints ------------------------------------------------------------------------
@@ -150,14 +149,14 @@ def test_a_run_that_is_none_is_not_believed() -> None:
 def test_limits_leave_it_undecided(folders: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert search(rows(8), Limits(memory_mb=6)).stopped is Stopped.MEMORY
     assert search(rows(8), Limits(seconds=0.05)).stopped is Stopped.TIME
-    monkeypatch.setattr(asking, "_FIRST_DEPTH", 20)
-    monkeypatch.setattr(asking, "_MOST_DEPTH", 20)
+    monkeypatch.setattr(queries, "_FIRST_DEPTH", 20)
+    monkeypatch.setattr(queries, "_MOST_DEPTH", 20)
     assert search(rows(3)).stopped is Stopped.DEPTH
     assert not list(folders.iterdir())
 
 
 def test_more_depth_is_given_where_it_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(asking, "_FIRST_DEPTH", 20)
+    monkeypatch.setattr(queries, "_FIRST_DEPTH", 20)
     found = search(rows(3))
     assert (found.stopped, found.states) == (None, 4**3 + 3)
 

@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 
 from m2pem.bpmn import read_mission
-from m2pem.verify.encoding import Encoding
-from m2pem.verify.spin.naming import comment, identifiers
-from m2pem.verify.spin.promela import Asks, text_of
-from m2pem.verify.system import Kind, System
-from m2pem.verify.translate import derive
+from m2pem.verify.net.encoding import Encoding
+from m2pem.verify.net.petri_net import Kind, System
+from m2pem.verify.spin.promela import Asks, comment, identifiers, text_of
+from m2pem.verify.translate import translate
 from tests.engine.notation import mission as notation
 
 ROOT = Path(__file__).parents[2]
@@ -29,7 +28,7 @@ fork -> b -> meet
 
 @pytest.fixture(scope="module")
 def vignette() -> System:
-    return derive(read_mission(VIGNETTE))
+    return translate(read_mission(VIGNETTE))
 
 
 def rule_lines(text: str) -> list[str]:
@@ -59,7 +58,7 @@ def test_what_comes_from_outside_is_tried_last(vignette: System) -> None:
 
 
 def test_a_place_is_a_bit_until_it_needs_more_room() -> None:
-    system = derive(notation(TWO_BRANCHES))
+    system = translate(notation(TWO_BRANCHES))
     meet = next(place for place in system.places if place.name == "meet")
     assert re.search(r"^bit at_meet;", text_of(system).text, re.M)
     wide = text_of(system, Encoding(system, {meet.index: 2}))

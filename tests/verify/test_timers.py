@@ -8,12 +8,12 @@ import pytest
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import Report, check
-from m2pem.verify.explore import Limits, explore
-from m2pem.verify.results import Result, Verdict
-from m2pem.verify.spin.checking import check_with_spin
+from m2pem.verify.net.petri_net import System, Trigger
+from m2pem.verify.properties.results import Result, Verdict
+from m2pem.verify.search.explore import Limits, explore
+from m2pem.verify.spin.check import check_with_spin
 from m2pem.verify.spin.promela import text_of
-from m2pem.verify.system import System, Trigger
-from m2pem.verify.translate import Options, derive
+from m2pem.verify.translate import Options, translate
 from tests.engine.notation import mission
 from tests.verify.models import Walk
 
@@ -123,19 +123,19 @@ def test_behind_a_gateway_the_timer_that_is_due_first_comes(
     one: str, two: str, can_come: set[str]
 ) -> None:
     text = mission(BEHIND.format(one, two))
-    assert reached(derive(text)) & {"one", "two"} == {"one", "two"}
-    assert reached(derive(text, options=IN_ORDER)) & {"one", "two"} == can_come
+    assert reached(translate(text)) & {"one", "two"} == {"one", "two"}
+    assert reached(translate(text, options=IN_ORDER)) & {"one", "two"} == can_come
 
 
 def test_durations_from_data_come_at_any_time() -> None:
     text = mission(BEHIND.format("PT5M", "${limit}"))
     data = replace(IN_ORDER, data={"limit": "PT1M"})
-    assert {"one", "two"} <= reached(derive(text, options=data))
+    assert {"one", "two"} <= reached(translate(text, options=data))
 
 
 def test_timers_of_other_scopes_come_in_any_order() -> None:
     both = {("one", "two"), ("two", "one")}
-    assert orders(derive(mission(PARALLEL), options=IN_ORDER)) == both
+    assert orders(translate(mission(PARALLEL), options=IN_ORDER)) == both
 
 
 @pytest.mark.parametrize(
@@ -151,8 +151,8 @@ def test_timers_of_an_activity_and_of_what_begins_with_it_are_compared(
     attributes: str, inner: str, outer: str, can_come: set[str]
 ) -> None:
     text = mission(NESTED.format(attributes, inner, outer))
-    assert reached(derive(text)) & {"due", "late"} == {"due", "late"}
-    assert reached(derive(text, options=IN_ORDER)) & {"due", "late"} == can_come
+    assert reached(translate(text)) & {"due", "late"} == {"due", "late"}
+    assert reached(translate(text, options=IN_ORDER)) & {"due", "late"} == can_come
 
 
 def test_a_timer_around_a_handler_that_has_begun_comes_all_the_same() -> None:
@@ -160,7 +160,7 @@ def test_a_timer_around_a_handler_that_has_begun_comes_all_the_same() -> None:
         '<endEvent id="k"/>\ndue -> k', '<userTask id="w">ask on</userTask><endEvent id="k"/>\n'
         "due -> w -> k"
     )  # fmt: skip
-    system = derive(mission(text), options=IN_ORDER)
+    system = translate(mission(text), options=IN_ORDER)
     assert ("due", "late") in orders(system)
     assert ("late",) not in orders(system)
 
@@ -169,7 +169,7 @@ def test_a_prompt_that_times_out_first_lets_no_later_timer_come() -> None:
     prompt = '<userTask id="ask" m2pem:timeout="{}">ask done</userTask>'
     for limit, can_come in (("PT30S", False), ("PT2M", False), ("PT5M", True), ("PT6M", True)):
         text = WARNED_FIRST.replace('<userTask id="ask">ask done</userTask>', prompt.format(limit))
-        came = reached(derive(mission(text), options=IN_ORDER))
+        came = reached(translate(mission(text), options=IN_ORDER))
         assert ("late" in came) is can_come
         assert ("soon" in came) is (limit != "PT30S")
 
@@ -189,7 +189,7 @@ late -> el
 """
 
     def waits(text: str) -> bool:
-        system = derive(mission(text), options=IN_ORDER)
+        system = translate(mission(text), options=IN_ORDER)
         (late,) = [r for r in system.rules if r.element == "late" and r.trigger is not None]
         return any(system.places[place].element == "soon" for place in late.inhibit)
 
@@ -250,7 +250,7 @@ g1 -> e
 def test_what_the_engine_does_with_timers_the_rules_can_do_in_order(seed: int) -> None:
     text = several_timers(Random(seed))
     fleet = fleet_for(text)
-    system = derive(text, fleet, options=IN_ORDER)
+    system = translate(text, fleet, options=IN_ORDER)
     for walk in range(4):
         assert Walk(text, fleet, system, walk).go() == ""
 
@@ -258,15 +258,15 @@ def test_what_the_engine_does_with_timers_the_rules_can_do_in_order(seed: int) -
 def test_some_of_those_missions_do_less_in_order() -> None:
     texts = [several_timers(Random(seed)) for seed in range(6)]
     limits = Limits(states=4_000, tokens=3)
-    any_order = [explore(derive(each), limits).transitions for each in texts]
-    in_order = [explore(derive(each, options=IN_ORDER), limits).transitions for each in texts]
+    any_order = [explore(translate(each), limits).transitions for each in texts]
+    in_order = [explore(translate(each, options=IN_ORDER), limits).transitions for each in texts]
     assert all(one >= other for one, other in zip(any_order, in_order, strict=True))
     assert sum(one > other for one, other in zip(any_order, in_order, strict=True)) >= 3
 
 
 def test_spin_is_given_the_same_order() -> None:
     text = mission(WARNED_FIRST)
-    ordered, free = (text_of(derive(text, options=o)).text for o in (IN_ORDER, Options()))
+    ordered, free = (text_of(translate(text, options=o)).text for o in (IN_ORDER, Options()))
     late = [line for line in ordered.splitlines() if "timer: late triggered" in line]
     assert len(late) == 1
     assert "!at_ask_soon_control_armed0" in late[0]

@@ -8,9 +8,8 @@ quiet moment in the same state follows; that is why no formula can tell how many
 not name happen between two that it does, and why searches may leave such steps out.
 """
 
-from m2pem.verify.ltl.formula import Formula, Proposition, negated, propositions
+from m2pem.verify.ltl.formula import Formula, Proposition, negated, propositions, show
 from m2pem.verify.ltl.observer import Observer
 from m2pem.verify.ltl.parser import parse
-from m2pem.verify.ltl.printer import show
 
 __all__ = ["Formula", "Observer", "Proposition", "negated", "parse", "propositions", "show"]

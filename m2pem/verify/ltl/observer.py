@@ -1,13 +1,142 @@
-"""A formula's automaton with its machines of the past: what a search runs beside a mission."""
+"""A formula's observer: its automaton, and small state machines for its operators of the past.
 
-from collections.abc import Sequence
+Each operator of the past and each count becomes a new bit of the letter; a machine sets it from the
+letters up to now. The rest of the formula is about the future alone, and becomes the automaton.
+"""
 
-from m2pem.verify.ltl.automaton import Automaton
-from m2pem.verify.ltl.formula import Formula, Proposition, propositions
-from m2pem.verify.ltl.lowering import lower
-from m2pem.verify.ltl.normal import Forms
-from m2pem.verify.ltl.past import Memory, Past
-from m2pem.verify.ltl.translate import translate
+import operator
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from m2pem.verify.ltl.automaton import Automaton, translate
+from m2pem.verify.ltl.formula import (
+    And,
+    Constant,
+    Count,
+    Formula,
+    Historically,
+    Iff,
+    Implies,
+    Not,
+    Once,
+    Or,
+    Proposition,
+    Since,
+    children,
+    propositions,
+)
+from m2pem.verify.ltl.normal_form import Forms, lower
+
+_COMPARE: dict[str, Callable[[int, int], bool]] = {
+    ">=": operator.ge,
+    "<=": operator.le,
+    ">": operator.gt,
+    "<": operator.lt,
+    "==": operator.eq,
+    "!=": operator.ne,
+}
+Memory = tuple[int, ...]
+"""What the machines remember: a number each, and one more bit for each thing that is counted."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Machine:
+    """One operator: its bit of the letter, and where in the memory its own is."""
+
+    formula: Formula
+    bit: int
+    slot: int
+
+
+class Past:
+    """The machines of one formula, in an order in which each finds ready what it looks at."""
+
+    def __init__(self, first_bit: int, number: Callable[[Formula], int]) -> None:
+        self._first_bit = first_bit
+        self._number = number
+        self._machines: list[_Machine] = []
+        self._bits: dict[Formula, int] = {}
+        self._slots = 0
+
+    def bit(self, formula: Formula) -> int:
+        """The bit of a proposition, or of an operator of the past, whose machine is made."""
+        if not isinstance(formula, (Once, Historically, Since, Count)):
+            return self._number(formula)
+        known = self._bits.get(formula)
+        if known is not None:
+            return known
+        for each in _inside(formula):
+            self.bit(each)
+        bit = self._first_bit + len(self._machines)
+        self._machines.append(_Machine(formula, bit, self._slots))
+        self._slots += 1 + (len(formula.operands) if isinstance(formula, Count) else 0)
+        self._bits[formula] = bit
+        return bit
+
+    @property
+    def initial(self) -> Memory:
+        """What is remembered before the first moment."""
+        return (0,) * self._slots
+
+    def step(self, memory: Memory, letter: int) -> tuple[Memory, int]:
+        """What is remembered after a moment, and the letter with the bits of the past."""
+        new = list(memory)
+        for machine in self._machines:
+            if self._watch(machine, memory, new, letter):
+                letter |= 1 << machine.bit
+        return tuple(new), letter
+
+    def _watch(self, machine: _Machine, old: Memory, new: list[int], letter: int) -> bool:
+        slot, formula = machine.slot, machine.formula
+        match formula:
+            case Once():
+                new[slot] = int(old[slot] or self._holds(formula.operand, letter))
+                return bool(new[slot])
+            case Historically():  # remembered: whether it has failed
+                new[slot] = int(old[slot] or not self._holds(formula.operand, letter))
+                return not new[slot]
+            case Since():
+                began = self._holds(formula.right, letter)
+                new[slot] = int(began or (old[slot] and self._holds(formula.left, letter)))
+                return bool(new[slot])
+            case Count():
+                for at, operand in enumerate(formula.operands, slot + 1):
+                    new[at] = int(self._holds(operand, letter))
+                    if new[at] and not old[at]:  # past the bound, more makes no difference
+                        new[slot] = min(new[slot] + 1, formula.number + 1)
+                return _COMPARE[formula.operator](new[slot], formula.number)
+            case _:
+                raise TypeError(f"no operator of the past: {formula}")
+
+    def _holds(self, formula: Formula, letter: int) -> bool:
+        match formula:
+            case Constant():
+                return formula.value
+            case Not():
+                return not self._holds(formula.operand, letter)
+            case And():
+                return all(self._holds(each, letter) for each in formula.operands)
+            case Or():
+                return any(self._holds(each, letter) for each in formula.operands)
+            case Implies(left, right):
+                return not self._holds(left, letter) or self._holds(right, letter)
+            case Iff(left, right):
+                return self._holds(left, letter) == self._holds(right, letter)
+            case _:
+                return bool(letter >> self.bit(formula) & 1)
+
+
+def _inside(formula: Formula) -> list[Formula]:
+    """The operators of the past nearest below."""
+    found: list[Formula] = []
+    waiting = list(children(formula))
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, (Once, Historically, Since, Count)):
+            found.append(each)
+        else:
+            waiting += children(each)
+    return found
 
 
 class Observer:

@@ -8,18 +8,22 @@ from m2pem.verify.properties.commands import (
     interrupted_commanded_again,
     one_behavior_each,
 )
-from m2pem.verify.properties.completion import (
+from m2pem.verify.properties.events import (
+    can_be_triggered,
+    decisions_handled,
+    is_caught,
+    prompts_have_decisions,
+)
+from m2pem.verify.properties.results import Result, Searched
+from m2pem.verify.properties.soundness import (
     can_complete,
     completes_if_fair,
     no_dead_element,
     no_deadlock,
     no_livelock,
+    one_token_each,
+    proper_completion,
 )
-from m2pem.verify.properties.events import can_be_triggered, is_caught
-from m2pem.verify.properties.operators import decisions_handled, prompts_have_decisions
-from m2pem.verify.properties.searched import Searched
-from m2pem.verify.properties.tokens import one_token_each, proper_completion
-from m2pem.verify.results import Result
 
 ALL: tuple[Callable[[Searched], Result], ...] = (
     no_deadlock,

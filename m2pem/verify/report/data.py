@@ -9,7 +9,7 @@ from hashlib import sha256
 from typing import Any
 
 from m2pem.verify.report.findings import Findings, Violated
-from m2pem.verify.report.telling import Token, Told
+from m2pem.verify.report.run_steps import Token, Told
 
 VERSION = 1
 

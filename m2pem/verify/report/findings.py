@@ -9,11 +9,10 @@ from m2pem.mission.events import CompensateEventDefinition
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.verify.check import Report
+from m2pem.verify.net.petri_net import Action, System
+from m2pem.verify.properties.results import Result, Verdict, Violation
+from m2pem.verify.report.run_steps import Token, Told, Words, encoding_of, tell, tokens_of
 from m2pem.verify.report.stuck import why_stuck
-from m2pem.verify.report.telling import Token, Told, encoding_of, tell, tokens_of
-from m2pem.verify.report.words import Words
-from m2pem.verify.results import Result, Verdict, Violation
-from m2pem.verify.system import Action, System
 
 DEADLOCK = "no-deadlock"
 FOLLOWING = frozenset({"no-dead-element", "can-complete", "completes-if-fair"})

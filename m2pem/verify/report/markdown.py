@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Mapping, Sequence
 from xml.sax.saxutils import escape
 
+from m2pem.verify.properties.results import Verdict
 from m2pem.verify.report.findings import Findings, Violated
-from m2pem.verify.report.telling import Told
+from m2pem.verify.report.run_steps import Told
 from m2pem.verify.report.text import covered
-from m2pem.verify.results import Verdict
 
 
 def as_markdown(findings: Findings, pictures: Mapping[int, Sequence[str]]) -> str:

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from m2pem.mission import elements as e
-from m2pem.verify.report.telling import Token, Told
-from m2pem.verify.report.words import Words
-from m2pem.verify.system import Action
+from m2pem.verify.net.petri_net import Action
+from m2pem.verify.report.run_steps import Token, Told, Words
 
 
 @dataclass(frozen=True, slots=True)

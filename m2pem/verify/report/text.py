@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Iterator
 
+from m2pem.verify.net.petri_net import Exactness
+from m2pem.verify.properties.results import Result, Verdict
 from m2pem.verify.report.findings import Coverage, Findings, Violated
-from m2pem.verify.report.telling import Told
-from m2pem.verify.results import Result, Verdict
-from m2pem.verify.system import Exactness
+from m2pem.verify.report.run_steps import Told
 
 _MOST_ROUGH = 5
 """Places told of at which the rules are not exactly the mission; a file has them all."""

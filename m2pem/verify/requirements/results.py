@@ -5,24 +5,23 @@ from dataclasses import dataclass, replace
 
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
-from m2pem.verify import product
 from m2pem.verify.check import Report, bound_of, full_states
-from m2pem.verify.explore import Exploration, Limits, Progress, Stopped, explore
-from m2pem.verify.ltl import propositions
+from m2pem.verify.ltl import model_check, propositions
 from m2pem.verify.ltl.formula import Active, Completed
-from m2pem.verify.requirements.checking import (
+from m2pem.verify.net.petri_net import System
+from m2pem.verify.properties.results import Result, Verdict, Violation
+from m2pem.verify.requirements.check import (
     Answer,
     check_requirement,
     reduction_for,
     system_for,
 )
 from m2pem.verify.requirements.requirement import Requirement
-from m2pem.verify.results import Result, Verdict, Violation
-from m2pem.verify.spin import requiring
-from m2pem.verify.spin.asking import Storage
+from m2pem.verify.search.explore import Exploration, Limits, Progress, Stopped, explore
+from m2pem.verify.spin import ltl_claims
+from m2pem.verify.spin.queries import Storage
 from m2pem.verify.spin.search import Found, Wanted
 from m2pem.verify.spin.search import search as search_with_spin
-from m2pem.verify.system import System
 from m2pem.verify.translate import Options, TooLargeError
 
 Show = Callable[[Progress], None] | None
@@ -47,7 +46,7 @@ class _Asking:
     def answer(self, requirement: Requirement) -> Answer:
         found = self._search(requirement)
         self.interrupted |= found.stopped is Stopped.INTERRUPTED
-        limits = product.Limits(self.limits.states, self.limits.seconds, self.limits.memory_mb)
+        limits = model_check.Limits(self.limits.states, self.limits.seconds, self.limits.memory_mb)
         return check_requirement(found, self.mission, self.fleet, requirement, limits=limits)
 
     def _search(self, requirement: Requirement) -> Exploration:
@@ -98,7 +97,7 @@ def with_requirements(
         )
     except TooLargeError as error:
         why = f"too large to search: {error}"
-        answers = (Answer(each, product.Result.UNDECIDED, why=why) for each in requirements)
+        answers = (Answer(each, model_check.Result.UNDECIDED, why=why) for each in requirements)
         return replace(
             report, results=(*report.results, *(_result(each, mission) for each in answers))
         )
@@ -112,7 +111,7 @@ def with_requirements(
     for each in requirements:
         if stopped or asking.interrupted:
             why = f"not begun, after {Stopped.INTERRUPTED}"
-            results.append(_result(Answer(each, product.Result.UNDECIDED, why=why), mission))
+            results.append(_result(Answer(each, model_check.Result.UNDECIDED, why=why), mission))
             continue
         if report.engine != "spin":
             answer = asking.answer(each)
@@ -127,10 +126,10 @@ def with_requirements(
                 storage=storage,
                 progress=progress,
             )
-        answer = requiring.check_requirement(
+        answer = ltl_claims.check_requirement(
             spins, mission, fleet, each, limits=limits, storage=storage, progress=progress
         )
-        if answer.why in requiring.BEYOND_SPIN:
+        if answer.why in ltl_claims.BEYOND_SPIN:
             instead.append(each.id)
             answer = asking.answer(each)
         stopped = spins.stopped is Stopped.INTERRUPTED or answer.why.endswith(Stopped.INTERRUPTED)
@@ -147,7 +146,7 @@ def _result(answer: Answer, mission: Mission) -> Result:
         requirement.id,
         requirement.english,
         Verdict(answer.result.value),
-        (_violation(answer, mission),) if answer.result is product.Result.VIOLATED else (),
+        (_violation(answer, mission),) if answer.result is model_check.Result.VIOLATED else (),
         covered=answer.why,
         required=True,
         author=requirement.text,

@@ -1,21 +1,50 @@
-"""A system as PROMELA, the language of the model checker Spin.
+"""A net as PROMELA, the language of the model checker Spin.
 
-One process goes round: of the rules of the first kind that has any that can fire, one fires. Each
-is one line, with a comment that says what it is in the mission. A place where one token is meant
-is a bit; one that was given more room, and a variable, is a number. The states of the model are
-those of the system, one for one.
+One process loops: of the transitions of the first kind that has any enabled, one fires. Each is one
+line, with a comment that says what it is in the mission. A place where one token is meant is a bit;
+one that was given more room, and a variable, is a number. The states of the model are those of the
+net, one for one.
 
 `text_of` gives the text and what its lines stand for. What it asserts is chosen (`Asks`), because
 Spin ends a search at what it finds first.
 """
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from m2pem.verify.encoding import Encoding
-from m2pem.verify.spin.naming import comment, identifiers
-from m2pem.verify.spin.watching import Watch
-from m2pem.verify.system import Flag, Kind, Rule, System
+from m2pem.verify.net.encoding import Encoding
+from m2pem.verify.net.petri_net import Flag, Kind, Rule, System
+from m2pem.verify.spin.never_claim import Watch
+
+_MARKS = {"!": "_active", ">": "_waiting", "~": "_", "/": "_"}
+_LONGEST = 60
+
+
+def identifiers(prefix: str, names: Iterable[str]) -> list[str]:
+    """An identifier for each name, all different.
+
+    The prefix keeps them apart from words of PROMELA and of C, which Spin writes them into.
+    """
+    found: list[str] = []
+    used: set[str] = set()
+    for name in names:
+        plain = "".join(_MARKS.get(each, each) for each in name)
+        plain = prefix + re.sub(r"[^A-Za-z0-9_]", "_", plain)[:_LONGEST]
+        unique, number = plain, 1
+        while unique in used:
+            number += 1
+            unique = f"{plain}_{number}"
+        used.add(unique)
+        found.append(unique)
+    return found
+
+
+def comment(text: str) -> str:
+    """A text as a comment of one line; what would end the comment, or mean more in C, is spaced."""
+    line = " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *").replace("\\", "\\ ")
+    return f"/* {line} */"
+
 
 _WARNINGS = (Flag.UNCAUGHT_FAILURE,)
 _SHARED_CLEARS = 4
@@ -213,7 +242,7 @@ class Writer:
         return tests
 
     def _effects(self, rule: Rule) -> list[str]:
-        """In the order that `m2pem.verify.system` tells."""
+        """In the order that `m2pem.verify.net.petri_net` tells."""
         places, most = self.places, self.most
         effects: list[str] = []
         if rule.index in self.asks.rules:

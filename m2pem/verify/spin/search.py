@@ -13,15 +13,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from m2pem.errors import InternalError
-from m2pem.verify.encoding import Encoding
-from m2pem.verify.explore import Limits, Progress, Stopped
-from m2pem.verify.spin.asking import Asking, Storage, Told
-from m2pem.verify.spin.naming import identifiers
+from m2pem.verify.net.encoding import Encoding
+from m2pem.verify.net.petri_net import Action, System
+from m2pem.verify.search.explore import Limits, Progress, Stopped
 from m2pem.verify.spin.programs import Workshop
-from m2pem.verify.spin.promela import Asks, Model, text_of
+from m2pem.verify.spin.promela import Asks, Model, identifiers, text_of
+from m2pem.verify.spin.queries import Asking, Storage, Told
 from m2pem.verify.spin.trail import may_fire, replay
 from m2pem.verify.spin.trail import read as read_trail
-from m2pem.verify.system import Action, System
 
 _MOST_SHORTEST = 200_000
 """States up to which a shortest run is asked for: searching nearest first takes more memory."""

@@ -1,7 +1,7 @@
 """From a mission, and the fleet that it commands, to the rules that the checker searches."""
 
-from m2pem.verify.translate.bound import Bound, TooLargeError
-from m2pem.verify.translate.derive import derive
+from m2pem.verify.net.size_limit import Bound, TooLargeError
+from m2pem.verify.translate.mission import translate
 from m2pem.verify.translate.options import Options
 
-__all__ = ["Bound", "Options", "TooLargeError", "derive"]
+__all__ = ["Bound", "Options", "TooLargeError", "translate"]

@@ -7,15 +7,14 @@ from m2pem.fleet.units import Dimension, UnitError, quantity
 from m2pem.mission import elements as e
 from m2pem.mission.behavior import Assignment, Behavior
 from m2pem.mission.expression.expression import literal
-from m2pem.verify.system import BEGINS, Action, Exactness, Flag, Kind, Role, Step, Trigger
-from m2pem.verify.translate import containers
-from m2pem.verify.translate.catching import catching
-from m2pem.verify.translate.effect import Effect, product
-from m2pem.verify.translate.holding import behavior_of, held_by, resources
-from m2pem.verify.translate.leaving import leave
+from m2pem.verify.net.petri_net import BEGINS, Action, Exactness, Flag, Kind, Role, Step, Trigger
+from m2pem.verify.translate import subprocesses
+from m2pem.verify.translate.catching import boundaries, caught_before_work
+from m2pem.verify.translate.compensation import noted
+from m2pem.verify.translate.context import Host, Making, behavior_of, catching, held_by, resources
 from m2pem.verify.translate.loops import looped
-from m2pem.verify.translate.making import Host, Making
-from m2pem.verify.translate.net import Area, at
+from m2pem.verify.translate.net_builder import Area, Effect, at, product
+from m2pem.verify.translate.sequence_flows import leave
 from m2pem.verify.translate.throwing import (
     catchable,
     interrupting_places,
@@ -24,8 +23,6 @@ from m2pem.verify.translate.throwing import (
     throw_error,
 )
 from m2pem.verify.translate.timers import due_us, runs, written
-from m2pem.verify.translate.undoable import noted
-from m2pem.verify.translate.waiting import boundaries, caught_before_work
 
 
 def activity(making: Making, node: e.FlowNode, area: Area) -> None:
@@ -129,11 +126,11 @@ def work(making: Making, host: Host) -> list[Effect]:
         case e.ReceiveTask(message=message) if message is not None:
             return _receive(making, host, node)
         case e.AdHocSubProcess():
-            return containers.ad_hoc(making, host)
+            return subprocesses.ad_hoc(making, host)
         case e.SubProcess():
-            return containers.subprocess(making, host)
+            return subprocesses.subprocess(making, host)
         case e.CallActivity():
-            return containers.call(making, host)
+            return subprocesses.call(making, host)
         case _:
             return _at_once(host)
 

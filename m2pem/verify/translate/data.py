@@ -14,11 +14,10 @@ from m2pem.mission.expression.expression import literal
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
-from m2pem.verify.system import Variable
-from m2pem.verify.translate.bound import Bound
+from m2pem.verify.net.petri_net import Variable
+from m2pem.verify.net.size_limit import Bound
 from m2pem.verify.translate.domains import MOST_COMBINATIONS, Domains, Write, tells_apart
-from m2pem.verify.translate.effect import Effect
-from m2pem.verify.translate.net import Area
+from m2pem.verify.translate.net_builder import Area, Effect
 from m2pem.verify.translate.options import Options
 from m2pem.verify.translate.payloads import Payloads
 

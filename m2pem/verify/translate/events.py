@@ -15,14 +15,12 @@ from m2pem.mission.events import (
     TerminateEventDefinition,
     TimerEventDefinition,
 )
-from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step, Trigger
-from m2pem.verify.translate.catching import catching, first, what_and_ref
+from m2pem.verify.net.petri_net import Action, Exactness, Flag, Kind, Role, Step, Trigger
 from m2pem.verify.translate.compensation import cancel, compensate
-from m2pem.verify.translate.effect import Effect, product
-from m2pem.verify.translate.gathering import Gathering, all_must_come, gather
-from m2pem.verify.translate.leaving import along, leave
-from m2pem.verify.translate.making import Host, Making
-from m2pem.verify.translate.net import Area, Draft, at
+from m2pem.verify.translate.context import Host, Making, catching, first, what_and_ref
+from m2pem.verify.translate.net_builder import Area, Draft, Effect, at, product
+from m2pem.verify.translate.parallel_multiple import Gathering, all_must_come, gather
+from m2pem.verify.translate.sequence_flows import along, leave
 from m2pem.verify.translate.throwing import (
     interrupting_places,
     message_effects,

@@ -5,11 +5,10 @@ import itertools
 from m2pem.errors import ExpressionError
 from m2pem.mission import elements as e
 from m2pem.mission.upstream import upstream
-from m2pem.verify.system import Action, Exactness, Kind, Role, Step, Trigger
-from m2pem.verify.translate.effect import Effect, product
-from m2pem.verify.translate.leaving import any_of, is_free_choice, leave
-from m2pem.verify.translate.making import Making
-from m2pem.verify.translate.net import Area, arrival, at
+from m2pem.verify.net.petri_net import Action, Exactness, Kind, Role, Step, Trigger
+from m2pem.verify.translate.context import Making
+from m2pem.verify.translate.net_builder import Area, Effect, arrival, at, product
+from m2pem.verify.translate.sequence_flows import any_of, is_free_choice, leave
 from m2pem.verify.translate.throwing import throw_error
 
 MOST_INCOMING = 8

@@ -5,13 +5,12 @@ from dataclasses import replace
 
 from m2pem.errors import ExpressionError
 from m2pem.mission.loops import InstanceBehavior, MultiInstance, StandardLoop
-from m2pem.verify.system import Action, Exactness, Flag, Role, Step
+from m2pem.verify.net.petri_net import Action, Exactness, Flag, Role, Step
+from m2pem.verify.translate.compensation import forget_instances, noted_instance
+from m2pem.verify.translate.context import Host, Making, behavior_of, resources
 from m2pem.verify.translate.data import ERROR, Truth
-from m2pem.verify.translate.effect import Effect, product
-from m2pem.verify.translate.holding import behavior_of, resources
-from m2pem.verify.translate.making import Host, Making
+from m2pem.verify.translate.net_builder import Effect, product
 from m2pem.verify.translate.throwing import throw_error
-from m2pem.verify.translate.undoable import forget_instances, noted_instance
 
 Work = Callable[[Making, Host], list[Effect]]
 

@@ -12,12 +12,11 @@ from m2pem.mission.events import (
     MessageEventDefinition,
     SignalEventDefinition,
 )
-from m2pem.verify.system import Action, Exactness, Flag, Kind, Role, Step
-from m2pem.verify.translate.areas import begin_event_subprocess, handler_host
-from m2pem.verify.translate.effect import Effect
-from m2pem.verify.translate.making import Host, Making
-from m2pem.verify.translate.net import Area, at
-from m2pem.verify.translate.undoable import Way, cut_short, forget, way_back
+from m2pem.verify.net.petri_net import Action, Exactness, Flag, Kind, Role, Step
+from m2pem.verify.translate.compensation import cut_short, forget, way_back
+from m2pem.verify.translate.context import Host, Making, Way
+from m2pem.verify.translate.net_builder import Area, Effect, at
+from m2pem.verify.translate.scopes import begin_event_subprocess, handler_host
 
 Catching = TypeVar("Catching", bound=e.Event)
 

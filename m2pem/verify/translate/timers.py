@@ -13,9 +13,8 @@ from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.duration import duration_us, fixed_us
 from m2pem.mission.events import TimerEventDefinition, TimerKind
 from m2pem.mission.expression import Expression
-from m2pem.verify.translate.effect import Effect, product
-from m2pem.verify.translate.making import Making
-from m2pem.verify.translate.net import Area, Draft, Timed
+from m2pem.verify.translate.context import Making
+from m2pem.verify.translate.net_builder import Area, Draft, Effect, Timed, product
 
 _2026_US = 1_767_225_600_000_000
 

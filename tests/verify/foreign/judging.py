@@ -12,8 +12,8 @@ from m2pem.executive.loading import findings_for
 from m2pem.findings import Severity
 from m2pem.plugins import PluginManager
 from m2pem.verify.check import Report, check
-from m2pem.verify.explore import Limits
-from m2pem.verify.results import Verdict
+from m2pem.verify.properties.results import Verdict
+from m2pem.verify.search.explore import Limits
 from m2pem.verify.translate import Options
 from tests.verify.foreign.sketches import UNREACHABLE, WORK, read_sketch
 

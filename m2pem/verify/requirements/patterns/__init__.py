@@ -2,12 +2,10 @@
 
 from collections.abc import Mapping
 
-from m2pem.verify.requirements.patterns.avoidance import AVOIDANCE
 from m2pem.verify.requirements.patterns.occurrence import OCCURRENCE
 from m2pem.verify.requirements.patterns.pattern import Argument, Kind, Pattern
-from m2pem.verify.requirements.patterns.reactions import REACTIONS
+from m2pem.verify.requirements.patterns.robotic import AVOIDANCE, REACTIONS, VISITS
 from m2pem.verify.requirements.patterns.teams import TEAMS
-from m2pem.verify.requirements.patterns.visits import VISITS
 
 GROUPS: Mapping[str, tuple[Pattern, ...]] = {
     "Visits": VISITS,

@@ -16,7 +16,7 @@ from m2pem.verify.ltl.formula import (
     WeakUntil,
 )
 from m2pem.verify.requirements.patterns.pattern import TIMES, Argument, Kind, Pattern
-from m2pem.verify.requirements.patterns.visits import sequence
+from m2pem.verify.requirements.patterns.robotic import sequence
 
 _WHAT = Argument("what", Kind.CONDITION)
 _FIRST, _THEN = Argument("first", Kind.CONDITION), Argument("then", Kind.CONDITION)

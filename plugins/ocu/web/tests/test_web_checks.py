@@ -12,7 +12,7 @@ from m2pem.executive.proving import Engine, asked_of, prove
 from m2pem.fleet.madeup import fleet_for
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse
-from m2pem.verify.explore import Limits
+from m2pem.verify.search.explore import Limits
 
 NAMES = ("escort", "patrol", "search", "survey", "sweep_and_detect")
 ROUTE = {"type": "LineString", "coordinates": [[-77.319, 38.107], [-77.318, 38.107]]}

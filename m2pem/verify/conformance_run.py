@@ -1,0 +1,267 @@
+"""Conformance run: the engine executes a counterexample step by step.
+
+    run = ConformanceRun(mission, fleet, process, data)
+    for step in steps:                # steps of a report as data (m2pem.verify.report.data)
+        run.play(step)
+    run.undone                        # sequence flows that the net took and the engine did not
+
+Each step that comes from outside becomes an input of the engine. The internal steps are not played:
+the run compares them with what the engine does by itself. Where a run waits for a condition,
+`data_for` finds data that makes the condition true or false.
+"""
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import combinations, islice, product
+from typing import Any
+
+from m2pem.engine import inputs as i
+from m2pem.engine import records as r
+from m2pem.engine.arming import definition_of
+from m2pem.engine.data import reader
+from m2pem.engine.run import MissionRun, Step
+from m2pem.engine.state import BehaviorPhase, RunStatus, Token, Wait
+from m2pem.engine.steps import Steps
+from m2pem.errors import ExpressionError
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.expression import Expression
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import ReadValue, Value
+from m2pem.verify.net.petri_net import Trigger
+from m2pem.verify.translate.domains import constants, representatives
+
+_SECOND_US = 1_000_000
+_START_US = 1_767_225_600 * _SECOND_US  # 2026-01-01, as of rehearsals
+_MOST_TIMERS = 1_000
+"""That may fire before the one that is meant."""
+_BY = "counterexample"
+
+
+class NotPlayableError(Exception):
+    """The engine is not where the run says, or something in it cannot be brought about."""
+
+
+class _Patient(Steps):
+    """Steps of a run into which data may still be written from nowhere."""
+
+    __slots__ = ()
+
+    def _notice_a_stuck_run(self) -> None:
+        """A condition may still become true."""
+        if not self.state.conditions:
+            super()._notice_a_stuck_run()
+
+
+class _Run(MissionRun):
+    """A run into which data can be written that nothing in the mission writes.
+
+    The rules let a condition on such data become true at any time.
+    """
+
+    def __init__(self, mission: Mission, fleet: Fleet | None) -> None:
+        super().__init__(mission, fleet, "r1")
+        self._x = _Patient(self.state, fleet, 10_000)
+
+    def write(self, wait: Wait, data: dict[str, Value], now_us: int) -> Step:
+        """Write data where a condition is awaited that reads it."""
+        x = self._x
+        seq, t_us = self.state.seq + 1, self.state.mission_time_us(now_us)
+        x.begin(now_us)
+        x.write_in(wait.scope, wait.node, data)
+        return Step(i.Continue(), now_us, t_us, seq, x.finish(), ())
+
+
+class Player:
+    """A run of the engine that is led along a run of the rules. `steps` has all that it did."""
+
+    def __init__(
+        self,
+        mission: Mission,
+        fleet: Fleet | None,
+        process: str,
+        data: Mapping[str, Value] | None = None,
+    ) -> None:
+        self.run = _Run(mission, fleet)
+        self.steps: list[Step] = []
+        self._now_us = _START_US
+        self._reports: Counter[str] = Counter()
+        self._expected: Counter[str] = Counter()
+        self._give(i.StartRun(process, dict(data or {}), _BY))
+
+    def play(self, step: Mapping[str, Any]) -> Sequence[Step]:
+        """Bring a step about, and answer with what the engine did then.
+
+        Raises:
+            NotPlayableError: it cannot be brought about here.
+        """
+        before = len(self.steps)
+        trigger = step["trigger"]
+        if trigger is not None:
+            self._now_us += _SECOND_US
+            self._bring_about(Trigger(trigger), step)
+        for action in step["actions"]:
+            if action["action"] == "taken":
+                self._expected[action["element"]] += 1
+        return self.steps[before:]
+
+    @property
+    def undone(self) -> list[str]:
+        """Sequence flows that the run takes, and the engine has not taken as often."""
+        taken = Counter(
+            record.flow
+            for step in self.steps
+            for record in step.records
+            if isinstance(record, r.FlowTaken)
+        )
+        return sorted((self._expected - taken).keys())
+
+    @property
+    def where(self) -> list[str]:
+        """Elements with a token now."""
+        return sorted(token.node.id for token in self.run.state.tokens.values())
+
+    # --- inputs ---------------------------------------------------------------------------------
+
+    def _bring_about(self, trigger: Trigger, step: Mapping[str, Any]) -> None:
+        element, detail = step["element"], step["detail"]
+        match trigger:
+            case Trigger.SUCCEEDS | Trigger.FAILS:
+                self._end_work(
+                    element, "" if trigger is Trigger.SUCCEEDS else detail, step["writes"]
+                )
+            case Trigger.ANSWER:
+                token = self._token(element, "prompt")
+                self._give(i.PromptAnswer(token.prompt, detail, _BY))
+            case Trigger.SIGNAL:
+                self._give(i.SignalReceived(detail, step["writes"], _BY))
+            case Trigger.MESSAGE:
+                self._give(i.MessageReceived(detail, step["writes"], _BY))
+            case Trigger.TIMER:
+                self._time_is_up(element)
+            case Trigger.CONDITION:
+                self._come_true(element, step["data"])
+
+    def _end_work(self, element: str, code: str, writes: Mapping[str, Any]) -> None:
+        token = self._token(element, "behavior", "service", "prompt")
+        if token.service and not code:
+            self._give(i.ServiceCompleted(token.service, dict(writes)))
+        elif token.service:
+            self._give(i.ServiceFailed(token.service, code))
+        elif token.behavior:
+            state = BehaviorState.FAILED if code else BehaviorState.SUCCEEDED
+            self._report(token.behavior, state, code)
+        else:
+            self._time_is_up(element)  # a prompt fails only when its time is up
+
+    def _report(self, behavior: str, state: BehaviorState, code: str = "") -> None:
+        self._reports[behavior] += 1
+        self._give(i.BehaviorReported(behavior, self._reports[behavior], state, code))
+
+    def _time_is_up(self, element: str) -> None:
+        for _ in range(_MOST_TIMERS):
+            due = self.run.next_due_us
+            if due is None:
+                break
+            self._now_us = max(self._now_us, due)
+            if self._fires(self._give(i.Tick()), element):
+                return
+        raise NotPlayableError(f"no timer of {element} runs in the engine")
+
+    def _come_true(self, element: str, data: Mapping[str, Value]) -> None:
+        """Write what makes the condition true for which an element waits: nothing else does."""
+        state = self.run.state
+        for number, wait in list(state.waits.items()):
+            if number not in state.conditions or wait.node.id != element:
+                continue
+            before = [] if state.conditions[number] else [False]  # it must be seen false first
+            for truth in [*before, True]:
+                read = reader(wait.token or wait.scope)
+                known = {key for name in data for key in _endings(name)}
+                values = data_for(definition_of(wait).condition, truth, read, known)
+                if values is None:
+                    raise NotPlayableError(f"no data was found for the condition of {element}")
+                steps = self._after(self.run.write(wait, dict(values), self._now_us))
+            if self._fires(steps, element):
+                return
+        where = ", ".join(self.where) or "nowhere"
+        raise NotPlayableError(f"no condition of {element} is awaited now: tokens are {where}")
+
+    def _fires(self, steps: Sequence[Step], element: str) -> bool:
+        return any(
+            getattr(record, "element", "") == element for step in steps for record in step.records
+        )
+
+    def _give(self, item: i.Input) -> Sequence[Step]:
+        return self._after(self.run.receive(item, self._now_us))
+
+    def _after(self, step: Step) -> Sequence[Step]:
+        """What an input led to, with all that it still leads to."""
+        item = step.input
+        before = len(self.steps)
+        self.steps.append(step)
+        while self.run.wants_continue:
+            self.steps.append(self.run.receive(i.Continue(), self._now_us))
+        if not isinstance(item, i.BehaviorReported) or item.state is not BehaviorState.CANCELLED:
+            self._end_cancelled()
+        return self.steps[before:]
+
+    def _end_cancelled(self) -> None:
+        """Vehicles do at once what they are told: a behavior that is cancelled ends."""
+        for behavior in [*self.run.state.behaviors.values()]:
+            if behavior.phase is BehaviorPhase.CANCELLING:
+                self._report(behavior.id, BehaviorState.CANCELLED)
+
+    def _token(self, element: str, *works: str) -> Token:
+        if self.run.state.status is RunStatus.ENDED:
+            raise NotPlayableError(f"the engine's run is over before {element} goes on")
+        for token in self.run.state.tokens.values():
+            if token.node.id == element and any(getattr(token, work) for work in works):
+                return token
+        where = ", ".join(self.where) or "nowhere"
+        raise NotPlayableError(f"{element} does not work in the engine now: its tokens are {where}")
+
+
+def _endings(name: str) -> set[str]:
+    """A name with the calls that it is in before it, and without each of them."""
+    parts = name.split(".")
+    return {".".join(parts[at:]) for at in range(len(parts))}
+
+
+_MOST_TRIES = 20_000
+_ORDINARY: tuple[Value, ...] = (True, False, 1, 0, -1, 2, None, "something", [])
+"""Values that are tried beside those that a condition compares with."""
+
+
+def data_for(
+    condition: Expression, truth: bool, read: ReadValue, known: Collection[str] = ()
+) -> Mapping[str, Value] | None:
+    """The fewest values to write for a condition to have a truth; None: none were found.
+
+    `read`: the data that there is. `known`: names that stay as they are.
+    """
+    free = sorted(name for name in condition.names if name not in known)
+    for data in islice(_changes(condition, free), _MOST_TRIES):
+
+        def with_changes(name: str, data: Mapping[str, Value] = data) -> Value:
+            return data[name] if name in data else read(name)
+
+        try:
+            if condition.holds(with_changes) is truth:
+                return data
+        except ExpressionError:
+            continue
+    return None
+
+
+def _changes(condition: Expression, names: list[str]) -> Iterator[dict[str, Value]]:
+    """Every choice of values, those that change the fewest names first."""
+    compared = constants(condition)
+    tried: dict[str, list[Value]] = {}
+    for name in names:
+        alike = representatives(compared[name]) if name in compared else []
+        tried[name] = [*(value for value, _ in alike), *_ORDINARY]
+    for count in range(len(names) + 1):
+        for changed in combinations(names, count):
+            for values in product(*(tried[name] for name in changed)):
+                yield dict(zip(changed, values, strict=True))

@@ -1,0 +1,420 @@
+"""Checking a formula of all runs of a system: the search for a run that violates it.
+
+    verdict = check(system, formula)
+    verdict.result                      # holds, violated, undecided
+    verdict.run                         # the counterexample: steps, and steps that repeat for ever
+
+The system is anything with a finite number of states (`LabelledSystem`). The search builds the
+product of the system and the automaton of the negated formula, nearest nodes first. So a violation
+that no continuation can mend is found by a shortest run. For violations that only an infinite run
+shows, the search looks for accepting cycles each time the product has grown fourfold, and when it
+is complete. Each counterexample is replayed and evaluated before it is returned (`breaks`).
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from m2pem.errors import InternalError
+from m2pem.verify.ltl import Observer, negated
+from m2pem.verify.ltl.automaton import components
+from m2pem.verify.ltl.formula import Formula, needs_steps
+from m2pem.verify.ltl.lasso import Moment, holds
+from m2pem.verify.ltl.product import QUIET, STUTTER, LabelledSystem, Product
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Where a search stops undecided. `states`: pairs of the system's and the formula's."""
+
+    states: int = 2_000_000
+    seconds: float = 600.0
+    memory_mb: float = 2_000.0
+
+
+class Stopped(StrEnum):
+    """Why a search did not see all."""
+
+    STATES = "the limit of states"
+    TIME = "the limit of time"
+    MEMORY = "the limit of memory"
+    SYSTEM = "states beyond which the mission was not searched"
+    INTERRUPTED = "an interruption by hand"
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a search is: pairs of states found, those still to look at, seconds so far."""
+
+    states: int
+    waiting: int
+    seconds: float
+
+
+class Result(StrEnum):
+    """What is known of a formula."""
+
+    HOLDS = "holds"
+    VIOLATED = "violated"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A rule fires, and leads to a state."""
+
+    rule: int
+    state: int
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run from `start`: the moves of `prefix`, then those of `cycle` again and again.
+
+    Without a cycle the run is over after the prefix; or, where `whatever_follows`, the formula is
+    broken by then, and nothing that comes later can mend it.
+    """
+
+    start: int
+    prefix: tuple[Move, ...]
+    cycle: tuple[Move, ...] = ()
+    whatever_follows: bool = False
+
+    @property
+    def length(self) -> int:
+        """How many moves are told."""
+        return len(self.prefix) + len(self.cycle)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The answer of a search, with what it cost. `run` breaks the formula; only if violated."""
+
+    result: Result
+    run: Run | None
+    states: int
+    moves: int
+    seconds: float
+    stopped: Stopped | None = None
+
+
+class Fairness:
+    """Which rules must not be passed over for ever: those that can fire again and again do.
+
+    `rules`: by rule, the outcome that it stands for; rules of one outcome are the same to it.
+    """
+
+    def __init__(self, product: Product, rules: dict[int, int] | None) -> None:
+        self.rules = rules
+        self._product = product
+        self._possible: dict[int, frozenset[int]] = {}
+
+    def possible(self, node: int) -> frozenset[int]:
+        """The outcomes that can come in a node."""
+        if self.rules is None or self._product.is_quiet(node):
+            return frozenset()
+        state = self._product.states[node]
+        known = self._possible.get(state)
+        if known is None:
+            steps = self._product.successors(state)
+            known = frozenset(self.rules[rule] for rule, _ in steps if rule in self.rules)
+            self._possible[state] = known
+        return known
+
+    def outcome(self, rule: int) -> int | None:
+        """The outcome that a rule stands for, if it is one that counts."""
+        return self.rules.get(rule) if self.rules is not None else None
+
+
+class Round:
+    """Nodes among which an accepted run can stay for ever; `wanted` is what it must pass.
+
+    A move fulfils promise n by not postponing it, and outcome o by being one of its rules.
+    """
+
+    def __init__(self, product: Product, nodes: frozenset[int], outcomes: frozenset[int]) -> None:
+        self.product = product
+        self.nodes = nodes
+        self.outcomes = outcomes
+
+    def moves(self, node: int) -> Iterator[tuple[int, int, int]]:
+        """The moves from a node that stay."""
+        return (move for move in self.product.moves[node] if move[1] in self.nodes)
+
+
+def accepting_rounds(product: Product, fairness: Fairness) -> Iterator[Round]:
+    """All of them in what is expanded so far."""
+    expanded = len(product.moves)
+    waiting = [frozenset(range(expanded))]
+    while waiting:
+        nodes = waiting.pop()
+        for part in _parts(product, nodes):
+            together = _postponed_always(product, part)
+            if together is None or together:
+                continue
+            possible = frozenset[int]().union(*(fairness.possible(node) for node in part))
+            passed = {
+                fairness.outcome(rule)
+                for node in part
+                for rule, target, _ in product.moves[node]
+                if target in part
+            }
+            missing = possible - passed
+            if not missing:
+                yield Round(product, part, possible)
+                continue
+            # Who stays here must not be where a missing outcome could come.
+            left = frozenset(node for node in part if not fairness.possible(node) & missing)
+            if left:
+                waiting.append(left)
+
+
+def _parts(product: Product, nodes: frozenset[int]) -> Iterator[frozenset[int]]:
+    """The strongly connected components of some nodes, nearest to the beginning first."""
+    order = sorted(nodes)
+    place = {node: at for at, node in enumerate(order)}
+    targets = [
+        [place[target] for _, target, _ in product.moves[node] if target in place] for node in order
+    ]
+    members: dict[int, list[int]] = {}
+    for at, number in enumerate(components(targets)):
+        members.setdefault(number, []).append(order[at])
+    for each in members.values():
+        yield frozenset(each)
+
+
+def _postponed_always(product: Product, nodes: frozenset[int]) -> int | None:
+    """The promises that every move inside postpones; None when there is no move inside."""
+    together: int | None = None
+    for node in nodes:
+        for _, target, postponed in product.moves[node]:
+            if target in nodes:
+                together = postponed if together is None else together & postponed
+    return together
+
+
+_Step = tuple[int, int, int, int]
+"""From which node, by which rule, to which node, with which promises postponed."""
+
+
+def run_to(product: Product, node: int) -> Run:
+    """The run that leads to a node after which whatever follows is accepted."""
+    start, prefix = _prefix(product, node)
+    return Run(start, prefix, whatever_follows=True)
+
+
+def run_round(round_: Round, fairness: Fairness) -> Run:
+    """A run that comes to a round by the shortest way, and fulfils all it must in each."""
+    product = round_.product
+    cycle = _cycle(round_, fairness, min(round_.nodes))
+    nearest = min(range(len(cycle)), key=lambda at: cycle[at][0])
+    cycle = cycle[nearest:] + cycle[:nearest]
+    start, prefix = _prefix(product, cycle[0][0])
+    return Run(start, prefix, _moves([(rule, product.states[to]) for _, rule, to, _ in cycle]))
+
+
+def _prefix(product: Product, node: int) -> tuple[int, tuple[Move, ...]]:
+    steps: list[tuple[int, int]] = []
+    while product.parent[node] >= 0:
+        steps.append((product.via[node], product.states[node]))
+        node = product.parent[node]
+    return product.states[node], _moves(steps[::-1])
+
+
+def _moves(steps: list[tuple[int, int]]) -> tuple[Move, ...]:
+    """What happens to the system; moments in which nothing does are left out."""
+    return tuple(Move(rule, state) for rule, state in steps if rule not in (QUIET, STUTTER))
+
+
+def _cycle(round_: Round, fairness: Fairness, start: int) -> list[_Step]:
+    promises = round_.product.observer.promises
+    outcomes = set(round_.outcomes)
+    at = start
+    steps: list[_Step] = []
+    while promises or outcomes:
+
+        def helps(step: _Step, promises: int = promises, outcomes: set[int] = outcomes) -> bool:
+            return bool(promises & ~step[3]) or fairness.outcome(step[1]) in outcomes
+
+        for step in _path(round_, at, helps):
+            steps.append(step)
+            promises &= step[3]
+            outcomes.discard(fairness.outcome(step[1]))
+        at = steps[-1][2]
+    if not steps or at != start:
+        steps += _path(round_, at, lambda step: step[2] == start)
+    return steps
+
+
+def _path(round_: Round, start: int, wanted: Callable[[_Step], bool]) -> list[_Step]:
+    """The shortest way, of one step at least, whose last step is wanted."""
+    came: dict[int, _Step] = {}
+    waiting = deque([start])
+    seen = {start}
+    while waiting:
+        node = waiting.popleft()
+        for rule, target, postponed in round_.moves(node):
+            step = (node, rule, target, postponed)
+            if wanted(step):
+                path = [step]
+                while node != start:
+                    path.append(came[node])
+                    node = came[node][0]
+                return path[::-1]
+            if target not in seen:
+                seen.add(target)
+                came[target] = step
+                waiting.append(target)
+    raise AssertionError("nodes of a round reach each other")
+
+
+def breaks(system: LabelledSystem, formula: Formula, run: Run, *, steps: bool) -> bool:
+    """Whether a run is one of the system's, and the formula does not hold of it.
+
+    A run that is broken whatever follows is tried with the run that first comes to hand.
+    """
+    run = _continued(system, run) if run.whatever_follows else run
+    last = run.start
+    for move in (*run.prefix, *run.cycle):
+        if (move.rule, move.state) not in system.successors(last):
+            return False
+        last = move.state
+    prefix = [_moment(system, run.start, None)]
+    prefix += _moments(system, run.prefix, steps=steps)
+    back_to = run.prefix[-1].state if run.prefix else run.start
+    if run.cycle:
+        if last != back_to:
+            return False
+        cycle = _moments(system, run.cycle, steps=steps)
+    else:
+        if system.successors(last):
+            return False
+        cycle = [_moment(system, last, None)]
+    return not holds(formula, prefix, cycle)
+
+
+def _continued(system: LabelledSystem, run: Run) -> Run:
+    """The run with something that follows: the first rule each time, until a state comes again."""
+    state = run.prefix[-1].state if run.prefix else run.start
+    seen = {state: 0}
+    further: list[Move] = []
+    while steps := system.successors(state):
+        rule, state = steps[0]
+        further.append(Move(rule, state))
+        if state in seen:
+            at = seen[state]
+            return Run(run.start, (*run.prefix, *further[:at]), tuple(further[at:]))
+        seen[state] = len(further)
+    return Run(run.start, (*run.prefix, *further))
+
+
+def _moments(system: LabelledSystem, moves: tuple[Move, ...], *, steps: bool) -> list[Moment]:
+    found: list[Moment] = []
+    for move in moves:
+        found.append(_moment(system, move.state, move.rule))
+        if system.true_when(move.rule) and not steps:
+            found.append(_moment(system, move.state, None))
+    return found
+
+
+def _moment(system: LabelledSystem, state: int, rule: int | None) -> Moment:
+    bits = system.true_in(state) | (0 if rule is None else system.true_when(rule))
+    return frozenset(each for n, each in enumerate(system.propositions) if bits >> n & 1)
+
+
+_LOOK_EVERY = 512
+"""Nodes between two looks at the clock."""
+_FIRST_LOOK = 2_000
+"""Nodes after which rounds are looked for the first time."""
+_MOST_ROUNDS = 50
+"""Of how many rounds the shortest is chosen."""
+
+
+def check(
+    system: LabelledSystem,
+    formula: Formula,
+    *,
+    fair: Mapping[int, int] | None = None,
+    limits: Limits | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Verdict:
+    """Whether a formula holds of all runs of a system.
+
+    `fair`: by rule, the outcome it stands for; only runs count in which each outcome that can come
+    again and again does come again and again. None: all runs count.
+
+    KeyboardInterrupt ends the search undecided.
+
+    Raises:
+        ValueError: the system leaves rules out, and the formula or the fairness needs all.
+        FormulaTooLargeError: the formula's automaton would be too large.
+    """
+    steps = needs_steps(formula)
+    if system.reduced and (steps or fair is not None):
+        raise ValueError("single steps, and fairness, need a system that leaves no rule out")
+    observer = Observer(negated(formula), system.propositions)
+    began = time.monotonic()
+    product = Product(system, observer, steps=steps)
+    search = _Search(product, Fairness(product, None if fair is None else dict(fair)), began)
+    try:
+        run, stopped = search.run(limits or Limits(), progress)
+    except KeyboardInterrupt:
+        run, stopped = None, Stopped.INTERRUPTED
+    if run is not None and not breaks(system, formula, run, steps=steps):
+        raise InternalError("the search found a run that does not break the formula")
+    if run is not None and stopped is Stopped.SYSTEM:
+        stopped = None
+    result = Result.VIOLATED if run is not None else Result.UNDECIDED if stopped else Result.HOLDS
+    seconds = time.monotonic() - began
+    return Verdict(result, run, len(product), product.number_of_moves, seconds, stopped)
+
+
+class _Search:
+    def __init__(self, product: Product, fairness: Fairness, began: float) -> None:
+        self.product = product
+        self.fairness = fairness
+        self.began = began
+
+    def run(
+        self, limits: Limits, progress: Callable[[Progress], None] | None
+    ) -> tuple[Run | None, Stopped | None]:
+        product = self.product
+        look_at = _FIRST_LOOK
+        while len(product.moves) < len(product):
+            if product.broken >= 0:
+                return run_to(product, product.broken), None
+            done = len(product.moves)
+            if done % _LOOK_EVERY == 0:
+                seconds = time.monotonic() - self.began
+                if progress is not None:
+                    progress(Progress(len(product), len(product) - done, seconds))
+                stopped = self._beyond(limits, seconds)
+                if stopped is not None:
+                    return self._round(), stopped
+            if done >= look_at:
+                look_at *= 4
+                if (run := self._round()) is not None:
+                    return run, None
+            product.expand()
+        if product.broken >= 0:
+            return run_to(product, product.broken), None
+        return self._round(), Stopped.SYSTEM if product.open else None
+
+    def _beyond(self, limits: Limits, seconds: float) -> Stopped | None:
+        if len(self.product) > limits.states:
+            return Stopped.STATES
+        if seconds > limits.seconds:
+            return Stopped.TIME
+        return Stopped.MEMORY if self.product.bytes > limits.memory_mb * 1e6 else None
+
+    def _round(self) -> Run | None:
+        best: Run | None = None
+        for found, round_ in enumerate(accepting_rounds(self.product, self.fairness)):
+            run = run_round(round_, self.fairness)
+            if best is None or run.length < best.length:
+                best = run
+            if found == _MOST_ROUNDS:
+                break
+        return best

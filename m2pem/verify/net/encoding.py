@@ -1,0 +1,241 @@
+"""States as integers: each place is a field of bits, each variable has a bit for each value.
+
+A place where one token is meant has one bit; a transition over such places is two masks. A place
+that was found to get more is given more bits, and the search begins anew (`search.explore`).
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from m2pem.mission.values import Value
+from m2pem.verify.net.petri_net import Rule, System
+
+SEVERAL_BITS = 2
+"""Of a place where several tokens are meant: up to three."""
+
+
+@dataclass(frozen=True, slots=True)
+class Marking:
+    """A state in words: tokens by place (those that have any), values by variable."""
+
+    tokens: Mapping[int, int]
+    values: Mapping[int, int]
+
+
+@dataclass(slots=True)
+class Compiled:
+    """One rule as masks. `plain`: they say it all; else the lists do what they cannot.
+
+    `erase`: of what is cleared, what goes after tokens have moved; the rest is consumed before.
+    `kill`: of that, what is emptied whatever it holds.
+    """
+
+    test: int = 0
+    need: int = 0
+    clear: int = 0
+    erase: int = 0
+    put: int = 0
+    plain: bool = True
+    any_of: list[int] = field(default_factory=list)
+    at_least: list[tuple[int, int, int]] = field(default_factory=list)
+    takes: list[tuple[int, int]] = field(default_factory=list)
+    moves: list[tuple[int, int, int, bool]] = field(default_factory=list)
+    gives: list[tuple[int, int, int, int]] = field(default_factory=list)
+    kill: int = 0
+    reads: int = 0
+    changes: int = 0
+
+
+class Encoding:
+    """How the states of a system are written as integers, and its rules as masks."""
+
+    def __init__(self, system: System, wider: Mapping[int, int] | None = None) -> None:
+        """`wider`: more bits than usual, by place."""
+        self.system = system
+        self.wider = dict(wider or {})
+        self.offset: list[int] = []
+        self.width: list[int] = []
+        self.mask: list[int] = []
+        at = 0
+        for place in system.places:
+            width = self.wider.get(place.index, SEVERAL_BITS if place.several else 1)
+            self.offset.append(at)
+            self.width.append(width)
+            self.mask.append(((1 << width) - 1) << at)
+            at += width
+        self.value_bit: list[int] = []
+        for variable in system.variables:
+            self.value_bit.append(at)
+            at += len(variable.values)
+        self.bits = at
+        self.initial = 0
+        for place_index, count in system.initial:
+            self.initial |= count << self.offset[place_index]
+        for variable in system.variables:
+            self.initial |= 1 << (self.value_bit[variable.index] + variable.initial)
+        self._kills: dict[tuple[int, ...], int] = {}
+        self.rules = [self._compile(rule) for rule in system.rules]
+
+    def places_mask(self, places: Iterable[int]) -> int:
+        """All bits of some places."""
+        mask = 0
+        for place in places:
+            mask |= self.mask[place]
+        return mask
+
+    def _killed(self, places: tuple[int, ...]) -> int:
+        """The same, of what an interruption ends: often what many others end as well."""
+        known = self._kills.get(places)
+        if known is None:
+            known = self._kills[places] = self.places_mask(places)
+        return known
+
+    def _values_mask(self, variable: int, values: Iterable[int]) -> int:
+        mask = 0
+        for value in values:
+            mask |= 1 << (self.value_bit[variable] + value)
+        return mask
+
+    def _compile(self, rule: Rule) -> Compiled:
+        c = Compiled()
+        taken = dict(rule.consume)
+        for place, count in rule.consume:
+            if self.width[place] == 1 and count == 1:
+                c.test |= self.mask[place]
+                c.need |= self.mask[place]
+                c.clear |= self.mask[place]
+            else:
+                c.at_least.append((self.mask[place], self.offset[place], count))
+                c.takes.append((place, count << self.offset[place]))
+        for place in rule.read:
+            if place in taken:
+                continue
+            if self.width[place] == 1:
+                c.test |= self.mask[place]
+                c.need |= self.mask[place]
+            else:
+                c.any_of.append(self.mask[place])
+        for place in rule.inhibit:
+            c.test |= self.mask[place]
+            if place in taken or place in rule.read:  # which it never can
+                c.at_least.append((self.mask[place], self.offset[place], 1 << self.width[place]))
+        for variable, values in rule.guard:
+            mask = self._values_mask(variable, values)
+            if len(values) == 1:
+                c.test |= mask
+                c.need |= mask
+            elif len(values) < len(self.system.variables[variable].values):
+                c.any_of.append(mask)
+        if rule.kill:
+            c.kill = self._killed(rule.kill)
+            c.erase = c.kill
+        for pairs, gone in ((rule.moves, True), (rule.copies, False)):
+            for source, target in pairs:
+                c.moves.append((self.mask[source], self.mask[target], self.offset[target], gone))
+        for place, count in rule.produce:
+            if self.width[place] == 1 and count == 1:
+                c.put |= self.mask[place]
+            else:
+                c.gives.append(
+                    (
+                        self.mask[place],
+                        self.offset[place],
+                        count,
+                        (1 << self.width[place]) - 1,
+                    )
+                )
+        for variable, value in rule.assign:
+            all_of = self._values_mask(variable, range(len(self.system.variables[variable].values)))
+            c.erase |= all_of
+            c.put |= 1 << (self.value_bit[variable] + value)
+        c.clear |= c.erase
+        c.plain = not (c.any_of or c.at_least or c.takes or c.moves or c.gives)
+        c.reads = c.test
+        for mask in c.any_of:
+            c.reads |= mask
+        for mask, _, _ in c.at_least:
+            c.reads |= mask
+        c.changes = c.clear | c.put
+        for place, _ in c.takes:
+            c.changes |= self.mask[place]
+        for source, target, _, gone in c.moves:
+            c.reads |= source
+            c.changes |= target | (source if gone else 0)
+        for mask, *_ in c.gives:
+            c.changes |= mask
+        return c
+
+    # --- firing ---------------------------------------------------------------------------------
+
+    def enabled(self, number: int, state: int) -> bool:
+        """Whether a rule's tests hold; which kinds may fire now is not looked at."""
+        c = self.rules[number]
+        if state & c.test != c.need:
+            return False
+        if c.plain:
+            return True
+        for mask in c.any_of:
+            if not state & mask:
+                return False
+        return all((state & mask) >> offset >= count for mask, offset, count in c.at_least)
+
+    def fire(self, number: int, state: int) -> tuple[int, int]:
+        """The state after an enabled rule, and the bits of the places that got more than they hold.
+
+        A place that is full stays full.
+        """
+        c = self.rules[number]
+        if c.plain:
+            state &= ~c.clear
+            return state | c.put, state & c.put
+        return self._fire_slowly(c, number, state)
+
+    def _fire_slowly(self, c: Compiled, number: int, state: int) -> tuple[int, int]:
+        for _, unit in c.takes:
+            state -= unit
+        consumed = 0
+        for place, _ in self.system.rules[number].consume:
+            if self.width[place] == 1:
+                consumed |= self.mask[place]
+        state &= ~consumed
+        for source, target, offset, gone in c.moves:
+            if state & source:
+                if gone:
+                    state &= ~source
+                if state & target != target:
+                    state += 1 << offset
+        state &= ~c.erase
+        full = state & c.put
+        state |= c.put
+        for mask, offset, count, most in c.gives:
+            if ((state & mask) >> offset) + count > most:
+                full |= mask
+                state |= mask
+            else:
+                state += count << offset
+        return state, full
+
+    def places_in(self, bits: int) -> list[int]:
+        """The places that have some of these bits."""
+        return [place for place, mask in enumerate(self.mask) if mask & bits]
+
+    # --- reading --------------------------------------------------------------------------------
+
+    def marking(self, state: int) -> Marking:
+        """A state in words."""
+        tokens = {
+            place.index: count
+            for place in self.system.places
+            if (count := (state & self.mask[place.index]) >> self.offset[place.index])
+        }
+        values: dict[int, int] = {}
+        for variable in self.system.variables:
+            base = self.value_bit[variable.index]
+            for number in range(len(variable.values)):
+                if state >> (base + number) & 1:
+                    values[variable.index] = number
+        return Marking(tokens, values)
+
+    def value(self, state: int, variable: int) -> Value:
+        """The value that a variable has in a state."""
+        return self.system.variables[variable].values[self.marking(state).values[variable]]

@@ -1,0 +1,309 @@
+"""A mission as a Petri net with inhibitor arcs, reset arcs and a few variables.
+
+A marking says how many tokens each place has, and which value each variable has. A transition is
+enabled when each place of `consume` has that many tokens, each of `read` has one, none of `inhibit`
+has any, and each variable of `guard` has one of the values named. Firing, in this order:
+
+1. the tokens of `consume` are removed;
+2. for each pair of `moves`, a token on the first place goes to the second, and for each pair of
+   `copies`, a token on the first place puts one on the second; an empty first place is no
+   obstacle, and a second place that is full stays as it is;
+3. the places of `reset` lose all their tokens;
+4. the tokens of `produce` are added;
+5. the variables of `assign` get their values.
+
+Priorities: `Kind.INTERNAL` transitions fire whenever they are enabled; `Kind.JOIN` ones when no
+internal one is; `Kind.EXTERNAL` ones when neither is. Transitions of one kind fire in any order.
+
+An *outcome* is what is decided when a transition fires: by something outside, or by a choice that
+the mission leaves open. Fairness is about outcomes: one that is possible again and again happens
+again and again. Transitions of one outcome are the same answer, report or timer in different
+states: never are two of them enabled. A join only waits, and decides nothing.
+
+Both the built-in search and the PROMELA that is written for Spin are made from this alone.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+from m2pem.mission.values import Value
+
+
+class Kind(StrEnum):
+    """When a rule may fire."""
+
+    INTERNAL = "internal"
+    """A step that the executive does by itself."""
+    JOIN = "join"
+    """An inclusive or complex join goes on: it waits until nothing else can move."""
+    OUTSIDE = "outside"
+    """An answer, report, timer, signal or message: comes when the executive has nothing to do."""
+
+
+class Role(StrEnum):
+    """What a token on a place stands for."""
+
+    ENTERING = "entering"
+    """It has come to an element that is executed next."""
+    FLOW = "flow"
+    """It has come to a join by that flow, and waits there."""
+    ACTIVE = "active"
+    """It is on an activity that works, or waits at an event or gateway."""
+    TRIGGERED = "triggered"
+    """What an element waited for has come."""
+    CONTROL = "control"
+    """No token of the mission: something that the rules must remember."""
+    END = "end"
+    """The run is over."""
+
+
+class Trigger(StrEnum):
+    """What an outside rule stands for, so that a run can be played to the engine."""
+
+    SUCCEEDS = "succeeds"
+    """A behavior's or service's work ends well."""
+    FAILS = "fails"
+    """A behavior or service ends with the error of `detail`."""
+    ANSWER = "answer"
+    """An operator answers with the decision of `detail`."""
+    TIMER = "timer"
+    """The timer of the element is due."""
+    SIGNAL = "signal"
+    """The signal of id `detail` comes from outside."""
+    MESSAGE = "message"
+    """The message of id `detail` comes from outside."""
+    CONDITION = "condition"
+    """A condition that the rules cannot follow becomes true."""
+
+
+class Flag(StrEnum):
+    """What is wrong when a rule fires at all."""
+
+    CONFLICT = "conflict"
+    """A behavior wants a resource that another one holds (RESOURCE_UNAVAILABLE)."""
+    UNCAUGHT = "uncaught"
+    """An error that the model throws leaves the process uncaught."""
+    UNCAUGHT_FAILURE = "uncaught failure"
+    """A behavior, service or prompt fails, and nothing catches that."""
+    UNHEARD = "unheard"
+    """An escalation, signal or message is thrown that nobody can catch."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """Where tokens are together: a process, a subprocess, a called process, an activity's inside.
+
+    `element`: the id of the process or activity. `path`: ids of the activities from outside to
+    it; with those, a place is told from the same place in another call.
+    """
+
+    index: int
+    element: str
+    parent: int | None
+    path: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where tokens can be.
+
+    `name`: unique, for people. `element`: whose it is, an id of the mission. `several`: more than
+    one token at a time is meant, or harmless. `resources` are held, by behavior `behavior`, as
+    long as there is a token.
+    """
+
+    index: int
+    name: str
+    element: str
+    scope: int
+    role: Role
+    several: bool = False
+    resources: tuple[str, ...] = ()
+    behavior: str = ""
+    once: bool = False
+    """A token that it has no room for is lost; that is a finding, unless `several` are meant."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A name of the data store that conditions depend on, with the values that it can have.
+
+    A value that is `exact` is that value; another stands for all that compare alike.
+    """
+
+    index: int
+    name: str
+    values: tuple[Value, ...]
+    exact: tuple[bool, ...]
+    initial: int
+    key: str = ""
+    """The name in the data store; `name` also says whose it is, in a called process."""
+
+
+UNDOES, UNDONE = "is undone", "has been undone"
+"""Details of steps: an activity that has completed begins to be undone, or that is over."""
+
+
+class Action(StrEnum):
+    """What happens to an element in a step."""
+
+    ENTERED = "entered"
+    COMPLETED = "completed"
+    INTERRUPTED = "interrupted"
+    TAKEN = "taken"
+    """A sequence flow."""
+    TRIGGERED = "triggered"
+    THROWN = "thrown"
+    """An event throws, or an activity's error goes up."""
+
+
+BEGINS = "begins"
+"""Detail of the step in which an activity begins its work, after its boundary events are armed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Something that a rule does, in the words of the mission: `element` is an id of it."""
+
+    element: str
+    action: Action
+    detail: str = ""
+
+
+Guard = tuple[tuple[int, frozenset[int]], ...]
+"""By variable, which of its values (by place in `Variable.values`) it must have."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A rule. Places and variables are named by their index; a place is in a tuple once.
+
+    `steps`: what it does, in order; the first is the element that it belongs to. `trigger` and
+    `detail` say what comes from outside. `flag`: firing it at all is a violation.
+    """
+
+    index: int
+    name: str
+    kind: Kind
+    steps: tuple[Step, ...]
+    consume: tuple[tuple[int, int], ...] = ()
+    read: tuple[int, ...] = ()
+    inhibit: tuple[int, ...] = ()
+    guard: Guard = ()
+    moves: tuple[tuple[int, int], ...] = ()
+    copies: tuple[tuple[int, int], ...] = ()
+    kill: tuple[int, ...] = ()
+    produce: tuple[tuple[int, int], ...] = ()
+    assign: tuple[tuple[int, int], ...] = ()
+    trigger: Trigger | None = None
+    detail: str = ""
+    flag: Flag | None = None
+    flagged: str = ""
+    """What the flag is about: a resource, an error's code, a signal's id."""
+    quiet: bool = False
+    """It inhibits because its scope must be empty: all of the scope's places are in `inhibit`."""
+    due_us: int | None = None
+    """Of a timer whose duration is written in the mission: microseconds after it is armed."""
+
+    outcomes: tuple[int, ...] = ()
+    """What is decided when it fires (`m2pem.verify.net.petri_net`)."""
+
+    @property
+    def element(self) -> str:
+        """The element that it belongs to."""
+        return self.steps[0].element
+
+
+class Exactness(StrEnum):
+    """How the rules of an element differ from what the engine does."""
+
+    MORE = "more"
+    """They can do all that the engine can, and more: a proof holds, an alarm may be false."""
+    BOUNDED = "bounded"
+    """They stop short of the engine, at a bound: what is proved holds up to that bound."""
+
+
+@dataclass(frozen=True, slots=True)
+class Approximation:
+    """Where the rules are not exactly what the engine does: at which element, and how."""
+
+    element: str
+    exactness: Exactness
+    what: str
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """A mission's rules.
+
+    `initial`: places with a token at first. `completed`, `terminated`, `failed`: the places that
+    say how the run ended. `elements`: every element of the mission that has rules, by id, with
+    its label. `dead`: elements that no rule can reach whatever happens (drawn, but not connected).
+    `single`: places that are known to have one token at most; None: nobody has looked.
+    """
+
+    mission: str
+    process: str
+    scopes: tuple[Scope, ...]
+    places: tuple[Place, ...]
+    variables: tuple[Variable, ...]
+    rules: tuple[Rule, ...]
+    initial: tuple[tuple[int, int], ...]
+    completed: int
+    terminated: int
+    failed: int
+    approximations: tuple[Approximation, ...] = ()
+    elements: Mapping[str, str] = field(default_factory=dict)
+    single: frozenset[int] | None = None
+
+    @property
+    def ends(self) -> frozenset[int]:
+        """Places that say that the run is over."""
+        return frozenset({self.completed, self.terminated, self.failed})
+
+
+_Decided = tuple[object, ...]
+
+
+def with_outcomes(rules: Sequence[Rule]) -> list[Rule]:
+    """The same rules, each with its outcome."""
+    alike: dict[_Decided, list[tuple[Rule, int]]] = {}
+    count = 0
+    made: list[Rule] = []
+    for rule in rules:
+        if rule.kind is Kind.JOIN:
+            made.append(rule)
+            continue
+        others = alike.setdefault(_decided(rule), [])
+        taken = {outcome for other, outcome in others if not _exclude(rule, other)}
+        free = [outcome for _, outcome in others if outcome not in taken]
+        outcome = free[0] if free else count
+        count += not free
+        others.append((rule, outcome))
+        made.append(replace(rule, outcomes=(outcome,)))
+    return made
+
+
+def _decided(rule: Rule) -> _Decided:
+    if rule.kind is not Kind.OUTSIDE:
+        return (rule.index,)
+    return rule.trigger, rule.detail, rule.element, rule.consume, rule.assign
+
+
+def _exclude(one: Rule, other: Rule) -> bool:
+    """Whether two rules ask for what cannot be at once."""
+    guard = dict(one.guard)
+    if any(v in guard and not guard[v] & values for v, values in other.guard):
+        return True
+    return any(
+        {*(p for p, _ in a.consume), *a.read} & set(b.inhibit)
+        for a, b in ((one, other), (other, one))
+    )
+
+
+def outcomes_of(system: System) -> Mapping[int, tuple[int, ...]]:
+    """By rule, the outcomes that it stands for: several, where it was made of several rules."""
+    if any(rule.outcomes for rule in system.rules):
+        return {rule.index: rule.outcomes for rule in system.rules}
+    return {r.index: () if r.kind is Kind.JOIN else (r.index,) for r in system.rules}

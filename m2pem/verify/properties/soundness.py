@@ -1,0 +1,271 @@
+"""Soundness: does the mission always complete, properly, and without dead elements?"""
+
+from collections.abc import Sequence
+
+from m2pem.mission import elements as e
+from m2pem.mission.events import CompensateEventDefinition
+from m2pem.verify.net.petri_net import Exactness, Flag, Role, Trigger
+from m2pem.verify.properties.results import Result, Searched, Violation
+from m2pem.verify.search.fairness import FairRounds
+
+
+def proper_completion(searched: Searched) -> Result:
+    """Nothing is left behind, and no end event is reached twice in one instance of its scope."""
+    violations: list[Violation] = []
+    found = searched.found
+    for place in found.overflows:
+        each = searched.system.places[place]
+        if each.once:
+            violations.append(
+                Violation(
+                    f"{searched.label(each.element)} is reached twice in one instance of its scope",
+                    (each.element,),
+                    found.overflow_runs[place],
+                )
+            )
+    return searched.result(
+        "proper-completion",
+        "No end event is reached twice in one instance of its scope.",
+        violations,
+    )
+
+
+def one_token_each(searched: Searched) -> Result:
+    """No element has two tokens at a time where the mission means one."""
+    violations: list[Violation] = []
+    found = searched.found
+    for place in found.overflows:
+        each = searched.system.places[place]
+        if each.once:
+            continue
+        more = " and more and more" if place in found.beyond else ""
+        violations.append(
+            Violation(
+                f"{searched.label(searched.node_of(each.element))} gets a second token{more}"
+                " before the first has left: tokens that were parted are not joined",
+                (searched.node_of(each.element),),
+                found.overflow_runs[place],
+            )
+        )
+    return searched.result(
+        "one-token", "Tokens that were parted do not meet again unjoined.", violations
+    )
+
+
+FAIR = "It ends, if nothing that can happen again and again is put off for ever."
+IN_EACH_STATE = (
+    "for runs in which that is so of each state that comes again and again: orders that lead to"
+    " the same were left out of the search"
+)
+"""In what sense it is proved to end, where not every order was searched."""
+
+
+def no_deadlock(searched: Searched) -> Result:
+    """There is always something that can happen, until the run is over."""
+    return searched.result("no-deadlock", "No token is stuck for ever.", _stuck(searched))
+
+
+def _stuck(searched: Searched) -> list[Violation]:
+    """The nearest state of each set of elements at which a run can be stuck."""
+    found = searched.found
+    first: dict[tuple[str, ...], int] = {}
+    for state in found.terminals:
+        if not searched.ended(state):
+            first.setdefault(searched.where(state), state)
+    return [
+        Violation(
+            f"stuck at {searched.labels(stuck) or 'the process'}: nothing can happen any more",
+            stuck,
+            tuple(found.run_to(state)),
+        )
+        for stuck, state in first.items()
+    ]
+
+
+def _reaching(searched: Searched, goals: list[int]) -> bytearray:
+    """Which states some of the goals can be reached from, if no work fails uncaught.
+
+    That a vehicle may fail, and end the run so, is no way out.
+    """
+    found = searched.found
+    assert found.edge_start is not None
+    assert found.edge_rule is not None
+    assert found.edge_state is not None
+    count = len(found.states)
+    before: list[list[int]] = [[] for _ in range(count)]
+    for state in range(count):
+        for at in range(found.edge_start[state], found.edge_start[state + 1]):
+            if not _fails(searched, found.edge_rule[at]):
+                before[found.edge_state[at]].append(state)
+    marked = bytearray(count)
+    waiting = list(goals)
+    for state in waiting:
+        marked[state] = 1
+    while waiting:
+        for each in before[waiting.pop()]:
+            if not marked[each]:
+                marked[each] = 1
+                waiting.append(each)
+    return marked
+
+
+def _fails(searched: Searched, rule: int) -> bool:
+    return searched.system.rules[rule].flag is Flag.UNCAUGHT_FAILURE
+
+
+def _begins(searched: Searched, rule: int) -> bool:
+    """Whether somebody outside begins a process of their own accord: nobody does so for ever."""
+    each, places = searched.system.rules[rule], searched.system.places
+    if each.trigger not in (Trigger.MESSAGE, Trigger.SIGNAL):
+        return False
+    waiting = [p for p in each.read if places[p].role is not Role.CONTROL]
+    return not (each.consume or waiting or each.moves or each.copies)
+
+
+def _lost(searched: Searched, *, ends_only: bool) -> list[int]:
+    """States from which no end (or nothing that ends at all) can be reached, in their order."""
+    found = searched.found
+    goals = [s for s in found.terminals if not ends_only or searched.ended(s)]
+    if not found.complete:
+        done = len(found.edge_start) - 1 if found.edge_start is not None else 0
+        last = next(
+            (
+                n
+                for n in range(len(found.states))
+                if found.edge_start is not None and found.edge_start[n + 1] == found.edge_start[n]
+            ),
+            done,
+        )
+        goals += range(last, len(found.states))
+    marked = _reaching(searched, goals)
+    return [state for state in range(len(found.states)) if not marked[state]]
+
+
+def can_complete(searched: Searched) -> Result:
+    """From everywhere, the end can be reached."""
+    violations: list[Violation] = []
+    lost = _lost(searched, ends_only=True)
+    if lost:
+        stuck = searched.where(lost[0])
+        run = tuple(searched.found.run_to(lost[0]))
+        last = searched.system.rules[run[-1]].element if run else ""
+        message = f"from {searched.labels(stuck)} on, the end cannot be reached any more"
+        if last:
+            message += f" (since {searched.label(last)})"
+        violations.append(Violation(message, stuck, run))
+    return searched.result("can-complete", "From everywhere, the end can be reached.", violations)
+
+
+def completes_if_fair(searched: Searched) -> Result:
+    """It comes to its end when all that can happen again and again happens again and again.
+
+    Of a search that left orders out it is known only whether the end can be reached from
+    everywhere, and whether anything goes round at all. If so, it ends in a stronger sense of
+    fairness, and the result says so.
+    """
+    found = searched.found
+    rounds = FairRounds(found, lambda rule: _fails(searched, rule) or _begins(searched, rule))
+    violations: list[Violation] = []
+    note = ""
+    if not found.reduced:
+        violations = _stuck(searched)[:1] or _fair_round(searched, rounds)
+    if not violations and (lost := _lost(searched, ends_only=True)):
+        violations = [_never_ends(searched, lost[0])]
+    elif not violations and found.reduced and found.complete and rounds.any:
+        note = IN_EACH_STATE
+    return searched.result("completes-if-fair", FAIR, violations, note=note)
+
+
+def _fair_round(searched: Searched, rounds: FairRounds) -> list[Violation]:
+    lasso = rounds.nearest()
+    if lasso is None:
+        return []
+    elements = _elements(searched, lasso.cycle)
+    return [
+        Violation(
+            f"goes round {searched.labels(elements)} for ever, though nothing that can happen again"
+            " and again is put off",
+            elements,
+            lasso.prefix,
+            lasso.cycle,
+        )
+    ]
+
+
+def _never_ends(searched: Searched, lost: int) -> Violation:
+    """From a state on, no end can be reached."""
+    found = searched.found
+    stuck = next((s for s in found.terminals if not searched.ended(s)), None)
+    if stuck is not None:
+        return _stuck(searched)[0]
+    into, cycle = _into_cycle(searched, lost)
+    where = _elements(searched, cycle) or searched.where(lost)
+    how = "and can reach no end any more" if cycle else "or fails"
+    return Violation(
+        f"goes round {searched.labels(where)} for ever, {how}",
+        where,
+        (*found.run_to(lost), *into),
+        cycle,
+    )
+
+
+def _elements(searched: Searched, rules: Sequence[int]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(searched.system.rules[rule].element for rule in rules))
+
+
+def no_livelock(searched: Searched) -> Result:
+    """It never goes on for ever without a way out."""
+    found = searched.found
+    lost = _lost(searched, ends_only=False)
+    violations: list[Violation] = []
+    if lost:
+        into, cycle = _into_cycle(searched, lost[0])
+        elements = _elements(searched, cycle)
+        violations.append(
+            Violation(
+                f"goes round {searched.labels(elements)} for ever, with no way out",
+                elements,
+                (*found.run_to(lost[0]), *into),
+                cycle,
+            )
+        )
+    return searched.result("no-livelock", "Nothing goes on for ever without a way out.", violations)
+
+
+def _into_cycle(searched: Searched, start: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Rules that lead from a state to where it goes round, and those that lead round."""
+    seen: dict[int, int] = {}
+    rules: list[int] = []
+    state = start
+    while state not in seen:
+        seen[state] = len(rules)
+        steps = (each for each in searched.found.successors(state) if not _fails(searched, each[0]))
+        rule, state = next(steps, (-1, -1))
+        if rule < 0:
+            return tuple(rules), ()
+        rules.append(rule)
+    return tuple(rules[: seen[state]]), tuple(rules[seen[state] :])
+
+
+def no_dead_element(searched: Searched) -> Result:
+    """Every element is reached in some run."""
+    system, found = searched.system, searched.found
+    reached = {step.element for rule in found.fired for step in system.rules[rule].steps}
+    unknown = {a.element for a in system.approximations if a.exactness is Exactness.BOUNDED}
+    violations = [
+        Violation(f"{searched.label(element)} is never reached", (element,))
+        for element in system.elements
+        if element not in reached
+        and element not in unknown
+        and not _undoes(searched.mission.elements.get(element))
+    ]
+    if not found.complete:
+        violations = []
+    return searched.result("no-dead-element", "Every element is reached in some run.", violations)
+
+
+def _undoes(element: object) -> bool:
+    """No token comes to the boundary event of a compensation: it says by what it is done."""
+    return isinstance(element, e.BoundaryEvent) and any(
+        isinstance(d, CompensateEventDefinition) for d in element.definitions
+    )

@@ -1,0 +1,292 @@
+"""Robotic mission patterns: visits, avoidance and reactions (their authors call those triggers).
+
+A visit lasts as long as its condition holds; the next visit of the same location begins after it
+did not hold. Locations are numbered from 1 as they are listed.
+"""
+
+import itertools
+from collections.abc import Sequence
+
+from m2pem.verify.ltl.formula import (
+    Always,
+    And,
+    Count,
+    Eventually,
+    Formula,
+    Iff,
+    Implies,
+    Next,
+    Not,
+    Until,
+    WeakUntil,
+    conjunction,
+)
+from m2pem.verify.requirements.patterns.pattern import (
+    AVOIDED,
+    CONDITIONS,
+    THEN,
+    TIMES,
+    WHEN,
+    Argument,
+    Arguments,
+    Kind,
+    Pattern,
+    Words,
+)
+
+
+def _places(a: Arguments) -> Sequence[Formula]:
+    found: Sequence[Formula] = a["locations"]
+    return found
+
+
+def _visit(places: Sequence[Formula]) -> Formula:
+    return conjunction([Eventually(each) for each in places])
+
+
+def sequence(places: Sequence[Formula]) -> Formula:
+    """The first at some point, from then on the second at some point, and so on."""
+    first, *rest = places
+    return Eventually(And((first, sequence(rest))) if rest else first)
+
+
+def _no_earlier(places: Sequence[Formula]) -> list[Formula]:
+    """Each comes only after the one before it has."""
+    return [Until(Not(later), earlier) for earlier, later in itertools.pairwise(places)]
+
+
+def _ordered(places: Sequence[Formula]) -> list[Formula]:
+    return [sequence(places), *_no_earlier(places)]
+
+
+def then_not_before(place: Formula, other: Formula) -> Formula:
+    """After this visit, the place is visited again only after the other; which must come."""
+    return Until(place, And((Not(place), Until(Not(place), other))))
+
+
+def then_not_before_if(place: Formula, other: Formula) -> Formula:
+    """The same, but the other need not come, if the place does not either."""
+    return WeakUntil(place, And((Not(place), WeakUntil(Not(place), other))))
+
+
+def _strictly(places: Sequence[Formula]) -> list[Formula]:
+    return [
+        Until(Not(earlier), And((earlier, then_not_before(earlier, later))))
+        for earlier, later in itertools.pairwise(places)
+    ]
+
+
+def _in_turn(places: Sequence[Formula]) -> list[Formula]:
+    """Between two visits of a place, the one that is next in turn is visited."""
+    turn = [*places[1:], places[0]]
+    return [
+        Always(Implies(each, then_not_before_if(each, other)))
+        for each, other in zip(places, turn, strict=True)
+    ]
+
+
+def _again(places: Sequence[Formula]) -> Formula:
+    return conjunction([Always(Eventually(each)) for each in places])
+
+
+def _ordered_rounds(places: Sequence[Formula]) -> list[Formula]:
+    return [
+        Always(sequence(places)),
+        *_no_earlier(places),
+        *(
+            Always(Implies(later, then_not_before(later, earlier)))
+            for earlier, later in itertools.pairwise(places)
+        ),
+    ]
+
+
+def _strict_rounds(places: Sequence[Formula]) -> list[Formula]:
+    return [
+        *_ordered_rounds(places),
+        *(
+            Always(Implies(earlier, then_not_before(earlier, later)))
+            for earlier, later in itertools.pairwise(places)
+        ),
+    ]
+
+
+def _pattern(name: str, meaning: str, build: "object", english: str) -> Pattern:
+    def formula(a: Arguments, _: object) -> Formula:
+        assert callable(build)
+        made = build(_places(a))
+        return made if not isinstance(made, list) else conjunction(made)
+
+    def say(a: Arguments, words: Words) -> str:
+        return english.format(all=words.each(_places(a)), order=words.each(_places(a), "then"))
+
+    return Pattern(name, meaning, (CONDITIONS,), formula, say)
+
+
+VISITS = (
+    _pattern(
+        "visit", "each location is visited, in any order", _visit, "at some point each: {all}"
+    ),
+    _pattern(
+        "sequenced_visit",
+        "each location is visited after the one before it; earlier visits do not matter",
+        sequence,
+        "at some point, one after the other: {order}",
+    ),
+    _pattern(
+        "ordered_visit",
+        "each location is visited, and none before the one that is listed before it",
+        _ordered,
+        "in this order, none before the one before it: {order}",
+    ),
+    _pattern(
+        "strict_ordered_visit",
+        "as ordered_visit, and none is visited twice before the next one is",
+        lambda places: [*_ordered(places), *_strictly(places)],
+        "in this order, none before the one before it and none twice before the next: {order}",
+    ),
+    _pattern(
+        "fair_visit",
+        "each location is visited, and none twice before the next one in turn",
+        lambda places: [_visit(places), *_in_turn(places)],
+        "at some point each, and none twice before the next in turn: {all}",
+    ),
+    _pattern(
+        "patrolling",
+        "each location is visited again and again, in any order",
+        _again,
+        "again and again each: {all}",
+    ),
+    _pattern(
+        "sequenced_patrolling",
+        "again and again, the locations are visited one after the other",
+        lambda places: Always(sequence(places)),
+        "again and again, one after the other: {order}",
+    ),
+    _pattern(
+        "ordered_patrolling",
+        "as sequenced_patrolling, and none is visited before the one that is listed before it, "
+        "in any round",
+        _ordered_rounds,
+        "again and again in this order, in each round none before the one before it: {order}",
+    ),
+    _pattern(
+        "strict_ordered_patrolling",
+        "as ordered_patrolling, and none is visited twice before the next one is",
+        _strict_rounds,
+        "again and again in this order, none twice before the next: {order}",
+    ),
+    _pattern(
+        "fair_patrolling",
+        "each location is visited again and again, and none twice before the next one in turn",
+        lambda places: [_again(places), *_in_turn(places)],
+        "again and again each, and none twice before the next in turn: {all}",
+    ),
+)
+
+
+AVOIDANCE = (
+    Pattern(
+        "past_avoidance",
+        "it does not happen before something else has, which must come",
+        (AVOIDED, Argument("until", Kind.CONDITION)),
+        lambda a, _: Until(Not(a["avoid"]), a["until"]),
+        lambda a, words: f"never {words.of(a['avoid'])} before {words.of(a['until'])}, which comes",
+        scoped=False,
+    ),
+    Pattern(
+        "global_avoidance",
+        "it never happens",
+        (AVOIDED,),
+        lambda a, _: Always(Not(a["avoid"])),
+        lambda a, words: f"never {words.of(a['avoid'])}",
+    ),
+    Pattern(
+        "future_avoidance",
+        "once something has happened, it never happens any more",
+        (AVOIDED, WHEN),
+        lambda a, _: Always(Implies(a["when"], Always(Not(a["avoid"])))),
+        lambda a, words: f"once {words.of(a['when'])}, never again {words.of(a['avoid'])}",
+    ),
+    Pattern(
+        "upper_restricted_avoidance",
+        "it happens at most so many times",
+        (AVOIDED, TIMES),
+        lambda a, _: Always(Count((a["avoid"],), "<=", a["times"])),
+        lambda a, words: f"at most {a['times']} times: {words.of(a['avoid'])}",
+    ),
+    Pattern(
+        "lower_restricted_avoidance",
+        "it happens at least so many times",
+        (AVOIDED, TIMES),
+        lambda a, _: Eventually(Count((a["avoid"],), ">=", a["times"])),
+        lambda a, words: f"at least {a['times']} times: {words.of(a['avoid'])}",
+    ),
+    Pattern(
+        "exact_restricted_avoidance",
+        "it happens just so many times",
+        (AVOIDED, TIMES),
+        lambda a, _: And(
+            (
+                Always(Count((a["avoid"],), "<=", a["times"])),
+                Eventually(Count((a["avoid"],), ">=", a["times"])),
+            )
+        ),
+        lambda a, words: f"exactly {a['times']} times: {words.of(a['avoid'])}",
+    ),
+)
+
+
+REACTIONS = (
+    Pattern(
+        "instantaneous_reaction",
+        "whenever the one holds, the other does in the same moment",
+        (WHEN, THEN),
+        lambda a, _: Always(Implies(a["when"], a["then"])),
+        lambda a, words: f"whenever {words.of(a['when'])}, in that moment {words.of(a['then'])}",
+    ),
+    Pattern(
+        "delayed_reaction",
+        "whenever the one happens, the other does then or later",
+        (WHEN, THEN),
+        lambda a, _: Always(Implies(a["when"], Eventually(a["then"]))),
+        lambda a, words: f"whenever {words.of(a['when'])}, then or later {words.of(a['then'])}",
+    ),
+    Pattern(
+        "prompt_reaction",
+        "whenever the one happens, the other does in the very next step of the run",
+        (WHEN, THEN),
+        lambda a, _: Always(Implies(a["when"], Next(a["then"]))),
+        lambda a, words: (
+            f"whenever {words.of(a['when'])}, in the very next step {words.of(a['then'])}"
+        ),
+        scoped=False,
+        steps=True,
+    ),
+    Pattern(
+        "bound_reaction",
+        "the one holds in just those moments in which the other does",
+        (WHEN, THEN),
+        lambda a, _: Always(Iff(a["when"], a["then"])),
+        lambda a, words: f"whenever {words.of(a['when'])}, and only then, {words.of(a['then'])}",
+    ),
+    Pattern(
+        "bound_delay",
+        "the one holds in just those steps after which, in the very next, the other does",
+        (WHEN, THEN),
+        lambda a, _: Always(Iff(a["when"], Next(a["then"]))),
+        lambda a, words: (
+            f"in the very next step after {words.of(a['when'])}, and only then, "
+            f"{words.of(a['then'])}"
+        ),
+        scoped=False,
+        steps=True,
+    ),
+    Pattern(
+        "wait",
+        "the one holds until the other comes, which must come",
+        (Argument("hold", Kind.CONDITION), Argument("until", Kind.CONDITION)),
+        lambda a, _: Until(a["hold"], a["until"]),
+        lambda a, words: f"{words.of(a['hold'])} until {words.of(a['until'])}, which comes",
+        scoped=False,
+    ),
+)

@@ -1,0 +1,240 @@
+"""The propositions of formulas on a net: which hold in a marking, and when a transition fires.
+
+`ExploredRuns` is an exploration as a `LabelledSystem`, for `m2pem.verify.ltl.model_check`.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from m2pem.errors import ExpressionError
+from m2pem.fleet.allocation import spelled_out
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.elements import Process, SequenceFlow
+from m2pem.mission.mission import Mission
+from m2pem.verify.ltl.formula import (
+    Active,
+    Commanded,
+    Completed,
+    Data,
+    Ended,
+    Proposition,
+)
+from m2pem.verify.net.encoding import Encoding
+from m2pem.verify.net.petri_net import Action, Place, Role, Rule, System, outcomes_of
+from m2pem.verify.search.explore import Exploration
+from m2pem.verify.translate.domains import tells_apart
+
+Test = Callable[[int], bool]
+_NO_TOKEN = frozenset({Role.CONTROL, Role.END})
+
+
+class UnknownDataError(Exception):
+    """The rules do not know what a formula asks of the data; the message says why."""
+
+
+class Labels:
+    """Tells which of some propositions are true in the states of a system, and of its rules."""
+
+    def __init__(
+        self, system: System, mission: Mission, fleet: Fleet, propositions: Sequence[Proposition]
+    ) -> None:
+        self.system = system
+        self.propositions = tuple(propositions)
+        self._mission = mission
+        self._fleet = fleet
+        self._places = [frozenset(self._places_of(each)) for each in self.propositions]
+        self._variables = [frozenset(self._variables_of(each)) for each in self.propositions]
+        self.of_rules = [self._of_rule(rule) for rule in system.rules]
+        """By rule, the propositions that are true in the moment in which it fires."""
+
+    def of_states(self, encoding: Encoding) -> Callable[[int], int]:
+        """What tells which propositions are true in a state."""
+        tests: list[tuple[int, int, dict[int, bool] | None, Data | None]] = []
+        for bit, each in enumerate(self.propositions):
+            if isinstance(each, Data):
+                mask = 0
+                for variable in self._variables[bit]:
+                    count = len(self.system.variables[variable].values)
+                    mask |= ((1 << count) - 1) << encoding.value_bit[variable]
+                tests.append((1 << bit, mask, {}, each))
+            elif not isinstance(each, Completed):
+                tests.append((1 << bit, encoding.places_mask(self._places[bit]), None, None))
+
+        def true_in(state: int) -> int:
+            found = 0
+            for bit, mask, known, data in tests:
+                seen = state & mask
+                if known is None:
+                    found |= bit if seen else 0
+                    continue
+                if seen not in known:
+                    assert data is not None
+                    known[seen] = self._holds(data, encoding, state)
+                found |= bit if known[seen] else 0
+            return found
+
+        return true_in
+
+    def places_of(self, number: int) -> frozenset[int]:
+        """The places of which one has a token where a proposition is true, if it is about places.
+
+        `number`: of the proposition, in `propositions`.
+        """
+        return self._places[number]
+
+    def variables_of(self, number: int) -> frozenset[int]:
+        """The variables that a proposition is about."""
+        return self._variables[number]
+
+    def visible_rules(self) -> frozenset[int]:
+        """The rules that may change what is true, or in whose moment something is."""
+        places = frozenset[int]().union(*self._places)
+        variables = frozenset[int]().union(*self._variables)
+        return frozenset(
+            rule.index
+            for rule, now in zip(self.system.rules, self.of_rules, strict=True)
+            if now or places & _touched(rule) or any(v in variables for v, _ in rule.assign)
+        )
+
+    def visible_places(self) -> frozenset[int]:
+        """The places that propositions are about."""
+        return frozenset[int]().union(*self._places)
+
+    # --- propositions ---------------------------------------------------------------------------
+
+    def _places_of(self, each: Proposition) -> list[int]:
+        places = self.system.places
+        match each:
+            case Active(element):
+                return [p.index for p in places if self._stands_on(p, element)]
+            case Commanded(resource, behavior):
+                team = self._fleet.teams.get(resource)
+                wanted = set(spelled_out(team)) if team else {resource}
+                return [
+                    p.index
+                    for p in places
+                    if p.resources and wanted <= set(p.resources) and behavior in ("", p.behavior)
+                ]
+            case Ended(outcome):
+                ends = {
+                    "completed": self.system.completed,
+                    "terminated": self.system.terminated,
+                    "failed": self.system.failed,
+                }
+                return [ends[outcome]] if outcome else list(ends.values())
+            case _:
+                return []
+
+    def _stands_on(self, place: Place, element: str) -> bool:
+        if element == self.system.process:
+            # The process that the run begins with is active from its beginning to its end.
+            return place.role is Role.CONTROL and place.name.endswith(":running")
+        if place.role in _NO_TOKEN:
+            return False
+        if place.role is Role.FLOW:
+            flow = self._mission.elements.get(place.element)
+            return isinstance(flow, SequenceFlow) and flow.target.id == element
+        return place.element == element or self._is_in_process(place, element)
+
+    def _is_in_process(self, place: Place, process: str) -> bool:
+        if not isinstance(self._mission.elements.get(process), Process):
+            return False
+        scope = self.system.scopes[place.scope]
+        while scope.element != process and scope.parent is not None:
+            scope = self.system.scopes[scope.parent]
+        return scope.element == process
+
+    def _variables_of(self, each: Proposition) -> list[int]:
+        if not isinstance(each, Data):
+            return []
+        by_name = {variable.name: variable.index for variable in self.system.variables}
+        for name in sorted(each.expression.names):
+            if name not in by_name:
+                raise UnknownDataError(
+                    f"what '{name}' is cannot be told from the mission: say what it begins with "
+                    "(--data), or write it in a task"
+                )
+        return [by_name[name] for name in sorted(each.expression.names)]
+
+    def _holds(self, data: Data, encoding: Encoding, state: int) -> bool:
+        values = encoding.marking(state).values
+        by_name = {variable.name: variable for variable in self.system.variables}
+        exact = True
+        read = {}
+        for name in data.expression.names:
+            variable = by_name[name]
+            number = values[variable.index]
+            read[name] = variable.values[number]
+            exact = exact and variable.exact[number]
+        if not exact and not tells_apart(data.expression.tree):
+            raise UnknownDataError(
+                f"whether {data.expression.text.strip()} is true cannot be told: it is more than "
+                "comparisons of single names with values"
+            )
+        try:
+            return data.expression.holds(lambda name: read[name])
+        except ExpressionError:
+            return False
+
+    def _of_rule(self, rule: Rule) -> int:
+        completed = {step.element for step in rule.steps if step.action is Action.COMPLETED}
+        return sum(
+            1 << bit
+            for bit, each in enumerate(self.propositions)
+            if isinstance(each, Completed) and each.element in completed
+        )
+
+
+def _touched(rule: Rule) -> frozenset[int]:
+    pairs = (*rule.moves, *rule.copies)
+    return frozenset(
+        {place for place, _ in (*rule.consume, *rule.produce)}
+        | {place for pair in pairs for place in pair}
+        | set(rule.kill)
+    )
+
+
+class MissionRuns:
+    """States are those of an exploration that kept its edges, by their numbers there."""
+
+    def __init__(self, exploration: Exploration, labels: Labels) -> None:
+        self._exploration = exploration
+        self._terminals = frozenset(exploration.terminals)
+        self._labels = labels
+        self._true_in = labels.of_states(exploration.encoding)
+
+    @property
+    def propositions(self) -> Sequence[Proposition]:
+        """What the bits stand for."""
+        return self._labels.propositions
+
+    @property
+    def reduced(self) -> bool:
+        """Whether the exploration left rules out."""
+        return self._exploration.reduced
+
+    def initial(self) -> Sequence[int]:
+        """The first state."""
+        return (0,)
+
+    def successors(self, state: int) -> Sequence[tuple[int, int]]:
+        """The rules that can fire in a state, each with the state after it."""
+        return tuple(self._exploration.successors(state))
+
+    def is_open(self, state: int) -> bool:
+        """Whether the exploration stopped before it looked at what follows."""
+        if self._exploration.complete or state in self._terminals:
+            return False
+        return not self.successors(state)
+
+    def true_in(self, state: int) -> int:
+        """The propositions that are true in a state."""
+        return self._true_in(self._exploration.states[state])
+
+    def true_when(self, rule: int) -> int:
+        """The propositions that are true in the moment in which a rule fires."""
+        return self._labels.of_rules[rule]
+
+    def outcomes(self) -> Mapping[int, int]:
+        """For fairness: the outcome that each rule stands for; joins, which only wait, for none."""
+        found = outcomes_of(self._exploration.system)
+        return {rule: outcomes[0] for rule, outcomes in found.items() if outcomes}

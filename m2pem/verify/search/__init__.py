@@ -1,0 +1,1 @@
+"""The built-in search of a net's state space, and what it may leave out."""

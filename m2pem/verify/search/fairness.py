@@ -1,0 +1,151 @@
+"""Runs that go round for ever though nothing that can happen again and again is put off for ever.
+
+In such a round each outcome (`Transition.outcomes`) that can come in one of its states comes.
+"""
+
+from collections import deque
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+
+from m2pem.verify.ltl.automaton import components
+from m2pem.verify.net.petri_net import outcomes_of
+from m2pem.verify.search.explore import Exploration, Stopped
+
+_Step = tuple[int, int]
+"""A rule, and the state after it."""
+_MOST_BEGINNINGS = 20
+"""States of which the one with the shortest run is taken."""
+_LARGE = 2_000
+"""States among which any run is short enough."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lasso:
+    """A run to `state`, and the rules of a round that begins and ends there."""
+
+    state: int
+    prefix: tuple[int, ...]
+    cycle: tuple[int, ...]
+
+
+class FairRounds:
+    """The states of a search in which fair runs can stay for ever.
+
+    The search must have kept its edges, and left no rule out. `ignored`: rules that no run needs
+    to take, and that none of those looked for takes.
+    """
+
+    def __init__(self, found: Exploration, ignored: Callable[[int], bool]) -> None:
+        self._found = found
+        self._ignored = [ignored(rule.index) for rule in found.system.rules]
+        outcomes = outcomes_of(found.system)
+        self._outcomes = [frozenset(outcomes[rule.index]) for rule in found.system.rules]
+        self._open = _last_expanded(found) if found.stopped is Stopped.INTERRUPTED else -1
+
+    @property
+    def any(self) -> bool:
+        """Whether anything goes round at all, fair or not."""
+        return any(self._goes_round(part) for part in self._parts(range(self._size)))
+
+    def nearest(self) -> Lasso | None:
+        """A run that ends nowhere and puts nothing off for ever; None if there is none."""
+        parts = sorted(self._fair(), key=min)
+        if not parts:
+            return None
+        part = parts[0]
+        tried = _MOST_BEGINNINGS if len(part) < _LARGE else 1
+        return min(
+            (self._lasso(part, state) for state in sorted(part)[:tried]),
+            key=lambda each: len(each.prefix) + len(each.cycle),
+        )
+
+    # --- where ----------------------------------------------------------------------------------
+
+    @property
+    def _size(self) -> int:
+        return len(self._found.states)
+
+    def _steps(self, state: int) -> Iterator[_Step]:
+        if state != self._open:
+            for step in self._found.successors(state):
+                if not self._ignored[step[0]]:
+                    yield step
+
+    def _possible(self, state: int) -> frozenset[int]:
+        """The outcomes that can come in a state."""
+        return frozenset[int]().union(*(self._outcomes[rule] for rule, _ in self._steps(state)))
+
+    def _fair(self) -> Iterator[frozenset[int]]:
+        waiting: list[Collection[int]] = [range(self._size)]
+        while waiting:
+            for part in self._parts(waiting.pop()):
+                if not self._goes_round(part):
+                    continue
+                passed: set[int] = set()
+                for state in part:
+                    for rule, to in self._steps(state):
+                        if to in part:
+                            passed |= self._outcomes[rule]
+                kept = [state for state in part if self._possible(state) <= passed]
+                if len(kept) == len(part):
+                    yield part
+                elif kept:  # who stays must not be where an outcome could come that leads away
+                    waiting.append(kept)
+
+    def _parts(self, states: Collection[int]) -> Iterator[frozenset[int]]:
+        """The strongly connected components of some states."""
+        place = {state: at for at, state in enumerate(states)}
+        targets = [[place[to] for _, to in self._steps(s) if to in place] for s in states]
+        members: dict[int, list[int]] = {}
+        for state, number in zip(states, components(targets), strict=True):
+            members.setdefault(number, []).append(state)
+        return (frozenset(each) for each in members.values())
+
+    def _goes_round(self, part: frozenset[int]) -> bool:
+        return len(part) > 1 or any(to in part for s in part for _, to in self._steps(s))
+
+    # --- one such run ---------------------------------------------------------------------------
+
+    def _lasso(self, part: frozenset[int], start: int) -> Lasso:
+        """Passes what could come in the states that it passes, and no more than it must."""
+        cycle: list[int] = []
+        possible = set(self._possible(start))
+        passed: set[int] = set()
+        at = start
+        while not cycle or at != start or possible - passed:
+            missing = frozenset(possible - passed)
+            for rule, state in self._way(part, at, missing, start):
+                cycle.append(rule)
+                passed |= self._outcomes[rule]
+                possible |= self._possible(state)
+                at = state
+        return Lasso(start, tuple(self._found.run_to(start)), tuple(cycle))
+
+    def _way(
+        self, part: frozenset[int], start: int, missing: frozenset[int], back_to: int
+    ) -> list[_Step]:
+        """The shortest way to one of some outcomes, or, if none is missing, back."""
+        came: dict[int, tuple[int, _Step]] = {}
+        waiting = deque([start])
+        while waiting:
+            state = waiting.popleft()
+            for rule, to in self._steps(state):
+                if to not in part:
+                    continue
+                if self._outcomes[rule] & missing if missing else to == back_to:
+                    way = [(rule, to)]
+                    while state != start:
+                        state, step = came[state]
+                        way.append(step)
+                    return way[::-1]
+                if to not in came and to != start:
+                    came[to] = (state, (rule, to))
+                    waiting.append(to)
+        raise AssertionError("the states of a round reach each other")
+
+
+def _last_expanded(found: Exploration) -> int:
+    """The state at which a search was interrupted: not all of its steps may be known."""
+    starts = found.edge_start
+    assert starts is not None
+    return max((n for n in range(len(found.states)) if starts[n + 1] > starts[n]), default=-1)

@@ -1,0 +1,109 @@
+"""By which sequence flows a token can leave an element."""
+
+import itertools
+from collections.abc import Callable, Sequence
+
+from m2pem.mission import elements as e
+from m2pem.verify.net.petri_net import Action, Exactness, Step
+from m2pem.verify.translate.context import Making
+from m2pem.verify.translate.data import ERROR, Truth
+from m2pem.verify.translate.net_builder import Area, Effect, arrival
+
+MOST_SUBSETS = 6
+"""Flows whose every combination is tried; of more, each alone and all together."""
+
+Fail = Callable[[str], list[Effect]]
+"""What an error of a code leads to, the token being taken off already."""
+
+
+def along(making: Making, area: Area, flows: Sequence[e.SequenceFlow], times: int = 1) -> Effect:
+    """A token comes to the end of each flow."""
+    return Effect(
+        steps=tuple(Step(flow.id, Action.TAKEN) for flow in flows),
+        produce=tuple(arrival(making.net, flow, area) for flow in flows) * times,
+    )
+
+
+def leave(
+    making: Making,
+    area: Area,
+    node: e.FlowNode,
+    default: e.SequenceFlow | None,
+    fail: Fail,
+    *,
+    first_only: bool = False,
+    times: int = 1,
+    own: frozenset[str] = frozenset(),
+) -> list[Effect]:
+    """Every flow that is true, or the first of them, else the default one, else NO_FLOW.
+
+    The default of an activity goes with the flows that have no condition (clause 13.3.1).
+    """
+    beside = default is not None and isinstance(node, e.Activity)
+    flows = [flow for flow in node.outgoing if flow is not default]
+    if not any(flow.condition is not None for flow in flows):
+        taken = flows[:1] if first_only else flows
+        if default is not None and (beside or not taken):
+            taken = [*taken, default]
+        return [along(making, area, taken, times)]
+    asked = [flow.condition for flow in flows if flow.condition is not None]
+
+    def choose(truths: Sequence[Truth]) -> tuple[int, ...] | str:
+        answers = iter(truths)
+        taken: list[int] = []
+        for number, flow in enumerate(flows):
+            truth = next(answers) if flow.condition is not None else True
+            if truth == ERROR:
+                return "EXPRESSION"
+            if truth is True:
+                taken.append(number)
+                if first_only:
+                    break
+        if not taken and default is None:
+            return "NO_FLOW"
+        return tuple(taken)
+
+    found: list[Effect] = []
+    if not making.data.is_followed(asked, node):
+        making.net.approximate(
+            node, Exactness.MORE, "a condition reads what nothing in the mission writes"
+        )
+    for guard, outcome in making.data.cases(asked, area, node, choose, own):
+        when = Effect(guard=guard)
+        if isinstance(outcome, str):
+            ways = fail(outcome)
+        else:
+            taken = [flows[number] for number in outcome]
+            asks = any(flow.condition is not None for flow in taken)
+            if default is not None and not (asks if beside else taken):
+                taken.append(default)
+            ways = [along(making, area, taken, times)]
+        found += [both for way in ways if (both := when.then(way)) is not None]
+    return found
+
+
+def is_free_choice(node: e.Gateway) -> bool:
+    """Whether a diverging gateway says nothing about which of its flows are taken."""
+    return len(node.outgoing) > 1 and all(flow.condition is None for flow in node.outgoing)
+
+
+def any_of(making: Making, area: Area, node: e.Gateway, *, one: bool) -> list[Effect]:
+    """A gateway whose flows have no conditions: one of them, or some, nobody knows which."""
+    making.net.approximate(
+        node, Exactness.MORE, "no flow has a condition, so any of them may be taken"
+    )
+    flows = node.outgoing
+    if one:
+        chosen: list[tuple[e.SequenceFlow, ...]] = [(flow,) for flow in flows]
+    else:
+        chosen = some_of(flows)
+    return [along(making, area, each) for each in chosen]
+
+
+def some_of(flows: Sequence[e.SequenceFlow]) -> list[tuple[e.SequenceFlow, ...]]:
+    """Combinations of flows, not none of them."""
+    if len(flows) > MOST_SUBSETS:
+        return [*((flow,) for flow in flows), tuple(flows)]
+    return [
+        each for size in range(1, len(flows) + 1) for each in itertools.combinations(flows, size)
+    ]

@@ -1,0 +1,144 @@
+"""Playing a run of the rules to the engine: which inputs make it happen, and whether they do.
+
+played = play(mission, fleet, system, run)
+played.inputs        # one for each rule that comes from outside
+played.agrees        # whether the engine came along all the way
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from m2pem.engine import inputs as i
+from m2pem.engine.run import MissionRun, Step
+from m2pem.engine.state import BehaviorPhase, RunState, RunStatus
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
+from m2pem.verify.net.petri_net import Action, Kind, Rule, System, Trigger
+from tests.verify.trace_mapping import Follower
+
+START_US = 1_767_225_600_000_000
+"""When a run is played: 2026-01-01T00:00:00Z, in microseconds since the Unix epoch."""
+_MOST_CONTINUES = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """`inputs` with their times (microseconds since the Unix epoch), and what came of them.
+
+    `stopped`: why the engine could not come along, "" when it did. A condition that the rules
+    cannot follow, and timers out of the order of their times, cannot be made to happen.
+    """
+
+    inputs: tuple[tuple[int, i.Input], ...]
+    steps: tuple[Step, ...]
+    stopped: str
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the engine went the whole way."""
+        return not self.stopped
+
+
+def play(
+    mission: Mission,
+    fleet: Fleet | None,
+    system: System,
+    run: Sequence[int],
+    data: Mapping[str, Value] | None = None,
+) -> Played:
+    """Play the rules of a run, one after the other, to a new run of the engine."""
+    engine = MissionRun(mission, fleet, "r1")
+    follower = Follower(system)
+    inputs: list[tuple[int, i.Input]] = []
+    steps: list[Step] = []
+    now_us = START_US
+
+    def give(item: i.Input) -> bool:
+        inputs.append((now_us, item))
+        steps.append(engine.receive(item, now_us))
+        for _ in range(_MOST_CONTINUES):
+            if not engine.wants_continue:
+                break
+            steps.append(engine.receive(i.Continue(), now_us))
+        return follower.step(engine.state)
+
+    if not give(i.StartRun(system.process, dict(data or {}))):
+        return Played(tuple(inputs), tuple(steps), "the engine begins otherwise")
+    for number in run:
+        rule = system.rules[number]
+        if rule.kind is not Kind.OUTSIDE:
+            continue
+        if engine.state.status is RunStatus.ENDED:
+            return Played(tuple(inputs), tuple(steps), f"the run is over before {rule.name}")
+        if rule.trigger is Trigger.TIMER:
+            due_us = _due_us(engine.state, rule)
+            if due_us is None:
+                return Played(tuple(inputs), tuple(steps), f"no timer of {rule.element} runs")
+            now_us = max(now_us, due_us)
+        item = next(_inputs(system, rule, engine.state), None)
+        if item is None:
+            return Played(tuple(inputs), tuple(steps), f"nothing makes {rule.name} happen")
+        if not give(item):
+            return Played(
+                tuple(inputs), tuple(steps), f"the engine goes another way at {rule.name}"
+            )
+    return Played(tuple(inputs), tuple(steps), "")
+
+
+def _due_us(state: RunState, rule: Rule) -> int | None:
+    elements = {step.element for step in rule.steps[:1]}
+    elements |= {step.element for step in rule.steps if step.action is Action.TRIGGERED}
+    offset_us = state.started_us + state.paused_total_us
+    due = [
+        wait.due_us if wait.calendar else wait.due_us + offset_us
+        for wait in state.waits.values()
+        if wait.trigger.value == "timer" and wait.node.id in elements
+    ]
+    return min(due, default=None)
+
+
+def _inputs(system: System, rule: Rule, state: RunState) -> Iterator[i.Input]:
+    element = rule.element
+    match rule.trigger:
+        case Trigger.ANSWER:
+            for prompt in state.prompts.values():
+                if prompt.token.node.id == element:
+                    yield i.PromptAnswer(prompt.id, rule.detail, "verify")
+        case Trigger.SUCCEEDS | Trigger.FAILS:
+            yield from _reports(system, rule, state)
+        case Trigger.TIMER:
+            yield i.Tick()
+        case Trigger.SIGNAL:
+            yield i.SignalReceived(rule.detail, by="verify")
+        case Trigger.MESSAGE:
+            yield i.MessageReceived(rule.detail, by="verify")
+        case _:
+            pass
+
+
+def _reports(system: System, rule: Rule, state: RunState) -> Iterator[i.Input]:
+    well = rule.trigger is Trigger.SUCCEEDS
+    for behavior in state.behaviors.values():
+        if behavior.element == rule.element and behavior.phase is BehaviorPhase.ACTIVE:
+            yield i.BehaviorReported(
+                behavior.id,
+                behavior.number + 1,
+                BehaviorState.SUCCEEDED if well else BehaviorState.FAILED,
+                "" if well else rule.detail,
+                outputs=_written(system, rule) if well else {},
+            )
+    for service in state.services.values():
+        if service.token.node.id == rule.element:
+            if well:
+                yield i.ServiceCompleted(service.id, _written(system, rule))
+            else:
+                yield i.ServiceFailed(service.id, rule.detail)
+
+
+def _written(system: System, rule: Rule) -> dict[str, Value]:
+    return {
+        system.variables[variable].key: system.variables[variable].values[value]
+        for variable, value in rule.assign
+    }
