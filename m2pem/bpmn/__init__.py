@@ -23,13 +23,14 @@ from m2pem.bpmn.merge import merge
 from m2pem.bpmn.messages import resolve_messages
 from m2pem.bpmn.prompts import resolve_prompts
 from m2pem.bpmn.reading import Reading
-from m2pem.bpmn.rules import check_rules
-from m2pem.bpmn.rules.registry import code
+from m2pem.bpmn.rules.files import DOCTYPE, ENCODING, NOT_BPMN, NOT_XML, TOO_LARGE, UNREADABLE_FILE
+from m2pem.bpmn.rules.registry import check_rules
+from m2pem.bpmn.rules.subprocesses import NO_PROCESS
 from m2pem.bpmn.search_path import SearchPath
 from m2pem.bpmn.size import max_bytes
 from m2pem.bpmn.targets import find_called
 from m2pem.errors import MissionError
-from m2pem.findings import Finding, Severity, has_errors
+from m2pem.findings import Severity, has_errors
 from m2pem.mission.library import Library
 from m2pem.mission.mission import Mission
 
@@ -42,7 +43,7 @@ __all__ = [
 ]
 
 NO_BPMN_RULES = frozenset(
-    {"doctype", "encoding", "not-bpmn", "not-xml", "too-large", "unreadable-file"}
+    rule.slug for rule in (DOCTYPE, ENCODING, NOT_BPMN, NOT_XML, TOO_LARGE, UNREADABLE_FILE)
 )
 """Rules of the findings that say that a file is no BPMN at all (`m2pem check`: exit 2)."""
 
@@ -60,16 +61,8 @@ def read_mission(path: str | Path, search_path: Iterable[Path | str] = ()) -> Mi
         with Path(path).open("rb") as stream:
             data = stream.read(max_bytes() + 1)
     except OSError as error:
-        finding = Finding(
-            Severity.ERROR,
-            file,
-            0,
-            "",
-            "unreadable-file",
-            f"cannot read the file: {error.strerror or error}",
-            "name a BPMN 2.0 file",
-            code("unreadable-file"),
-        )
+        message = f"cannot read the file: {error.strerror or error}"
+        finding = UNREADABLE_FILE.finding(file, 0, "", message, UNREADABLE_FILE.right)
         raise MissionError(f"{file}: no mission", [finding]) from error
     return parse_mission(data, file, SearchPath(Path(path), map(Path, search_path)))
 
@@ -138,7 +131,7 @@ def _resolve(part: Part) -> None:
         reading.report.error(
             root,
             root.get("id", ""),
-            "no-process",
+            NO_PROCESS,
             "the file has no process",
             "draw a process with a start event",
         )

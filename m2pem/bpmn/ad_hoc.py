@@ -4,6 +4,7 @@ from lxml import etree
 
 from m2pem.bpmn.names import BPMN, M2PEM, ZEEBE
 from m2pem.bpmn.reading import Reading, text_of
+from m2pem.bpmn.rules.subprocesses import AD_HOC_ORDERING
 from m2pem.mission.elements import AdHocOrdering, AdHocSubProcess
 from m2pem.mission.expression import Expression
 
@@ -15,7 +16,7 @@ def read_ad_hoc(reading: Reading, element: etree._Element, identifier: str) -> A
         reading.report.error(
             element,
             identifier,
-            "ad-hoc-ordering",
+            AD_HOC_ORDERING,
             f"ordering='{ordering}' is none that BPMN knows",
             'write ordering="Parallel" or ordering="Sequential"',
         )

@@ -7,6 +7,22 @@ from lxml import etree
 
 from m2pem.bpmn.names import BPMN, M2PEM, local
 from m2pem.bpmn.reading import Reading
+from m2pem.bpmn.rules.attributes import BAD_VALUE
+from m2pem.bpmn.rules.behaviors import (
+    BEHAVIOR_NAME,
+    BEHAVIOR_TYPE,
+    DUPLICATE_PARAMETER,
+    DUPLICATE_PROPERTY,
+    DUPLICATE_ROLE,
+    MISPLACED,
+    PARAMETER_NAME,
+    REQUIRES_RESERVED,
+    ROLE_ALLOCATION,
+    ROLE_NAME,
+    ROLE_NOT_LITERAL,
+    SERVICE_CLASS,
+)
+from m2pem.bpmn.rules.rule import Rule
 from m2pem.mission.behavior import Behavior, BehaviorType, Parameter, Role, RoleKind, ServiceCall
 
 _ROLE_ATTRIBUTES = frozenset({"name", "optional", "requires", *RoleKind})
@@ -42,8 +58,8 @@ class BehaviorReader:
                 roles += self._resources(child)
             elif what == "role":
                 self._misplaced(child, "role", "resources")
-        self.refuse_repeated(parameters, "parameter")
-        self.refuse_repeated(roles, "role")
+        self.refuse_repeated(parameters, DUPLICATE_PARAMETER)
+        self.refuse_repeated(roles, DUPLICATE_ROLE)
         return self._finish(element, head, parameters, roles)
 
     def _finish(
@@ -60,7 +76,7 @@ class BehaviorReader:
             what = f"its type is '{kind}'" if kind else "it has no type"
             self._error(
                 line,
-                "behavior-type",
+                BEHAVIOR_TYPE,
                 f"the behavior cannot be commanded: {what}",
                 f"write one of the types {', '.join(BehaviorType)}",
             )
@@ -68,7 +84,7 @@ class BehaviorReader:
             what = f"its name '{name}' is no literal text" if name else "it has no name"
             self._error(
                 line,
-                "behavior-name",
+                BEHAVIOR_NAME,
                 f"the behavior cannot be commanded: {what}",
                 'write for example <property name="name" value="goto"/>',
             )
@@ -85,7 +101,7 @@ class BehaviorReader:
         if head.get(name, text) != text:
             self._error(
                 self._line(element),
-                f"behavior-{name}",
+                BEHAVIOR_TYPE if name == "type" else BEHAVIOR_NAME,
                 f"the behavior's {name} is both '{head[name]}' and '{text}'",
                 "keep one of the two",
             )
@@ -105,14 +121,14 @@ class BehaviorReader:
                 parameters += self._parameters(child)
             elif what == "resources":
                 roles += self._resources(child)
-        self.refuse_repeated(parameters, "property")
-        self.refuse_repeated(roles, "role")
+        self.refuse_repeated(parameters, DUPLICATE_PROPERTY)
+        self.refuse_repeated(roles, DUPLICATE_ROLE)
         name = (_attribute(element, "class") or "").strip()
         line = self._line(element)
         if not name:
             self._error(
                 line,
-                "service-class",
+                SERVICE_CLASS,
                 "the service has no class",
                 'write for example <m2pem:service class="Detector"/>',
             )
@@ -136,7 +152,7 @@ class BehaviorReader:
         if not name:
             self._error(
                 line,
-                "parameter-name",
+                PARAMETER_NAME,
                 "a property has no name",
                 'write <property name="speed" value="2 m/s"/>',
             )
@@ -157,13 +173,13 @@ class BehaviorReader:
         line = self._line(element)
         name = (_attribute(element, "name") or "").strip()
         if not name:
-            self._error(line, "role-name", "a role has no name", 'write <role name="driver" .../>')
+            self._error(line, ROLE_NAME, "a role has no name", 'write <role name="driver" .../>')
         texts = {key: _attribute(element, key) for key in sorted(_ROLE_ATTRIBUTES)}
         for key, text in texts.items():
             if text is not None and ("${" in text or "#{" in text):
                 self._error(
                     line,
-                    "role-not-literal",
+                    ROLE_NOT_LITERAL,
                     f"{key}='{text}' of role '{name}' is an expression, but roles are literal",
                     "write the vehicle, payload or team itself",
                 )
@@ -171,7 +187,7 @@ class BehaviorReader:
         if texts["requires"] is not None:
             self._error(
                 line,
-                "requires-reserved",
+                REQUIRES_RESERVED,
                 f"role '{name}' asks for a dynamic allocation (requires=), which m2pem reserves "
                 "but does not offer yet",
                 'name the resource: vehicle="...", payload="vehicle/payload" or team="..."',
@@ -182,7 +198,7 @@ class BehaviorReader:
             what = " and ".join(kind for kind, _ in named) if len(named) > 1 else "no resource"
             self._error(
                 line,
-                "role-allocation",
+                ROLE_ALLOCATION,
                 f"role '{name}' names {what}",
                 "name exactly one vehicle, payload or team",
             )
@@ -195,7 +211,7 @@ class BehaviorReader:
         if text not in (None, "true", "false", "1", "0"):
             self._error(
                 line,
-                "bad-value",
+                BAD_VALUE,
                 f"optional='{text}' of role '{role}' is neither true nor false",
                 'write optional="true", or delete it',
             )
@@ -208,14 +224,15 @@ class BehaviorReader:
             if _is_ours(child.tag):
                 yield child
 
-    def refuse_repeated(self, items: list[Named], what: str) -> None:
-        """Say which names stand there more than once."""
+    def refuse_repeated(self, items: list[Named], rule: Rule) -> None:
+        """Report the names that stand there more than once."""
+        what = rule.slug.removeprefix("duplicate-")
         seen: set[str] = set()
         for item in items:
             if item.name in seen:
                 self._error(
                     item.line,
-                    f"duplicate-{what}",
+                    rule,
                     f"the {what} '{item.name}' stands there twice",
                     "keep one of the two",
                 )
@@ -224,12 +241,12 @@ class BehaviorReader:
     def _misplaced(self, element: etree._Element, what: str, wrapper: str) -> None:
         self._error(
             self._line(element),
-            "misplaced",
+            MISPLACED,
             f"{what} stands outside <{wrapper}>",
             f"move it into <{wrapper}>",
         )
 
-    def _error(self, line: int, rule: str, message: str, remedy: str) -> None:
+    def _error(self, line: int, rule: Rule, message: str, remedy: str) -> None:
         self._report.error(line, self._task, rule, message, remedy)
 
 

@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import TypeAlias
 
 from m2pem.bpmn.data_names import written_by
-from m2pem.bpmn.rules.registry import code
-from m2pem.findings import Finding, Severity
+from m2pem.bpmn.rules.loops import BUSY_LOOP, ENDLESS_LOOP
+from m2pem.findings import Finding
 from m2pem.mission.behavior import Assignment, ThrowError
 from m2pem.mission.components import components
 from m2pem.mission.elements import (
@@ -428,7 +428,7 @@ class _Look:
         self, group: Sequence[FlowNode], path: Sequence[FlowNode], *, ends: bool
     ) -> Finding:
         ending = None if ends else _ending(self.mission, group)
-        rule = "busy-loop" if ends or ending is not None else "endless-loop"
+        rule = BUSY_LOOP if ends or ending is not None else ENDLESS_LOOP
         named = [f"'{node.id}'" for node in path[:_NAMED]]
         if len(path) > _NAMED:
             named.append(f"{len(path) - _NAMED} more")
@@ -447,15 +447,12 @@ class _Look:
                 "steps in it is paused"
             )
             remedy = "wait in each round, for a timer or an event, or count the rounds"
-        return Finding(
-            Severity.WARNING if rule == "busy-loop" else Severity.ERROR,
+        return rule.finding(
             self.mission.file_of(path[0]),
             path[0].line,
             path[0].id,
-            rule,
             f"{what} {how}",
             remedy,
-            code(rule),
         )
 
 

@@ -13,6 +13,8 @@ from m2pem.bpmn.reading import (
     association,
     reference,
 )
+from m2pem.bpmn.rules.activities import MAPPING_SOURCE, PASSES_EVERYTHING
+from m2pem.bpmn.rules.data import ASSOCIATION_IGNORED, BAD_KEY
 from m2pem.bpmn.scan import Scan
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.behavior import Mapping, Mappings
@@ -77,7 +79,7 @@ def _mapping(reading: Reading, found: Scan, element: etree._Element) -> Mapping 
         reading.report.error(
             element,
             found.id,
-            "passes-everything",
+            PASSES_EVERYTHING,
             f"variables='{element.get('variables')}' would pass every value, which m2pem refuses: "
             "nothing passes that is not listed",
             _ALL,
@@ -89,7 +91,7 @@ def _mapping(reading: Reading, found: Scan, element: etree._Element) -> Mapping 
         reading.report.error(
             element,
             found.id,
-            "bad-key",
+            BAD_KEY,
             f"the target '{target}' is no name of the data store"
             if target
             else "the mapping has no target",
@@ -105,7 +107,7 @@ def _source(reading: Reading, found: Scan, element: etree._Element) -> Expressio
         reading.report.error(
             element,
             found.id,
-            "mapping-source",
+            MAPPING_SOURCE,
             "the mapping has no source",
             'write a name or an expression, for example source="mission.speed"',
         )
@@ -121,7 +123,7 @@ def _refuse_propagation(reading: Reading, found: Scan, element: etree._Element) 
             reading.report.error(
                 element,
                 found.id,
-                "passes-everything",
+                PASSES_EVERYTHING,
                 f"{name} would pass every value, which m2pem refuses: nothing passes that is not "
                 "listed",
                 _ALL,
@@ -191,7 +193,7 @@ def _not_passed(
     reading.report.warning(
         found.element,
         pending.call.id,
-        "association-ignored",
+        ASSOCIATION_IGNORED,
         f"the data association passes nothing: {because}",
         'use <m2pem:in source="a.b" target="x"/> or <m2pem:out .../>',
     )

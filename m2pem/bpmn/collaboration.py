@@ -7,6 +7,7 @@ from lxml import etree
 from m2pem.bpmn.compensation import read_association
 from m2pem.bpmn.names import BPMN, local
 from m2pem.bpmn.reading import Reading, reference
+from m2pem.bpmn.rules.references import DANGLING_REFERENCE
 from m2pem.bpmn.scan import scan
 from m2pem.mission.elements import Element
 from m2pem.mission.mission import MessageFlow, Participant
@@ -78,7 +79,7 @@ def _warn(
     reading.report.warning(
         element.line,
         element.id,
-        "dangling-reference",
+        DANGLING_REFERENCE,
         f"{attribute} names '{name}', which does not exist" if name else f"it has no {attribute}",
         did_you_mean(name, known, "correct it, or delete it; it has no effect on execution"),
     )

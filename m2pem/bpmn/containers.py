@@ -15,6 +15,8 @@ from m2pem.bpmn.loops import LOOPS, read_loop
 from m2pem.bpmn.names import BPMN, a, kind, local
 from m2pem.bpmn.nodes import read_node
 from m2pem.bpmn.reading import Reading
+from m2pem.bpmn.rules.attributes import UNKNOWN_ELEMENT
+from m2pem.bpmn.rules.files import TOO_DEEP
 from m2pem.bpmn.scan import Order, Scan
 from m2pem.bpmn.schema import FLOW_ELEMENT_NAMES, SHAPES, Shape
 from m2pem.mission.elements import Container, Process, SubProcess
@@ -68,7 +70,7 @@ def read_process(reading: Reading, element: etree._Element) -> None:
             reading.report.error(
                 child,
                 inner.id,
-                "too-deep",
+                TOO_DEEP,
                 f"subprocesses are nested more than {MAX_DEPTH} deep",
                 "move inner subprocesses to processes of their own and call them",
             )
@@ -135,7 +137,7 @@ def _refuse_unknown(reading: Reading, frame: _Frame, child: etree._Element) -> N
     reading.report.error(
         child,
         child.get("id", "") or frame.container.id,
-        "unknown-element",
+        UNKNOWN_ELEMENT,
         f"BPMN has no '{name}' in {a(kind(frame.element.tag))}",
         did_you_mean(name, FLOW_ELEMENT_NAMES, "delete it"),
     )

@@ -6,6 +6,12 @@ from lxml import etree
 
 from m2pem.bpmn.names import BPMN, M2PEM, ZEEBE
 from m2pem.bpmn.reading import Reading, reference, text_of
+from m2pem.bpmn.rules.collaboration import (
+    BINDING_PATH,
+    BINDING_PROPERTY,
+    RETRIEVAL_MESSAGE,
+    RETRIEVAL_PATH,
+)
 from m2pem.mission.elements import Process
 from m2pem.mission.events import CorrelationProperty
 from m2pem.mission.expression import Expression
@@ -78,7 +84,7 @@ def _path(
     reading.report.error(
         element,
         identifier,
-        "retrieval-path" if tag == "messagePath" else "binding-path",
+        RETRIEVAL_PATH if tag == "messagePath" else BINDING_PATH,
         f"it has no {tag}, so nothing says by what messages are matched",
         f"write <{tag}>expression</{tag}>",
     )
@@ -89,9 +95,9 @@ def _dangling(
     reading: Reading, element: etree._Element, identifier: str, attribute: str, name: str
 ) -> None:
     if attribute == "messageRef":
-        rule, known = "retrieval-message", frozenset(reading.messages)
+        rule, known = RETRIEVAL_MESSAGE, frozenset(reading.messages)
     else:
-        rule, known = "binding-property", frozenset(reading.correlation_properties)
+        rule, known = BINDING_PROPERTY, frozenset(reading.correlation_properties)
     reading.report.error(
         element,
         identifier,

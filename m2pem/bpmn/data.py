@@ -4,6 +4,7 @@ from lxml import etree
 
 from m2pem.bpmn.names import local
 from m2pem.bpmn.reading import DataEnd, Reading, reference
+from m2pem.bpmn.rules.references import DANGLING_REFERENCE
 from m2pem.bpmn.scan import scan
 from m2pem.mission.elements import Container, DataObject
 from m2pem.mission.near import did_you_mean
@@ -41,7 +42,7 @@ def resolve_data(reading: Reading) -> None:
             reading.report.warning(
                 end.carriers[0],
                 identifier,
-                "dangling-reference",
+                DANGLING_REFERENCE,
                 f"it refers to '{end.refers_to}', which is no data object or data store",
                 did_you_mean(end.refers_to, reading.data, "correct it, or delete it"),
             )

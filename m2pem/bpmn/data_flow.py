@@ -13,6 +13,7 @@ from m2pem.bpmn.reading import (
     association,
     text_of,
 )
+from m2pem.bpmn.rules.data import BAD_ASSIGNMENT, EMPTY_ASSIGNMENT
 from m2pem.bpmn.scan import Scan
 from m2pem.mission.behavior import Mapping, Mappings
 from m2pem.mission.elements import Activity, Event
@@ -121,7 +122,7 @@ def _assignment(
         reading.report.warning(
             ends["from"],
             pending.node.id,
-            "empty-assignment",
+            EMPTY_ASSIGNMENT,
             f"the assignment of '{written}' has an empty 'from'; it assigns nothing",
             "write what it assigns, or delete it",
         )
@@ -130,7 +131,7 @@ def _assignment(
         reading.report.error(
             element,
             pending.node.id,
-            "bad-assignment",
+            BAD_ASSIGNMENT,
             f"the assignment's 'to', '{written}', is no name of the data"
             if "from" in ends and written
             else "the assignment does not say what to write, or where",

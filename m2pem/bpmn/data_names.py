@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from m2pem.bpmn.rules.registry import code
-from m2pem.findings import Finding, Severity
+from m2pem.bpmn.rules.data import UNWRITTEN_NAME
+from m2pem.findings import Finding
 from m2pem.mission.behavior import Assignment, Behavior, Parameter
 from m2pem.mission.behavior import Mapping as DataMapping
 from m2pem.mission.elements import (
@@ -117,16 +117,13 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
             reader = mission.elements.get(
                 read.element
             )  # a call reads what another file's process has
-            yield Finding(
-                Severity.WARNING,
+            yield UNWRITTEN_NAME.finding(
                 mission.file_of(reader if isinstance(reader, FlowNode) else process),
                 read.line,
                 read.element,
-                "unwritten-name",
                 f"'{name}' is read, but nothing in process '{process.id}' writes it; unless "
                 "--data or an operator does, it is null",
                 did_you_mean(name, store.written, "write it in a task before, or pass it in"),
-                code("unwritten-name"),
             )
 
 

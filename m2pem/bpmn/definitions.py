@@ -8,6 +8,8 @@ from lxml import etree
 from m2pem.bpmn.names import local
 from m2pem.bpmn.reading import MessageUse, Reading, reference, text_of
 from m2pem.bpmn.rewriting import time_remedy
+from m2pem.bpmn.rules.events import MISSING_REFERENCE, NO_CONDITION, TIMER_TIME
+from m2pem.bpmn.rules.references import DANGLING_REFERENCE
 from m2pem.bpmn.scan import Scan, scan
 from m2pem.bpmn.schema import SHAPES
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
@@ -101,7 +103,7 @@ def look_up(
     reading.report.error(
         element,
         stand_in.id,
-        "dangling-reference",
+        DANGLING_REFERENCE,
         f"{what}Ref names '{name}', but {because}",
         did_you_mean(name, table, f'put <{what} id="{name}"/> into definitions, or name another'),
     )
@@ -114,7 +116,7 @@ def _own(reading: Reading, event: Scan, table: dict[str, Root], root: Root) -> R
     reading.report.warning(
         event.element,
         event.id,
-        "missing-reference",
+        MISSING_REFERENCE,
         f"the event names no {what}; it has one of its own, with the id '{event.id}'",
         f"add {what}Ref to its event definition",
     )
@@ -146,7 +148,7 @@ def _conditional(reading: Reading, found: Scan) -> ConditionalEventDefinition | 
     reading.report.error(
         found.element,
         found.id,
-        "no-condition",
+        NO_CONDITION,
         "the conditional event has no condition",
         "add one, for example <condition>battery.level &lt; 20</condition>",
     )
@@ -167,7 +169,7 @@ def _timer(
         reading.report.error(
             element,
             identifier,
-            "timer-time",
+            TIMER_TIME,
             f"the timer has {said}",
             "give it one timeDuration (PT30S), timeDate (2026-01-31T12:00:00Z) or timeCycle "
             "(R3/PT10S)",
@@ -183,7 +185,7 @@ def _timer(
             _CHECKS[kind](expression.evaluate(lambda _: None))
         except (ExpressionSyntaxError, ExpressionError) as error:
             reading.report.error(
-                times[0], identifier, "timer-time", f"{name}: {error}", time_remedy(name, text)
+                times[0], identifier, TIMER_TIME, f"{name}: {error}", time_remedy(name, text)
             )
             return None
     return TimerEventDefinition(reading.report.line(element), kind, expression)

@@ -8,7 +8,14 @@ from m2pem.bpmn.data_flow import read_data_flow
 from m2pem.bpmn.definitions import read_definition
 from m2pem.bpmn.names import BPMN, a, kind, local
 from m2pem.bpmn.reading import Reading, reference, text_of
-from m2pem.bpmn.rules.events import allowed_triggers
+from m2pem.bpmn.rules.events import (
+    ERROR_NOT_INTERRUPTING,
+    EVENT_NOT_ALLOWED,
+    NO_TRIGGER,
+    TYPED_START_IN_SUBPROCESS,
+    allowed_triggers,
+)
+from m2pem.bpmn.rules.references import DANGLING_REFERENCE
 from m2pem.bpmn.scan import Scan, scan
 from m2pem.mission.elements import (
     BoundaryEvent,
@@ -88,7 +95,7 @@ def _no_error(reading: Reading, element: etree._Element, event: Event) -> None:
     reading.report.error(
         element,
         event.id,
-        "error-not-interrupting",
+        ERROR_NOT_INTERRUPTING,
         f'a {word} event that catches an error cannot have {attribute}="false": the {what} has '
         "already failed",
         "make it interrupting, or throw and catch an escalation",
@@ -134,7 +141,7 @@ def read_thrown(
             reading.report.error(
                 element,
                 found.id,
-                "event-not-allowed",
+                EVENT_NOT_ALLOWED,
                 f"a multi-instance activity cannot throw {a(kind(element.tag))} by itself",
                 f"use one of: {', '.join(sorted(_THROWN_IMPLICITLY))}",
             )
@@ -155,7 +162,7 @@ def _definition(
         reading.report.error(
             found.element,
             found.id,
-            "typed-start-in-subprocess",
+            TYPED_START_IN_SUBPROCESS,
             f"a start event in an embedded subprocess cannot wait for {a(kind(definition.tag))}",
             "use a plain start event, and a catching intermediate event after it",
         )
@@ -174,7 +181,7 @@ def referred_definition(
         reading.report.error(
             referring,
             identifier,
-            "dangling-reference",
+            DANGLING_REFERENCE,
             f"{attribute} names '{name}', which is no event definition of this file",
             did_you_mean(name, reading.event_definitions, "name one that stands in definitions"),
         )
@@ -187,7 +194,7 @@ def _no_trigger(reading: Reading, found: Scan, place: str) -> None:
     reading.report.error(
         found.element,
         found.id,
-        "no-trigger",
+        NO_TRIGGER,
         f"{a(word)} must say what it waits for",
         f"give it a signal, message, timer or conditional event definition{also}",
     )

@@ -12,11 +12,11 @@ from m2pem.bpmn.names import BPMN, local
 from m2pem.bpmn.reading import PendingCall, Reading
 from m2pem.bpmn.report import Report
 from m2pem.bpmn.roots import read_roots
-from m2pem.bpmn.rules.registry import code
+from m2pem.bpmn.rules.files import IMPORT_UNREADABLE, NOT_BPMN, UNUSABLE_FILE
 from m2pem.bpmn.type_names import call_by_role
 from m2pem.bpmn.xml import Document, XmlError, parse_xml
 from m2pem.errors import MissionError
-from m2pem.findings import Finding, Severity
+from m2pem.findings import Finding
 from m2pem.mission.elements import CallActivity, Container, Process, SubProcess
 from m2pem.mission.events import CorrelationProperty
 from m2pem.mission.library import Library, LibraryError, Question, Source
@@ -113,16 +113,7 @@ def open_part(data: bytes, name: str, qualifier: str = "") -> Part:
     try:
         document = parse_xml(data)
     except XmlError as error:
-        finding = Finding(
-            Severity.ERROR,
-            name,
-            error.line,
-            "",
-            error.rule,
-            error.message,
-            error.remedy,
-            code(error.rule),
-        )
+        finding = error.rule.finding(name, error.line, "", error.message, error.remedy)
         raise MissionError(f"{name}: no BPMN 2.0 file", [finding]) from None
     report = Report(name, document.line, qualifier)
     if document.root.tag != BPMN + "definitions":
@@ -138,7 +129,7 @@ def _not_bpmn(report: Report, document: Document) -> None:
     report.error(
         document.root,
         document.root.get("id", ""),
-        "not-bpmn",
+        NOT_BPMN,
         f"the file's root is '{local(tag)}' of the namespace {namespace}, not BPMN 2.0's "
         "'definitions'",
         f'export it as BPMN 2.0: xmlns="{_MODEL}"',
@@ -198,7 +189,7 @@ class Files:
                 part = open_part(source.data, source.name, self._qualifier(source.name))
             except MissionError as error:
                 self.findings += [
-                    replace(each, rule="unusable-file", number=code("unusable-file"))
+                    replace(each, rule=UNUSABLE_FILE.slug, number=UNUSABLE_FILE.code)
                     for each in error.findings
                 ]
                 return None
@@ -241,7 +232,7 @@ class Files:
             source = self.library.imported(location, part.name)
         except LibraryError as error:
             part.reading.report.warning(
-                element, "", "import-unreadable", f"nothing is imported: {error}", error.remedy
+                element, "", IMPORT_UNREADABLE, f"nothing is imported: {error}", error.remedy
             )
             return
         imported = self._take(source, ("import", location, part.name))

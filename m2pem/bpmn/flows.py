@@ -4,6 +4,7 @@ from lxml import etree
 
 from m2pem.bpmn.names import BPMN
 from m2pem.bpmn.reading import FlowEnds, Reading, reference, text_of
+from m2pem.bpmn.rules.sequence_flows import EMPTY_CONDITION
 from m2pem.bpmn.scan import Order
 from m2pem.bpmn.schema import SHAPES
 from m2pem.mission.elements import Container, SequenceFlow
@@ -45,7 +46,7 @@ def _condition(reading: Reading, element: etree._Element, identifier: str) -> Ex
         reading.report.warning(
             element,
             identifier,
-            "empty-condition",
+            EMPTY_CONDITION,
             "the condition is empty; the flow counts as one without a condition",
             "write the condition, or delete the conditionExpression",
         )

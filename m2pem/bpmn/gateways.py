@@ -4,6 +4,7 @@ from lxml import etree
 
 from m2pem.bpmn.names import BPMN
 from m2pem.bpmn.reading import Reading, reference, text_of
+from m2pem.bpmn.rules.gateways import NO_ACTIVATION_CONDITION, PARALLEL_EVENT_GATEWAY
 from m2pem.bpmn.scan import Scan, scan
 from m2pem.mission.elements import (
     ComplexGateway,
@@ -40,7 +41,7 @@ def read_gateway(reading: Reading, element: etree._Element) -> Gateway:
             reading.report.error(
                 element,
                 identifier,
-                "parallel-event-gateway",
+                PARALLEL_EVENT_GATEWAY,
                 "an event-based gateway that waits for all of its events (eventGatewayType="
                 '"Parallel") is allowed only where it begins the process',
                 'add instantiate="true" where it has no incoming flow; else fork with a parallel '
@@ -63,7 +64,7 @@ def _activation(reading: Reading, found: Scan) -> Expression | None:
     reading.report.warning(
         found.element,
         found.id,
-        "no-activation-condition",
+        NO_ACTIVATION_CONDITION,
         "the complex gateway has no activationCondition; any token activates it",
         "add one, for example <activationCondition>activationCount >= 2</activationCondition>",
     )

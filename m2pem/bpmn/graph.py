@@ -1,8 +1,9 @@
 """What BPMN asks of the linked graph: a beginning, and conditions in place."""
 
 from m2pem.bpmn.reading import Reading
-from m2pem.bpmn.rules.registry import code
-from m2pem.findings import Finding, Severity
+from m2pem.bpmn.rules.sequence_flows import CONDITION_IGNORED, CONDITION_NOT_ALLOWED
+from m2pem.bpmn.rules.subprocesses import EMPTY_PROCESS, EMPTY_SUBPROCESS, NO_START, UNREACHABLE
+from m2pem.findings import Finding
 from m2pem.mission.elements import (
     Container,
     Event,
@@ -29,7 +30,7 @@ def check_graph(reading: Reading) -> None:
             reading.report.warning(
                 container.line,
                 container.id,
-                "empty-subprocess",
+                EMPTY_SUBPROCESS,
                 "the subprocess is empty; it ends as soon as it is entered",
                 "draw its content, or make it a task",
             )
@@ -48,7 +49,7 @@ def _check_processes(reading: Reading) -> None:
         say(
             process.line,
             process.id,
-            "empty-process",
+            EMPTY_PROCESS,
             "the process has no elements",
             "draw its content, or delete it",
         )
@@ -60,7 +61,7 @@ def _check_start(reading: Reading, container: Container) -> None:
             reading.report.error(
                 container.line,
                 container.id,
-                "no-start",
+                NO_START,
                 "an event subprocess begins with its start event, and it has none",
                 "add a start event that says what it waits for",
             )
@@ -68,7 +69,7 @@ def _check_start(reading: Reading, container: Container) -> None:
         reading.report.error(
             container.line,
             container.id,
-            "no-start",
+            NO_START,
             "nothing in it can start: there is no start event, and every element has an incoming "
             "flow or waits for a trigger",
             "add a start event",
@@ -94,16 +95,8 @@ def unreachable(file: str, node: FlowNode) -> Finding:
         for definition in node.definitions:
             if isinstance(definition, LinkEventDefinition):
                 remedy = f"add a link throw event of the name '{definition.name}', or delete it"
-    return Finding(
-        Severity.ERROR,
-        file,
-        node.line,
-        node.id,
-        "unreachable",
-        f"{what}, so it would never run",
-        remedy,
-        code("unreachable"),
-    )
+    message = f"{what}, so it would never run"
+    return UNREACHABLE.finding(file, node.line, node.id, message, remedy)
 
 
 def _containers(reading: Reading) -> list[Container]:
@@ -120,7 +113,7 @@ def _check_conditions(reading: Reading) -> None:
             reading.report.warning(
                 flow.line,
                 flow.id,
-                "condition-ignored",
+                CONDITION_IGNORED,
                 "a parallel gateway takes every flow; the condition is ignored",
                 "delete the condition, or make the gateway inclusive",
             )
@@ -129,7 +122,7 @@ def _check_conditions(reading: Reading) -> None:
             reading.report.error(
                 flow.line,
                 flow.id,
-                "condition-not-allowed",
+                CONDITION_NOT_ALLOWED,
                 "BPMN allows no condition on a flow out of an event",
                 "put an exclusive gateway behind the event",
             )

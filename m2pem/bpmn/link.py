@@ -6,6 +6,16 @@ The only place that sets the fields of elements after they were made.
 from m2pem.bpmn.links import is_link_target, resolve_links
 from m2pem.bpmn.names import a
 from m2pem.bpmn.reading import FlowEnds, Reading
+from m2pem.bpmn.rules.events import BAD_ATTACHMENT
+from m2pem.bpmn.rules.references import DANGLING_REFERENCE
+from m2pem.bpmn.rules.sequence_flows import (
+    DEFAULT_NOT_OWN,
+    DEFAULT_WITH_CONDITION,
+    FLOW_CROSSES_BORDER,
+    FLOW_INTO_BOUNDARY,
+    FLOW_INTO_START,
+    FLOW_OUT_OF_END,
+)
 from m2pem.mission.elements import (
     Activity,
     BoundaryEvent,
@@ -93,7 +103,7 @@ def _dangling_end(
     reading.report.error(
         ends.flow.line,
         ends.flow.id,
-        "dangling-reference",
+        DANGLING_REFERENCE,
         message,
         did_you_mean(name, nodes, "name an activity, gateway or event, or delete the flow"),
     )
@@ -104,7 +114,7 @@ def _crossing(reading: Reading, flow: SequenceFlow, source: FlowNode, target: Fl
     reading.report.error(
         flow.line,
         flow.id,
-        "flow-crosses-border",
+        FLOW_CROSSES_BORDER,
         f"the sequence flow leads from '{source.id}' in {_called(source.container)} to "
         f"'{target.id}' in {_called(target.container)}",
         "let it lead from or to the subprocess itself; between pools, draw a message flow",
@@ -118,15 +128,15 @@ def _called(container: Container) -> str:
 
 def _wrong_end(reading: Reading, flow: SequenceFlow, source: FlowNode, target: FlowNode) -> None:
     if isinstance(source, EndEvent):
-        rule = "flow-out-of-end"
+        rule = FLOW_OUT_OF_END
         said = f"out of the end event '{source.id}'"
         remedy = "make it an intermediate throw event, or delete the flow"
     elif isinstance(target, BoundaryEvent):
-        rule = "flow-into-boundary"
+        rule = FLOW_INTO_BOUNDARY
         said = f"into the boundary event '{target.id}'"
         remedy = "lead it to the activity, or to what follows the boundary event"
     else:
-        rule = "flow-into-start"
+        rule = FLOW_INTO_START
         said = f"into the start event '{target.id}'"
         remedy = "lead it to what follows the start event"
     reading.report.error(flow.line, flow.id, rule, f"no sequence flow can lead {said}", remedy)
@@ -183,7 +193,7 @@ def _link_defaults(reading: Reading) -> None:
                 reading.report.warning(
                     flow.line,
                     flow.id,
-                    "default-with-condition",
+                    DEFAULT_WITH_CONDITION,
                     f"the condition of a default flow is ignored (it is that of '{node.id}')",
                     "delete the condition, or make another flow the default",
                 )
@@ -192,7 +202,7 @@ def _link_defaults(reading: Reading) -> None:
             reading.report.error(
                 line,
                 node.id,
-                "default-not-own",
+                DEFAULT_NOT_OWN,
                 f"the default flow '{ref}' does not leave '{node.id}'",
                 "name one of its own outgoing sequence flows",
             )
@@ -200,7 +210,7 @@ def _link_defaults(reading: Reading) -> None:
             reading.report.error(
                 line,
                 node.id,
-                "dangling-reference",
+                DANGLING_REFERENCE,
                 f"default names '{ref}', but no sequence flow has that id",
                 did_you_mean(
                     ref,
@@ -219,11 +229,11 @@ def _link_boundary(reading: Reading, nodes: dict[str, FlowNode]) -> None:
             attached.setdefault(host, []).append(event)
             continue
         reading.broken.add(event.container)
-        rule, remedy = "bad-attachment", "attach it to an activity of the same process"
+        rule, remedy = BAD_ATTACHMENT, "attach it to an activity of the same process"
         if not ref:
             message = "the boundary event says not to which activity it is attached"
         elif host is None:
-            rule = "dangling-reference"
+            rule = DANGLING_REFERENCE
             message = f"attachedToRef names '{ref}', but no flow node has that id"
             remedy = did_you_mean(ref, nodes, remedy)
         elif isinstance(host, Activity):

@@ -5,6 +5,15 @@ one target.
 """
 
 from m2pem.bpmn.reading import Reading
+from m2pem.bpmn.rules.events import (
+    DANGLING_LINK,
+    DUPLICATE_LINK,
+    LINK_CATCH_INCOMING,
+    LINK_CROSSES_BORDER,
+    LINK_NAME,
+    LINK_THROW_OUTGOING,
+)
+from m2pem.bpmn.rules.rule import Rule
 from m2pem.mission.elements import (
     Container,
     Event,
@@ -35,7 +44,7 @@ def resolve_links(reading: Reading) -> None:
             _say(
                 reading,
                 node,
-                "link-name",
+                LINK_NAME,
                 "the link event has no name, so nothing says what it is joined to",
                 'name it: <linkEventDefinition name="A"/>, and the other end alike',
             )
@@ -45,7 +54,7 @@ def resolve_links(reading: Reading) -> None:
                 _say(
                     reading,
                     node,
-                    "duplicate-link",
+                    DUPLICATE_LINK,
                     f"the link '{link.name}' has another target, '{first.id}' on line {first.line}",
                     "give it another name, or lead the sources to one of the two",
                 )
@@ -79,7 +88,7 @@ def _check_flows(reading: Reading, node: FlowNode) -> None:
         reading.report.error(
             flow.line,
             flow.id,
-            "link-catch-incoming" if catches else "link-throw-outgoing",
+            LINK_CATCH_INCOMING if catches else LINK_THROW_OUTGOING,
             f"no sequence flow can lead {said}",
             f"lead it to {follows}" if catches else f"let it begin at {follows}",
         )
@@ -93,15 +102,15 @@ def _no_target(
 ) -> None:
     near = [name for container, name in targets if container is node.container]
     elsewhere = [each.id for (_, name), each in targets.items() if name == link.name]
-    rule, message = "dangling-link", f"the link '{link.name}' has no target"
+    rule, message = DANGLING_LINK, f"the link '{link.name}' has no target"
     remedy = f'add <intermediateCatchEvent> with <linkEventDefinition name="{link.name}"/>'
     if elsewhere:
-        rule = "link-crosses-border"
+        rule = LINK_CROSSES_BORDER
         message += f" here: '{elsewhere[0]}' is in another process or subprocess"
         remedy = "links join places of one container: let a sequence flow leave the subprocess"
     _say(reading, node, rule, message, did_you_mean(link.name, near, remedy))
 
 
-def _say(reading: Reading, node: FlowNode, rule: str, message: str, remedy: str) -> None:
+def _say(reading: Reading, node: FlowNode, rule: Rule, message: str, remedy: str) -> None:
     reading.broken.add(node.container)
     reading.report.error(node.line, node.id, rule, message, remedy)

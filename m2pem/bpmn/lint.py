@@ -10,8 +10,11 @@ from m2pem.bpmn import collector
 from m2pem.bpmn.busy_loops import busy_loops
 from m2pem.bpmn.data_names import unwritten
 from m2pem.bpmn.graph import unreachable
-from m2pem.bpmn.rules.registry import code
-from m2pem.findings import Finding, Severity
+from m2pem.bpmn.rules.activities import CALL_RECURSION
+from m2pem.bpmn.rules.events import OUTSIDE_ONLY
+from m2pem.bpmn.rules.gateways import NO_CONDITIONS
+from m2pem.bpmn.rules.rule import Rule
+from m2pem.findings import Finding
 from m2pem.mission.components import components
 from m2pem.mission.elements import (
     Activity,
@@ -71,10 +74,10 @@ def by_file(mission: Mission) -> Callable[[Finding], tuple[bool, str]]:
 
 
 def _warning(
-    mission: Mission, about: FlowNode | Signal | Message, rule: str, said: tuple[str, str]
+    mission: Mission, about: FlowNode | Signal | Message, rule: Rule, said: tuple[str, str]
 ) -> Finding:
     file = mission.file_of(about)
-    return Finding(Severity.WARNING, file, about.line, about.id, rule, *said, code(rule))
+    return rule.finding(file, about.line, about.id, *said)
 
 
 def _unreachable(mission: Mission) -> Iterator[Finding]:
@@ -100,7 +103,7 @@ def _undecided_gateways(mission: Mission) -> Iterator[Finding]:
             yield _warning(
                 mission,
                 node,
-                "no-conditions",
+                NO_CONDITIONS,
                 (
                     f"none of the gateway's {len(node.outgoing)} outgoing flows has a condition; "
                     f"{what}",
@@ -135,7 +138,7 @@ def _outside_only(mission: Mission) -> Iterator[Finding]:
         yield _warning(
             mission,
             root,
-            "outside-only",
+            OUTSIDE_ONLY,
             (
                 f"{waiting} {'wait' if len(catchers) > 1 else 'waits'} for the {what} "
                 f"'{root.name or root.id}', which nothing in the file "
@@ -185,7 +188,7 @@ def _recursion(mission: Mission) -> Iterator[Finding]:
                 yield _warning(
                     mission,
                     call,
-                    "call-recursion",
+                    CALL_RECURSION,
                     (
                         f"process '{process.id}' calls itself through '{call.called.id}'"
                         if call.called is not process

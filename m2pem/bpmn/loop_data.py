@@ -17,6 +17,8 @@ from m2pem.bpmn.reading import (
     Reading,
     text_of,
 )
+from m2pem.bpmn.rules.events import MISSING_REFERENCE
+from m2pem.bpmn.rules.references import DANGLING_REFERENCE
 from m2pem.mission.elements import Activity
 from m2pem.mission.events import SignalEventDefinition
 from m2pem.mission.expression import Expression
@@ -93,12 +95,12 @@ def _named(reading: Reading, pending: PendingLoop, attribute: str, ref: str) -> 
     if not KEY.fullmatch(ref):
         remedy = did_you_mean(ref, reading.data, "name a data object")
         what = f"{attribute} names '{ref}', which is no data object"
-        reading.report.error(where, identifier, "dangling-reference", what, remedy)
+        reading.report.error(where, identifier, DANGLING_REFERENCE, what, remedy)
         return ""
     reading.report.warning(
         where,
         identifier,
-        "dangling-reference",
+        DANGLING_REFERENCE,
         f"{attribute} names '{ref}', which is no data object, data input or data output here; it "
         "is taken for a name of the data store",
         did_you_mean(ref, reading.data, 'name a data object, or write m2pem:collection="..."'),
@@ -137,5 +139,5 @@ def _catch_default(reading: Reading, node: Activity, thrown: SignalEventDefiniti
             findings[:] = [
                 each
                 for each in findings
-                if (each.element, each.rule) != (event.id, "missing-reference")
+                if (each.element, each.rule) != (event.id, MISSING_REFERENCE.slug)
             ]

@@ -8,6 +8,18 @@ from lxml import etree
 from m2pem.bpmn.events import definition_elements, read_thrown, referred_definition
 from m2pem.bpmn.names import ACTIVITI, BPMN, CAMUNDA, FLOWABLE, M2PEM, ZEEBE
 from m2pem.bpmn.reading import KEY, DataEnd, PendingLoop, Reading, reference, text_of
+from m2pem.bpmn.rules.data import BAD_KEY
+from m2pem.bpmn.rules.loops import (
+    COMPLEX_BEHAVIOR,
+    INSTANCE_COUNT,
+    INSTANCES_BEHAVIOR,
+    INSTANCES_COUNTED_TWICE,
+    LOOP_MAXIMUM,
+    LOOP_NOT_ALLOWED,
+    NO_LOOP,
+    TWO_LOOPS,
+)
+from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.scan import Scan, scan
 from m2pem.mission.elements import Activity, SubProcess
 from m2pem.mission.events import EventDefinition, Signal, SignalEventDefinition
@@ -37,15 +49,13 @@ def read_loop(reading: Reading, found: Scan, node: Activity) -> None:
     markers = [each for tag in LOOPS for each in found.children.get(tag, [])]
     element = markers[0]
     if len(markers) > 1:
-        _error(
-            reading, markers[1], node, "two-loops", "an activity has one loop marker", "keep one"
-        )
+        _error(reading, markers[1], node, TWO_LOOPS, "an activity has one loop marker", "keep one")
     if isinstance(node, SubProcess) and node.triggered_by_event:
         _error(
             reading,
             element,
             node,
-            "loop-not-allowed",
+            LOOP_NOT_ALLOWED,
             "an event subprocess is begun by its start event, as often as that is triggered; it "
             "cannot have a loop marker",
             "delete the marker, or put it on an activity inside",
@@ -60,13 +70,13 @@ def read_loop(reading: Reading, found: Scan, node: Activity) -> None:
             object.__setattr__(node, "own_data", own)
     else:
         remedy = "write standardLoopCharacteristics or multiInstanceLoopCharacteristics"
-        _error(reading, element, node, "no-loop", "it does not say which kind of loop", remedy)
+        _error(reading, element, node, NO_LOOP, "it does not say which kind of loop", remedy)
         return
     object.__setattr__(node, "loop", loop)
 
 
 def _error(
-    reading: Reading, where: etree._Element, node: Activity, rule: str, what: str, remedy: str
+    reading: Reading, where: etree._Element, node: Activity, rule: Rule, what: str, remedy: str
 ) -> None:
     reading.report.error(where, node.id, rule, what, remedy)
 
@@ -90,7 +100,7 @@ def _standard_loop(reading: Reading, element: etree._Element, node: Activity) ->
         maximum = int(text)
     elif text is not None:
         what = f"loopMaximum='{text}' is no number of rounds"
-        _error(reading, element, node, "loop-maximum", what, 'write for example loopMaximum="5"')
+        _error(reading, element, node, LOOP_MAXIMUM, what, 'write for example loopMaximum="5"')
     return StandardLoop(
         _expression(reading, found, "loopCondition", node),
         reading.boolean(element, "testBefore", False, node.id),
@@ -190,7 +200,7 @@ def _key(reading: Reading, element: etree._Element, node: Activity, key: str) ->
     if not key or KEY.fullmatch(key):
         return key
     what = f"'{key}' is no name of the data store"
-    _error(reading, element, node, "bad-key", what, 'write a dotted name, for example "field"')
+    _error(reading, element, node, BAD_KEY, what, 'write a dotted name, for example "field"')
     return ""
 
 
@@ -201,7 +211,7 @@ def _check_count(reading: Reading, found: Scan, node: Activity, has_collection: 
             reading,
             found.element,
             node,
-            "instances-counted-twice",
+            INSTANCES_COUNTED_TWICE,
             "the multi-instance activity has both a loopCardinality and a collection, either of "
             "which says how many instances there are",
             "keep one",
@@ -211,7 +221,7 @@ def _check_count(reading: Reading, found: Scan, node: Activity, has_collection: 
             reading,
             found.element,
             node,
-            "instance-count",
+            INSTANCE_COUNT,
             "the multi-instance activity does not say how many instances it has",
             "add a loopCardinality (a number or an expression), or name a collection: "
             'm2pem:collection="fields" m2pem:elementVariable="field"',
@@ -229,7 +239,7 @@ def _behavior(reading: Reading, element: etree._Element, node: Activity) -> Inst
         known = list(InstanceBehavior)
         remedy = did_you_mean(text, known, f"write one of: {', '.join(known)}")
         what = f"behavior='{text}' is no behavior of a multi-instance activity"
-        _error(reading, element, node, "instances-behavior", what, remedy)
+        _error(reading, element, node, INSTANCES_BEHAVIOR, what, remedy)
         return InstanceBehavior.ALL
 
 
@@ -263,7 +273,7 @@ def _complex(reading: Reading, found: Scan, node: Activity) -> tuple[ComplexBeha
                 reading,
                 each,
                 node,
-                "complex-behavior",
+                COMPLEX_BEHAVIOR,
                 "a complexBehaviorDefinition says when something is thrown, and what",
                 "give it a condition, and an event with an event definition",
             )

@@ -6,6 +6,7 @@ is made up, with the id of the first flow.
 """
 
 from m2pem.bpmn.reading import MessageUse, Reading
+from m2pem.bpmn.rules.events import MISSING_REFERENCE
 from m2pem.mission.elements import ReceiveTask
 from m2pem.mission.events import Message, MessageEventDefinition
 
@@ -68,7 +69,7 @@ def _assign(reading: Reading, use: MessageUse, message: Message | None) -> None:
         reading.report.warning(
             use.line,
             use.node_id,
-            "missing-reference",
+            MISSING_REFERENCE,
             f"no message is named and no message flow leads {'to' if use.catches else 'from'} it; "
             f"it has a message of its own, with the id '{use.node_id}'",
             "add messageRef, or draw a message flow",

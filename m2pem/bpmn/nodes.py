@@ -13,6 +13,10 @@ from m2pem.bpmn.loops import read_loop
 from m2pem.bpmn.names import BPMN, a, attribute_names, kind, local
 from m2pem.bpmn.prompts import read_user_task
 from m2pem.bpmn.reading import Reading, reference
+from m2pem.bpmn.rules.activities import COMPLETION_QUANTITY, START_QUANTITY
+from m2pem.bpmn.rules.attributes import BAD_VALUE
+from m2pem.bpmn.rules.files import NOT_EXECUTED
+from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.scan import Scan, scan
 from m2pem.bpmn.scripts import read_script_task
 from m2pem.bpmn.tasks import (
@@ -37,8 +41,8 @@ MAX_QUANTITY = 1000
 """Of tokens that begin an activity, or leave it by one flow."""
 
 _QUANTITIES = {
-    "start_quantity": ("startQuantity", "start-quantity"),
-    "completion_quantity": ("completionQuantity", "completion-quantity"),
+    "start_quantity": ("startQuantity", START_QUANTITY),
+    "completion_quantity": ("completionQuantity", COMPLETION_QUANTITY),
 }
 
 _MARKS = frozenset(
@@ -115,7 +119,7 @@ def _subprocess(reading: Reading, element: etree._Element, identifier: str) -> S
         reading.report.error(
             element,
             identifier,
-            "bad-value",
+            BAD_VALUE,
             f"{a(kind(element.tag))} cannot be an event subprocess too",
             'put it into a plain <subProcess triggeredByEvent="true">, behind a start event',
         )
@@ -132,7 +136,7 @@ def not_executed(
 ) -> None:
     """Refuse what is BPMN but nothing that m2pem runs."""
     reading.report.error(
-        element, identifier, "not-executed", f"m2pem does not execute {a(what)} yet", instead
+        element, identifier, NOT_EXECUTED, f"m2pem does not execute {a(what)} yet", instead
     )
 
 
@@ -151,13 +155,13 @@ def _check_activity(reading: Reading, element: etree._Element, node: Activity) -
         reading.report.error(
             element,
             node.id,
-            "start-quantity",
+            START_QUANTITY,
             "an event subprocess is begun by its start event, not by tokens that come to it",
             "delete startQuantity",
         )
 
 
-def _quantity(reading: Reading, element: etree._Element, name: str, text: str, rule: str) -> int:
+def _quantity(reading: Reading, element: etree._Element, name: str, text: str, rule: Rule) -> int:
     """How many tokens begin, or leave, an activity (table 10.3)."""
     if text.isascii() and text.isdecimal() and 1 <= int(text) <= MAX_QUANTITY:
         return int(text)

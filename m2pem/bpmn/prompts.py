@@ -6,6 +6,10 @@ from lxml import etree
 
 from m2pem.bpmn.names import BPMN, M2PEM, local
 from m2pem.bpmn.reading import KEY, PendingPrompt, Reading, association, text_of
+from m2pem.bpmn.rules.activities import DECISION_VALUE
+from m2pem.bpmn.rules.data import BAD_KEY
+from m2pem.bpmn.rules.events import TIMER_TIME
+from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.scan import Scan, own_extensions
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.behavior import Decision, Prompt
@@ -111,7 +115,7 @@ class _Asked:
             if name == "store" and not KEY.fullmatch(text.strip()):
                 self._error(
                     element,
-                    "bad-key",
+                    BAD_KEY,
                     f"store='{text}' is no name of the data store",
                     'write a dotted name, for example store="user.decision"',
                 )
@@ -125,7 +129,7 @@ class _Asked:
         try:
             duration_us(self.timeout.evaluate(lambda _: None), 0)
         except (ExpressionSyntaxError, ExpressionError) as error:
-            self._error(element, "timer-time", f"timeout: {error}", 'write for example "PT5M"')
+            self._error(element, TIMER_TIME, f"timeout: {error}", 'write for example "PT5M"')
 
     def _decision(self, element: etree._Element) -> None:
         value = element.get("value", element.get(M2PEM + "value"))
@@ -133,14 +137,14 @@ class _Asked:
         if not value:
             self._error(
                 element,
-                "decision-value",
+                DECISION_VALUE,
                 "a decision has no value",
                 'write <m2pem:decision value="continue" label="Continue"/>',
             )
         elif any(value == other.value for other in self.decisions):
             self._error(
                 element,
-                "decision-value",
+                DECISION_VALUE,
                 f"two decisions have the value '{value}'",
                 "give each its own value",
             )
@@ -148,5 +152,5 @@ class _Asked:
             label = element.get("label", element.get(M2PEM + "label")) or value
             self.decisions.append(Decision(value, label))
 
-    def _error(self, element: etree._Element, rule: str, message: str, remedy: str) -> None:
+    def _error(self, element: etree._Element, rule: Rule, message: str, remedy: str) -> None:
         self.reading.report.error(element, self.task, rule, message, remedy)

@@ -8,8 +8,10 @@ from lxml import etree
 from m2pem.bpmn.names import M2PEM, a, attribute_names, kind, local
 from m2pem.bpmn.report import Report, Where
 from m2pem.bpmn.rewriting import expression_remedy, value_remedy
+from m2pem.bpmn.rules.attributes import BAD_EXPRESSION, BAD_VALUE, unknown_attribute
+from m2pem.bpmn.rules.definitions import DUPLICATE_ID, MISSING_ID
+from m2pem.bpmn.rules.extensions import MISPLACED_EXTENSION, UNKNOWN_EXTENSION, WRONG_NAMESPACE
 from m2pem.bpmn.schema import Shape
-from m2pem.bpmn.unknown import unknown_attribute
 from m2pem.bpmn.vocabulary import looks_like_own, stranger_attribute
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.elements import (
@@ -196,7 +198,7 @@ class Reading:
             self.report.error(
                 element,
                 identifier,
-                "duplicate-id",
+                DUPLICATE_ID,
                 f"the id '{identifier}' is already that of the element on line {first}",
                 "give one of the two another id, and its references too",
             )
@@ -215,7 +217,7 @@ class Reading:
             self.report.warning(
                 element,
                 identifier,
-                "missing-id",
+                MISSING_ID,
                 f"{a(kind(element.tag))} has no id{f' (its name is {name!r})' if name else ''}; it "
                 f"is called '{identifier}'",
                 "give it an id that nothing else in the file has, so that others can name it",
@@ -243,7 +245,7 @@ class Reading:
                 self.report.error(
                     element,
                     identifier,
-                    "wrong-namespace",
+                    WRONG_NAMESPACE,
                     f"'{local(key)}' is of the namespace '{namespace}', which is not m2pem's",
                     f"did you mean '{M2PEM[1:-1]}'?",
                 )
@@ -254,9 +256,9 @@ class Reading:
             return
         known, message, remedy = wrong
         if known:
-            self.report.warning(element, identifier, "misplaced-extension", message, remedy)
+            self.report.warning(element, identifier, MISPLACED_EXTENSION, message, remedy)
         else:
-            self.report.error(element, identifier, "unknown-extension", message, remedy)
+            self.report.error(element, identifier, UNKNOWN_EXTENSION, message, remedy)
 
     def note_outputs(self, elements: list[etree._Element]) -> list[Association]:
         """Keep data output associations: they say what the element writes."""
@@ -282,7 +284,7 @@ class Reading:
             self.report.error(
                 element,
                 identifier,
-                "bad-value",
+                BAD_VALUE,
                 f"{name}='{text}' is neither true nor false",
                 f'write {name}="true" or {name}="false"',
             )
@@ -340,7 +342,7 @@ class Reading:
         self.report.error(
             where,
             identifier,
-            "bad-expression",
+            BAD_EXPRESSION,
             f"not an expression: {error}",
             remedy or expression_remedy(error.text),
         )

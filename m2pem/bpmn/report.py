@@ -5,7 +5,7 @@ from typing import TypeAlias, Union
 
 from lxml import etree
 
-from m2pem.bpmn.rules.registry import code
+from m2pem.bpmn.rules.rule import Rule
 from m2pem.findings import Finding, Severity
 
 Where: TypeAlias = Union[etree._Element, int]
@@ -25,21 +25,21 @@ class Report:
         self.line = line
         self.findings: list[Finding] = []
 
-    def error(self, where: Where, element: str, rule: str, message: str, remedy: str) -> None:
+    def error(self, where: Where, element: str, rule: Rule, message: str, remedy: str) -> None:
         """Note something that stops the mission from being loaded."""
         self._add(Severity.ERROR, where, element, rule, (message, remedy))
 
-    def warning(self, where: Where, element: str, rule: str, message: str, remedy: str) -> None:
+    def warning(self, where: Where, element: str, rule: Rule, message: str, remedy: str) -> None:
         """Note something doubtful."""
         self._add(Severity.WARNING, where, element, rule, (message, remedy))
 
     def _add(
-        self, severity: Severity, where: Where, element: str, rule: str, said: tuple[str, str]
+        self, severity: Severity, where: Where, element: str, rule: Rule, said: tuple[str, str]
     ) -> None:
         line = where if isinstance(where, int) else self.line(where)
         if self.qualifier and element:
             element = f"{self.qualifier}:{element}"
-        self.findings.append(Finding(severity, self.file, line, element, rule, *said, code(rule)))
+        self.findings.append(rule.finding(self.file, line, element, *said, severity))
 
     def sorted(self) -> tuple[Finding, ...]:
         """All findings by line; those of one line in the order they were made."""

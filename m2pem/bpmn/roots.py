@@ -7,6 +7,8 @@ from m2pem.bpmn.correlation import correlation_key, read_property
 from m2pem.bpmn.global_tasks import GLOBAL_TASKS
 from m2pem.bpmn.names import BPMN, M2PEM, a, kind, local
 from m2pem.bpmn.reading import DataEnd, Reading
+from m2pem.bpmn.rules.attributes import BAD_VALUE, UNKNOWN_ELEMENT
+from m2pem.bpmn.rules.files import NOT_EXECUTED
 from m2pem.bpmn.scan import Order, scan
 from m2pem.bpmn.schema import ROOT_NAMES, SHAPES
 from m2pem.mission.events import Error, Escalation, Message, Signal
@@ -56,7 +58,7 @@ def read_roots(reading: Reading, definitions: etree._Element) -> list[etree._Ele
             reading.report.warning(
                 element,
                 element.get("id", ""),
-                "unknown-element",
+                UNKNOWN_ELEMENT,
                 f"BPMN has no '{name}' in definitions; it is ignored",
                 did_you_mean(name, ROOT_NAMES, "delete it"),
             )
@@ -95,7 +97,7 @@ def _from_operator(reading: Reading, element: etree._Element, identifier: str) -
         reading.report.error(
             element,
             identifier,
-            "bad-value",
+            BAD_VALUE,
             f"m2pem:from='{sender}' names no sender that m2pem knows",
             'write m2pem:from="operator", or delete it',
         )
@@ -114,7 +116,7 @@ def _refuse_choreography(reading: Reading, element: etree._Element) -> None:
     reading.report.error(
         element,
         element.get("id", ""),
-        "not-executed",
+        NOT_EXECUTED,
         f"m2pem does not execute {a(word)} yet",
         "draw the mission as processes and collaborations",
     )

@@ -6,6 +6,7 @@ from lxml import etree
 
 from m2pem.bpmn.names import BPMN, M2PEM, a, kind, local
 from m2pem.bpmn.reading import Reading, text_of
+from m2pem.bpmn.rules.attributes import ELEMENT_ORDER, UNKNOWN_ELEMENT
 from m2pem.bpmn.schema import SHAPES, Shape
 from m2pem.mission.near import did_you_mean
 
@@ -80,7 +81,7 @@ class Order:
                 reading.report.warning(
                     child,
                     identifier or child.get("id", ""),
-                    "unknown-element",
+                    UNKNOWN_ELEMENT,
                     f"BPMN has no '{local(name)}' in {a(kind(parent.tag))}; it is ignored",
                     did_you_mean(local(name), [local(each) for each in shape.ranks], "delete it"),
                 )
@@ -92,7 +93,7 @@ class Order:
             reading.report.warning(
                 child,
                 identifier,
-                "element-order",
+                ELEMENT_ORDER,
                 f"'{local(name)}' comes after '{local(self.last)}', which BPMN's schema forbids",
                 f"move it before the first '{local(self.last)}'; some editors refuse the file",
             )

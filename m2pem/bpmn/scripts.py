@@ -8,6 +8,9 @@ from m2pem.bpmn.behavior_xml import BehaviorReader, is_behavior
 from m2pem.bpmn.names import BPMN, local
 from m2pem.bpmn.reading import Reading
 from m2pem.bpmn.rewriting import script_remedy, statement_remedy
+from m2pem.bpmn.rules.activities import BAD_SCRIPT, EMPTY_SCRIPT, SCRIPT_LANGUAGE
+from m2pem.bpmn.rules.behaviors import TWO_BEHAVIORS
+from m2pem.bpmn.rules.extensions import UNKNOWN_EXTENSION
 from m2pem.bpmn.scan import Scan, own_extensions
 from m2pem.bpmn.vocabulary import strangers
 from m2pem.bpmn.xml import XmlError, parse_xml
@@ -35,7 +38,7 @@ def read_script_task(reading: Reading, found: Scan) -> ScriptTask:
             reading.report.error(
                 found.element,
                 found.id,
-                "two-behaviors",
+                TWO_BEHAVIORS,
                 "the task has both m2pem:behavior and a script",
                 "delete one of the two",
             )
@@ -46,7 +49,7 @@ def read_script_task(reading: Reading, found: Scan) -> ScriptTask:
         reading.report.warning(
             found.element,
             found.id,
-            "empty-script",
+            EMPTY_SCRIPT,
             "the script task has no script; it does nothing",
             "give it a behavior, or make it a plain task",
         )
@@ -60,7 +63,7 @@ def read_carried(reading: Reading, found: Scan, carried: list[etree._Element]) -
         reading.report.error(
             carried[1],
             found.id,
-            "two-behaviors",
+            TWO_BEHAVIORS,
             "the task has more than one m2pem:behavior",
             "keep one; draw a task for each behavior",
         )
@@ -77,7 +80,7 @@ def _script(
         reading.report.error(
             found.element,
             found.id,
-            "script-language",
+            SCRIPT_LANGUAGE,
             f"m2pem does not run scripts in '{written}'",
             script_remedy(text, _language(found)),
         )
@@ -95,7 +98,7 @@ def _script(
         reading.report.error(
             line,
             found.id,
-            "bad-script",
+            BAD_SCRIPT,
             f"the script cannot be run: {message}",
             statement_remedy(lines[line - first]),
         )
@@ -111,7 +114,7 @@ def _form_differs(reading: Reading, found: Scan, actual: str) -> None:
     reading.report.error(
         found.element,
         found.id,
-        "script-language",
+        SCRIPT_LANGUAGE,
         f"the script says {_language(found)}='{found.element.get(_language(found))}', but is "
         f"{actual}",
         f"correct its {_language(found)}",
@@ -137,7 +140,7 @@ def _text_behavior(
         reading.report.error(
             first + error.line - 1,
             found.id,
-            "bad-script",
+            BAD_SCRIPT,
             error.message.replace("the file", "the script"),
             error.remedy,
         )
@@ -159,7 +162,7 @@ def _behavior(
     line: Callable[[etree._Element], int],
 ) -> Behavior | None:
     for where, message, remedy in strangers(element):
-        reading.report.error(line(where), found.id, "unknown-extension", message, remedy)
+        reading.report.error(line(where), found.id, UNKNOWN_EXTENSION, message, remedy)
     return BehaviorReader(reading, found.id, line).behavior(element)
 
 
@@ -167,7 +170,7 @@ def _no_behavior(reading: Reading, found: Scan, line: int, name: str) -> None:
     reading.report.error(
         line,
         found.id,
-        "bad-script",
+        BAD_SCRIPT,
         f"the script is XML, but <{name}> is no <behavior>",
         "write one <behavior> (docs/missions.md), or statements",
     )

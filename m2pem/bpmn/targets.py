@@ -10,6 +10,9 @@ from collections import deque
 from m2pem.bpmn.files import Files, Part
 from m2pem.bpmn.names import BPMN
 from m2pem.bpmn.reading import PendingCall
+from m2pem.bpmn.rules.activities import AMBIGUOUS_CALL, NO_CALLED_ELEMENT
+from m2pem.bpmn.rules.files import NOT_EXECUTED
+from m2pem.bpmn.rules.references import DANGLING_REFERENCE
 from m2pem.mission.elements import Process
 from m2pem.mission.library import LibraryError
 from m2pem.mission.near import did_you_mean
@@ -42,11 +45,11 @@ def find_called(files: Files) -> set[Process]:
 def _target(files: Files, part: Part, pending: PendingCall) -> Part | None:
     """The file in which the called element is; None when a finding says why there is none."""
     name = pending.call.called_id
-    rule, remedy = "dangling-reference", ""
+    rule, remedy = DANGLING_REFERENCE, ""
     if not name:
-        rule, message = "no-called-element", "the call activity does not say what it calls"
+        rule, message = NO_CALLED_ELEMENT, "the call activity does not say what it calls"
     elif name.startswith("=") or "{" in name:
-        rule = "not-executed"
+        rule = NOT_EXECUTED
         message = "m2pem does not execute a calledElement that is an expression"
         remedy = (
             "write the process's id, so that it can be checked before anything moves; to choose "
@@ -56,7 +59,7 @@ def _target(files: Files, part: Part, pending: PendingCall) -> Part | None:
         try:
             found = _look(files, part, name, _namespace(part, pending))
         except LibraryError as error:
-            rule, message, remedy = "ambiguous-call", error.message, error.remedy
+            rule, message, remedy = AMBIGUOUS_CALL, error.message, error.remedy
         else:
             if found is not None:
                 return found

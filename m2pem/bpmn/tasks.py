@@ -17,6 +17,7 @@ from m2pem.bpmn.names import (
     local,
 )
 from m2pem.bpmn.reading import MessageUse, Reading
+from m2pem.bpmn.rules.behaviors import DUPLICATE_PROPERTY, NO_SERVICE, TWO_BEHAVIORS, TWO_SERVICES
 from m2pem.bpmn.scan import Scan, own_extensions
 from m2pem.bpmn.scripts import BEHAVIOR, read_carried
 from m2pem.mission.behavior import Behavior, Parameter, ServiceCall
@@ -71,7 +72,7 @@ def _service_task(reading: Reading, found: Scan, task: type[Serving]) -> Serving
         reading.report.error(
             found.element,
             found.id,
-            "two-behaviors",
+            TWO_BEHAVIORS,
             f"the task has both m2pem:behavior and the service class '{call.service}'",
             "delete one of the two",
         )
@@ -79,7 +80,7 @@ def _service_task(reading: Reading, found: Scan, task: type[Serving]) -> Serving
         reading.report.warning(
             found.element,
             found.id,
-            "no-service",
+            NO_SERVICE,
             f"the {kind(found.element.tag)} names no service{_bound_elsewhere(found)}; it does "
             "nothing",
             'add <m2pem:service class="Detector"/> to its extension elements, or make it a plain '
@@ -106,7 +107,7 @@ def _service_call(
         reading.report.error(
             element,
             found.id,
-            "two-services",
+            TWO_SERVICES,
             f"the task names several service classes: {', '.join(sorted(classes))}",
             "keep one",
         )
@@ -115,7 +116,7 @@ def _service_call(
     first = named[0]
     properties = [*first.properties, *_loose_properties(reader, found, extensions)]
     roles = [*first.roles, *reader.roles(extensions.get("role", []))]
-    reader.refuse_repeated(properties, "property")
+    reader.refuse_repeated(properties, DUPLICATE_PROPERTY)
     return ServiceCall(first.service, first.line, tuple(roles), tuple(properties))
 
 
@@ -148,7 +149,7 @@ def read_send_task(reading: Reading, found: Scan) -> SendTask:
         reading.report.error(
             found.element,
             found.id,
-            "two-behaviors",
+            TWO_BEHAVIORS,
             "the task has both m2pem:behavior and a message to send",
             "draw a task for each",
         )

@@ -14,6 +14,8 @@ from operator import attrgetter
 
 from lxml import etree
 
+from m2pem.bpmn.rules.files import DOCTYPE, ENCODING, NOT_XML, TOO_DEEP, TOO_LARGE
+from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.size import max_bytes, too_large
 
 MAX_ELEMENT_DEPTH = 2048
@@ -43,7 +45,7 @@ _REFUSED_CODECS = frozenset(
 class XmlError(Exception):
     """The bytes are no XML that m2pem reads. `line` counts from 1."""
 
-    def __init__(self, rule: str, line: int, message: str, remedy: str) -> None:
+    def __init__(self, rule: Rule, line: int, message: str, remedy: str) -> None:
         super().__init__(message)
         self.rule = rule
         self.line = line
@@ -68,7 +70,7 @@ def parse_xml(data: bytes, *, declared: bool = True) -> Document:
         XmlError: too large, wrongly encoded, with a DOCTYPE, too deep or not well-formed.
     """
     if len(data) > max_bytes():
-        raise XmlError("too-large", 1, *too_large(len(data)))
+        raise XmlError(TOO_LARGE, 1, *too_large(len(data)))
     text = _decode(data) if declared else data.decode()
     _refuse_doctype(text)
     utf8 = text.encode()
@@ -110,7 +112,7 @@ def _decode(data: bytes) -> str:
         line = data.count(b"\n", 0, error.start) + 1
         byte = data[error.start]
         raise XmlError(
-            "encoding",
+            ENCODING,
             line,
             f"byte 0x{byte:02x} is no {encoding} text",
             "save the file as UTF-8, or declare its encoding in the first line",
@@ -133,7 +135,7 @@ def _declared_encoding(data: bytes) -> str:
         encoding = ""
     if not encoding or encoding.replace("_", "-") in _REFUSED_CODECS:
         raise XmlError(
-            "encoding", 1, f"m2pem does not know the encoding '{name}'", "save the file as UTF-8"
+            ENCODING, 1, f"m2pem does not know the encoding '{name}'", "save the file as UTF-8"
         )
     if encoding.startswith(("utf-16", "utf-32")):
         return "utf-8"  # the declaration was readable byte by byte, so it is wrong about itself
@@ -150,7 +152,7 @@ def _refuse_doctype(text: str) -> None:
 
 def _doctype_found(line: int) -> XmlError:
     return XmlError(
-        "doctype",
+        DOCTYPE,
         line,
         "the file has a document type declaration (DOCTYPE), which m2pem refuses: it can pull in "
         "other files",
@@ -163,13 +165,13 @@ def _not_well_formed(error: etree.XMLSyntaxError) -> XmlError:
     line = max(error.lineno or 1, 1)
     if "Excessive depth" in message:
         return XmlError(
-            "too-deep",
+            TOO_DEEP,
             line,
             f"elements are nested more than {MAX_ELEMENT_DEPTH} deep",
             "move inner subprocesses to processes of their own and call them",
         )
     return XmlError(
-        "not-xml",
+        NOT_XML,
         line,
         f"the file is not well-formed XML: {message.strip()}",
         "correct it, or export it again from the editor",

@@ -9,7 +9,9 @@ from urllib.parse import unquote, urlsplit
 from m2pem.api.authoring import Draft, MissionSource
 from m2pem.bpmn import parse_mission
 from m2pem.bpmn.lint import by_file, lint
-from m2pem.bpmn.rules.registry import code
+from m2pem.bpmn.rules.attributes import MISSPELLED_ATTRIBUTE
+from m2pem.bpmn.rules.extensions import FOREIGN_EXTENSION, MISPLACED_EXTENSION
+from m2pem.bpmn.rules.files import TOO_LARGE, UNREADABLE_FILE
 from m2pem.bpmn.search_path import SearchPath
 from m2pem.bpmn.size import max_bytes, too_large
 from m2pem.errors import MissionError
@@ -78,15 +80,12 @@ def _fetch(url: str) -> bytes:
 
 def _too_large(name: str, size: int | None) -> MissionError:
     message, remedy = too_large(size)
-    rule = "too-large"
-    finding = Finding(Severity.ERROR, name, 0, "", rule, message, remedy, code(rule))
+    finding = TOO_LARGE.finding(name, 0, "", message, remedy)
     return MissionError(f"{name} cannot be read", [finding])
 
 
 def _unreadable(name: str, why: str, remedy: str = "check the path") -> MissionError:
-    finding = Finding(
-        Severity.ERROR, name, 0, "", "unreadable-file", f"cannot be read: {why}", remedy
-    )
+    finding = UNREADABLE_FILE.finding(name, 0, "", f"cannot be read: {why}", remedy)
     return MissionError(f"{name} cannot be read", [finding])
 
 
@@ -161,7 +160,9 @@ def _unprovided(mission: Mission, services: Collection[str]) -> list[Finding]:
     ]
 
 
-_WITHOUT_EFFECT = frozenset({"misspelled-attribute", "misplaced-extension", "foreign-extension"})
+_WITHOUT_EFFECT = frozenset(
+    rule.slug for rule in (MISSPELLED_ATTRIBUTE, MISPLACED_EXTENSION, FOREIGN_EXTENSION)
+)
 
 
 def without_effect(mission: Mission) -> list[str]:

@@ -198,6 +198,14 @@ def test_roles_and_properties_of_a_service() -> None:
     [
         (extended("serviceTask", "<m2pem:service/>"), ("service-class", 4)),
         (
+            extended(
+                "serviceTask",
+                '<m2pem:service class="A"/><m2pem:property name="b" value="1"/>'
+                '<m2pem:property name="b" value="2"/>',
+            ),
+            ("duplicate-property", 4),
+        ),
+        (
             extended("serviceTask", '<m2pem:service class="A"/>', ' camunda:class="B"'),
             ("two-services", 3),
         ),

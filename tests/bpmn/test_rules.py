@@ -16,7 +16,7 @@ import test_rules_values
 from bpmn_text import around, findings, process, summary
 
 from m2pem.bpmn.rules.page import page
-from m2pem.bpmn.rules.registry import BY_SLUG, RULES
+from m2pem.bpmn.rules.registry import RULES
 from m2pem.bpmn.rules.rule import Rule
 
 HERE = Path(__file__).parent
@@ -79,18 +79,15 @@ def test_every_finding_of_the_readers_has_a_number() -> None:
     assert unnumbered == set()
 
 
-def test_slugs_in_the_code_of_the_readers_are_registered() -> None:
+def test_every_rule_is_used() -> None:
+    """Each is named again in the code, beside its declaration."""
     package = REPOSITORY / "m2pem" / "bpmn"
-    raised = {
-        slug
-        for file in package.glob("*.py")
-        for slug in re.findall(
-            r"report\.(?:error|warning)\([^\"]*?\n\s+\"([a-z]+(?:-[a-z]+)+)\",\n",
-            file.read_text(encoding="utf-8"),
-        )
-    }
-    assert raised
-    assert raised <= set(BY_SLUG)
+    used = Counter(
+        name
+        for file in package.rglob("*.py")
+        for name in re.findall(r"\b[A-Z_]+\b(?! = Rule)", file.read_text(encoding="utf-8"))
+    )
+    assert [rule.slug for rule in RULES if not used[rule.slug.upper().replace("-", "_")]] == []
 
 
 def test_the_docs_list_the_rules_as_they_are() -> None:

@@ -1,9 +1,230 @@
-"""Tasks: their data, and receive tasks that begin a process (BPMN 2.0.2, 10.3.3)."""
+"""Activities: tasks, calls, and who does them (BPMN 2.0.2, 8.4.12, 8.5, 10.3.1 and 10.3.3)."""
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import E, Rule, Topic, W, declared
-from m2pem.bpmn.rules.tree import Tree, children, is_true
+from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.tree import Checks, Tree, children, has, is_true, names, texts
+
+BAD_SCRIPT = Rule(
+    202,
+    "bad-script",
+    "missions.md",
+    E,
+    "a script is neither statements nor a behavior",
+    "see missions.md",
+)
+SCRIPT_LANGUAGE = Rule(
+    203,
+    "script-language",
+    "missions.md",
+    E,
+    "a script is in a language that m2pem does not run",
+    "write statements",
+)
+MAPPING_SOURCE = Rule(
+    215,
+    "mapping-source",
+    "missions.md",
+    E,
+    "a mapping of a call activity has no source",
+    "write a name or an expression",
+)
+PASSES_EVERYTHING = Rule(
+    216,
+    "passes-everything",
+    "missions.md",
+    E,
+    "a call activity passes all its data",
+    "list each value",
+)
+DECISION_VALUE = Rule(
+    217,
+    "decision-value",
+    "missions.md",
+    E,
+    "a decision has no value, or that of another",
+    "give each its own value",
+)
+AMBIGUOUS_CALL = Rule(
+    223,
+    "ambiguous-call",
+    "missions.md",
+    E,
+    "several files have the process that a call activity names",
+    "name the file's namespace in calledElement, or take one out of the search path",
+)
+EMPTY_SCRIPT = Rule(
+    302,
+    "empty-script",
+    "missions.md",
+    W,
+    "a script task has no script",
+    "write one, or make it a plain task",
+)
+CALL_RECURSION = Rule(
+    310,
+    "call-recursion",
+    "missions.md",
+    W,
+    "a process can call itself",
+    "make sure that a decision can end it",
+)
+START_QUANTITY = Rule(
+    10301,
+    "start-quantity",
+    "10.3",
+    E,
+    "startQuantity is no whole number from 1",
+    "write how many tokens begin the activity, or delete it",
+)
+COMPLETION_QUANTITY = Rule(
+    10302,
+    "completion-quantity",
+    "10.3",
+    E,
+    "completionQuantity is no whole number from 1",
+    "write how many tokens leave the activity, or delete it",
+)
+NO_CALLED_ELEMENT = Rule(
+    10321,
+    "no-called-element",
+    "10.3.6",
+    E,
+    "a call activity does not say what it calls",
+    "name a process in calledElement",
+)
+
+RESOURCE_NAME = Rule(
+    8461,
+    "resource-name",
+    "8.4.12",
+    W,
+    "the resource has no name",
+    "give it the name by which it is known",
+)
+RESOURCE_PARAMETER_NAME = Rule(
+    8462,
+    "resource-parameter-name",
+    "8.4.12",
+    W,
+    "the resource's parameter has no name",
+    "give the resourceParameter a name",
+)
+INTERFACE_NAME = Rule(
+    8501, "interface-name", "8.5.1", W, "the interface has no name", "give it a name"
+)
+INTERFACE_OPERATIONS = Rule(
+    8502,
+    "interface-operations",
+    "8.5.1",
+    W,
+    "the interface has no operation",
+    "add an operation, or delete the interface",
+)
+OPERATION_NAME = Rule(
+    8503, "operation-name", "8.5.3", W, "the operation has no name", "give it a name"
+)
+OPERATION_IN_MESSAGE = Rule(
+    8504,
+    "operation-in-message",
+    "8.5.3",
+    W,
+    "the operation's inMessageRef names no message",
+    "name the message that the operation takes",
+)
+ROLE_NAMED_TWICE = Rule(
+    10304,
+    "role-named-twice",
+    "10.3.1",
+    W,
+    "the role has both a resourceRef and a resourceAssignmentExpression",
+    "keep one of the two",
+)
+ROLE_BINDINGS = Rule(
+    10305,
+    "role-bindings",
+    "10.3.1",
+    W,
+    "the role binds parameters of a resource but names no resource",
+    "add resourceRef, or delete the resourceParameterBinding",
+)
+ROLE_PARAMETER = Rule(
+    10306,
+    "role-parameter",
+    "10.3.1",
+    W,
+    "the role's parameterRef names no parameter of a resource",
+    "name a resourceParameter",
+)
+ROLE_EXPRESSION = Rule(
+    10307,
+    "role-expression",
+    "10.3.1",
+    W,
+    "the role's resourceAssignmentExpression has no expression",
+    "write the expression that says who it is",
+)
+
+
+def _resource(tree: Tree, element: etree._Element) -> None:
+    if not element.get("name"):
+        tree.report(RESOURCE_NAME, element)
+
+
+def _parameter(tree: Tree, element: etree._Element) -> None:
+    if not element.get("name"):
+        tree.report(RESOURCE_PARAMETER_NAME, element)
+
+
+def _interface(tree: Tree, element: etree._Element) -> None:
+    if not element.get("name"):
+        tree.report(INTERFACE_NAME, element)
+    if not has(element, "operation"):
+        tree.report(INTERFACE_OPERATIONS, element)
+
+
+def _operation(tree: Tree, element: etree._Element) -> None:
+    if not element.get("name"):
+        tree.report(OPERATION_NAME, element)
+    messages = texts(element, "inMessageRef") or [""]
+    if tree.leads_nowhere(element, messages[0], names("message")):
+        tree.report(OPERATION_IN_MESSAGE, element, f"'{messages[0]}'")
+
+
+def _role(tree: Tree, element: etree._Element) -> None:
+    by_name = has(element, "resourceRef")
+    if by_name and has(element, "resourceAssignmentExpression"):
+        tree.report(ROLE_NAMED_TWICE, element)
+    if not by_name and has(element, "resourceParameterBinding"):
+        tree.report(ROLE_BINDINGS, element)
+
+
+def _binding(tree: Tree, element: etree._Element) -> None:
+    name = element.get("parameterRef", "")
+    if tree.leads_nowhere(element, name, names("resourceParameter")):
+        tree.report(ROLE_PARAMETER, element, f"'{name}'")
+
+
+def _expression(tree: Tree, element: etree._Element) -> None:
+    if not has(element, "expression formalExpression"):
+        tree.report(ROLE_EXPRESSION, element)
+
+
+SERVICES = Checks(
+    {
+        "resource": _resource,
+        "resourceParameter": _parameter,
+        "interface": _interface,
+        "operation": _operation,
+        "resourceRole": _role,
+        "performer": _role,
+        "humanPerformer": _role,
+        "potentialOwner": _role,
+        "resourceParameterBinding": _binding,
+        "resourceAssignmentExpression": _expression,
+    },
+)
+
 
 SERVICE_DATA = Rule(
     10312,
@@ -43,26 +264,25 @@ def _service(tree: Tree, element: etree._Element) -> None:
     for specification in children(element, "ioSpecification"):
         inputs = list(children(specification, "inputSet"))
         if len(inputs) > 1 or len(list(children(specification, "outputSet"))) > 1:
-            tree.say(SERVICE_DATA, element)
+            tree.report(SERVICE_DATA, element)
 
 
 def _send(tree: Tree, element: etree._Element) -> None:
     for specification in children(element, "ioSpecification"):
         inputs = list(children(specification, "dataInput"))
         if len(inputs) > 1 or len(list(children(specification, "inputSet"))) > 1:
-            tree.say(SEND_DATA, element)
+            tree.report(SEND_DATA, element)
 
 
 def _receive(tree: Tree, element: etree._Element) -> None:
     for specification in children(element, "ioSpecification"):
         outputs = list(children(specification, "dataOutput"))
         if len(outputs) > 1 or len(list(children(specification, "outputSet"))) > 1:
-            tree.say(RECEIVE_DATA, element)
+            tree.report(RECEIVE_DATA, element)
     if is_true(element, "instantiate") and tree.into(element):
-        tree.say(RECEIVE_BEGINS, element)
+        tree.report(RECEIVE_BEGINS, element)
 
 
-TOPIC = Topic(
-    declared(globals()),
+CHECKS = Checks(
     {"serviceTask": _service, "sendTask": _send, "receiveTask": _receive},
 )

@@ -1,11 +1,129 @@
-"""Pools and conversations (BPMN 2.0.2, 9.3 and 9.5)."""
+"""Pools, conversations, message flows, correlation and lanes.
+
+BPMN 2.0.2, 7.6.3, 8.4.2, 9.3 to 9.5, 10.5 and 10.8.
+"""
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import Check, Rule, Topic, W, declared
-from m2pem.bpmn.rules.tree import Tree, name_of, names, texts
+from m2pem.bpmn.names import BPMN, a, kind
+from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.tree import (
+    ACTIVITIES,
+    CATCHING,
+    EVENTS,
+    NODES,
+    THROWING,
+    Check,
+    Checks,
+    Tree,
+    children,
+    has,
+    has_trigger,
+    name_of,
+    names,
+    texts,
+    triggers,
+    what,
+)
 
-MINIMUM = Rule(
+RETRIEVAL_MESSAGE = Rule(
+    8412,
+    "retrieval-message",
+    "8.4.2",
+    E,
+    "the retrieval expression's messageRef names no message",
+    "name the message from which the value is read",
+)
+RETRIEVAL_PATH = Rule(
+    8413,
+    "retrieval-path",
+    "8.4.2",
+    E,
+    "the retrieval expression has no messagePath",
+    "write the expression that gives the value",
+)
+BINDING_PROPERTY = Rule(
+    8417,
+    "binding-property",
+    "8.4.2",
+    E,
+    "the correlation binding's correlationPropertyRef names no correlation property",
+    "name a correlationProperty that stands in definitions",
+)
+BINDING_PATH = Rule(
+    8418,
+    "binding-path",
+    "8.4.2",
+    E,
+    "the correlation binding has no dataPath",
+    "write the expression that gives the value in the process",
+)
+
+CORRELATION_RETRIEVAL = Rule(
+    8411,
+    "correlation-retrieval",
+    "8.4.2",
+    W,
+    "the correlation property does not say where messages have its value",
+    "add a correlationPropertyRetrievalExpression for each message",
+)
+CORRELATION_KEY_PROPERTIES = Rule(
+    8414,
+    "correlation-key-properties",
+    "8.4.2",
+    W,
+    "the correlation key has no properties",
+    "add a correlationPropertyRef for each part of the key",
+)
+CORRELATION_KEY_PROPERTY = Rule(
+    8415,
+    "correlation-key-property",
+    "8.4.2",
+    W,
+    "the correlation key's correlationPropertyRef names no correlation property",
+    "name a correlationProperty that stands in definitions",
+)
+SUBSCRIPTION_KEY = Rule(
+    8416,
+    "subscription-key",
+    "8.4.2",
+    W,
+    "the correlation subscription's correlationKeyRef names no correlation key",
+    "name a correlationKey of a collaboration or conversation",
+)
+_PROPERTY = names("correlationProperty")
+
+
+def _property(tree: Tree, element: etree._Element) -> None:
+    if not has(element, "correlationPropertyRetrievalExpression"):
+        tree.report(CORRELATION_RETRIEVAL, element)
+
+
+def _key(tree: Tree, element: etree._Element) -> None:
+    properties = texts(element, "correlationPropertyRef")
+    if not properties:
+        tree.report(CORRELATION_KEY_PROPERTIES, element)
+    for name in properties:
+        if tree.leads_nowhere(element, name, _PROPERTY):
+            tree.report(CORRELATION_KEY_PROPERTY, element, f"'{name}'")
+
+
+def _subscription(tree: Tree, element: etree._Element) -> None:
+    key = element.get("correlationKeyRef", "")
+    if tree.leads_nowhere(element, key, names("correlationKey")):
+        tree.report(SUBSCRIPTION_KEY, element, f"'{key}'")
+
+
+CORRELATION = Checks(
+    {
+        "correlationProperty": _property,
+        "correlationKey": _key,
+        "correlationSubscription": _subscription,
+    },
+)
+
+
+POOL_MINIMUM = Rule(
     9301,
     "pool-minimum",
     "9.3.1",
@@ -13,7 +131,7 @@ MINIMUM = Rule(
     "the least number of participants must be a whole number from 0",
     "correct minimum; it has no effect on execution",
 )
-MAXIMUM = Rule(
+POOL_MAXIMUM = Rule(
     9302,
     "pool-maximum",
     "9.3.1",
@@ -29,7 +147,7 @@ PARTICIPANT_ASSOCIATION = Rule(
     "a participant association must join two pools",
     "name a participant in innerParticipantRef and in outerParticipantRef",
 )
-FLOW_ASSOCIATION = Rule(
+MESSAGE_FLOW_ASSOCIATION = Rule(
     9406,
     "message-flow-association",
     "9.4.2",
@@ -37,7 +155,7 @@ FLOW_ASSOCIATION = Rule(
     "a message flow association must join two message flows",
     "name a messageFlow in innerMessageFlowRef and in outerMessageFlowRef",
 )
-PARTICIPANTS = Rule(
+CONVERSATION_PARTICIPANTS = Rule(
     9501,
     "conversation-participants",
     "9.5.1",
@@ -45,7 +163,7 @@ PARTICIPANTS = Rule(
     "a conversation must have two or more participants",
     "add a participantRef for each",
 )
-PARTICIPANT = Rule(
+CONVERSATION_PARTICIPANT = Rule(
     9502,
     "conversation-participant",
     "9.5.1",
@@ -53,7 +171,7 @@ PARTICIPANT = Rule(
     "the conversation's participantRef names no pool",
     "name a participant of the collaboration",
 )
-LINK_ENDS = Rule(
+CONVERSATION_LINK_ENDS = Rule(
     9503,
     "conversation-link-ends",
     "9.5.6",
@@ -77,9 +195,9 @@ def _multiplicity(tree: Tree, element: etree._Element) -> None:
     least = _number(element.get("minimum", "0"))
     greatest = _number(element.get("maximum", "1"))
     if least is None:
-        tree.say(MINIMUM, element, f"'{element.get('minimum')}'")
+        tree.report(POOL_MINIMUM, element, f"'{element.get('minimum')}'")
     if greatest is None or greatest < 1 or (element.get("maximum") and greatest < (least or 0)):
-        tree.say(MAXIMUM, element, f"'{element.get('maximum')}'")
+        tree.report(POOL_MAXIMUM, element, f"'{element.get('maximum')}'")
 
 
 def _number(text: str) -> int | None:
@@ -90,17 +208,17 @@ def _number(text: str) -> int | None:
 def _conversation(tree: Tree, element: etree._Element) -> None:
     participants = texts(element, "participantRef")
     if len(participants) < 2:
-        tree.say(PARTICIPANTS, element, f"this one has {len(participants)}")
+        tree.report(CONVERSATION_PARTICIPANTS, element, f"this one has {len(participants)}")
     for name in participants:
         if tree.leads_nowhere(element, name, _PARTICIPANT):
-            tree.say(PARTICIPANT, element, f"'{name}'")
+            tree.report(CONVERSATION_PARTICIPANT, element, f"'{name}'")
 
 
 def _link(tree: Tree, element: etree._Element) -> None:
     ends = [tree.find(element, element.get(name, "")) for name in ("sourceRef", "targetRef")]
     tags = [name_of(end) if end is not None else "" for end in ends]
     if "" in tags or not any(end is not None and end.tag in _CONVERSATIONS for end in ends):
-        tree.say(LINK_ENDS, element)
+        tree.report(CONVERSATION_LINK_ENDS, element)
 
 
 def _joins(inner: str, tags: frozenset[str], rule: Rule) -> Check:
@@ -108,13 +226,12 @@ def _joins(inner: str, tags: frozenset[str], rule: Rule) -> Check:
         for name in (inner, inner.replace("inner", "outer")):
             text = (texts(element, name) or [element.get(name, "")])[0]
             if tree.leads_nowhere(element, text, tags):
-                tree.say(rule, element, f"{name} is '{text}'")
+                tree.report(rule, element, f"{name} is '{text}'")
 
     return check
 
 
-TOPIC = Topic(
-    declared(globals()),
+CHECKS = Checks(
     {
         "participantMultiplicity": _multiplicity,
         "conversation": _conversation,
@@ -125,10 +242,165 @@ TOPIC = Topic(
             "innerParticipantRef", _PARTICIPANT, PARTICIPANT_ASSOCIATION
         ),
         "messageFlowAssociation": _joins(
-            "innerMessageFlowRef", names("messageFlow"), FLOW_ASSOCIATION
+            "innerMessageFlowRef", names("messageFlow"), MESSAGE_FLOW_ASSOCIATION
         ),
         "conversationAssociation": _joins(
             "innerConversationNodeRef", _CONVERSATIONS, CONVERSATION_ASSOCIATION
         ),
     },
 )
+
+
+MESSAGE_FLOW_END = Rule(
+    9401,
+    "message-flow-end",
+    "9.4",
+    W,
+    "a message flow can join only pools, activities and events",
+    "lead it to the activity or event that sends or receives",
+)
+MESSAGE_FLOW_INSIDE = Rule(
+    9402,
+    "message-flow-inside",
+    "9.4",
+    W,
+    "a message flow must not join two elements of one pool",
+    "draw a sequence flow, or send the message from another pool",
+)
+MESSAGE_FLOW_FROM_CATCH = Rule(
+    7611,
+    "message-flow-from-catch",
+    "7.6.3",
+    W,
+    "a message flow must not lead out of an event that catches",
+    "turn the flow round, or make the event one that throws",
+)
+MESSAGE_FLOW_INTO_THROW = Rule(
+    7612,
+    "message-flow-into-throw",
+    "7.6.3",
+    W,
+    "a message flow must not lead into an event that throws",
+    "turn the flow round, or make the event one that catches",
+)
+MESSAGE_FLOW_INTO_OTHER = Rule(
+    10560,
+    "message-flow-into-other",
+    "10.5.2",
+    W,
+    "a message flow leads into an event that does not wait for a message",
+    "give the event a messageEventDefinition, or delete the flow",
+)
+MESSAGE_FLOW_FROM_OTHER = Rule(
+    10561,
+    "message-flow-from-other",
+    "10.5.3",
+    W,
+    "a message flow leads out of an event that does not send a message",
+    "give the event a messageEventDefinition, or delete the flow",
+)
+MESSAGE_FLOW_MESSAGE = Rule(
+    9403,
+    "message-flow-message",
+    "9.4",
+    W,
+    "the message flow carries another message than its end sends or receives",
+    "name the same message in both",
+)
+_ENDS = ACTIVITIES | EVENTS | names("participant conversation subConversation callConversation")
+
+
+def _flow(tree: Tree, element: etree._Element) -> None:
+    source = tree.find(element, element.get("sourceRef", ""))
+    target = tree.find(element, element.get("targetRef", ""))
+    for end in (source, target):
+        if end is not None and end.tag not in _ENDS:
+            tree.report(MESSAGE_FLOW_END, element, f"{what(end)} is {a(kind(end.tag))}")
+        if end is not None:
+            _carries(tree, element, end)
+    if source is None or target is None:
+        return  # which a reader has said
+    if source.tag in CATCHING:
+        tree.report(MESSAGE_FLOW_FROM_CATCH, element, f"{what(source)} is one")
+    elif source.tag in THROWING and not has_trigger(tree, source, "message"):
+        tree.report(MESSAGE_FLOW_FROM_OTHER, element, what(source))
+    if target.tag in THROWING:
+        tree.report(MESSAGE_FLOW_INTO_THROW, element, f"{what(target)} is one")
+    elif target.tag in CATCHING and not has_trigger(tree, target, "message"):
+        tree.report(MESSAGE_FLOW_INTO_OTHER, element, what(target))
+    homes = {_pool(tree, source), _pool(tree, target)}
+    if len(homes) == 1 and None not in homes:
+        tree.report(MESSAGE_FLOW_INSIDE, element, f"both ends are in '{homes.pop()}'")
+
+
+def _carries(tree: Tree, flow: etree._Element, end: etree._Element) -> None:
+    """Report a flow whose message is none of those that one of its ends names."""
+    message = tree.find(flow, flow.get("messageRef", ""))
+    own = [end] if end.tag in ACTIVITIES else triggers(tree, end) if end.tag in EVENTS else []
+    named = [tree.find(each, each.get("messageRef", "")) for each in own]
+    known = [each for each in named if each is not None]
+    if message is not None and known and message not in known:
+        tree.report(
+            MESSAGE_FLOW_MESSAGE, flow, f"{what(message)} is not {what(known[0])} of {what(end)}"
+        )
+
+
+def _pool(tree: Tree, element: etree._Element) -> str | None:
+    """The id of the process in which an element stands, or which a pool shows."""
+    if name_of(element) == "participant":
+        name = element.get("processRef", "").rpartition(":")[2]
+        return name or None
+    if element.tag not in NODES:
+        return None
+    process = next(element.iterancestors(BPMN + "process"), None)
+    return None if process is None else process.get("id")
+
+
+MESSAGE_FLOWS = Checks({"messageFlow": _flow})
+
+
+LANE_NODE_TWICE = Rule(
+    10801,
+    "lane-node-twice",
+    "10.8",
+    W,
+    "an element is in two lanes of one lane set",
+    "keep it in one",
+)
+LANE_OTHER_PROCESS = Rule(
+    10802,
+    "lane-other-process",
+    "10.8",
+    W,
+    "the lane lists an element of another process",
+    "list elements of its own process only",
+)
+LANE_NO_NODE = Rule(
+    10803,
+    "lane-no-node",
+    "10.8",
+    W,
+    "the lane lists what is no activity, gateway or event",
+    "delete the flowNodeRef",
+)
+
+
+def _lane_set(tree: Tree, element: etree._Element) -> None:
+    first: dict[str, etree._Element] = {}
+    process = next(element.iterancestors(BPMN + "process"), None)
+    for lane in children(element, "lane"):
+        for reference in children(lane, "flowNodeRef"):
+            name = (reference.text or "").strip()
+            before = first.setdefault(name, lane)
+            if before is not lane:
+                tree.report(LANE_NODE_TWICE, reference, f"'{name}' is in {what(before)}, too")
+            node = tree.find(reference, name)
+            if node is None:
+                continue
+            if node.tag not in NODES:
+                tree.report(LANE_NO_NODE, reference, f"'{name}' is {a(kind(node.tag))}")
+            elif next(node.iterancestors(BPMN + "process"), None) is not process:
+                tree.report(LANE_OTHER_PROCESS, reference, f"'{name}'")
+
+
+LANES = Checks({"laneSet": _lane_set, "childLaneSet": _lane_set})

@@ -3,13 +3,15 @@
 from lxml import etree
 
 from m2pem.bpmn.names import BPMN
-from m2pem.bpmn.rules.rule import E, Rule, Topic, W, declared
+from m2pem.bpmn.rules.references import DANGLING_REFERENCE
+from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import (
     ACTIVITIES,
     CATCHING,
     CONTAINERS,
     EVENTS,
     SUBPROCESSES,
+    Checks,
     Tree,
     has_trigger,
     is_false,
@@ -19,16 +21,15 @@ from m2pem.bpmn.rules.tree import (
     what,
 )
 
-ACTIVITY = Rule(
+COMPENSATED_ACTIVITY = Rule(
     10535,
     "compensated-activity",
     "10.5.5",
     E,
     "activityRef names no activity",
     "name the activity that is to be compensated, or delete it to compensate all",
-    same_as=("dangling-reference",),
 )
-INVISIBLE = Rule(
+COMPENSATED_ELSEWHERE = Rule(
     10708,
     "compensated-elsewhere",
     "10.7.2",
@@ -36,7 +37,7 @@ INVISIBLE = Rule(
     "the activity to be compensated is not in the scope of the event",
     "throw it where the activity stands, or in an event subprocess there",
 )
-NO_HANDLER = Rule(
+COMPENSATED_WITHOUT_HANDLER = Rule(
     10537,
     "compensated-without-handler",
     "10.5.4",
@@ -44,7 +45,7 @@ NO_HANDLER = Rule(
     "the activity to be compensated has nothing that compensates it",
     "attach a compensation boundary event with a handler to it",
 )
-CAUGHT_ACTIVITY = Rule(
+COMPENSATION_CATCH_ACTIVITY = Rule(
     10538,
     "compensation-catch-activity",
     "10.5.5",
@@ -52,7 +53,7 @@ CAUGHT_ACTIVITY = Rule(
     "an event that catches compensation must not name an activity; where it stands says it",
     "delete activityRef",
 )
-BOUNDARY_FLOW = Rule(
+COMPENSATION_BOUNDARY_FLOW = Rule(
     10518,
     "compensation-boundary-flow",
     "10.5.4",
@@ -60,7 +61,7 @@ BOUNDARY_FLOW = Rule(
     "a compensation boundary event must not have an outgoing sequence flow",
     "draw an association to the activity that compensates",
 )
-BOUNDARY_GOES_ON = Rule(
+COMPENSATION_BOUNDARY_NOT_INTERRUPTING = Rule(
     10522,
     "compensation-boundary-not-interrupting",
     "10.5.4",
@@ -68,7 +69,7 @@ BOUNDARY_GOES_ON = Rule(
     "cancelActivity has no meaning on a compensation boundary event: its activity has completed",
     'delete cancelActivity="false"',
 )
-HANDLER_IN = Rule(
+HANDLER_INCOMING = Rule(
     10701,
     "handler-incoming",
     "10.7.1",
@@ -76,7 +77,7 @@ HANDLER_IN = Rule(
     "a compensation activity must not have an incoming flow",
     "delete the flow; an association from a compensation boundary event leads to it",
 )
-HANDLER_OUT = Rule(
+HANDLER_OUTGOING = Rule(
     10702,
     "handler-outgoing",
     "10.7.1",
@@ -92,7 +93,7 @@ HANDLER_UNUSED = Rule(
     "no compensation boundary event leads to the compensation activity",
     "draw an association to it, or delete isForCompensation",
 )
-NO_ASSOCIATION = Rule(
+COMPENSATION_WITHOUT_HANDLER = Rule(
     10704,
     "compensation-without-handler",
     "10.7.1",
@@ -108,7 +109,7 @@ TWO_HANDLERS = Rule(
     "the compensation boundary event leads to several activities",
     "put them into one subprocess for compensation",
 )
-TWO_EVENTS = Rule(
+TWO_COMPENSATION_EVENTS = Rule(
     10709,
     "two-compensation-events",
     "10.7.1",
@@ -116,7 +117,7 @@ TWO_EVENTS = Rule(
     "the activity has several compensation boundary events; the first counts",
     "keep one of them",
 )
-HANDLER_UNMARKED = Rule(
+HANDLER_NOT_MARKED = Rule(
     10706,
     "handler-not-marked",
     "10.7.1",
@@ -142,20 +143,21 @@ def _definition(tree: Tree, definition: etree._Element) -> None:
     if not name:
         return
     if event.tag in CATCHING:
-        tree.say(CAUGHT_ACTIVITY, definition)
+        tree.report(COMPENSATION_CATCH_ACTIVITY, definition)
         return
     if tree.leads_nowhere(definition, name, ACTIVITIES):
-        tree.say(ACTIVITY, definition, f"'{name}'")
+        unless = (DANGLING_REFERENCE,)
+        tree.report(COMPENSATED_ACTIVITY, definition, f"'{name}'", unless=unless)
         return
     activity = tree.find(definition, name)
     if activity is None or event.tag not in EVENTS:
         return
     if not _visible(event, activity):
-        tree.say(INVISIBLE, definition, what(activity))
+        tree.report(COMPENSATED_ELSEWHERE, definition, what(activity))
     inner = activity.tag in SUBPROCESSES or activity.tag == BPMN + "callActivity"
     attached = tree.boundary.get(activity.get("id", ""), [])
     if not inner and not any(has_trigger(tree, each, "compensate") for each in attached):
-        tree.say(NO_HANDLER, definition, what(activity))
+        tree.report(COMPENSATED_WITHOUT_HANDLER, definition, what(activity))
 
 
 def _visible(event: etree._Element, activity: etree._Element) -> bool:
@@ -173,22 +175,22 @@ def _boundary(tree: Tree, event: etree._Element) -> None:
     if not has_trigger(tree, event, "compensate"):
         return
     if tree.out(event):
-        tree.say(BOUNDARY_FLOW, event)
+        tree.report(COMPENSATION_BOUNDARY_FLOW, event)
     if is_false(event, "cancelActivity"):
-        tree.say(BOUNDARY_GOES_ON, event)
+        tree.report(COMPENSATION_BOUNDARY_NOT_INTERRUPTING, event)
     beside = tree.boundary.get(event.get("attachedToRef", ""), [])
     if [each for each in beside if has_trigger(tree, each, "compensate")][:1] != [event]:
-        tree.say(TWO_EVENTS, event)
+        tree.report(TWO_COMPENSATION_EVENTS, event)
     handlers = _associated(tree, event, ACTIVITIES)
     if not handlers:
-        tree.say(NO_ASSOCIATION, event)
+        tree.report(COMPENSATION_WITHOUT_HANDLER, event)
     if len(handlers) > 1:
-        tree.say(TWO_HANDLERS, event, ", ".join(map(what, handlers)))
+        tree.report(TWO_HANDLERS, event, ", ".join(map(what, handlers)))
     for handler in handlers:
         if handler.getparent() is not event.getparent():
-            tree.say(HANDLER_ELSEWHERE, handler, f"{what(event)} leads to it")
+            tree.report(HANDLER_ELSEWHERE, handler, f"{what(event)} leads to it")
         if not is_true(handler, "isForCompensation"):
-            tree.say(HANDLER_UNMARKED, handler)
+            tree.report(HANDLER_NOT_MARKED, handler)
 
 
 def _associated(tree: Tree, element: etree._Element, tags: frozenset[str]) -> list[etree._Element]:
@@ -208,16 +210,15 @@ def _handlers(tree: Tree) -> None:
         if not is_true(element, "isForCompensation"):
             continue
         if tree.into(element):
-            tree.say(HANDLER_IN, element)
+            tree.report(HANDLER_INCOMING, element)
         if tree.out(element):
-            tree.say(HANDLER_OUT, element)
+            tree.report(HANDLER_OUTGOING, element)
         by_event = is_true(element, "triggeredByEvent")
         if not by_event and not _associated(tree, element, _BOUNDARY):
-            tree.say(HANDLER_UNUSED, element)
+            tree.report(HANDLER_UNUSED, element)
 
 
-TOPIC = Topic(
-    declared(globals()),
+CHECKS = Checks(
     {"compensateEventDefinition": _definition, "boundaryEvent": _boundary},
     (_handlers,),
 )

@@ -1,22 +1,67 @@
-"""Data objects and stores, references to them, and inputs and outputs (BPMN 2.0.2, 10.4.1)."""
+"""Data objects, stores, inputs, outputs and associations between them (BPMN 2.0.2, 10.4.1)."""
 
 from collections.abc import Sequence
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import Rule, Topic, W, declared
+from m2pem.bpmn.rules.references import ITEMS
+from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import (
     SUBPROCESSES,
+    Checks,
     Tree,
     children,
     has,
     is_true,
     name_of,
+    named,
+    names,
     parent,
     texts,
 )
 
-REFERENCE_OBJECT = Rule(
+BAD_KEY = Rule(
+    214,
+    "bad-key",
+    "missions.md",
+    E,
+    "a name is none of the data store",
+    "write a dotted name",
+)
+ASSOCIATION_IGNORED = Rule(
+    306,
+    "association-ignored",
+    "missions.md",
+    W,
+    "a data association of a call activity passes nothing",
+    "use m2pem:in, m2pem:out",
+)
+UNWRITTEN_NAME = Rule(
+    307,
+    "unwritten-name",
+    "missions.md",
+    W,
+    "a name is read that nothing writes",
+    "write it before, or pass it in",
+)
+EMPTY_ASSIGNMENT = Rule(
+    311,
+    "empty-assignment",
+    "missions.md",
+    W,
+    "an assignment's 'from' is empty",
+    "write what it assigns, or delete it",
+)
+BAD_ASSIGNMENT = Rule(
+    10424,
+    "bad-assignment",
+    "10.4.1",
+    E,
+    "an assignment of a data association lacks from or to",
+    "write both",
+)
+
+DATA_REFERENCE_OBJECT = Rule(
     10401,
     "data-reference-object",
     "10.4.1",
@@ -24,7 +69,7 @@ REFERENCE_OBJECT = Rule(
     "the data object reference names no data object",
     "add dataObjectRef",
 )
-REFERENCE_ITEM = Rule(
+DATA_REFERENCE_ITEM = Rule(
     10402,
     "data-reference-item",
     "10.4.1",
@@ -32,7 +77,7 @@ REFERENCE_ITEM = Rule(
     "a data object reference must not have an item definition of its own",
     "move itemSubjectRef to the data object",
 )
-OBJECT_STATE = Rule(
+DATA_OBJECT_STATE = Rule(
     10403,
     "data-object-state",
     "10.4.1",
@@ -40,7 +85,7 @@ OBJECT_STATE = Rule(
     "a data object must not have a state; references to it can",
     "move dataState to a data object reference",
 )
-COLLECTION = Rule(
+COLLECTION_MISMATCH = Rule(
     10405,
     "collection-mismatch",
     "10.4.1",
@@ -48,7 +93,7 @@ COLLECTION = Rule(
     "isCollection is not what the item definition says",
     "write the same in both",
 )
-CAPACITY = Rule(
+STORE_CAPACITY = Rule(
     10406,
     "store-capacity",
     "10.4.1",
@@ -56,7 +101,7 @@ CAPACITY = Rule(
     "the data store's capacity is no whole number",
     "write a number, or delete it",
 )
-INPUT_SETS = Rule(
+NO_INPUT_SET = Rule(
     10407,
     "no-input-set",
     "10.4.1",
@@ -64,7 +109,7 @@ INPUT_SETS = Rule(
     "the ioSpecification has no input set",
     "add an inputSet with the data inputs that are needed; it may be empty",
 )
-OUTPUT_SETS = Rule(
+NO_OUTPUT_SET = Rule(
     10408,
     "no-output-set",
     "10.4.1",
@@ -72,7 +117,7 @@ OUTPUT_SETS = Rule(
     "the ioSpecification has no output set",
     "add an outputSet with the data outputs that are made; it may be empty",
 )
-INPUT_UNUSED = Rule(
+INPUT_IN_NO_SET = Rule(
     10409,
     "input-in-no-set",
     "10.4.1",
@@ -80,7 +125,7 @@ INPUT_UNUSED = Rule(
     "the data input is in no input set",
     "add dataInputRefs with its id to an inputSet",
 )
-OUTPUT_UNUSED = Rule(
+OUTPUT_IN_NO_SET = Rule(
     10410,
     "output-in-no-set",
     "10.4.1",
@@ -88,7 +133,7 @@ OUTPUT_UNUSED = Rule(
     "the data output is in no output set",
     "add dataOutputRefs with its id to an outputSet",
 )
-INPUT_SET = Rule(
+INPUT_SET_REFERENCE = Rule(
     10411,
     "input-set-reference",
     "10.4.1",
@@ -96,7 +141,7 @@ INPUT_SET = Rule(
     "the input set names no data input",
     "name a dataInput of the same ioSpecification or event",
 )
-OUTPUT_SET = Rule(
+OUTPUT_SET_REFERENCE = Rule(
     10412,
     "output-set-reference",
     "10.4.1",
@@ -120,7 +165,7 @@ OPTIONAL_OUTPUT = Rule(
     "an optional data output is not among the set's dataOutputRefs",
     "add it to dataOutputRefs, too",
 )
-SET_PAIR = Rule(
+PAIRED_SET = Rule(
     10415,
     "paired-set",
     "10.4.1",
@@ -140,14 +185,14 @@ SUBPROCESS_DATA = Rule(
 
 def _reference(tree: Tree, element: etree._Element) -> None:
     if not element.get("dataObjectRef"):
-        tree.say(REFERENCE_OBJECT, element)
+        tree.report(DATA_REFERENCE_OBJECT, element)
     if element.get("itemSubjectRef"):
-        tree.say(REFERENCE_ITEM, element)
+        tree.report(DATA_REFERENCE_ITEM, element)
 
 
 def _object(tree: Tree, element: etree._Element) -> None:
     if has(element, "dataState"):
-        tree.say(OBJECT_STATE, element)
+        tree.report(DATA_OBJECT_STATE, element)
     _collection(tree, element)
 
 
@@ -156,27 +201,27 @@ def _collection(tree: Tree, element: etree._Element) -> None:
     if item is None or name_of(item) != "itemDefinition":
         return
     if is_true(element, "isCollection") != is_true(item, "isCollection"):
-        tree.say(COLLECTION, element, f"see '{item.get('id')}'")
+        tree.report(COLLECTION_MISMATCH, element, f"see '{item.get('id')}'")
 
 
 def _store(tree: Tree, element: etree._Element) -> None:
     capacity = element.get("capacity")
     if capacity is not None and not capacity.strip().lstrip("+-").isdigit():
-        tree.say(CAPACITY, element, f"'{capacity}'")
+        tree.report(STORE_CAPACITY, element, f"'{capacity}'")
 
 
 def _specification(tree: Tree, element: etree._Element) -> None:
     if parent(element).tag in SUBPROCESSES:
-        tree.say(SUBPROCESS_DATA, element)
+        tree.report(SUBPROCESS_DATA, element)
     inputs, outputs = list(children(element, "inputSet")), list(children(element, "outputSet"))
     if not inputs:
-        tree.say(INPUT_SETS, element)
+        tree.report(NO_INPUT_SET, element)
     if not outputs:
-        tree.say(OUTPUT_SETS, element)
+        tree.report(NO_OUTPUT_SET, element)
     if inputs:
-        _in_a_set(tree, element, "dataInput", inputs, INPUT_UNUSED)
+        _in_a_set(tree, element, "dataInput", inputs, INPUT_IN_NO_SET)
     if outputs:
-        _in_a_set(tree, element, "dataOutput", outputs, OUTPUT_UNUSED)
+        _in_a_set(tree, element, "dataOutput", outputs, OUTPUT_IN_NO_SET)
 
 
 def _in_a_set(
@@ -185,17 +230,17 @@ def _in_a_set(
     used = {text for each in sets for text in texts(each, f"{name}Refs")}
     for data in children(element, name):
         if data.get("id") not in used:
-            tree.say(rule, data, f"'{data.get('name') or data.get('id', '')}'")
+            tree.report(rule, data, f"'{data.get('name') or data.get('id', '')}'")
 
 
 def _input_set(tree: Tree, element: etree._Element) -> None:
-    _references(tree, element, "dataInput", INPUT_SET)
+    _references(tree, element, "dataInput", INPUT_SET_REFERENCE)
     _optional(tree, element, "Input", OPTIONAL_INPUT)
     _pair(tree, element, "outputSet")
 
 
 def _output_set(tree: Tree, element: etree._Element) -> None:
-    _references(tree, element, "dataOutput", OUTPUT_SET)
+    _references(tree, element, "dataOutput", OUTPUT_SET_REFERENCE)
     _optional(tree, element, "Output", OPTIONAL_OUTPUT)
     _pair(tree, element, "inputSet")
 
@@ -204,7 +249,7 @@ def _references(tree: Tree, element: etree._Element, name: str, rule: Rule) -> N
     known = {data.get("id") for data in children(parent(element), name)}
     for text in texts(element, f"{name}Refs"):
         if text.rpartition(":")[2] not in known:
-            tree.say(rule, element, f"'{text}'")
+            tree.report(rule, element, f"'{text}'")
 
 
 def _optional(tree: Tree, element: etree._Element, direction: str, rule: Rule) -> None:
@@ -212,18 +257,17 @@ def _optional(tree: Tree, element: etree._Element, direction: str, rule: Rule) -
     for name in (f"optional{direction}Refs", f"whileExecuting{direction}Refs"):
         for text in texts(element, name):
             if text not in listed:
-                tree.say(rule, element, f"'{text}'")
+                tree.report(rule, element, f"'{text}'")
 
 
 def _pair(tree: Tree, element: etree._Element, other: str) -> None:
     known = {each.get("id") for each in children(parent(element), other)}
     for text in texts(element, f"{other}Refs"):
         if text.rpartition(":")[2] not in known:
-            tree.say(SET_PAIR, element, f"'{text}'")
+            tree.report(PAIRED_SET, element, f"'{text}'")
 
 
-TOPIC = Topic(
-    declared(globals()),
+CHECKS = Checks(
     {
         "dataObject": _object,
         "dataObjectReference": _reference,
@@ -233,5 +277,128 @@ TOPIC = Topic(
         "ioSpecification": _specification,
         "inputSet": _input_set,
         "outputSet": _output_set,
+    },
+)
+
+
+DATA_ASSOCIATION_TARGET = Rule(
+    10421,
+    "data-association-target",
+    "10.4.1",
+    W,
+    "the data association has no targetRef",
+    "name the data that it writes",
+)
+DATA_ASSOCIATION_END = Rule(
+    10422,
+    "data-association-end",
+    "10.4.1",
+    W,
+    "an end of the data association names no data",
+    "name a data object, store, property, data input or data output",
+)
+DATA_ASSOCIATION_SOURCES = Rule(
+    10423,
+    "data-association-sources",
+    "10.4.1",
+    W,
+    "a data association with several sources must have a transformation",
+    "keep one sourceRef, or add a transformation",
+)
+PROCESS_INPUT_WRITTEN = Rule(
+    10425,
+    "process-input-written",
+    "10.4.1",
+    W,
+    "a data association must not write a data input of its process; the caller does",
+    "write a data object instead",
+)
+PROCESS_OUTPUT_READ = Rule(
+    10426,
+    "process-output-read",
+    "10.4.1",
+    W,
+    "a data association must not read a data output of its process; the caller does",
+    "read a data object instead",
+)
+DATA_ASSOCIATION_ITEMS = Rule(
+    10427,
+    "data-association-items",
+    "10.4.1",
+    W,
+    "a data association without a transformation must join data of one structure",
+    "give both ends an item definition of the same structureRef, or add a transformation",
+)
+IO_BINDING = Rule(
+    10323,
+    "io-binding",
+    "10.3.6",
+    W,
+    "the ioBinding lacks an operation, an input or an output",
+    "name an operation of an interface, an inputSet and an outputSet of the process",
+)
+
+
+def _association(tree: Tree, element: etree._Element) -> None:
+    sources, targets = texts(element, "sourceRef"), texts(element, "targetRef")
+    unless = (ASSOCIATION_IGNORED,)
+    if not any(targets):
+        tree.report(DATA_ASSOCIATION_TARGET, element, unless=unless)
+    for name in [*sources, *targets]:
+        if name and tree.leads_nowhere(element, name, ITEMS):
+            tree.report(DATA_ASSOCIATION_END, element, f"'{name}'", unless=unless)
+    if len(sources) > 1 and not has(element, "transformation"):
+        tree.report(DATA_ASSOCIATION_SOURCES, element, f"this one has {len(sources)}")
+    if not has(element, "transformation assignment"):
+        ends = [(name, _structure(tree, element, name)) for name in (*sources[:1], *targets[:1])]
+        if len(ends) == 2 and all(structure for _, structure in ends) and ends[0][1] != ends[1][1]:
+            said = " and ".join(f"'{name}' is '{structure}'" for name, structure in ends)
+            tree.report(DATA_ASSOCIATION_ITEMS, element, said)
+    for names_, data, rule in (
+        (targets, "dataInput", PROCESS_INPUT_WRITTEN),
+        (sources, "dataOutput", PROCESS_OUTPUT_READ),
+    ):
+        for name in names_:
+            found = tree.find(element, name)
+            if found is not None and name_of(found) == data and _of_process(found):
+                tree.report(rule, element, f"'{name}'")
+
+
+def _structure(tree: Tree, owner: etree._Element, name: str) -> str:
+    """Return the structure of data, also of what a reference refers to; "" if it has none.
+
+    Many editors write an item definition for each element, so their ids are not compared.
+    """
+    data = tree.find(owner, name)
+    for reference in ("dataObjectRef", "dataStoreRef"):
+        if data is not None and data.get(reference):
+            data = tree.find(data, data.get(reference, ""))
+    item = None if data is None else tree.find(data, data.get("itemSubjectRef", ""))
+    return "" if item is None else named(item.get("structureRef", ""))
+
+
+def _of_process(data: etree._Element) -> bool:
+    specification = parent(data)
+    return (
+        name_of(specification) == "ioSpecification" and name_of(parent(specification)) == "process"
+    )
+
+
+def _binding(tree: Tree, element: etree._Element) -> None:
+    for attribute, tag in (
+        ("operationRef", "operation"),
+        ("inputDataRef", "inputSet"),
+        ("outputDataRef", "outputSet"),
+    ):
+        name = element.get(attribute, "")
+        if tree.leads_nowhere(element, name, names(tag)):
+            tree.report(IO_BINDING, element, f"{attribute} is '{name}'")
+
+
+ASSOCIATIONS = Checks(
+    {
+        "dataInputAssociation": _association,
+        "dataOutputAssociation": _association,
+        "ioBinding": _binding,
     },
 )

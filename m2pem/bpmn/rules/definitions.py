@@ -1,110 +1,199 @@
-"""Event definitions: codes and cancellation (BPMN 2.0.2, 8.4.3, 8.4.4 and 10.5.5)."""
+"""Definitions, imports, relationships, ids and artifacts (BPMN 2.0.2, 8.2 to 8.4.1)."""
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN
-from m2pem.bpmn.rules.rule import E, Rule, Topic, W, declared
-from m2pem.bpmn.rules.tree import (
-    THROWING,
-    Tree,
-    has_trigger,
-    is_false,
-    name_of,
-    parent,
-)
+from m2pem.bpmn.names import BPMN, kind
+from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.tree import Checks, Tree, is_true, texts, what
 
-ERROR_CODE = Rule(
-    8422,
-    "thrown-error-code",
-    "8.4.3",
+MISSING_ID = Rule(
+    8301,
+    "missing-id",
+    "8.3.1",
     W,
-    "the error that is thrown has no errorCode",
-    "add errorCode to the error; until then its id is its code",
+    "an element that others could refer to has no id; m2pem makes one up",
+    "give it an id that nothing else in the file has",
 )
-ESCALATION_CODE = Rule(
-    8432,
-    "thrown-escalation-code",
-    "8.4.4",
+DUPLICATE_ID = Rule(
+    8302,
+    "duplicate-id",
+    "8.3.1",
+    E,
+    "two elements have the same id",
+    "give one of the two another id, and its references too",
+)
+
+NO_TARGET_NAMESPACE = Rule(
+    8201,
+    "no-target-namespace",
+    "8.2.1",
     W,
-    "the escalation that is thrown has no escalationCode",
-    "add escalationCode to the escalation; until then its id is its code",
+    "definitions has no targetNamespace",
+    'add one, for example targetNamespace="urn:my-missions"',
 )
-CANCEL_END = Rule(
-    10549,
-    "cancel-end-place",
-    "10.5.5",
-    E,
-    "a cancel end event can stand only in a transaction",
-    "make what is around it a transaction, or use an error or terminate end event",
-)
-CANCEL_BOUNDARY = Rule(
-    10550,
-    "cancel-boundary-place",
-    "10.5.5",
-    E,
-    "a cancel boundary event can be attached only to a transaction",
-    "make the activity a transaction, or catch an error",
-)
-CANCEL_GOES_ON = Rule(
-    10551,
-    "cancel-not-interrupting",
-    "10.5.5",
-    E,
-    "a cancel boundary event must interrupt the transaction",
-    'delete cancelActivity="false"',
-)
-CANCEL_UNCAUGHT = Rule(
-    10552,
-    "cancel-uncaught",
-    "10.5.6",
+IMPORT_TYPE = Rule(
+    8202,
+    "import-type",
+    "8.2.2",
     W,
-    "no boundary event of the transaction catches the cancellation; its token ends there",
-    "attach a cancel boundary event to the transaction",
+    "the import does not say of which type the imported file is",
+    "add importType with the namespace of the file's format",
+)
+IMPORT_NAMESPACE = Rule(
+    8203,
+    "import-namespace",
+    "8.2.2",
+    W,
+    "the import does not say which namespace it imports",
+    "add the targetNamespace of the imported file as namespace",
+)
+DUPLICATE_INNER_ID = Rule(
+    8303,
+    "duplicate-inner-id",
+    "8.3.1",
+    W,
+    "the id is also that of another element",
+    "give one of the two another id",
+)
+EXTENSION_NOT_UNDERSTOOD = Rule(
+    8304,
+    "extension-not-understood",
+    "8.3.3",
+    W,
+    "the file says that an extension must be understood, and m2pem does not know it",
+    'write mustUnderstand="false" if the mission means the same without it',
+)
+RELATIONSHIP_TYPE = Rule(
+    8305,
+    "relationship-type",
+    "8.3.4",
+    W,
+    "the relationship has no type",
+    "add the type, or delete the relationship",
+)
+RELATIONSHIP_ENDS = Rule(
+    8306,
+    "relationship-ends",
+    "8.3.4",
+    W,
+    "the relationship lacks a source or a target",
+    "add source and target, or delete the relationship",
+)
+RELATIONSHIP_DIRECTION = Rule(
+    8307,
+    "relationship-direction",
+    "8.3.4",
+    W,
+    "the relationship's direction is none that BPMN has",
+    "write None, Forward, Backward or Both",
+)
+ASSOCIATION_END = Rule(
+    8401,
+    "association-end",
+    "8.4.1",
+    W,
+    "the association lacks a sourceRef or a targetRef",
+    "add what it joins, or delete it",
+)
+ASSOCIATION_NOWHERE = Rule(
+    8402,
+    "association-nowhere",
+    "8.4.1",
+    W,
+    "an end of the association names nothing",
+    "name an element of the file, or delete the association",
+)
+ASSOCIATION_DIRECTION = Rule(
+    8403,
+    "association-direction",
+    "8.4.1",
+    W,
+    "the association's direction is none that BPMN has",
+    "write None, One or Both",
+)
+
+_INNER = (
+    "ioSpecification dataInput dataOutput inputSet outputSet dataInputAssociation "
+    "dataOutputAssociation standardLoopCharacteristics multiInstanceLoopCharacteristics "
+    "resourceRole performer humanPerformer potentialOwner itemDefinition interface operation "
+    "endPoint resource association group textAnnotation category categoryValue "
+    "cancelEventDefinition compensateEventDefinition conditionalEventDefinition "
+    "errorEventDefinition escalationEventDefinition linkEventDefinition messageEventDefinition "
+    "signalEventDefinition terminateEventDefinition timerEventDefinition correlationProperty "
+    "correlationKey conversation subConversation callConversation conversationLink partnerRole "
+    "partnerEntity"
 )
 
 
-def _error(tree: Tree, definition: etree._Element) -> None:
-    _code(tree, definition, "errorRef", "errorCode", ERROR_CODE)
+def _definitions(tree: Tree, element: etree._Element) -> None:
+    if not element.get("targetNamespace"):
+        tree.report(NO_TARGET_NAMESPACE, element)
 
 
-def _escalation(tree: Tree, definition: etree._Element) -> None:
-    _code(tree, definition, "escalationRef", "escalationCode", ESCALATION_CODE)
+def _import(tree: Tree, element: etree._Element) -> None:
+    if not element.get("importType"):
+        tree.report(IMPORT_TYPE, element)
+    if not element.get("namespace"):
+        tree.report(IMPORT_NAMESPACE, element)
 
 
-def _code(
-    tree: Tree, definition: etree._Element, reference: str, attribute: str, rule: Rule
-) -> None:
-    name = definition.get(reference)
-    if not name or parent(definition).tag not in THROWING:
-        return
-    root = tree.find(definition, name)
-    if root is not None and name_of(root) == reference[:-3] and not root.get(attribute):
-        tree.say(rule, definition, f"'{name}'")
+def _extension(tree: Tree, element: etree._Element) -> None:
+    if is_true(element, "mustUnderstand"):
+        tree.report(EXTENSION_NOT_UNDERSTOOD, element, f"'{element.get('definition', '')}'")
 
 
-def _cancel(tree: Tree, definition: etree._Element) -> None:
-    event = parent(definition)
-    transaction = BPMN + "transaction"
-    around = parent(event)
-    if name_of(event) == "endEvent" and around.tag != transaction:
-        tree.say(CANCEL_END, event)
-    elif name_of(event) == "endEvent":
-        attached = tree.boundary.get(around.get("id", ""), [])
-        if not any(has_trigger(tree, each, "cancel") for each in attached):
-            tree.say(CANCEL_UNCAUGHT, event)
-    elif name_of(event) == "boundaryEvent":
-        host = tree.find(event, event.get("attachedToRef", ""))
-        if host is not None and host.tag != transaction:
-            tree.say(CANCEL_BOUNDARY, event)
-        if is_false(event, "cancelActivity"):
-            tree.say(CANCEL_GOES_ON, event)
+def _relationship(tree: Tree, element: etree._Element) -> None:
+    if not element.get("type"):
+        tree.report(RELATIONSHIP_TYPE, element)
+    if not texts(element, "source") or not texts(element, "target"):
+        tree.report(RELATIONSHIP_ENDS, element)
+    direction = element.get("direction", "None")
+    if direction not in ("None", "Forward", "Backward", "Both"):
+        tree.report(RELATIONSHIP_DIRECTION, element, f"'{direction}'")
 
 
-TOPIC = Topic(
-    declared(globals()),
+def _association(tree: Tree, element: etree._Element) -> None:
+    ends = [element.get("sourceRef", ""), element.get("targetRef", "")]
+    if not all(ends):
+        tree.report(ASSOCIATION_END, element)
+    for end in ends:
+        if end and tree.leads_nowhere(element, end, _anything(tree, element, end)):
+            tree.report(ASSOCIATION_NOWHERE, element, f"'{end}'")
+    direction = element.get("associationDirection", "None")
+    if direction not in ("None", "One", "Both"):
+        tree.report(ASSOCIATION_DIRECTION, element, f"'{direction}'")
+
+
+def _anything(tree: Tree, owner: etree._Element, name: str) -> frozenset[str]:
+    found = tree.find(owner, name)
+    return frozenset() if found is None else frozenset({found.tag})
+
+
+def _inner_ids(tree: Tree) -> None:
+    """Ids that no reader claims; flow nodes, flows and root elements are claimed there."""
+    seen: dict[str, etree._Element] = {}
+    for element in _inner(tree):
+        identifier = element.get("id")
+        if not identifier:
+            continue
+        first = seen.setdefault(identifier, element)
+        if first is not element:
+            detail = f"{what(element)}, of a {kind(first.tag)}"
+            tree.report(DUPLICATE_INNER_ID, element, detail, unless=(DUPLICATE_ID,))
+
+
+def _inner(tree: Tree) -> list[etree._Element]:
+    """All elements whose ids only this module looks at."""
+    return list(tree.root.iter(*(BPMN + name for name in _INNER.split())))
+
+
+CHECKS = Checks(
     {
-        "errorEventDefinition": _error,
-        "escalationEventDefinition": _escalation,
-        "cancelEventDefinition": _cancel,
+        "definitions": _definitions,
+        "import": _import,
+        "extension": _extension,
+        "relationship": _relationship,
+        "association": _association,
     },
+    (_inner_ids,),
 )

@@ -1,23 +1,148 @@
-"""Events: what may trigger them where they stand; their flows (BPMN 2.0.2, 10.5.2 to 10.5.4)."""
+"""Events: their triggers, flows and definitions (BPMN 2.0.2, 8.4.3, 8.4.4 and 10.5.2 to 10.5.5)."""
 
 from lxml import etree
 
 from m2pem.bpmn.names import BPMN, a, kind
-from m2pem.bpmn.rules.rule import E, Rule, Topic, W, declared
+from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import (
     SUBPROCESSES,
+    THROWING,
+    Checks,
     Tree,
     children,
     has,
     has_trigger,
     is_false,
     is_true,
+    name_of,
     parent,
     trigger_name,
     triggers,
 )
 
-START = Rule(
+OUTSIDE_ONLY = Rule(
+    308,
+    "outside-only",
+    "missions.md",
+    W,
+    "what is awaited only the outside can send",
+    'mark it m2pem:from="operator"',
+)
+TYPED_START_IN_SUBPROCESS = Rule(
+    10331,
+    "typed-start-in-subprocess",
+    "10.3.5",
+    E,
+    "a start event in an embedded subprocess waits for something",
+    "use a plain start event, and a catching intermediate event after it",
+)
+EVENT_NOT_ALLOWED = Rule(
+    10387,
+    "event-not-allowed",
+    "10.3.8",
+    E,
+    "a multi-instance activity throws by itself what it cannot",
+    "let it throw a message, signal, escalation, error or compensation",
+)
+NO_TRIGGER = Rule(
+    10507,
+    "no-trigger",
+    "10.5.4",
+    E,
+    "a catching intermediate event, a boundary event or the start event of an event subprocess "
+    "has no trigger",
+    "give it an event definition",
+)
+ERROR_NOT_INTERRUPTING = Rule(
+    10508,
+    "error-not-interrupting",
+    "10.5.4",
+    E,
+    "a boundary or start event that catches an error does not interrupt",
+    "make it interrupting, or throw and catch an escalation",
+)
+BAD_ATTACHMENT = Rule(
+    10519,
+    "bad-attachment",
+    "10.5.4",
+    E,
+    "a boundary event is attached to no activity beside it",
+    "attach it to an activity of the same process or subprocess",
+)
+TIMER_TIME = Rule(
+    10531,
+    "timer-time",
+    "10.5.5",
+    E,
+    "a timer has no time, several, or one that is no ISO 8601",
+    "give it one timeDuration, timeDate or timeCycle",
+)
+MISSING_REFERENCE = Rule(
+    10532,
+    "missing-reference",
+    "10.5.5",
+    W,
+    "an event or task names no message, signal, error or escalation",
+    "add messageRef, signalRef, errorRef or escalationRef",
+)
+NO_CONDITION = Rule(
+    10533,
+    "no-condition",
+    "10.5.5",
+    E,
+    "a conditional event has no condition",
+    "write the condition that it waits for",
+)
+LINK_NAME = Rule(
+    10541,
+    "link-name",
+    "10.5.5",
+    E,
+    "a link event has no name",
+    "give both of its ends the same name",
+)
+DANGLING_LINK = Rule(
+    10542,
+    "dangling-link",
+    "10.5.4",
+    E,
+    "no catching link event has the name of a throwing one",
+    "add a catching intermediate event with a link of this name",
+)
+DUPLICATE_LINK = Rule(
+    10543,
+    "duplicate-link",
+    "10.5.4",
+    E,
+    "two catching link events have the same name",
+    "give one another name",
+)
+LINK_THROW_OUTGOING = Rule(
+    10545,
+    "link-throw-outgoing",
+    "10.5.4",
+    E,
+    "a sequence flow leads out of a throwing link event",
+    "let it begin at what follows the link target",
+)
+LINK_CATCH_INCOMING = Rule(
+    10546,
+    "link-catch-incoming",
+    "10.5.4",
+    E,
+    "a sequence flow leads into a catching link event",
+    "lead it to what follows the link target",
+)
+LINK_CROSSES_BORDER = Rule(
+    10547,
+    "link-crosses-border",
+    "10.5.5",
+    E,
+    "a link leads out of its process or subprocess",
+    "put both of its ends into the same process or subprocess",
+)
+
+START_TRIGGER = Rule(
     10501,
     "start-trigger",
     "10.5.2",
@@ -25,7 +150,7 @@ START = Rule(
     "a process can begin only plainly, or by a message, timer, condition or signal",
     "give the start event one of these triggers, or none",
 )
-EVENT_SUBPROCESS_START = Rule(
+EVENT_SUBPROCESS_START_TRIGGER = Rule(
     10502,
     "event-subprocess-start-trigger",
     "10.5.2",
@@ -34,7 +159,7 @@ EVENT_SUBPROCESS_START = Rule(
     "condition or signal",
     "give its start event one of these triggers",
 )
-END = Rule(
+END_RESULT = Rule(
     10503,
     "end-result",
     "10.5.3",
@@ -43,7 +168,7 @@ END = Rule(
     "signal or termination, or in nothing",
     "give it one of these results, or none",
 )
-CATCH = Rule(
+CATCH_TRIGGER = Rule(
     10504,
     "catch-trigger",
     "10.5.4",
@@ -52,7 +177,7 @@ CATCH = Rule(
     "signal",
     "give it one of these triggers, or attach it to an activity",
 )
-THROW = Rule(
+THROW_RESULT = Rule(
     10505,
     "throw-result",
     "10.5.4",
@@ -60,7 +185,7 @@ THROW = Rule(
     "an intermediate event can throw only a message, escalation, link, compensation or signal",
     "give it one of these results, or none; or make it an end event",
 )
-BOUNDARY = Rule(
+BOUNDARY_TRIGGER = Rule(
     10506,
     "boundary-trigger",
     "10.5.4",
@@ -69,7 +194,7 @@ BOUNDARY = Rule(
     "compensation, condition or signal",
     "give it one of these triggers",
 )
-OUTSIDE = Rule(
+NOT_INTERRUPTING_ELSEWHERE = Rule(
     10511,
     "not-interrupting-elsewhere",
     "10.5.2",
@@ -85,7 +210,7 @@ PARALLEL_MULTIPLE = Rule(
     "an event with parallelMultiple must have several triggers",
     "add event definitions, or delete parallelMultiple",
 )
-NO_END = Rule(
+START_WITHOUT_END = Rule(
     10513,
     "start-without-end",
     "10.5.3",
@@ -93,7 +218,7 @@ NO_END = Rule(
     "it has a start event and no end event",
     "add an end event to each path",
 )
-NO_START = Rule(
+END_WITHOUT_START = Rule(
     10514,
     "end-without-start",
     "10.5.2",
@@ -101,7 +226,7 @@ NO_START = Rule(
     "it has an end event and no start event",
     "add a start event",
 )
-START_FLOW = Rule(
+START_WITHOUT_FLOW = Rule(
     10515,
     "start-without-flow",
     "10.5.2",
@@ -109,7 +234,7 @@ START_FLOW = Rule(
     "no sequence flow leads out of the start event",
     "draw one to what comes first",
 )
-INTERMEDIATE_FLOW = Rule(
+INTERMEDIATE_WITHOUT_FLOW = Rule(
     10516,
     "intermediate-without-flow",
     "10.5.4",
@@ -117,7 +242,7 @@ INTERMEDIATE_FLOW = Rule(
     "no sequence flow leads out of the intermediate event",
     "draw one to what follows, or make it an end event",
 )
-BOUNDARY_FLOW = Rule(
+BOUNDARY_WITHOUT_FLOW = Rule(
     10517,
     "boundary-without-flow",
     "10.5.4",
@@ -126,7 +251,7 @@ BOUNDARY_FLOW = Rule(
     "draw one to what follows when it is triggered",
 )
 
-INTERMEDIATE_SOURCE = Rule(
+INTERMEDIATE_WITHOUT_INCOMING = Rule(
     10520,
     "intermediate-without-incoming",
     "10.5.4",
@@ -134,7 +259,7 @@ INTERMEDIATE_SOURCE = Rule(
     "no sequence flow leads into the intermediate event; it happens when its process begins",
     "draw one from what comes before",
 )
-COMPENSATION_START = Rule(
+COMPENSATION_NOT_INTERRUPTING = Rule(
     10521,
     "compensation-not-interrupting",
     "10.5.2",
@@ -158,22 +283,24 @@ def _kinds(text: str) -> frozenset[str]:
 
 
 _ALLOWED: dict[Rule, frozenset[str]] = {
-    START: _kinds("message timer conditional signal"),
-    EVENT_SUBPROCESS_START: _kinds("message timer escalation error compensate conditional signal"),
-    END: _kinds("message error escalation cancel compensate signal terminate"),
-    CATCH: _kinds("message timer conditional link signal"),
-    THROW: _kinds("message escalation link compensate signal"),
-    BOUNDARY: _kinds("message timer escalation error cancel compensate conditional signal"),
+    START_TRIGGER: _kinds("message timer conditional signal"),
+    EVENT_SUBPROCESS_START_TRIGGER: _kinds(
+        "message timer escalation error compensate conditional signal"
+    ),
+    END_RESULT: _kinds("message error escalation cancel compensate signal terminate"),
+    CATCH_TRIGGER: _kinds("message timer conditional link signal"),
+    THROW_RESULT: _kinds("message escalation link compensate signal"),
+    BOUNDARY_TRIGGER: _kinds("message timer escalation error cancel compensate conditional signal"),
 }
 
 
 _AD_HOC = BPMN + "adHocSubProcess"
 _RULES = {
-    BPMN + "startEvent": START,
-    BPMN + "endEvent": END,
-    BPMN + "intermediateCatchEvent": CATCH,
-    BPMN + "intermediateThrowEvent": THROW,
-    BPMN + "boundaryEvent": BOUNDARY,
+    BPMN + "startEvent": START_TRIGGER,
+    BPMN + "endEvent": END_RESULT,
+    BPMN + "intermediateCatchEvent": CATCH_TRIGGER,
+    BPMN + "intermediateThrowEvent": THROW_RESULT,
+    BPMN + "boundaryEvent": BOUNDARY_TRIGGER,
 }
 
 
@@ -184,8 +311,8 @@ def allowed_triggers(event: etree._Element) -> frozenset[str]:
 
 def _rule(event: etree._Element) -> Rule:
     rule = _RULES[event.tag]
-    if rule is START and is_true(parent(event), "triggeredByEvent"):
-        return EVENT_SUBPROCESS_START
+    if rule is START_TRIGGER and is_true(parent(event), "triggeredByEvent"):
+        return EVENT_SUBPROCESS_START_TRIGGER
     return rule
 
 
@@ -194,9 +321,9 @@ def _allow(tree: Tree, event: etree._Element) -> None:
     allowed = allowed_triggers(event)
     for each in found:
         if trigger_name(each) not in allowed:
-            tree.say(_rule(event), event, f"this one has {a(kind(each.tag))}")
+            tree.report(_rule(event), event, f"this one has {a(kind(each.tag))}")
     if len(found) < 2 and is_true(event, "parallelMultiple"):
-        tree.say(PARALLEL_MULTIPLE, event, f"this one has {len(found)}")
+        tree.report(PARALLEL_MULTIPLE, event, f"this one has {len(found)}")
 
 
 def _start(tree: Tree, event: etree._Element) -> None:
@@ -204,14 +331,14 @@ def _start(tree: Tree, event: etree._Element) -> None:
     if is_true(outer, "triggeredByEvent"):
         _allow(tree, event)
         if is_false(event, "isInterrupting") and has_trigger(tree, event, "compensate"):
-            tree.say(COMPENSATION_START, event)
+            tree.report(COMPENSATION_NOT_INTERRUPTING, event)
     else:
         if outer.tag not in SUBPROCESSES:
             _allow(tree, event)
         if is_false(event, "isInterrupting"):
-            tree.say(OUTSIDE, event)
+            tree.report(NOT_INTERRUPTING_ELSEWHERE, event)
     if not tree.out(event):
-        tree.say(START_FLOW, event)
+        tree.report(START_WITHOUT_FLOW, event)
 
 
 def _end(tree: Tree, event: etree._Element) -> None:
@@ -223,41 +350,40 @@ def _catch(tree: Tree, event: etree._Element) -> None:
     if not has_trigger(tree, event, "link"):
         _has_source(tree, event)
     if not tree.out(event):
-        tree.say(INTERMEDIATE_FLOW, event)
+        tree.report(INTERMEDIATE_WITHOUT_FLOW, event)
 
 
 def _has_source(tree: Tree, event: etree._Element) -> None:
     if not tree.into(event) and parent(event).tag != _AD_HOC:
-        tree.say(INTERMEDIATE_SOURCE, event)
+        tree.report(INTERMEDIATE_WITHOUT_INCOMING, event)
 
 
 def _throw(tree: Tree, event: etree._Element) -> None:
     _allow(tree, event)
     _has_source(tree, event)
     if not tree.out(event) and not has_trigger(tree, event, "link"):
-        tree.say(INTERMEDIATE_FLOW, event)
+        tree.report(INTERMEDIATE_WITHOUT_FLOW, event)
 
 
 def _boundary(tree: Tree, event: etree._Element) -> None:
     _allow(tree, event)
     if not tree.out(event) and not has_trigger(tree, event, "compensate"):
-        tree.say(BOUNDARY_FLOW, event)
+        tree.report(BOUNDARY_WITHOUT_FLOW, event)
 
 
 def _container(tree: Tree, element: etree._Element) -> None:
     if element.tag != BPMN + "process" and not is_true(element, "triggeredByEvent"):
         number = sum(1 for _ in children(element, "startEvent"))
         if number > 1:
-            tree.say(SUBPROCESS_STARTS, element, f"this one has {number}")
+            tree.report(SUBPROCESS_STARTS, element, f"this one has {number}")
     starts, ends = has(element, "startEvent"), has(element, "endEvent")
     if starts and not ends:
-        tree.say(NO_END, element)
+        tree.report(START_WITHOUT_END, element)
     elif ends and not starts:
-        tree.say(NO_START, element)
+        tree.report(END_WITHOUT_START, element)
 
 
-TOPIC = Topic(
-    declared(globals()),
+CHECKS = Checks(
     {
         "startEvent": _start,
         "endEvent": _end,
@@ -267,5 +393,101 @@ TOPIC = Topic(
         "process": _container,
         "subProcess": _container,
         "transaction": _container,
+    },
+)
+
+
+THROWN_ERROR_CODE = Rule(
+    8422,
+    "thrown-error-code",
+    "8.4.3",
+    W,
+    "the error that is thrown has no errorCode",
+    "add errorCode to the error; until then its id is its code",
+)
+THROWN_ESCALATION_CODE = Rule(
+    8432,
+    "thrown-escalation-code",
+    "8.4.4",
+    W,
+    "the escalation that is thrown has no escalationCode",
+    "add escalationCode to the escalation; until then its id is its code",
+)
+CANCEL_END_PLACE = Rule(
+    10549,
+    "cancel-end-place",
+    "10.5.5",
+    E,
+    "a cancel end event can stand only in a transaction",
+    "make what is around it a transaction, or use an error or terminate end event",
+)
+CANCEL_BOUNDARY_PLACE = Rule(
+    10550,
+    "cancel-boundary-place",
+    "10.5.5",
+    E,
+    "a cancel boundary event can be attached only to a transaction",
+    "make the activity a transaction, or catch an error",
+)
+CANCEL_NOT_INTERRUPTING = Rule(
+    10551,
+    "cancel-not-interrupting",
+    "10.5.5",
+    E,
+    "a cancel boundary event must interrupt the transaction",
+    'delete cancelActivity="false"',
+)
+CANCEL_UNCAUGHT = Rule(
+    10552,
+    "cancel-uncaught",
+    "10.5.6",
+    W,
+    "no boundary event of the transaction catches the cancellation; its token ends there",
+    "attach a cancel boundary event to the transaction",
+)
+
+
+def _error(tree: Tree, definition: etree._Element) -> None:
+    _code(tree, definition, "errorRef", "errorCode", THROWN_ERROR_CODE)
+
+
+def _escalation(tree: Tree, definition: etree._Element) -> None:
+    _code(tree, definition, "escalationRef", "escalationCode", THROWN_ESCALATION_CODE)
+
+
+def _code(
+    tree: Tree, definition: etree._Element, reference: str, attribute: str, rule: Rule
+) -> None:
+    name = definition.get(reference)
+    if not name or parent(definition).tag not in THROWING:
+        return
+    root = tree.find(definition, name)
+    if root is not None and name_of(root) == reference[:-3] and not root.get(attribute):
+        tree.report(rule, definition, f"'{name}'")
+
+
+def _cancel(tree: Tree, definition: etree._Element) -> None:
+    event = parent(definition)
+    transaction = BPMN + "transaction"
+    around = parent(event)
+    if name_of(event) == "endEvent" and around.tag != transaction:
+        tree.report(CANCEL_END_PLACE, event)
+    elif name_of(event) == "endEvent":
+        attached = tree.boundary.get(around.get("id", ""), [])
+        if not any(has_trigger(tree, each, "cancel") for each in attached):
+            tree.report(CANCEL_UNCAUGHT, event)
+    elif name_of(event) == "boundaryEvent":
+        host = tree.find(event, event.get("attachedToRef", ""))
+        if host is not None and host.tag != transaction:
+            tree.report(CANCEL_BOUNDARY_PLACE, event)
+        if is_false(event, "cancelActivity"):
+            tree.report(CANCEL_NOT_INTERRUPTING, event)
+
+
+DEFINITIONS = Checks(
+    {
+        "errorEventDefinition": _error,
+        "escalationEventDefinition": _escalation,
+        "cancelEventDefinition": _cancel,
     },
 )

@@ -3,17 +3,43 @@
 from lxml import etree
 
 from m2pem.bpmn.names import BPMN, CAMUNDA, M2PEM, ZEEBE, a, kind, local
-from m2pem.bpmn.rules import own_rules
-from m2pem.bpmn.rules.rule import Topic
-from m2pem.bpmn.rules.tree import Tree, parent
+from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.tree import Checks, Tree, parent
 from m2pem.bpmn.vocabulary import ELEMENTS, PLACES, looks_like_own, strangers
 from m2pem.mission.near import did_you_mean
 
-_RULES = {rule.slug: rule for rule in own_rules.TOPIC.rules}
-_WRONG_NAMESPACE = _RULES["wrong-namespace"]
-_UNKNOWN = _RULES["unknown-extension"]
-_MISPLACED = _RULES["misplaced-extension"]
-_FOREIGN = _RULES["foreign-extension"]
+WRONG_NAMESPACE = Rule(
+    218,
+    "wrong-namespace",
+    "missions.md",
+    E,
+    "a prefix or namespace is like m2pem's, but is not",
+    "see extensions.md",
+)
+MISPLACED_EXTENSION = Rule(
+    304,
+    "misplaced-extension",
+    "missions.md",
+    W,
+    "an m2pem: name has no effect where it stands",
+    "move it, or delete it",
+)
+UNKNOWN_EXTENSION = Rule(
+    305,
+    "unknown-extension",
+    "missions.md",
+    E,
+    "m2pem has no such element or attribute",
+    "correct it, or delete it",
+)
+FOREIGN_EXTENSION = Rule(
+    312,
+    "foreign-extension",
+    "missions.md",
+    W,
+    "another program's extension elements have no effect here",
+    "see extensions.md",
+)
 
 _OWN = M2PEM[1:-1]
 _EXTENSIONS = BPMN + "extensionElements"
@@ -68,7 +94,7 @@ def _extensions(tree: Tree) -> None:
             namespace = _namespace(tag)
             if namespace in ("", BPMN[1:-1]) and local(tag) in ELEMENTS:
                 right = f'did you mean <m2pem:{local(tag)}>, with xmlns:m2pem="{_OWN}"?'
-                tree.say(_WRONG_NAMESPACE, element, f"<{local(tag)}> has no prefix", right)
+                tree.report(WRONG_NAMESPACE, element, f"<{local(tag)}> has no prefix", right)
             elif namespace and looks_like_own(element.prefix or "", namespace):
                 if namespace not in tree.root.nsmap.values():
                     _say_wrong(tree, element, element.prefix or "", namespace)
@@ -87,7 +113,7 @@ def _declared(tree: Tree) -> None:
 def _say_wrong(tree: Tree, element: etree._Element, prefix: str, namespace: str) -> None:
     declared = f"xmlns:{prefix}" if prefix else "xmlns"
     right = f'did you mean xmlns:m2pem="{_OWN}"?'
-    tree.say(_WRONG_NAMESPACE, element, f'{declared}="{namespace}"', right)
+    tree.report(WRONG_NAMESPACE, element, f'{declared}="{namespace}"', right)
 
 
 def _own(tree: Tree, element: etree._Element, owner: etree._Element) -> None:
@@ -95,14 +121,14 @@ def _own(tree: Tree, element: etree._Element, owner: etree._Element) -> None:
     schema = ELEMENTS.get(name)
     if schema is None:
         right = did_you_mean(name, ELEMENTS, "delete it")
-        tree.say(_UNKNOWN, element, f"m2pem:{name}", right)
+        tree.report(UNKNOWN_EXTENSION, element, f"m2pem:{name}", right)
         return
     if local(owner.tag) not in schema.places:
         places = [kind(place) for place in schema.places]
         right = f"it is for: {', '.join(places)}" if places else f"put it into {_wrappers(name)}"
-        tree.say(_MISPLACED, element, f"m2pem:{name} on {a(kind(owner.tag))}", right)
+        tree.report(MISPLACED_EXTENSION, element, f"m2pem:{name} on {a(kind(owner.tag))}", right)
     for where, message, right in strangers(element):
-        tree.say(_UNKNOWN, where, message, right)
+        tree.report(UNKNOWN_EXTENSION, where, message, right)
 
 
 def _wrappers(name: str) -> str:
@@ -122,7 +148,7 @@ def _say_foreign(tree: Tree, namespace: str, elements: list[etree._Element]) -> 
     listed = ", ".join(names[:_SHOWN]) + (", ..." if len(names) > _SHOWN else "")
     count = f"{len(elements):,} element" + ("" if len(elements) == 1 else "s")
     whose = f"of the namespace {namespace}" if namespace else "without a namespace"
-    tree.say(_FOREIGN, elements[0], f"{count} {whose} from here on: {listed}")
+    tree.report(FOREIGN_EXTENSION, elements[0], f"{count} {whose} from here on: {listed}")
 
 
-TOPIC = Topic((), {}, (_extensions,))
+CHECKS = Checks({}, (_extensions,))

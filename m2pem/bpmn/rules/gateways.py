@@ -1,11 +1,52 @@
-"""Gateways as their direction says they are (BPMN 2.0.2, 8.4.9 and 10.6)."""
+"""Gateways: their direction, and event-based ones (BPMN 2.0.2, 8.4.9 and 10.6)."""
+
+from collections.abc import Sequence
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import Rule, Topic, W, declared
-from m2pem.bpmn.rules.tree import Tree, name_of, parent
+from m2pem.bpmn.names import a, kind
+from m2pem.bpmn.rules.attributes import BAD_VALUE
+from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.sequence_flows import CONDITION_IGNORED, CONDITION_NOT_ALLOWED
+from m2pem.bpmn.rules.tree import (
+    Checks,
+    Tree,
+    has,
+    has_trigger,
+    is_true,
+    name_of,
+    parent,
+    trigger_name,
+    triggers,
+    what,
+)
 
-DIRECTION = Rule(
+NO_CONDITIONS = Rule(
+    309,
+    "no-conditions",
+    "missions.md",
+    W,
+    "no flow out of a gateway has a condition",
+    "give the flows conditions",
+)
+NO_ACTIVATION_CONDITION = Rule(
+    10605,
+    "no-activation-condition",
+    "10.6.5",
+    W,
+    "a complex gateway does not say when it is activated",
+    "add an activationCondition",
+)
+PARALLEL_EVENT_GATEWAY = Rule(
+    10618,
+    "parallel-event-gateway",
+    "10.6.6",
+    E,
+    "an event-based gateway that does not begin a process cannot be parallel",
+    "use a parallel gateway before the events",
+)
+
+GATEWAY_DIRECTION = Rule(
     8491,
     "gateway-direction",
     "8.4.9",
@@ -13,7 +54,7 @@ DIRECTION = Rule(
     "the gateway's direction is none that BPMN has",
     "write Unspecified, Converging, Diverging or Mixed",
 )
-IDLE = Rule(
+IDLE_GATEWAY = Rule(
     10601,
     "idle-gateway",
     "10.6.1",
@@ -21,7 +62,7 @@ IDLE = Rule(
     "the gateway neither merges nor splits",
     "draw several flows to it or from it, or delete it",
 )
-CONVERGING = Rule(
+NOT_CONVERGING = Rule(
     10602,
     "not-converging",
     "10.6.1",
@@ -29,7 +70,7 @@ CONVERGING = Rule(
     "a converging gateway must have several incoming flows and at most one outgoing flow",
     "correct its gatewayDirection; the flows count",
 )
-DIVERGING = Rule(
+NOT_DIVERGING = Rule(
     10603,
     "not-diverging",
     "10.6.1",
@@ -37,7 +78,7 @@ DIVERGING = Rule(
     "a diverging gateway must have at most one incoming flow and several outgoing flows",
     "correct its gatewayDirection; the flows count",
 )
-MIXED = Rule(
+NOT_MIXED = Rule(
     10604,
     "not-mixed",
     "10.6.1",
@@ -51,22 +92,21 @@ def _gateway(tree: Tree, element: etree._Element) -> None:
     incoming, outgoing = len(tree.into(element)), len(tree.out(element))
     direction = element.get("gatewayDirection", "Unspecified").strip()
     if direction not in ("Unspecified", "Converging", "Diverging", "Mixed"):
-        tree.say(DIRECTION, element, f"'{direction}'")
+        tree.report(GATEWAY_DIRECTION, element, f"'{direction}'")
     detail = f"this one has {incoming} incoming and {outgoing} outgoing"
     if incoming < 2 and outgoing < 2:
         alone = incoming + outgoing == 0 and name_of(parent(element)) == "adHocSubProcess"
         if name_of(element) != "eventBasedGateway" and not alone:
-            tree.say(IDLE, element)
+            tree.report(IDLE_GATEWAY, element)
     elif direction == "Converging" and (incoming < 2 or outgoing > 1):
-        tree.say(CONVERGING, element, detail)
+        tree.report(NOT_CONVERGING, element, detail)
     elif direction == "Diverging" and (incoming > 1 or outgoing < 2):
-        tree.say(DIVERGING, element, detail)
+        tree.report(NOT_DIVERGING, element, detail)
     elif direction == "Mixed" and (incoming < 2 or outgoing < 2):
-        tree.say(MIXED, element, detail)
+        tree.report(NOT_MIXED, element, detail)
 
 
-TOPIC = Topic(
-    declared(globals()),
+CHECKS = Checks(
     {
         "exclusiveGateway": _gateway,
         "inclusiveGateway": _gateway,
@@ -75,3 +115,121 @@ TOPIC = Topic(
         "complexGateway": _gateway,
     },
 )
+
+
+EVENT_GATEWAY_BRANCHES = Rule(
+    10611,
+    "event-gateway-branches",
+    "10.6.6",
+    E,
+    "an event-based gateway must have two or more outgoing flows",
+    "lead a flow from it to each event that it waits for",
+)
+EVENT_GATEWAY_TARGET = Rule(
+    10612,
+    "event-gateway-target",
+    "10.6.6",
+    E,
+    "an event-based gateway can lead only to catching intermediate events and receive tasks",
+    "put an event between the two, or use another gateway",
+)
+EVENT_GATEWAY_TRIGGER = Rule(
+    10613,
+    "event-gateway-trigger",
+    "10.6.6",
+    E,
+    "an event behind an event-based gateway can wait only for a message, signal, timer or "
+    "condition",
+    "give the event one of these triggers",
+)
+EVENT_GATEWAY_MIXED = Rule(
+    10614,
+    "event-gateway-mixed",
+    "10.6.6",
+    W,
+    "the event-based gateway leads to both message events and receive tasks",
+    "use one of the two for all its messages",
+)
+EVENT_GATEWAY_BOUNDARY = Rule(
+    10615,
+    "event-gateway-boundary",
+    "10.6.6",
+    E,
+    "a receive task behind an event-based gateway must not have boundary events",
+    "make what it waits for another branch of the gateway",
+)
+EVENT_GATEWAY_SHARED_TARGET = Rule(
+    10616,
+    "event-gateway-shared-target",
+    "10.6.6",
+    W,
+    "what an event-based gateway leads to must not have another incoming flow",
+    "draw an event of its own for the other flow",
+)
+EVENT_GATEWAY_CONDITION = Rule(
+    10617,
+    "event-gateway-condition",
+    "10.6.6",
+    W,
+    "a flow out of an event-based gateway must not have a condition; events decide",
+    "delete the condition",
+)
+EVENT_GATEWAY_BEGINS = Rule(
+    10619,
+    "event-gateway-begins",
+    "10.6.6",
+    E,
+    "an event-based gateway that begins a process must not have an incoming flow",
+    'delete the flow, or instantiate="true"',
+)
+EVENT_GATEWAY_TYPE = Rule(
+    10620,
+    "event-gateway-type",
+    "10.6.6",
+    E,
+    "the event-based gateway's type is none that BPMN has",
+    "write Exclusive or Parallel",
+)
+_TRIGGERS = frozenset({"message", "signal", "timer", "conditional"})
+
+
+def _gateway_event_gateway(tree: Tree, element: etree._Element) -> None:
+    flows = tree.out(element)
+    if len(flows) < 2:
+        tree.report(EVENT_GATEWAY_BRANCHES, element, f"this one has {len(flows)}")
+    targets = [tree.find(flow, flow.get("targetRef", "")) for flow in flows]
+    found = [target for target in targets if target is not None]
+    _check_targets(tree, element, found)
+    for flow in flows:
+        if has(flow, "conditionExpression"):
+            unless = (CONDITION_IGNORED, CONDITION_NOT_ALLOWED)
+            tree.report(EVENT_GATEWAY_CONDITION, flow, unless=unless)
+    begins = is_true(element, "instantiate")
+    kind_of = element.get("eventGatewayType", "Exclusive").strip()
+    if kind_of not in ("Exclusive", "Parallel"):
+        tree.report(EVENT_GATEWAY_TYPE, element, f"'{kind_of}'", unless=(BAD_VALUE,))
+    if begins and tree.into(element):
+        tree.report(EVENT_GATEWAY_BEGINS, element)
+
+
+def _check_targets(tree: Tree, gateway: etree._Element, targets: Sequence[etree._Element]) -> None:
+    for target in targets:
+        name = name_of(target)
+        if name == "receiveTask":
+            if tree.boundary.get(target.get("id", "")):
+                tree.report(EVENT_GATEWAY_BOUNDARY, target)
+        elif name != "intermediateCatchEvent":
+            tree.report(EVENT_GATEWAY_TARGET, gateway, f"{what(target)} is {a(kind(target.tag))}")
+            continue
+        for each in triggers(tree, target):
+            if trigger_name(each) not in _TRIGGERS:
+                tree.report(EVENT_GATEWAY_TRIGGER, target, f"this one for {a(kind(each.tag))}")
+        if len(tree.into(target)) > 1:
+            tree.report(EVENT_GATEWAY_SHARED_TARGET, target)
+    if any(name_of(target) == "receiveTask" for target in targets) and any(
+        has_trigger(tree, target, "message") for target in targets
+    ):
+        tree.report(EVENT_GATEWAY_MIXED, gateway)
+
+
+EVENT_BASED = Checks({"eventBasedGateway": _gateway_event_gateway})

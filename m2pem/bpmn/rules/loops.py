@@ -2,10 +2,91 @@
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import E, Rule, Topic, W, declared
-from m2pem.bpmn.rules.tree import Tree, has, texts
+from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.tree import Checks, Tree, has, texts
 
-ENDLESS = Rule(
+ENDLESS_LOOP = Rule(
+    313,
+    "endless-loop",
+    "missions.md",
+    E,
+    "a loop has no wait and no end",
+    "wait in each round, or draw a way out",
+)
+BUSY_LOOP = Rule(
+    314,
+    "busy-loop",
+    "missions.md",
+    W,
+    "a loop has no wait; only data can end it",
+    "wait in each round, or count the rounds",
+)
+LOOP_NOT_ALLOWED = Rule(
+    10336,
+    "loop-not-allowed",
+    "10.3.5",
+    E,
+    "an event subprocess has a loop marker",
+    "delete it, or put it on an activity inside",
+)
+TWO_LOOPS = Rule(
+    10371,
+    "two-loops",
+    "10.3.8",
+    E,
+    "an activity has two loop markers",
+    "keep one; put the activity into a subprocess that has the other",
+)
+LOOP_MAXIMUM = Rule(
+    10372,
+    "loop-maximum",
+    "10.3.8",
+    E,
+    "loopMaximum is no whole number",
+    "write the number of rounds at most, or delete it",
+)
+INSTANCE_COUNT = Rule(
+    10374,
+    "instance-count",
+    "10.3.8",
+    E,
+    "a multi-instance activity does not say how many instances there are",
+    "add a loopCardinality or a collection",
+)
+INSTANCES_COUNTED_TWICE = Rule(
+    10375,
+    "instances-counted-twice",
+    "10.3.8",
+    E,
+    "a multi-instance activity has both a loopCardinality and a collection",
+    "keep one of the two",
+)
+INSTANCES_BEHAVIOR = Rule(
+    10376,
+    "instances-behavior",
+    "10.3.8",
+    E,
+    "the multi-instance behavior is none that BPMN has",
+    "write None, One, All or Complex",
+)
+COMPLEX_BEHAVIOR = Rule(
+    10381,
+    "complex-behavior",
+    "10.3.8",
+    E,
+    "a complexBehaviorDefinition lacks its condition or its event",
+    "say when something is thrown, and what",
+)
+NO_LOOP = Rule(
+    10386,
+    "no-loop",
+    "10.3.8",
+    E,
+    "a loop marker does not say which kind of loop",
+    "write standardLoopCharacteristics or multiInstanceLoopCharacteristics",
+)
+
+LOOP_WITHOUT_CONDITION = Rule(
     10373,
     "loop-without-condition",
     "10.3.8",
@@ -13,7 +94,7 @@ ENDLESS = Rule(
     "the loop does not say how long it goes on",
     "add a loopCondition or a loopMaximum",
 )
-UNUSED_EVENT = Rule(
+INSTANCES_EVENT_UNUSED = Rule(
     10378,
     "instances-event-unused",
     "10.3.8",
@@ -21,7 +102,7 @@ UNUSED_EVENT = Rule(
     "the multi-instance activity names an event that its behavior never throws",
     'write behavior="None" or behavior="One" as the event is meant, or delete its reference',
 )
-COMPLEX = Rule(
+INSTANCES_COMPLEX = Rule(
     10379,
     "instances-complex",
     "10.3.8",
@@ -29,7 +110,7 @@ COMPLEX = Rule(
     "the multi-instance behavior is Complex, but nothing says what is thrown, and when",
     "add a complexBehaviorDefinition",
 )
-UNUSED_COMPLEX = Rule(
+INSTANCES_COMPLEX_UNUSED = Rule(
     10380,
     "instances-complex-unused",
     "10.3.8",
@@ -37,7 +118,7 @@ UNUSED_COMPLEX = Rule(
     "complexBehaviorDefinition has no effect without the behavior Complex",
     'write behavior="Complex", or delete it',
 )
-INPUT_ITEM = Rule(
+INPUT_ITEM_WITHOUT_INPUT = Rule(
     10382,
     "input-item-without-input",
     "10.3.8",
@@ -45,7 +126,7 @@ INPUT_ITEM = Rule(
     "inputDataItem has no effect without loopDataInputRef",
     "add the collection, or delete the item",
 )
-OUTPUT_ITEM = Rule(
+OUTPUT_WITHOUT_ITEM = Rule(
     10383,
     "output-without-item",
     "10.3.8",
@@ -58,26 +139,27 @@ _THROWN = {"noneBehaviorEventRef": "None", "oneBehaviorEventRef": "One"}
 
 def _loop(tree: Tree, element: etree._Element) -> None:
     if element.get("loopMaximum") is None and not any(texts(element, "loopCondition")):
-        tree.say(ENDLESS, element)
+        tree.report(LOOP_WITHOUT_CONDITION, element)
 
 
 def _instances(tree: Tree, element: etree._Element) -> None:
     if has(element, "inputDataItem") and not any(texts(element, "loopDataInputRef")):
-        tree.say(INPUT_ITEM, element)
+        tree.report(INPUT_ITEM_WITHOUT_INPUT, element)
     if has(element, "loopDataOutputRef") != has(element, "outputDataItem"):
-        tree.say(OUTPUT_ITEM, element)
+        tree.report(OUTPUT_WITHOUT_ITEM, element)
     behavior = element.get("behavior", "All").strip()
     for attribute, value in _THROWN.items():
         if element.get(attribute) and behavior != value:
-            tree.say(UNUSED_EVENT, element, f"{attribute} with the behavior {behavior}")
+            tree.report(
+                INSTANCES_EVENT_UNUSED, element, f"{attribute} with the behavior {behavior}"
+            )
     complexes = has(element, "complexBehaviorDefinition")
     if behavior == "Complex" and not complexes:
-        tree.say(COMPLEX, element)
+        tree.report(INSTANCES_COMPLEX, element)
     elif behavior != "Complex" and complexes:
-        tree.say(UNUSED_COMPLEX, element)
+        tree.report(INSTANCES_COMPLEX_UNUSED, element)
 
 
-TOPIC = Topic(
-    declared(globals()),
+CHECKS = Checks(
     {"standardLoopCharacteristics": _loop, "multiInstanceLoopCharacteristics": _instances},
 )

@@ -5,8 +5,18 @@ References that execution needs (flows, attachments, signals, ...) are looked up
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import Check, Rule, Topic, W, declared
-from m2pem.bpmn.rules.tree import ACTIVITIES, EVENTS, Tree, name_of, names, texts
+from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.tree import ACTIVITIES, EVENTS, Check, Checks, Tree, name_of, names, texts
+
+DANGLING_REFERENCE = Rule(
+    15301,
+    "dangling-reference",
+    "15.3.2",
+    E,
+    "a reference names nothing, or nothing of the right kind (a warning where it has no effect on "
+    "execution: pools, lanes, message flows, data)",
+    "name an element that is there",
+)
 
 ITEMS = names(
     "dataObject dataObjectReference dataStore dataStoreReference property dataInput dataOutput "
@@ -46,7 +56,7 @@ MESSAGE_ITEM = Rule(
     "the message's itemRef names no item definition",
     "name an itemDefinition, or delete it",
 )
-OUT_MESSAGE = Rule(
+OPERATION_OUT_MESSAGE = Rule(
     8505,
     "operation-out-message",
     "8.5.3",
@@ -62,7 +72,7 @@ OPERATION_ERROR = Rule(
     "the operation's errorRef names no error",
     "name an error that stands in definitions, or delete it",
 )
-INTERFACE = Rule(
+PARTICIPANT_INTERFACE = Rule(
     9303,
     "participant-interface",
     "9.3.1",
@@ -70,7 +80,7 @@ INTERFACE = Rule(
     "the pool's interfaceRef names no interface",
     "name an interface that stands in definitions, or delete it",
 )
-END_POINT = Rule(
+PARTICIPANT_END_POINT = Rule(
     9304,
     "participant-end-point",
     "9.3.1",
@@ -78,7 +88,7 @@ END_POINT = Rule(
     "the pool's endPointRef names no end point",
     "name an endPoint that stands in definitions, or delete it",
 )
-PARTNER = Rule(
+PARTNER_PARTICIPANT = Rule(
     9305,
     "partner-participant",
     "9.3.1",
@@ -94,7 +104,7 @@ CALLED_COLLABORATION = Rule(
     "the call conversation's calledCollaborationRef names no collaboration",
     "name a collaboration or globalConversation, or delete it",
 )
-CONVERSATION_FLOW = Rule(
+CONVERSATION_MESSAGE_FLOW = Rule(
     9506,
     "conversation-message-flow",
     "9.5.1",
@@ -102,7 +112,7 @@ CONVERSATION_FLOW = Rule(
     "the conversation's messageFlowRef names no message flow",
     "name a messageFlow of the collaboration, or delete it",
 )
-CHOREOGRAPHY = Rule(
+COLLABORATION_CHOREOGRAPHY = Rule(
     9701,
     "collaboration-choreography",
     "9.7",
@@ -110,7 +120,7 @@ CHOREOGRAPHY = Rule(
     "the collaboration's choreographyRef names no choreography",
     "name a choreography that stands in definitions, or delete it",
 )
-DEFINITIONAL = Rule(
+DEFINITIONAL_COLLABORATION = Rule(
     10103,
     "definitional-collaboration",
     "10.1",
@@ -118,7 +128,7 @@ DEFINITIONAL = Rule(
     "definitionalCollaborationRef names no collaboration",
     "name a collaboration of the file, or delete it",
 )
-SUPPORTS = Rule(
+SUPPORTED_PROCESS = Rule(
     10104,
     "supported-process",
     "10.1",
@@ -150,7 +160,7 @@ TASK_OPERATION = Rule(
     "the task's operationRef names no operation",
     "name an operation of an interface, or delete it",
 )
-ITEM = Rule(
+DATA_ITEM = Rule(
     10404,
     "data-item",
     "10.4.1",
@@ -174,7 +184,7 @@ SIGNAL_STRUCTURE = Rule(
     "the signal's structureRef names no item definition",
     "name an itemDefinition, or delete it",
 )
-PARTITION = Rule(
+LANE_PARTITION = Rule(
     10804,
     "lane-partition",
     "10.8",
@@ -199,22 +209,22 @@ _ATTRIBUTES: list[tuple[str, str, frozenset[str], Rule]] = [
     ("signal", "structureRef", _ITEM_DEFINITION, SIGNAL_STRUCTURE),
     ("message", "itemRef", _ITEM_DEFINITION, MESSAGE_ITEM),
     ("callConversation", "calledCollaborationRef", _COLLABORATION, CALLED_COLLABORATION),
-    ("process", "definitionalCollaborationRef", _COLLABORATION, DEFINITIONAL),
+    ("process", "definitionalCollaborationRef", _COLLABORATION, DEFINITIONAL_COLLABORATION),
     ("serviceTask", "operationRef", _OPERATION, TASK_OPERATION),
     ("sendTask", "operationRef", _OPERATION, TASK_OPERATION),
     ("receiveTask", "operationRef", _OPERATION, TASK_OPERATION),
-    ("lane", "partitionElementRef", _PARTITION, PARTITION),
-    *((each, "itemSubjectRef", _ITEM_DEFINITION, ITEM) for each in _DATA.split()),
+    ("lane", "partitionElementRef", _PARTITION, LANE_PARTITION),
+    *((each, "itemSubjectRef", _ITEM_DEFINITION, DATA_ITEM) for each in _DATA.split()),
 ]
 _CHILDREN: list[tuple[str, frozenset[str], Rule]] = [
     ("categoryValueRef", names("categoryValue"), CATEGORY_VALUE),
-    ("outMessageRef", names("message"), OUT_MESSAGE),
+    ("outMessageRef", names("message"), OPERATION_OUT_MESSAGE),
     ("errorRef", names("error"), OPERATION_ERROR),
-    ("interfaceRef", _INTERFACE, INTERFACE),
-    ("endPointRef", names("endPoint"), END_POINT),
-    ("messageFlowRef", names("messageFlow"), CONVERSATION_FLOW),
-    ("choreographyRef", names("choreography globalChoreographyTask"), CHOREOGRAPHY),
-    ("supports", names("process"), SUPPORTS),
+    ("interfaceRef", _INTERFACE, PARTICIPANT_INTERFACE),
+    ("endPointRef", names("endPoint"), PARTICIPANT_END_POINT),
+    ("messageFlowRef", names("messageFlow"), CONVERSATION_MESSAGE_FLOW),
+    ("choreographyRef", names("choreography globalChoreographyTask"), COLLABORATION_CHOREOGRAPHY),
+    ("supports", names("process"), SUPPORTED_PROCESS),
     ("supportedInterfaceRef", _INTERFACE, SUPPORTED_INTERFACE),
     ("resourceRef", names("resource"), ROLE_RESOURCE),
     ("operationRef", _OPERATION, EVENT_OPERATION),
@@ -225,7 +235,7 @@ def _attribute(attribute: str, tags: frozenset[str], rule: Rule) -> Check:
     def check(tree: Tree, element: etree._Element) -> None:
         name = element.get(attribute)
         if name and tree.leads_nowhere(element, name, tags):
-            tree.say(rule, element, f"'{name}'")
+            tree.report(rule, element, f"'{name}'")
 
     return check
 
@@ -234,7 +244,7 @@ def _child(tags: frozenset[str], rule: Rule) -> Check:
     def check(tree: Tree, element: etree._Element) -> None:
         name = (element.text or "").strip()
         if name and tree.leads_nowhere(element, name, tags):
-            tree.say(rule, element, f"'{name}'")
+            tree.report(rule, element, f"'{name}'")
 
     return check
 
@@ -243,11 +253,10 @@ def _partner(tree: Tree, element: etree._Element) -> None:
     """partnerEntity and partnerRole; participantRef is also a child of conversations."""
     for name in texts(element, "participantRef"):
         if tree.leads_nowhere(element, name, names("participant")):
-            tree.say(PARTNER, element, f"{name_of(element)} names '{name}'")
+            tree.report(PARTNER_PARTICIPANT, element, f"{name_of(element)} names '{name}'")
 
 
-TOPIC = Topic(
-    declared(globals()),
+CHECKS = Checks(
     {
         **{owner: _attribute(name, tags, rule) for owner, name, tags, rule in _ATTRIBUTES},
         **{name: _child(tags, rule) for name, tags, rule in _CHILDREN},

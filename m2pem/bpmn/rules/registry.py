@@ -1,66 +1,52 @@
-"""All rules: of BPMN, whoever checks them, and of m2pem's own."""
+"""All rules of mission files, and the checks of a file's XML tree; time is linear in the file."""
 
 from collections.abc import Mapping
 
+from lxml import etree
+
+from m2pem.bpmn.names import BPMN
+from m2pem.bpmn.report import Report
 from m2pem.bpmn.rules import (
     activities,
+    attributes,
+    behaviors,
     collaboration,
     compensation,
-    correlation,
     data,
-    data_flow,
     definitions,
-    event_gateways,
     events,
     extensions,
-    flows,
+    files,
     gateways,
-    lanes,
     loops,
-    message_flows,
-    own_rules,
-    reader_process_rules,
-    reader_rules,
     references,
-    services,
-    shapes,
-    structure,
+    sequence_flows,
     subprocesses,
-    values,
 )
-from m2pem.bpmn.rules.rule import Rule, Topic
+from m2pem.bpmn.rules.rule import Rule, declared
+from m2pem.bpmn.rules.tree import Check, Checks, Tree
 
-TOPICS: tuple[Topic, ...] = (
-    structure.TOPIC,
-    references.TOPIC,
-    correlation.TOPIC,
-    services.TOPIC,
-    flows.TOPIC,
-    gateways.TOPIC,
-    event_gateways.TOPIC,
-    activities.TOPIC,
-    loops.TOPIC,
-    subprocesses.TOPIC,
-    events.TOPIC,
-    definitions.TOPIC,
-    compensation.TOPIC,
-    data.TOPIC,
-    data_flow.TOPIC,
-    collaboration.TOPIC,
-    message_flows.TOPIC,
-    lanes.TOPIC,
-    values.TOPIC,
-    values.TRUTHS,
-    shapes.TOPIC,
-    reader_rules.TOPIC,
-    reader_process_rules.TOPIC,
-    own_rules.TOPIC,
-    extensions.TOPIC,
+_FAMILIES = (
+    activities,
+    attributes,
+    behaviors,
+    collaboration,
+    compensation,
+    data,
+    definitions,
+    events,
+    extensions,
+    files,
+    gateways,
+    loops,
+    references,
+    sequence_flows,
+    subprocesses,
 )
 
 RULES: tuple[Rule, ...] = tuple(
     sorted(
-        {rule for topic in TOPICS for rule in topic.rules},
+        {rule for family in _FAMILIES for rule in declared(vars(family))},
         key=lambda rule: rule.number,
     )
 )
@@ -68,8 +54,61 @@ RULES: tuple[Rule, ...] = tuple(
 
 BY_SLUG: Mapping[str, Rule] = {rule.slug: rule for rule in RULES}
 
+_CHECKS: tuple[Checks, ...] = (
+    definitions.CHECKS,
+    references.CHECKS,
+    collaboration.CORRELATION,
+    activities.SERVICES,
+    sequence_flows.CHECKS,
+    gateways.CHECKS,
+    gateways.EVENT_BASED,
+    activities.CHECKS,
+    loops.CHECKS,
+    subprocesses.CHECKS,
+    events.CHECKS,
+    events.DEFINITIONS,
+    compensation.CHECKS,
+    data.CHECKS,
+    data.ASSOCIATIONS,
+    collaboration.CHECKS,
+    collaboration.MESSAGE_FLOWS,
+    collaboration.LANES,
+    attributes.VALUES,
+    attributes.TRUTHS,
+    attributes.SHAPES,
+    extensions.CHECKS,
+)
+"""In the order in which they look at an element."""
 
-def code(slug: str) -> str:
-    """The number of a finding's rule as it is shown (B10611), or "" when it has none."""
-    rule = BY_SLUG.get(slug)
-    return "" if rule is None else rule.code
+
+def _of_root(check: Check) -> Check:
+    """Restrict a check to root elements: a script's behavior may have elements of the same name."""
+
+    def checked(tree: Tree, element: etree._Element) -> None:
+        if element.getparent() is tree.root:
+            check(tree, element)
+
+    return checked
+
+
+def _by_tag() -> dict[str, list[Check]]:
+    found: dict[str, list[Check]] = {}
+    for checks in _CHECKS:
+        for name, check in checks.by_name.items():
+            added = _of_root(check) if name == "resource" else check
+            found.setdefault(BPMN + name, []).append(added)
+    return found
+
+
+_BY_TAG = _by_tag()
+
+
+def check_rules(root: etree._Element, report: Report, source: bytes) -> None:
+    """Add what the checks find in a file, with its bytes `source`, to what the readers found."""
+    tree = Tree(root, report, source)
+    for element in root.iter(*_BY_TAG):
+        for check in _BY_TAG[element.tag]:
+            check(tree, element)
+    for checks in _CHECKS:
+        for whole in checks.whole:
+            whole(tree)

@@ -1,15 +1,9 @@
 """A rule: one thing that BPMN, or m2pem, forbids, with its number, clause and sentences."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from lxml import etree
-
-from m2pem.findings import Severity
-
-if TYPE_CHECKING:
-    from m2pem.bpmn.rules.tree import Tree
+from m2pem.findings import Finding, Severity
 
 E = Severity.ERROR
 W = Severity.WARNING
@@ -22,9 +16,8 @@ class Rule:
     """What is forbidden, and what is right.
 
     Numbers are never used again: those of BPMN's rules are a section of the specification (10.6)
-    and two digits (10601), smaller ones are m2pem's own. `clause` is one of BPMN 2.0.2, or a page
-    of the docs. `same_as`: slugs of readers' findings that say the same of the same element; where
-    one of them stands, this rule says nothing.
+    and two digits (10601), smaller ones are m2pem's own. `slug` names the rule in findings.
+    `clause` is one of BPMN 2.0.2, or a page of the docs.
     """
 
     number: int
@@ -33,26 +26,26 @@ class Rule:
     severity: Severity
     wrong: str
     right: str
-    same_as: tuple[str, ...] = ()
 
     @property
     def code(self) -> str:
         """The number as findings show it: B10601, M101."""
         return f"{'B' if self.number > _FIRST_OF_BPMN else 'M'}{self.number}"
 
-
-Check = Callable[["Tree", etree._Element], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Topic:
-    """The rules of one topic: checks of single elements by local name, and of the whole file."""
-
-    rules: tuple[Rule, ...]
-    by_name: Mapping[str, Check]
-    whole: tuple[Callable[["Tree"], None], ...] = ()
+    def finding(
+        self,
+        file: str,
+        line: int,
+        element: str,
+        message: str,
+        remedy: str,
+        severity: Severity | None = None,
+    ) -> Finding:
+        """Return a finding of this rule; `severity` where it is not the rule's."""
+        level = self.severity if severity is None else severity
+        return Finding(level, file, line, element, self.slug, message, remedy, self.code)
 
 
 def declared(names: Mapping[str, object]) -> tuple[Rule, ...]:
-    """The rules among the names of a module."""
+    """Return the rules among the names of a module."""
     return tuple(each for each in names.values() if isinstance(each, Rule))

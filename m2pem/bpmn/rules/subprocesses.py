@@ -1,11 +1,12 @@
-"""Event subprocesses, transactions and ad-hoc subprocesses (BPMN 2.0.2, 10.3.5 and 10.5.6)."""
+"""Processes and subprocesses: event, transaction and ad-hoc ones (BPMN 2.0.2, 10.3.5, 10.5.6)."""
 
 from lxml import etree
 
-from m2pem.bpmn.rules.rule import E, Rule, Topic, W, declared
+from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import (
     ACTIVITIES,
     SUBPROCESSES,
+    Checks,
     Tree,
     children,
     is_false,
@@ -16,7 +17,56 @@ from m2pem.bpmn.rules.tree import (
     what,
 )
 
-FLOW_IN = Rule(
+NO_PROCESS = Rule(
+    108,
+    "no-process",
+    "missions.md",
+    E,
+    "the file has no process",
+    "draw a process with a start event",
+)
+EMPTY_PROCESS = Rule(
+    109,
+    "empty-process",
+    "missions.md",
+    E,
+    "a process has no elements (a warning for a closed pool)",
+    "draw its content",
+)
+EMPTY_SUBPROCESS = Rule(
+    301,
+    "empty-subprocess",
+    "missions.md",
+    W,
+    "a subprocess has no elements",
+    "draw its content, or make it a task",
+)
+AD_HOC_ORDERING = Rule(
+    10355,
+    "ad-hoc-ordering",
+    "10.3.5",
+    E,
+    "the ad-hoc subprocess's ordering is none that BPMN has",
+    "write Parallel or Sequential",
+)
+NO_START = Rule(
+    13201,
+    "no-start",
+    "13.2",
+    E,
+    "nothing in a process or subprocess can start, or an event subprocess has no start event",
+    "add a start event",
+)
+UNREACHABLE = Rule(
+    13202,
+    "unreachable",
+    "13.2",
+    E,
+    "no start event, and nothing else that begins, leads to an element",
+    "draw a sequence flow to it, or delete it",
+)
+
+EVENT_SUBPROCESS_INCOMING = Rule(
     10332,
     "event-subprocess-incoming",
     "10.3.5",
@@ -24,7 +74,7 @@ FLOW_IN = Rule(
     "an event subprocess must not have an incoming flow; its start event begins it",
     "delete the flow, or triggeredByEvent",
 )
-FLOW_OUT = Rule(
+EVENT_SUBPROCESS_OUTGOING = Rule(
     10333,
     "event-subprocess-outgoing",
     "10.3.5",
@@ -32,7 +82,7 @@ FLOW_OUT = Rule(
     "an event subprocess must not have an outgoing flow",
     "delete the flow, or triggeredByEvent",
 )
-STARTS = Rule(
+EVENT_SUBPROCESS_STARTS = Rule(
     10334,
     "event-subprocess-starts",
     "10.3.5",
@@ -40,7 +90,7 @@ STARTS = Rule(
     "an event subprocess must not have several start events",
     "keep one, or draw an event subprocess for each",
 )
-METHOD = Rule(
+TRANSACTION_METHOD = Rule(
     10341,
     "transaction-method",
     "10.3.5",
@@ -55,7 +105,6 @@ AD_HOC_ACTIVITIES = Rule(
     W,
     "the ad-hoc subprocess has no activity",
     "draw the activities that may be done in it",
-    same_as=("empty-subprocess",),
 )
 AD_HOC_START = Rule(
     10352,
@@ -81,7 +130,7 @@ AD_HOC_CANCEL = Rule(
     "cancelRemainingInstances has no meaning in an ad-hoc subprocess of ordering Sequential",
     "delete it; only one activity runs at a time",
 )
-SAME_EVENT = Rule(
+EVENT_SUBPROCESS_TWICE = Rule(
     10555,
     "event-subprocess-twice",
     "10.5.6",
@@ -101,12 +150,12 @@ def _subprocess(tree: Tree, element: etree._Element) -> None:
     if not is_true(element, "triggeredByEvent"):
         return
     if tree.into(element):
-        tree.say(FLOW_IN, element)
+        tree.report(EVENT_SUBPROCESS_INCOMING, element)
     if tree.out(element):
-        tree.say(FLOW_OUT, element)
+        tree.report(EVENT_SUBPROCESS_OUTGOING, element)
     starts = list(children(element, "startEvent"))
     if len(starts) > 1:
-        tree.say(STARTS, element, f"this one has {len(starts)}")
+        tree.report(EVENT_SUBPROCESS_STARTS, element, f"this one has {len(starts)}")
 
 
 def _same_events(tree: Tree) -> None:
@@ -128,31 +177,30 @@ def _same_events(tree: Tree) -> None:
                     continue
                 first = seen.setdefault((parent(element), name, event), element)
                 if first is not element:
-                    tree.say(SAME_EVENT, element, f"{what(first)} does, too")
+                    tree.report(EVENT_SUBPROCESS_TWICE, element, f"{what(first)} does, too")
 
 
 def _transaction(tree: Tree, element: etree._Element) -> None:
     method = element.get("method", "##Compensate").strip()
     if method not in ("##Compensate", "##Store", "##Image") and ":" not in method:
-        tree.say(METHOD, element, f"'{method}'")
+        tree.report(TRANSACTION_METHOD, element, f"'{method}'")
     _subprocess(tree, element)
 
 
 def _ad_hoc(tree: Tree, element: etree._Element) -> None:
     if next(element.iterchildren(*ACTIVITIES), None) is None:
-        tree.say(AD_HOC_ACTIVITIES, element)
+        tree.report(AD_HOC_ACTIVITIES, element, unless=(EMPTY_SUBPROCESS,))
     for start in children(element, "startEvent"):
-        tree.say(AD_HOC_START, start)
+        tree.report(AD_HOC_START, start)
     for end in children(element, "endEvent"):
-        tree.say(AD_HOC_END, end)
+        tree.report(AD_HOC_END, end)
     sequential = element.get("ordering", "").strip() == "Sequential"
     if sequential and element.get("cancelRemainingInstances") is not None:
-        tree.say(AD_HOC_CANCEL, element)
+        tree.report(AD_HOC_CANCEL, element)
     _subprocess(tree, element)
 
 
-TOPIC = Topic(
-    declared(globals()),
+CHECKS = Checks(
     {"subProcess": _subprocess, "transaction": _transaction, "adHocSubProcess": _ad_hoc},
     (_same_events,),
 )

@@ -3,18 +3,17 @@
 Everything is indexed at most once, and only when a rule asks for it: most files need little.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TypeAlias
 
 from lxml import etree
 
 from m2pem.bpmn.names import BPMN, local
+from m2pem.bpmn.report import Report
 from m2pem.bpmn.rules.rule import Rule
 from m2pem.findings import Severity
-
-if TYPE_CHECKING:
-    from m2pem.bpmn.report import Report
 
 _NOTHING = " "
 """What no reference names."""
@@ -62,7 +61,7 @@ def named(text: str) -> str:
 class Tree:
     """The tree, and the findings about it."""
 
-    def __init__(self, root: etree._Element, report: "Report", source: bytes) -> None:
+    def __init__(self, root: etree._Element, report: Report, source: bytes) -> None:
         self.root = root
         self._report = report
         self._source = source
@@ -170,26 +169,48 @@ class Tree:
     # --- findings -------------------------------------------------------------------------------
 
     @cached_property
-    def _said(self) -> dict[tuple[int, str], set[str]]:
-        said: dict[tuple[int, str], set[str]] = {}
+    def _found(self) -> dict[tuple[int, str], set[str]]:
+        """The slugs of the readers' findings by line and element, and by line alone."""
+        found: dict[tuple[int, str], set[str]] = {}
         for finding in self._report.findings:
             for name in (finding.element, ""):
-                said.setdefault((finding.line, name), set()).add(finding.rule)
-        return said
+                found.setdefault((finding.line, name), set()).add(finding.rule)
+        return found
 
-    def say(self, rule: Rule, element: etree._Element, detail: str = "", right: str = "") -> None:
-        """Note that the rule is broken at an element, unless a reader has said so."""
-        identifier = place(element)
-        line = self._report.line(element)
-        said = self._said.get((line, identifier))
-        if said is not None and not said.isdisjoint((rule.slug, *rule.same_as)):
+    def report(
+        self,
+        rule: Rule,
+        element: etree._Element,
+        detail: str = "",
+        right: str = "",
+        unless: tuple[Rule, ...] = (),
+    ) -> None:
+        """Report that the rule is broken at an element.
+
+        Nothing is reported where a reader has reported the rule, or one of `unless`, which say the
+        same.
+        """
+        line, identifier = self._report.line(element), finding_id(element)
+        found = self._found.get((line, identifier))
+        if found is not None and any(each.slug in found for each in (rule, *unless)):
             return
         add = self._report.error if rule.severity is Severity.ERROR else self._report.warning
         message = f"{rule.wrong}: {detail}" if detail else rule.wrong
-        add(line, identifier, rule.slug, message, right or rule.right)
+        add(line, identifier, rule, message, right or rule.right)
 
 
-def place(element: etree._Element) -> str:
+Check: TypeAlias = Callable[[Tree, etree._Element], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Checks:
+    """Checks of single elements, by local name, and of the whole file."""
+
+    by_name: Mapping[str, Check]
+    whole: tuple[Callable[[Tree], None], ...] = ()
+
+
+def finding_id(element: etree._Element) -> str:
     """The id that a finding about an element shows: that of what is drawn, or of a root element.
 
     Where that has none (the readers make one up), the element's own, or "".

@@ -3,8 +3,90 @@
 from lxml import etree
 
 from m2pem.bpmn.names import BPMN
-from m2pem.bpmn.rules.rule import Rule, Topic, W, declared
-from m2pem.bpmn.rules.tree import ACTIVITIES, Tree, is_false, is_true, named, parent, what
+from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.tree import (
+    ACTIVITIES,
+    Checks,
+    Tree,
+    is_false,
+    is_true,
+    named,
+    parent,
+    what,
+)
+
+FLOW_INTO_START = Rule(
+    7601,
+    "flow-into-start",
+    "7.6.2",
+    E,
+    "a sequence flow leads into a start event",
+    "lead it to what follows the start event",
+)
+FLOW_INTO_BOUNDARY = Rule(
+    7602,
+    "flow-into-boundary",
+    "7.6.2",
+    E,
+    "a sequence flow leads into a boundary event",
+    "lead it to the activity, or to what follows the boundary event",
+)
+FLOW_OUT_OF_END = Rule(
+    7603,
+    "flow-out-of-end",
+    "7.6.2",
+    E,
+    "a sequence flow leads out of an end event",
+    "make it an intermediate throw event, or delete the flow",
+)
+FLOW_CROSSES_BORDER = Rule(
+    7604,
+    "flow-crosses-border",
+    "7.6.2",
+    E,
+    "a sequence flow crosses the border of a subprocess or pool",
+    "let it lead from or to the subprocess itself; between pools, draw a message flow",
+)
+CONDITION_NOT_ALLOWED = Rule(
+    8471,
+    "condition-not-allowed",
+    "8.4.13",
+    E,
+    "a flow out of an event has a condition",
+    "put an exclusive gateway behind the event",
+)
+CONDITION_IGNORED = Rule(
+    8472,
+    "condition-ignored",
+    "8.4.13",
+    W,
+    "a flow out of a parallel gateway has a condition",
+    "delete the condition, or make the gateway inclusive",
+)
+DEFAULT_WITH_CONDITION = Rule(
+    8473,
+    "default-with-condition",
+    "8.4.13",
+    W,
+    "the default flow has a condition",
+    "delete the condition, or make another flow the default",
+)
+DEFAULT_NOT_OWN = Rule(
+    8474,
+    "default-not-own",
+    "8.4.13",
+    E,
+    "the default flow leaves another element",
+    "name one of its own outgoing sequence flows",
+)
+EMPTY_CONDITION = Rule(
+    8475,
+    "empty-condition",
+    "8.4.13",
+    W,
+    "a conditionExpression is empty",
+    "write the condition, or delete the conditionExpression",
+)
 
 LONE_CONDITION = Rule(
     8476,
@@ -14,7 +96,7 @@ LONE_CONDITION = Rule(
     "the only flow out of an activity has a condition",
     "add a flow for when it is false, or delete the condition",
 )
-IMMEDIATE = Rule(
+IMMEDIATE_FALSE = Rule(
     8477,
     "immediate-false",
     "8.4.13",
@@ -22,7 +104,7 @@ IMMEDIATE = Rule(
     "isImmediate must not be false in an executable process",
     "delete it",
 )
-LISTED = Rule(
+LISTED_FLOW = Rule(
     8478,
     "listed-flow",
     "8.4.13",
@@ -31,7 +113,7 @@ LISTED = Rule(
     "delete the incoming or outgoing element; the flows themselves count",
 )
 
-LISTED_ELSEWHERE = Rule(
+LISTED_FLOW_ELSEWHERE = Rule(
     8479,
     "listed-flow-elsewhere",
     "8.4.13",
@@ -40,7 +122,7 @@ LISTED_ELSEWHERE = Rule(
     "correct the incoming or outgoing element, or the flow; the flows count",
 )
 
-UNLISTED = Rule(
+UNLISTED_FLOW = Rule(
     8480,
     "unlisted-flow",
     "8.4.13",
@@ -57,7 +139,7 @@ def _condition(tree: Tree, element: etree._Element) -> None:
     flow = parent(element)
     source = tree.find(flow, flow.get("sourceRef", ""))
     if source is not None and source.tag in ACTIVITIES and len(tree.out(source)) == 1:
-        tree.say(LONE_CONDITION, flow)
+        tree.report(LONE_CONDITION, flow)
 
 
 def _immediate(tree: Tree) -> None:
@@ -67,7 +149,7 @@ def _immediate(tree: Tree) -> None:
         if is_false(flow, "isImmediate"):
             process = next(flow.iterancestors(BPMN + "process"), None)
             if process is not None and is_true(process, "isExecutable"):
-                tree.say(IMMEDIATE, flow)
+                tree.report(IMMEDIATE_FALSE, flow)
 
 
 def _listed(tree: Tree) -> None:
@@ -84,11 +166,11 @@ def _listed(tree: Tree) -> None:
                 flow = known.get(name, known.get(named(name)))
                 if flow is None:
                     if name:
-                        tree.say(LISTED, element, f"'{name}'")
+                        tree.report(LISTED_FLOW, element, f"'{name}'")
                     continue
                 there = flow.get(end, "")
                 if owner and named(there) != owner:
-                    tree.say(LISTED_ELSEWHERE, element, f"{end} of '{name}' is '{there}'")
+                    tree.report(LISTED_FLOW_ELSEWHERE, element, f"{end} of '{name}' is '{there}'")
                     continue
                 ends.pop((owner, flow.get("id", "")), None)
             listing[owner] = holder
@@ -97,7 +179,7 @@ def _listed(tree: Tree) -> None:
             if owner and owner in listing:
                 missing.setdefault(owner, []).append(what(flow))
         for owner, flows in missing.items():
-            tree.say(UNLISTED, listing[owner], ", ".join(flows))
+            tree.report(UNLISTED_FLOW, listing[owner], ", ".join(flows))
 
 
-TOPIC = Topic(declared(globals()), {"conditionExpression": _condition}, (_immediate, _listed))
+CHECKS = Checks({"conditionExpression": _condition}, (_immediate, _listed))

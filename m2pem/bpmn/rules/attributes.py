@@ -1,22 +1,177 @@
-"""Attributes and order of the elements that no reader looks into (BPMN 2.0.2, 15.3).
+"""Attributes, their values, and the children of elements (BPMN 2.0.2, tables of 8 and 10; 15.3)."""
 
-The table is that of the readers (`schema.py`) for the rest of BPMN.
-"""
+from collections.abc import Collection
 
 from lxml import etree
 
 from m2pem.bpmn.names import BPMN, a, attribute_names, kind, local
-from m2pem.bpmn.rules.reader_rules import (
-    ELEMENT_ORDER,
-    MISSPELLED_ATTRIBUTE,
-    UNKNOWN_ATTRIBUTE,
-    UNKNOWN_ELEMENT,
-)
-from m2pem.bpmn.rules.rule import Check, Topic
-from m2pem.bpmn.rules.tree import Tree
+from m2pem.bpmn.rules.rule import E, Rule, W
+from m2pem.bpmn.rules.tree import Check, Checks, Tree, is_true, name_of, parent
 from m2pem.bpmn.schema import Shape, shape
-from m2pem.bpmn.unknown import unknown_attribute
-from m2pem.mission.near import did_you_mean
+from m2pem.bpmn.vocabulary import ATTRIBUTES
+from m2pem.mission.near import did_you_mean, near
+
+BAD_EXPRESSION = Rule(
+    201,
+    "bad-expression",
+    "missions.md",
+    E,
+    "a text is no expression of the condition language",
+    "see conditions.md",
+)
+ELEMENT_ORDER = Rule(
+    15302,
+    "element-order",
+    "15.3",
+    W,
+    "an element comes after one that BPMN's schema has behind it",
+    "move it up; some editors refuse the file",
+)
+UNKNOWN_ATTRIBUTE = Rule(
+    15303,
+    "unknown-attribute",
+    "15.3",
+    W,
+    "BPMN has no such attribute there",
+    "delete it, or give it its namespace",
+)
+UNKNOWN_ELEMENT = Rule(
+    15304,
+    "unknown-element",
+    "15.3",
+    W,
+    "BPMN has no such element there (an error in a process, where it might be part of the flow)",
+    "delete it, or give it its namespace",
+)
+BAD_VALUE = Rule(
+    15308,
+    "bad-value",
+    "15.3",
+    E,
+    "the value of an attribute is none that it can have",
+    "write one of its values",
+)
+MISSPELLED_ATTRIBUTE = Rule(
+    15309,
+    "misspelled-attribute",
+    "15.3",
+    W,
+    "BPMN has no such attribute there, but one with a name like it",
+    "correct the name; until then the attribute has no effect",
+)
+
+ITEM_KIND = Rule(
+    8441,
+    "item-kind",
+    "8.4.10",
+    W,
+    "the item definition's itemKind is none that BPMN has",
+    "write Information or Physical",
+)
+PROCESS_TYPE = Rule(
+    10101,
+    "process-type",
+    "10.1",
+    W,
+    "the process's type is none that BPMN has",
+    "write None, Public or Private",
+)
+PUBLIC_EXECUTABLE = Rule(
+    10102,
+    "public-executable",
+    "10.1",
+    W,
+    "a public process must not be executable",
+    'write processType="Private", or isExecutable="false"',
+)
+BAD_TRUTH = Rule(
+    15305,
+    "bad-truth",
+    "15.3",
+    W,
+    "an attribute without an effect on execution is neither true nor false",
+    "write true or false",
+)
+REPEATED_ELEMENT = Rule(
+    15307,
+    "repeated-element",
+    "15.3",
+    W,
+    "the element stands here a second time",
+    "keep one",
+)
+_TRUTHS = {
+    "process": "isClosed isExecutable",
+    "collaboration": "isClosed",
+    "dataObject": "isCollection",
+    "dataInput": "isCollection",
+    "dataOutput": "isCollection",
+    "itemDefinition": "isCollection",
+    "dataStore": "isUnlimited",
+    "resourceParameter": "isRequired",
+    "extension": "mustUnderstand",
+}
+_ONCE = (
+    "extensionElements ioSpecification conditionExpression script activationCondition "
+    "completionCondition loopCondition loopCardinality loopDataInputRef loopDataOutputRef "
+    "inputDataItem outputDataItem condition participantMultiplicity correlationKeyRef text "
+    "childLaneSet messagePath dataPath dataState transformation auditing monitoring"
+)
+
+
+def unknown_attribute(
+    element: etree._Element, name: str, known: Collection[str]
+) -> tuple[Rule, str, str]:
+    """The rule, message and remedy; `known` are the names that BPMN has there.
+
+    A name that is like a known one is a rule of its own (`misspelled-attribute`): whoever wrote it
+    expects an effect that it does not have.
+    """
+    message = f"BPMN has no attribute '{name}' for {a(kind(element.tag))}; it is ignored"
+    own = ATTRIBUTES.get(local(element.tag), frozenset())
+    match = f"m2pem:{name}" if name in own else near(name, known)
+    if not match and (owned := near(name, own)):
+        match = f"m2pem:{owned}"
+    if match:
+        return MISSPELLED_ATTRIBUTE, message, f"did you mean '{match}'?"
+    return UNKNOWN_ATTRIBUTE, message, "delete it, or give it its namespace"
+
+
+def _truth(attributes: str) -> Check:
+    def check(tree: Tree, element: etree._Element) -> None:
+        for name in attributes.split():
+            text = element.get(name, "true").strip()
+            if text not in ("true", "false", "1", "0"):
+                tree.report(BAD_TRUTH, element, f"{name} is '{text}'")
+
+    return check
+
+
+def _item(tree: Tree, element: etree._Element) -> None:
+    value = element.get("itemKind", "Information").strip()
+    if value not in ("Information", "Physical"):
+        tree.report(ITEM_KIND, element, f"'{value}'")
+
+
+def _process(tree: Tree, element: etree._Element) -> None:
+    value = element.get("processType", "None").strip()
+    if value not in ("None", "Public", "Private"):
+        tree.report(PROCESS_TYPE, element, f"'{value}'")
+    if value == "Public" and is_true(element, "isExecutable"):
+        tree.report(PUBLIC_EXECUTABLE, element)
+
+
+def _once(tree: Tree, element: etree._Element) -> None:
+    if tree.has_one_before(element):
+        owner = kind(parent(element).tag)
+        tree.report(REPEATED_ELEMENT, element, f"'{name_of(element)}' in {a(owner)}")
+
+
+VALUES = Checks(
+    {"itemDefinition": _item, "process": _process, **dict.fromkeys(_ONCE.split(), _once)},
+)
+TRUTHS = Checks({name: _truth(each) for name, each in _TRUTHS.items()})
+
 
 _BASE = "documentation extensionElements"
 _ROLE = f"{_BASE} resourceRef resourceParameterBinding resourceAssignmentExpression"
@@ -120,9 +275,10 @@ def _check(expected: Shape) -> Check:
     def check(tree: Tree, element: etree._Element) -> None:
         for key in attribute_names(element):
             if key[0] != "{" and key not in expected.attributes:
-                slug, _, right = unknown_attribute(element, key, expected.attributes)
-                rule = UNKNOWN_ATTRIBUTE if slug == UNKNOWN_ATTRIBUTE.slug else MISSPELLED_ATTRIBUTE
-                tree.say(rule, element, f"'{key}' of {a(kind(element.tag))}; it is ignored", right)
+                rule, _, right = unknown_attribute(element, key, expected.attributes)
+                tree.report(
+                    rule, element, f"'{key}' of {a(kind(element.tag))}; it is ignored", right
+                )
         _children(tree, element, expected)
 
     return check
@@ -134,7 +290,7 @@ def _children(tree: Tree, element: etree._Element, expected: Shape) -> None:
         rank = expected.ranks.get(child.tag)
         if rank is None:
             if child.tag.startswith(BPMN):
-                tree.say(
+                tree.report(
                     UNKNOWN_ELEMENT,
                     child,
                     f"'{local(child.tag)}' in {a(kind(element.tag))}; it is ignored",
@@ -147,7 +303,7 @@ def _children(tree: Tree, element: etree._Element, expected: Shape) -> None:
         elif rank >= reached:
             reached, last = rank, child.tag
         else:
-            tree.say(
+            tree.report(
                 ELEMENT_ORDER,
                 child,
                 f"'{local(child.tag)}' after '{local(last)}'",
@@ -156,7 +312,6 @@ def _children(tree: Tree, element: etree._Element, expected: Shape) -> None:
             return
 
 
-TOPIC = Topic(
-    (),
+SHAPES = Checks(
     {name: _check(shape(*row)) for name, row in _TABLE.items()},
 )
