@@ -12,6 +12,7 @@ import m2pem
 
 REPOSITORY = Path(__file__).parents[1]
 REGISTRIES = re.compile(rb"\b(?:pypi|pythonhosted|npmjs|debian)\.(?:org|com|io)\b")
+PLUGIN_MODULES = re.compile(r"^\s*(?:from|import) (m2pem_plugin_\w+)\.([\w.]+)", re.MULTILINE)
 HOME_PATHS = re.compile(rb"(?<![\w.])/(?:home|Users)/\w+|(?<![\w./])/root[/]")
 
 
@@ -80,3 +81,15 @@ def test_every_version_is_pinned() -> None:
     pins = [line for line in lines if line and not line.startswith("#")]
     assert [pin for pin in pins if not re.fullmatch(r"[\w.-]+==[\w.]+", pin)] == []
     assert pins
+
+
+def test_plugins_import_no_submodule_of_another_plugin() -> None:
+    """What a plugin offers to others is in its `__init__`."""
+    found = []
+    for path in files():
+        own = next((part for part in path.parts if part.startswith("m2pem_plugin_")), "")
+        if own and path.suffix == ".py":
+            for plugin, module in PLUGIN_MODULES.findall(path.read_text(encoding="utf-8")):
+                if plugin != own:
+                    found.append(f"{path.relative_to(REPOSITORY)}: {plugin}.{module}")
+    assert found == []

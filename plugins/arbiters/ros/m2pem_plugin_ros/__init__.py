@@ -1,27 +1,63 @@
-"""ROS 2 vehicles: on land and on water (docs/ros.md)."""
+"""ROS 2 vehicles: on land and on water (docs/ros.md).
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+Other plugins import only what `__all__` lists. Each name is loaded when it is used, so that this
+package can be imported where there is no ROS. `RosRuntime` and `qos` need rclpy.
+"""
 
-from m2pem import hookimpl
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from m2pem_plugin_ros.hooks import m2pem_register_arbiters, m2pem_register_commands
 
 if TYPE_CHECKING:
-    import click
+    from m2pem_plugin_ros.drivers.driver import Told
+    from m2pem_plugin_ros.frames import to_local
+    from m2pem_plugin_ros.installation import RosError, require_interfaces
+    from m2pem_plugin_ros.interfaces import set_stamp
+    from m2pem_plugin_ros.interfaces.vehicle_status import write_payload_status
+    from m2pem_plugin_ros.loopback import keep_on_loopback
+    from m2pem_plugin_ros.onboard.arbiter_driver import ArbiterDriver
+    from m2pem_plugin_ros.onboard.node import Onboard
+    from m2pem_plugin_ros.onboard.target_bus import Targets
+    from m2pem_plugin_ros.runtime import RosRuntime, qos
+    from m2pem_plugin_ros.settings import read_payloads, read_settings
 
-    from m2pem.api import Arbiter
+__all__ = [
+    "ArbiterDriver",
+    "Onboard",
+    "RosError",
+    "RosRuntime",
+    "Targets",
+    "Told",
+    "keep_on_loopback",
+    "m2pem_register_arbiters",
+    "m2pem_register_commands",
+    "qos",
+    "read_payloads",
+    "read_settings",
+    "require_interfaces",
+    "set_stamp",
+    "to_local",
+    "write_payload_status",
+]
+
+_MODULES = {
+    "drivers.driver": "Told",
+    "frames": "to_local",
+    "installation": "RosError require_interfaces",
+    "interfaces": "set_stamp",
+    "interfaces.vehicle_status": "write_payload_status",
+    "loopback": "keep_on_loopback",
+    "onboard.arbiter_driver": "ArbiterDriver",
+    "onboard.node": "Onboard",
+    "onboard.target_bus": "Targets",
+    "runtime": "RosRuntime qos",
+    "settings": "read_payloads read_settings",
+}
+_LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 
 
-@hookimpl
-def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], None]") -> None:
-    """Register `ros`."""
-    from m2pem_plugin_ros.arbiter import RosArbiter  # noqa: PLC0415  # starting up must be fast
-
-    register("ros", RosArbiter)
-
-
-@hookimpl
-def m2pem_register_commands(cli: "click.Group") -> None:
-    """Add what commands.py has."""
-    from m2pem_plugin_ros.commands import add_to  # noqa: PLC0415  # starting up must be fast
-
-    add_to(cli.commands)
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_LAZY[name]}"), name)

@@ -24,13 +24,12 @@ from m2pem.api import (
     VehicleState,
 )
 from m2pem_plugin_ros.catalogue import LEVEL, PAYLOAD
-from m2pem_plugin_ros.complaints import Complaints
-from m2pem_plugin_ros.drivers.choice import make_driver as driver_of_the_fleet
+from m2pem_plugin_ros.checkpoint import Kept, native_ref, read_native_ref
+from m2pem_plugin_ros.connections import Installation, Station
 from m2pem_plugin_ros.drivers.driver import Driver, Seat
-from m2pem_plugin_ros.instruments import Installation, Station
-from m2pem_plugin_ros.native_ref import Kept, native_ref, read_native_ref
-from m2pem_plugin_ros.payload_settings import read_payloads
-from m2pem_plugin_ros.settings import DriverName, read_detectors, read_settings
+from m2pem_plugin_ros.drivers.driver import make_driver as driver_of_the_fleet
+from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.settings import DriverName, read_detectors, read_payloads, read_settings
 from m2pem_plugin_ros.vehicle import Post, Vehicle
 
 LOST_AFTER_S = 3.0
@@ -54,7 +53,7 @@ MakeStation = Callable[[Installation], Station]
 
 
 def _station(installation: Installation) -> Station:
-    from m2pem_plugin_ros.station import DdsStation  # noqa: PLC0415  # starting up must be fast
+    from m2pem_plugin_ros.connections import DdsStation  # noqa: PLC0415  # starting up must be fast
 
     return DdsStation(installation)
 

@@ -1,14 +1,132 @@
-"""What a fleet says of the connection to a ROS vehicle, or to a detector on it (docs/ros.md)."""
+"""Reads a map of a fleet file strictly: what is unknown, or has no sense, is refused by name."""
 
+import difflib
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
-from typing import Any
+from typing import Any, TypeVar
 
-from m2pem.api import BehaviorSpec, Connection, Dimension, ResourceId
+from m2pem.api import (
+    BehaviorSpec,
+    BehaviorType,
+    Connection,
+    Dimension,
+    ResourceId,
+    UnitError,
+    quantity,
+)
 from m2pem.errors import PluginError
-from m2pem_plugin_ros.connection_reader import ConnectionReader
-from m2pem_plugin_ros.declared_behaviors import read_declared_behaviors
+from m2pem_plugin_ros.catalogue import read_declared_behaviors
+
+Choice = TypeVar("Choice", bound=StrEnum)
+
+_TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
+_NAME = re.compile(rf"/?{_TOKEN}(/{_TOKEN})*")
+HIGHEST_DOMAIN = 232
+
+
+class ConnectionReader:
+    """The map at `connection`, or one inside of it, such as `connection.topics`.
+
+    All methods raise PluginError; the text names the resource and the key.
+    """
+
+    def __init__(
+        self, resource: ResourceId, values: Mapping[str, Any], path: str = "connection"
+    ) -> None:
+        self.resource = resource
+        self.values = values
+        self.path = path
+
+    def error(self, key: str, problem: str) -> PluginError:
+        """What is wrong with the value of a key."""
+        return PluginError(f"{self.resource}: {self.path}.{key}: {problem}")
+
+    def refuse_others(self, known: Collection[str]) -> None:
+        """Nothing but these keys may be there."""
+        for key in self.values:
+            if key not in known:
+                near = difflib.get_close_matches(str(key), known, n=1)
+                hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
+                raise self.error(str(key), f"there is no such setting; {hint}")
+
+    def inner(self, key: str, example: str) -> "ConnectionReader":
+        """The map of a key; empty if it is not there."""
+        value = self.values.get(key, {})
+        if not isinstance(value, Mapping):
+            raise self.error(key, f"{value!r} is no map, such as {example}")
+        return ConnectionReader(self.resource, value, f"{self.path}.{key}")
+
+    def text(self, key: str, default: str) -> str:
+        """A text that is not empty."""
+        value = self.values.get(key, default)
+        if key in self.values and (not isinstance(value, str) or not value.strip()):
+            raise self.error(key, f"{value!r} is no text")
+        return str(value)
+
+    def flag(self, key: str, default: bool) -> bool:
+        """True or false."""
+        value = self.values.get(key, default)
+        if not isinstance(value, bool):
+            raise self.error(key, f"{value!r} is neither true nor false")
+        return value
+
+    def choice(self, key: str, choices: type[Choice], default: Choice) -> Choice:
+        """One of an enumeration."""
+        value = self.values.get(key, default)
+        try:
+            return choices(value)
+        except ValueError:
+            raise self.error(key, f"{value!r} is none of {', '.join(choices)}") from None
+
+    def domain_id(self) -> int | None:
+        """The ROS domain; None: that of the environment."""
+        value = self.values.get("domain_id")
+        if value is None:
+            return None
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        if not whole or not 0 <= value <= HIGHEST_DOMAIN:
+            raise self.error(
+                "domain_id", f"{value!r} is not a whole number from 0 to {HIGHEST_DOMAIN}"
+            )
+        return int(value)
+
+    def namespace(self, default: str | None = None) -> str:
+        """With its leading "/"; "" is the root."""
+        value = self.values.get("namespace", default)
+        if value is None:
+            raise self.error("namespace", "it is missing: that of the vehicle's nodes, as /evsg1")
+        if value == "/" or (value == "" and default == ""):
+            return ""
+        if not isinstance(value, str) or not _NAME.fullmatch(value):
+            raise self.error("namespace", f"{value!r} is no ROS namespace, such as /evsg1")
+        return f"/{value.removeprefix('/')}"
+
+    def topic(self, key: str, default: str) -> str:
+        """The name of a topic."""
+        value = self.values.get(key, default)
+        if not isinstance(value, str) or not _NAME.fullmatch(value):
+            raise self.error(key, f"{value!r} is no name of a ROS topic, such as {default}")
+        return value
+
+    def number(
+        self, key: str, default: float, dimension: Dimension, *, zero: bool = False
+    ) -> float:
+        """A quantity in SI, above 0 or, with `zero`, not below it."""
+        if key not in self.values:
+            return default
+        try:
+            number = quantity(self.values[key], dimension)
+        except UnitError as error:
+            raise self.error(key, str(error)) from None
+        return self._positive(key, number, zero)
+
+    def _positive(self, key: str, number: float, zero: bool) -> float:
+        if number < 0.0 or (number == 0.0 and not zero):
+            raise self.error(key, f"{self.values[key]!r} is {'below' if zero else 'not above'} 0")
+        return number
+
 
 DOMAINS = ("ground", "surface")
 """Of the vehicles that this arbiter commands."""
@@ -258,3 +376,64 @@ def _read_detector(
     return DetectorSettings(
         namespace, in_namespace(namespace, topic), reader.domain_id(), type_, message
     )
+
+
+_PAYLOAD_KEYS = (*DETECTOR_KEYS, *NODE_KEYS)
+
+
+def read_payloads(
+    connections: Mapping[ResourceId, Connection], vehicles: Mapping[ResourceId, Settings]
+) -> dict[ResourceId, Settings]:
+    """The settings of all payloads with a node. `vehicles`: those of the vehicles.
+
+    Raises:
+        PluginError: something is missing or wrong; the text names the resource and the key.
+    """
+    reached = {
+        (settings.domain_id, settings.namespace): vehicle for vehicle, settings in vehicles.items()
+    }
+    read: dict[ResourceId, Settings] = {}
+    for resource, connection in connections.items():
+        if "/" not in resource or not _has_node(connection, connections):
+            continue
+        settings = read[resource] = _read_payload(connection, inherited(connection, connections))
+        other = reached.setdefault((settings.domain_id, settings.namespace), resource)
+        if other != resource:
+            problem = f"{settings.namespace or '/'} is that of {other}, too"
+            raise ConnectionReader(resource, {}).error("namespace", problem)
+    return read
+
+
+def _has_node(connection: Connection, connections: Mapping[ResourceId, Connection]) -> bool:
+    values, of_vehicle = connection.settings, inherited(connection, connections)
+    own = _own_keys(connection, of_vehicle)
+    if values.get("driver") != DriverName.NODE:
+        if "driver" in own and of_vehicle is not None:
+            problem = f"{own['driver']!r} reaches no payload: one with a node of its own has m2pem"
+            raise ConnectionReader(connection.resource, own).error("driver", problem)
+        return False
+    if "driver" in own or "own_behaviors" in own:
+        return True
+    detects = connection.detector or "topic" in values
+    return "namespace" in own and (connection.behaviors is not None or not detects)
+
+
+def _read_payload(connection: Connection, of_vehicle: Mapping[str, Any] | None) -> Settings:
+    resource, own = connection.resource, _own_keys(connection, of_vehicle)
+    reader = ConnectionReader(resource, own)
+    reader.refuse_others(_PAYLOAD_KEYS)
+    whole = ConnectionReader(resource, connection.settings)
+    return Settings(
+        whole.namespace(),
+        whole.domain_id(),
+        DriverName.NODE,
+        whole.choice("via", Via, Via.TOPICS),
+        own_behaviors=read_declared_behaviors(
+            resource, own.get("own_behaviors"), BehaviorType.PAYLOAD
+        ),
+    )
+
+
+def _own_keys(connection: Connection, of_vehicle: Mapping[str, Any] | None) -> dict[str, Any]:
+    # Of a vehicle that is another arbiter's nothing is known: what we read is the payload's own.
+    return own_settings(connection, of_vehicle, _PAYLOAD_KEYS if of_vehicle is None else ())

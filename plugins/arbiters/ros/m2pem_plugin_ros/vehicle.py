@@ -2,6 +2,7 @@
 and when it was heard."""
 
 import asyncio
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -23,13 +24,12 @@ from m2pem.api import (
     VehicleState,
 )
 from m2pem.errors import PluginError
-from m2pem_plugin_ros.complaints import Complaints
-from m2pem_plugin_ros.confines import Confines
+from m2pem_plugin_ros.checkpoint import goal_id, run_id
+from m2pem_plugin_ros.connections import Instruments, Senses
 from m2pem_plugin_ros.drivers.driver import Driver, Health, Order, Outcome, Seat
-from m2pem_plugin_ros.goal_ids import goal_id, run_id
-from m2pem_plugin_ros.instruments import Instruments
+from m2pem_plugin_ros.fence_check import Confines
+from m2pem_plugin_ros.log_throttle import Complaints
 from m2pem_plugin_ros.settings import DriverName, Settings
-from m2pem_plugin_ros.telemetry import link_state, vehicle_state
 
 LOOK_WITHIN_S = 3.0
 """In real time: so long may a vehicle take to say how it stands to a goal."""
@@ -414,3 +414,54 @@ class Vehicle:
 
 def _bug(error: Exception) -> str:
     return f"m2pem is wrong: {type(error).__name__}: {error}"
+
+
+DEGRADED_SHARE = 0.5
+"""Of `lost_after_s`: a vehicle that is silent for longer has a bad link."""
+
+
+def link_state(silent_s: float, lost_after_s: float) -> LinkState:
+    """How well a vehicle is heard that was heard so many seconds ago."""
+    if silent_s >= lost_after_s:
+        return LinkState.LOST
+    if silent_s >= DEGRADED_SHARE * lost_after_s:
+        return LinkState.DEGRADED
+    return LinkState.CONNECTED
+
+
+def vehicle_state(
+    resource: ResourceId,
+    time_us: int,
+    senses: Senses,
+    health: Health,
+    link: LinkState,
+    behavior: str,
+) -> VehicleState:
+    """What the fleet is told. A part that reports an error makes the vehicle not ready."""
+    pose, errors = senses.localization.pose, senses.errors
+    battery = health.battery_fraction
+    return VehicleState(
+        resource,
+        time_us,
+        senses.localization.position,
+        velocity_enu_m_s=_velocity(senses),
+        yaw_rad=pose.yaw_rad if pose is not None else None,
+        battery_fraction=senses.battery_fraction if battery is None else battery,
+        mode=health.mode,
+        ready=False if errors else health.ready,
+        not_ready_reasons=(*health.not_ready_reasons, *errors, *senses.troubles),
+        link=link,
+        behavior=behavior,
+    )
+
+
+def _velocity(senses: Senses) -> tuple[float, float, float] | None:
+    pose, twist = senses.localization.pose, senses.localization.twist
+    if pose is None or twist is None:
+        return None
+    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    return (
+        twist.forward_m_s * cos - twist.left_m_s * sin,
+        twist.forward_m_s * sin + twist.left_m_s * cos,
+        0.0,
+    )

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from uuid import UUID
 
 from m2pem_plugin_ros.arbiter import RosArbiter
+from m2pem_plugin_ros.connections import Installation, Instruments
 from m2pem_plugin_ros.drivers.driver import Driver, Health, Order, Outcome, Seat
 from m2pem_plugin_ros.frames import to_geodetic, to_local
-from m2pem_plugin_ros.instruments import Installation, Instruments
 from m2pem_plugin_ros.pose import Pose, Twist
 
 from m2pem.api import (

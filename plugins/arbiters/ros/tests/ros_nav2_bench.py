@@ -14,8 +14,8 @@ from uuid import UUID, uuid4
 from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
 from m2pem_plugin_ros.drivers.nav2 import Nav2Driver
 from m2pem_plugin_ros.frames import to_geodetic, to_local
-from m2pem_plugin_ros.localization import TopicLocalization
 from m2pem_plugin_ros.runtime import RosRuntime, qos
+from m2pem_plugin_ros.sensors.localization import TopicLocalization
 from m2pem_plugin_ros.settings import DriverName, RouteAction, Settings
 from nav_msgs.msg import Odometry
 from rclpy.qos import QoSProfile, ReliabilityPolicy

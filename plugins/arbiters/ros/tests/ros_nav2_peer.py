@@ -21,7 +21,7 @@ from m2pem_plugin_ros.drivers.driver import Health, Order, Outcome, Told  # noqa
 from m2pem_plugin_ros.frames import quaternion_of_yaw, to_local  # noqa: E402
 from m2pem_plugin_ros.pose import Pose, Twist  # noqa: E402
 from m2pem_plugin_ros.runtime import RosRuntime, qos  # noqa: E402
-from m2pem_plugin_ros.sim.nav2 import Nav2Server  # noqa: E402
+from m2pem_plugin_ros.simulator.nav2 import Nav2Server  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
 from std_msgs.msg import String, UInt32  # noqa: E402
 

@@ -8,8 +8,8 @@ import signal
 import sys
 
 from m2pem_plugin_ros.drivers.driver import Told
-from m2pem_plugin_ros.onboard import Onboard
-from m2pem_plugin_ros.onboard.targets import Targets
+from m2pem_plugin_ros.onboard.node import Onboard
+from m2pem_plugin_ros.onboard.target_bus import Targets
 from m2pem_plugin_ros.runtime import RosRuntime
 from ros_scripted_driver import ScriptedDriver
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 from uuid import uuid4
 
 import pytest
+from m2pem_plugin_ros.checkpoint import goal_id, run_id
 from m2pem_plugin_ros.drivers.driver import Health, Outcome
-from m2pem_plugin_ros.goal_ids import goal_id, run_id
 from ros_double import Body, DoubleDriver, at
 from ros_play import FAR, JOURNAL, NEAR, A, B, play
 

@@ -2,8 +2,7 @@
 
 import asyncio
 
-from m2pem_plugin_ros.goal_ids import goal_id
-from m2pem_plugin_ros.native_ref import LONGEST_ROUTE, Kept, native_ref, read_native_ref
+from m2pem_plugin_ros.checkpoint import LONGEST_ROUTE, Kept, goal_id, native_ref, read_native_ref
 from ros_play import FAR, JOURNAL, NEAR, A, B, play
 
 from m2pem.api import BehaviorState, Route, VehiclePosition

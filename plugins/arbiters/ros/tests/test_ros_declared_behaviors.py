@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from m2pem_plugin_ros.declared_behaviors import read_declared_behaviors
+from m2pem_plugin_ros.catalogue import read_declared_behaviors
 
 from m2pem.api import (
     SHARED,

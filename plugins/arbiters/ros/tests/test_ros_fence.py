@@ -3,11 +3,11 @@
 import math
 
 import pytest
-from m2pem_plugin_ros.pilot.fence_watch import STRAY_M
+from m2pem_plugin_ros.behaviors.monitors import STRAY_M
 from m2pem_plugin_ros.pose import Pose, Twist
+from ros_behaviors_bench import Body as BaseBody
+from ros_behaviors_bench import Road, point
 from ros_double import Body, at
-from ros_pilot_road import Body as BaseBody
-from ros_pilot_road import Road, point
 from ros_play import A, B, play
 
 from m2pem.api import Area, BehaviorState, Route, VehiclePosition, VehicleState

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from m2pem_plugin_ros.arbiter import RosArbiter
 from m2pem_plugin_ros.catalogue import LEVEL, PAYLOAD
-from m2pem_plugin_ros.payload_settings import read_payloads
 from m2pem_plugin_ros.settings import (
     BOUNDS,
     DetectorMessage,
@@ -18,6 +17,7 @@ from m2pem_plugin_ros.settings import (
     Topics,
     Via,
     read_detectors,
+    read_payloads,
     read_settings,
 )
 

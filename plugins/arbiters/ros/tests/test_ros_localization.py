@@ -5,10 +5,10 @@ import math
 from collections.abc import AsyncIterator, Iterator
 
 import pytest
-from m2pem_plugin_ros.complaints import Complaints
-from m2pem_plugin_ros.localization import TopicLocalization
+from m2pem_plugin_ros.log_throttle import Complaints
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros.sensors.localization import TopicLocalization
 from m2pem_plugin_ros.settings import OdomFrame, Settings
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from ros_double import ORIGIN

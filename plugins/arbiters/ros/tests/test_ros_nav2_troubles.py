@@ -9,7 +9,7 @@ from uuid import UUID, uuid4
 import pytest
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
-from m2pem_plugin_ros.drivers.nav2.numbered_goals import number_of, numbered
+from m2pem_plugin_ros.drivers.nav2.goal_client import number_of, numbered
 from m2pem_plugin_ros.runtime import RosError
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from nav2_msgs.action import NavigateToPose

@@ -20,8 +20,8 @@ from m2pem_interfaces.msg import (
     VehicleStatus,
 )
 from m2pem_plugin_ros.drivers.driver import Told
-from m2pem_plugin_ros.onboard import Onboard
-from m2pem_plugin_ros.onboard.targets import Targets
+from m2pem_plugin_ros.onboard.node import Onboard
+from m2pem_plugin_ros.onboard.target_bus import Targets
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from rclpy.action import ActionClient

@@ -1,6 +1,6 @@
 """A node that was not running itself does not take its vehicle for silent."""
 
-from m2pem_plugin_ros.onboard.vigil import rounds
+from m2pem_plugin_ros.onboard.node import rounds
 
 
 class Busy:

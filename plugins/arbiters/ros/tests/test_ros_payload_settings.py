@@ -4,8 +4,14 @@ from typing import Any
 
 import pytest
 from m2pem_plugin_ros.arbiter import RosArbiter
-from m2pem_plugin_ros.payload_settings import read_payloads
-from m2pem_plugin_ros.settings import DetectorSettings, Settings, Via, read_detectors, read_settings
+from m2pem_plugin_ros.settings import (
+    DetectorSettings,
+    Settings,
+    Via,
+    read_detectors,
+    read_payloads,
+    read_settings,
+)
 
 from m2pem.api import Connection, ResourceId
 from m2pem.errors import PluginError

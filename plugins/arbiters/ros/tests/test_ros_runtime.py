@@ -12,7 +12,7 @@ import pytest
 from m2pem_interfaces.action import ExecuteBehavior
 from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus
 from m2pem_interfaces.srv import AnswerPrompt, ListRuns
-from m2pem_plugin_ros.runtime import RosError, RosRuntime, RosTimeoutError, qos, responses
+from m2pem_plugin_ros.runtime import RosError, RosRuntime, RosTimeoutError, calls, qos
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from rclpy.action import ActionClient
 from rclpy.service import Service
@@ -192,7 +192,7 @@ async def test_a_response_that_can_never_be_sent_is_reported(
     async def serve(_: ListRuns.Request, response: ListRuns.Response) -> ListRuns.Response:
         return response
 
-    monkeypatch.setattr(responses, "AGAIN_S", (0.01, 0.01))
+    monkeypatch.setattr(calls, "AGAIN_S", (0.01, 0.01))
     drop_responses(monkeypatch, -1)
     ros.serve(ListRuns, "gone", serve)
     call = asyncio.create_task(ros.call(ros.client(ListRuns, "gone"), ListRuns.Request(), AMPLE_S))

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from m2pem_plugin_ros import loopback
-from m2pem_plugin_ros.commands import add_to
+from m2pem_plugin_ros.hooks import add_commands
 from ros_sim_command import cli
 from ros_sim_watch import COMMAND
 
@@ -145,7 +145,7 @@ def test_groups_of_other_plugins_are_kept() -> None:
     theirs = click.Group("sim")
     theirs.add_command(click.Command("mavlink"))
     commands: dict[str, click.Command] = {"sim": theirs}
-    add_to(commands)
+    add_commands(commands)
     assert commands["sim"] is theirs
     assert sorted(theirs.commands) == ["mavlink", "ros"]
     assert isinstance(commands["ros"], click.Group)
@@ -156,7 +156,7 @@ def test_the_list_of_commands_loads_none_of_them() -> None:
     program = (
         "import sys; from ros_sim_command import cli\n"
         "cli(['sim', '--help'], standalone_mode=False)\n"
-        "heavy = ('rclpy', 'numpy', 'm2pem_plugin_ros.sim')\n"
+        "heavy = ('rclpy', 'numpy', 'm2pem_plugin_ros.simulator')\n"
         "print(*(name for name in heavy if name in sys.modules))"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(COMMAND.parent), *sys.path])}

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 from m2pem_plugin_ros import settings
-from m2pem_plugin_ros.sim.faults import parse
-from m2pem_plugin_ros.sim.faults.actions import KINDS
-from m2pem_plugin_ros.sim.words import OF_DETECTORS, WORDS
+from m2pem_plugin_ros.simulator.faults import KINDS, parse
+from m2pem_plugin_ros.simulator.specification import OF_DETECTORS, WORDS
 from m2pem_plugin_ros.testing import Peer
 from ros_sim_watch import COMMAND
 

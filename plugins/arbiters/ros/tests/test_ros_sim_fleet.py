@@ -11,8 +11,8 @@ from geometry_msgs.msg import TwistStamped
 from m2pem_plugin_ros import settings
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.settings import DriverName
-from m2pem_plugin_ros.sim.detector import Target
-from m2pem_plugin_ros.sim.specification import VehicleSpec
+from m2pem_plugin_ros.simulator.sensors import Target
+from m2pem_plugin_ros.simulator.specification import VehicleSpec
 from m2pem_plugin_ros.testing import Peer
 from nav_msgs.msg import Odometry
 from ros_sim_command import cli
@@ -72,7 +72,7 @@ def fleet_file(folder: Path, text: str = FLEET) -> Path:
 
 
 def specs(folder: Path, text: str = FLEET, **words: Any) -> list[VehicleSpec]:
-    from m2pem_plugin_ros.sim.fleet import read_specs
+    from m2pem_plugin_ros.simulator.fleet import read_specs
 
     return list(read_specs(load_fleet(fleet_file(folder, text)), words))
 

@@ -8,11 +8,11 @@ import pytest
 from m2pem_plugin_ros.pose import Twist
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.settings import DriverName, Settings
-from m2pem_plugin_ros.sim import host as hosts
-from m2pem_plugin_ros.sim.clock import SimulatedClock
-from m2pem_plugin_ros.sim.simulation import LATE_S, Simulation
-from m2pem_plugin_ros.sim.specification import VehicleSpec
-from m2pem_plugin_ros.sim.vehicle import Vehicle
+from m2pem_plugin_ros.simulator import host as hosts
+from m2pem_plugin_ros.simulator.clock import SimulatedClock
+from m2pem_plugin_ros.simulator.simulation import LATE_S, Simulation
+from m2pem_plugin_ros.simulator.specification import VehicleSpec
+from m2pem_plugin_ros.simulator.vehicle import Vehicle
 from ros_sim_watch import until
 
 

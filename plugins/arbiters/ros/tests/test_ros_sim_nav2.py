@@ -13,7 +13,7 @@ from rclpy.action import ActionClient
 from ros_sim_watch import AMPLE_S, COMMAND, Heard, switch, until
 
 nav2_actions = pytest.importorskip("nav2_msgs.action")
-pytest.importorskip("m2pem_plugin_ros.sim.nav2")
+pytest.importorskip("m2pem_plugin_ros.simulator.nav2")
 pytest.importorskip("m2pem_plugin_ros.drivers.base")
 
 WORDS = ["sim", "ros", "--driver", "nav2", "--ground", "1", "--speed", "5"]

@@ -8,11 +8,16 @@ import pytest
 from m2pem_plugin_ros.frames import to_local
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.settings import Settings
-from m2pem_plugin_ros.sim.battery import Battery, Capacity
-from m2pem_plugin_ros.sim.detector import DetectorSpec, Target
-from m2pem_plugin_ros.sim.odometer import Inaccuracy, Odometer
-from m2pem_plugin_ros.sim.specification import VehicleSpec
-from m2pem_plugin_ros.sim.vehicle import Vehicle
+from m2pem_plugin_ros.simulator.sensors import (
+    Battery,
+    Capacity,
+    DetectorSpec,
+    Inaccuracy,
+    Odometer,
+    Target,
+)
+from m2pem_plugin_ros.simulator.specification import VehicleSpec
+from m2pem_plugin_ros.simulator.vehicle import Vehicle
 
 START = Pose(100.0, -50.0, math.pi / 2)
 

@@ -3,8 +3,8 @@ import math
 import pytest
 from m2pem_plugin_ros.frames import to_geodetic, to_local
 from m2pem_plugin_ros.pose import Pose, Twist
+from m2pem_plugin_ros.sensors.localization import Whereabouts
 from m2pem_plugin_ros.settings import OdomFrame
-from m2pem_plugin_ros.whereabouts import Whereabouts
 
 from m2pem.api import GeoPosition
 

@@ -5,7 +5,7 @@ import logging
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
-from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros import RosRuntime
 
 from m2pem.api import MissionControl, TeamState
 from m2pem.errors import M2pemError

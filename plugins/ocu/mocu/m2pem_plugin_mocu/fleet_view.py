@@ -8,9 +8,7 @@ from typing import Any
 
 from geometry_msgs.msg import Point32, PolygonStamped
 from m2pem_interfaces import msg
-from m2pem_plugin_ros.frames import to_local
-from m2pem_plugin_ros.payload_status import write_payload_status
-from m2pem_plugin_ros.runtime import RosRuntime, qos
+from m2pem_plugin_ros import RosRuntime, qos, to_local, write_payload_status
 
 from m2pem.api import (
     GeoPosition,

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from m2pem_plugin_ros.installation import require_interfaces
-from m2pem_plugin_ros.loopback import keep_on_loopback
+from m2pem_plugin_ros import keep_on_loopback, require_interfaces
 
 from m2pem.errors import M2pemError
 from m2pem_plugin_mocu import settings
@@ -58,7 +57,7 @@ class MocuOcu:
 
         Ends when the executive does.
         """
-        from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415  # rclpy
+        from m2pem_plugin_ros import RosRuntime  # noqa: PLC0415  # rclpy
 
         from m2pem_plugin_mocu.examiner import Examiner  # noqa: PLC0415
         from m2pem_plugin_mocu.fleet_view import FleetView  # noqa: PLC0415

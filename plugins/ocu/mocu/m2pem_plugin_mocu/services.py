@@ -4,7 +4,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from m2pem_interfaces import srv
-from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros import RosRuntime
 
 from m2pem.api import MissionControl
 from m2pem.errors import M2pemError, OperatorError

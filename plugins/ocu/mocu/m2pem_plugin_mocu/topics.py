@@ -8,7 +8,7 @@ from collections import deque
 from typing import Any
 
 from m2pem_interfaces import msg
-from m2pem_plugin_ros.runtime import RosRuntime, qos
+from m2pem_plugin_ros import RosRuntime, qos
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 

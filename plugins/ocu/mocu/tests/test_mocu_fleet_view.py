@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from m2pem_interfaces import msg
 from m2pem_plugin_mocu.fleet_view import Outlines, team_status
-from m2pem_plugin_ros.payload_status import write_payload_status
+from m2pem_plugin_ros.interfaces.vehicle_status import write_payload_status
 from mocu_world import Client, Message, World
 from rclpy.validate_topic_name import validate_topic_name
 

@@ -3,14 +3,13 @@
 import logging
 from typing import TYPE_CHECKING
 
-from m2pem_plugin_ros.onboard import ArbiterDriver, Onboard, Targets
+from m2pem_plugin_ros import ArbiterDriver, Onboard, Targets
 
 from m2pem.api import ArbiterContext, Clock, Connection, PayloadState
 from m2pem_plugin_ptz.arbiter import PtzArbiter
 
 if TYPE_CHECKING:
-    from m2pem_plugin_ros.drivers.driver import Told
-    from m2pem_plugin_ros.runtime import RosRuntime
+    from m2pem_plugin_ros import RosRuntime, Told
 
 LOGGER = logging.getLogger("m2pem.onboard")
 

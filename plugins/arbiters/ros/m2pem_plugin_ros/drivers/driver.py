@@ -6,7 +6,8 @@ return at once or soon: what becomes of an order is told later, and as often as 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from importlib import import_module
+from typing import TYPE_CHECKING, Protocol, cast
 from uuid import UUID
 
 from m2pem.api import (
@@ -17,8 +18,8 @@ from m2pem.api import (
     ResolvedValue,
     Value,
 )
-from m2pem_plugin_ros.localization import Localization
-from m2pem_plugin_ros.settings import Settings
+from m2pem_plugin_ros.sensors.localization import Localization
+from m2pem_plugin_ros.settings import DriverName, Settings
 
 if TYPE_CHECKING:
     from m2pem_plugin_ros.runtime import RosRuntime
@@ -138,3 +139,20 @@ class Driver(Protocol):
     async def close(self) -> None:
         """Let go. The vehicle keeps doing what it does, if it can without us."""
         ...
+
+
+_DRIVERS = {
+    DriverName.NODE: ("m2pem_plugin_ros.drivers.node", "NodeDriver"),
+    DriverName.NAV2: ("m2pem_plugin_ros.drivers.nav2", "Nav2Driver"),
+    DriverName.BASE: ("m2pem_plugin_ros.drivers.base", "BaseDriver"),
+}
+
+
+def make_driver(seat: Seat) -> Driver:
+    """The driver for a seat; not open yet.
+
+    Raises:
+        RosError: it needs a package of ROS that is not installed.
+    """
+    module, name = _DRIVERS[seat.settings.driver]
+    return cast("Driver", getattr(import_module(module), name)(seat))

@@ -2,14 +2,15 @@
 
 import asyncio
 import signal
+import time
 from typing import Any
 
 import click
 
 from m2pem.api import ArbiterContext, Connection, GeoPosition, ResourceId
 from m2pem.errors import PluginError
+from m2pem_plugin_ros.command_options import Place
 from m2pem_plugin_ros.loopback import keep_on_loopback
-from m2pem_plugin_ros.place_option import Place
 from m2pem_plugin_ros.settings import DriverName, Settings, read_settings
 
 _FLAGS = {"true": True, "false": False}
@@ -106,12 +107,17 @@ def _put(given: dict[str, Any], path: tuple[str, ...], value: str | bool) -> Non
 async def _serve(
     connection: Connection, settings: Settings, origin: tuple[float, float, float]
 ) -> None:
-    from m2pem_plugin_ros.drivers.choice import make_driver  # noqa: PLC0415  # they need rclpy
-    from m2pem_plugin_ros.drivers.driver import Driver, Seat, Told  # noqa: PLC0415
-    from m2pem_plugin_ros.localization import TopicLocalization  # noqa: PLC0415
-    from m2pem_plugin_ros.onboard.onboard import LOGGER, Onboard  # noqa: PLC0415
-    from m2pem_plugin_ros.onboard.targets import Targets  # noqa: PLC0415
-    from m2pem_plugin_ros.onboard.wall_clock import WallClock  # noqa: PLC0415
+    from m2pem_plugin_ros.drivers.driver import (  # noqa: PLC0415
+        Driver,
+        Seat,
+        Told,
+        make_driver,  # they need rclpy
+    )
+    from m2pem_plugin_ros.onboard.node import LOGGER, Onboard  # noqa: PLC0415
+    from m2pem_plugin_ros.onboard.target_bus import Targets  # noqa: PLC0415
+    from m2pem_plugin_ros.sensors.localization import TopicLocalization  # noqa: PLC0415
+
+    pass
     from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415
 
     ended = asyncio.Event()
@@ -134,3 +140,23 @@ async def _serve(
         click.echo("ready")
         await ended.wait()
         await node.close()
+
+
+class WallClock:
+    """Implements `m2pem.api.Clock`: the time of day at its start, and steady time from there."""
+
+    def __init__(self) -> None:
+        self._start_us = time.time_ns() // 1000 - time.monotonic_ns() // 1000
+
+    def now_us(self) -> int:
+        """Microseconds since the Unix epoch; never goes back."""
+        return self._start_us + time.monotonic_ns() // 1000
+
+    async def sleep(self, seconds: float) -> None:
+        """Wait for `seconds`."""
+        await asyncio.sleep(max(seconds, 0.0))
+
+    async def sleep_until(self, time_us: int) -> None:
+        """Wait until `now_us()` is at least `time_us`."""
+        while (left_us := time_us - self.now_us()) > 0:  # noqa: ASYNC110  # it may wake early
+            await asyncio.sleep(left_us / 1e6)

@@ -12,7 +12,7 @@ from m2pem_plugin_ptz.drivers.ros.settings import Command, read_settings
 from m2pem_plugin_ptz.head import Look, Picture, Reach
 
 if TYPE_CHECKING:
-    from m2pem_plugin_ros.runtime import RosRuntime
+    from m2pem_plugin_ros import RosRuntime
 
     from m2pem_plugin_ptz.drivers.ros.image_feed import ImageFeed
     from m2pem_plugin_ptz.drivers.ros.recorder import Recorder
@@ -57,12 +57,12 @@ class RosDriver:
 
     def _join(self) -> "RosRuntime":
         try:
-            from m2pem_plugin_ros import loopback  # noqa: PLC0415  # optional
+            from m2pem_plugin_ros import keep_on_loopback  # noqa: PLC0415  # optional
         except ModuleNotFoundError as error:
             raise PluginError(f"{self._resource}: {MISSING} ({error})") from error
-        if self._seat.connection.sitl and not loopback.is_kept():
+        if self._seat.connection.sitl:
             try:
-                loopback.keep_on_loopback()
+                keep_on_loopback()
             except PluginError:  # other vehicles are reached over other networks already
                 self._seat.context.logger.info("%s: DDS is not on 127.0.0.1 alone", self._resource)
         # Two executives on one network have two journals, and so two names.
@@ -70,7 +70,7 @@ class RosDriver:
         return shared_runtime.join(self._settings.domain_id, name)
 
     def _listen(self, ros: "RosRuntime") -> None:
-        from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415  # they need ROS
+        from m2pem_plugin_ros import qos  # noqa: PLC0415  # they need ROS
         from sensor_msgs.msg import JointState  # noqa: PLC0415
         from std_msgs.msg import Float64MultiArray  # noqa: PLC0415
         from trajectory_msgs.msg import JointTrajectory  # noqa: PLC0415

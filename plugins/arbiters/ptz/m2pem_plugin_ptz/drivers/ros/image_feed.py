@@ -11,7 +11,7 @@ from m2pem.api import Clock
 from m2pem_plugin_ptz.drivers.driver import CameraError
 
 if TYPE_CHECKING:
-    from m2pem_plugin_ros.runtime import RosRuntime
+    from m2pem_plugin_ros import RosRuntime
 
 WITHIN_S = 5.0
 """Of real time: a camera that shows nothing for so long shows nothing."""
@@ -54,7 +54,7 @@ class ImageFeed:
             self._lingering.cancel()
             self._lingering = None
         if self._subscription is None:
-            from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415  # it needs rclpy
+            from m2pem_plugin_ros import qos  # noqa: PLC0415  # it needs rclpy
 
             self._subscription = self._ros.subscribe(
                 CompressedImage, self.topic, self._hear, qos.TELEMETRY, waiting=2

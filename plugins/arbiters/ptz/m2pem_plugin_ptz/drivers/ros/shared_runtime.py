@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 if TYPE_CHECKING:
-    from m2pem_plugin_ros.runtime import RosRuntime
+    from m2pem_plugin_ros import RosRuntime
 
 
 @dataclass(slots=True)
@@ -26,7 +26,7 @@ def join(domain_id: int | None, name: str) -> "RosRuntime":
     Raises:
         RosError: ROS cannot be used; the text says what would be right.
     """
-    from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415  # it needs rclpy
+    from m2pem_plugin_ros import RosRuntime  # noqa: PLC0415  # it needs rclpy
 
     domains = _shared.setdefault(asyncio.get_running_loop(), {})
     if domain_id not in domains:

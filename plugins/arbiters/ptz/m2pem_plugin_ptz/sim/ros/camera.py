@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from m2pem_plugin_ros.runtime import RosRuntime, qos
+from m2pem_plugin_ros import RosRuntime, qos
 from sensor_msgs.msg import CompressedImage, JointState
 from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory

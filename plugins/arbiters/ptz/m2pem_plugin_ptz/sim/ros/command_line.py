@@ -42,7 +42,7 @@ def ros_cameras(fleet_file: Path, speed: float, domain_id: int | None) -> None:
     Example: m2pem sim ros-cameras --fleet fleet.yaml
     """
     try:
-        from m2pem_plugin_ros.loopback import keep_on_loopback  # noqa: PLC0415  # optional
+        from m2pem_plugin_ros import keep_on_loopback  # noqa: PLC0415  # optional
     except ModuleNotFoundError as error:
         raise PluginError(
             "simulated cameras over ROS need the plugin m2pem-plugin-ros: "

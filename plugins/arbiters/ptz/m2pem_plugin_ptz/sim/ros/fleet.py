@@ -4,8 +4,8 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from m2pem_plugin_ros.payload_settings import read_payloads
-from m2pem_plugin_ros.settings import read_settings as read_vehicles
+from m2pem_plugin_ros import read_payloads
+from m2pem_plugin_ros import read_settings as read_vehicles
 
 from m2pem.api import Connection, Fleet, ResourceId
 from m2pem.errors import PluginError

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Sequence
 from dataclasses import replace
 
-from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros import RosRuntime
 
 from m2pem.api import Clock
 from m2pem_plugin_ptz.onboard.node import CameraNode

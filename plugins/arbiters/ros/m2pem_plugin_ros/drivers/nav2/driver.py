@@ -12,12 +12,12 @@ from uuid import UUID
 
 from m2pem.api import BehaviorRequest, BehaviorState, ResolvedValue
 from m2pem_plugin_ros.drivers.driver import Health, Order, Outcome, Seat
-from m2pem_plugin_ros.drivers.nav2.errands import ERRANDS, Errand, Job
-from m2pem_plugin_ros.drivers.nav2.nav2 import Nav2
-from m2pem_plugin_ros.drivers.nav2.numbered_goals import number_of
-from m2pem_plugin_ros.drivers.nav2.standing import stands
-from m2pem_plugin_ros.drivers.nav2.verdicts import NavigationError, taken_over
+from m2pem_plugin_ros.drivers.nav2.client import Nav2
+from m2pem_plugin_ros.drivers.nav2.errors import NavigationError, taken_over
+from m2pem_plugin_ros.drivers.nav2.goal_client import number_of
+from m2pem_plugin_ros.drivers.nav2.tasks import ERRANDS, Errand, Job
 from m2pem_plugin_ros.runtime import RosError
+from m2pem_plugin_ros.sensors.localization import stands
 
 LOOK_EVERY_S = 1.0
 LOOK_AT_MOST_EVERY_S = 0.1

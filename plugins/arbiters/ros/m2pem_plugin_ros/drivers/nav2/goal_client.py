@@ -198,3 +198,17 @@ class GoalClient:
 
 def _uuid(goal_id: UUID) -> Any:
     return unique_identifier.UUID(uuid=list(goal_id.bytes))
+
+
+_NUMBERS = (1 << 32) - 1
+
+
+def numbered(order: UUID, number: int) -> UUID:
+    """The goal of that number, from 0 to 2**32 - 1."""
+    return UUID(int=order.int ^ (number & _NUMBERS))
+
+
+def number_of(order: UUID, goal: UUID) -> int | None:
+    """Which goal of the order it is; None: it is none of them."""
+    difference = order.int ^ goal.int
+    return difference if difference <= _NUMBERS else None

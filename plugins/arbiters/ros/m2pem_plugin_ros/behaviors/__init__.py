@@ -1,0 +1,49 @@
+"""The pilot of a plain base (docs/ros.md, "A plain base"): pure code, in the local frame."""
+
+from collections.abc import Mapping
+
+from m2pem_plugin_ros.behaviors.follow import Follow
+from m2pem_plugin_ros.behaviors.goto import Goto
+from m2pem_plugin_ros.behaviors.hold_and_teleop import DriveStop, Hold, Teleop
+from m2pem_plugin_ros.behaviors.motion import Motion
+from m2pem_plugin_ros.behaviors.motion_state import Ending, RefusedError, Seen, Step, Target
+from m2pem_plugin_ros.behaviors.parameters import Wishes
+from m2pem_plugin_ros.behaviors.pilot import STALE_S, STANDING, Pilot
+from m2pem_plugin_ros.behaviors.reverse import Reverse
+from m2pem_plugin_ros.behaviors.route import SingleVehicleRouting
+from m2pem_plugin_ros.settings import Bounds
+
+__all__ = [
+    "MOTIONS",
+    "STALE_S",
+    "STANDING",
+    "Ending",
+    "Motion",
+    "Pilot",
+    "RefusedError",
+    "Seen",
+    "Step",
+    "Target",
+    "Teleop",
+    "Wishes",
+    "make_motion",
+]
+
+
+MOTIONS: Mapping[str, type[Motion]] = {
+    motion.name: motion
+    for motion in (SingleVehicleRouting, Goto, Hold, DriveStop, Reverse, Follow, Teleop)
+}
+
+
+def make_motion(behavior: str, wishes: Wishes, bounds: Bounds) -> Motion:
+    """The motion for a behavior.
+
+    Raises:
+        RefusedError: a plain base cannot do it, or not so.
+    """
+    if behavior not in MOTIONS:
+        raise RefusedError(
+            f"a plain base cannot do '{behavior}', only {', '.join(sorted(MOTIONS))}"
+        )
+    return MOTIONS[behavior](wishes, bounds)

@@ -1,0 +1,77 @@
+"""A request's parameters in the local frame, as motions ask for them."""
+
+import math
+from collections.abc import Callable, Mapping
+
+from m2pem.api import Point, ResolvedValue, Route, VehiclePosition
+from m2pem_plugin_ros.behaviors.motion_state import Place, RefusedError
+
+Level = Callable[[float, float], Place]
+"""The local place of a latitude and a longitude, in degrees."""
+
+
+class Wishes:
+    """Parameters that were checked against the catalogue."""
+
+    def __init__(self, values: Mapping[str, ResolvedValue], level: Level, own_name: str) -> None:
+        self._values = values
+        self._level = level
+        self._own_name = own_name
+
+    def number(self, name: str) -> float | None:
+        """A number in SI; None if not given."""
+        value = self._values.get(name)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return None
+        return float(value)
+
+    def flag(self, name: str) -> bool:
+        """Whether something is wished."""
+        return self._values.get(name) is True
+
+    def route(self) -> tuple[Place, ...]:
+        """The places of `route`.
+
+        Raises:
+            RefusedError: there are none.
+        """
+        route = self._values.get("route")
+        if not isinstance(route, Route) or not route.waypoints:
+            raise RefusedError("parameter 'route': there is no waypoint in it")
+        return tuple(self._place("route", each[0], each[1]) for each in route.waypoints)
+
+    def vehicle(self) -> str:
+        """The vehicle that `target` names, or "".
+
+        Raises:
+            RefusedError: it is the one that is to move.
+        """
+        target = self._values.get("target")
+        if not isinstance(target, VehiclePosition):
+            return ""
+        if target.vehicle == self._own_name:
+            raise RefusedError("parameter 'target': another vehicle is expected")
+        return target.vehicle
+
+    def point(self) -> Place:
+        """The point that `target` says.
+
+        Raises:
+            RefusedError: it says none.
+        """
+        target = self._values.get("target")
+        if not isinstance(target, Point):
+            raise RefusedError("parameter 'target': there is none")
+        return self._place("target", target.position[0], target.position[1])
+
+    def _place(self, parameter: str, latitude_deg: float, longitude_deg: float) -> Place:
+        if not math.isfinite(latitude_deg + longitude_deg):
+            raise RefusedError(
+                f"parameter '{parameter}': [{latitude_deg}, {longitude_deg}] is no position"
+            )
+        place = self._level(latitude_deg, longitude_deg)
+        if not math.isfinite(place[0] + place[1]):
+            raise RefusedError(
+                f"parameter '{parameter}': [{latitude_deg}, {longitude_deg}] is no position"
+            )
+        return place

@@ -1,0 +1,260 @@
+"""Nav2 on one vehicle: whether it is active, what it does, and goals for it."""
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterable
+from typing import Any
+from uuid import UUID
+
+from action_msgs.msg import GoalStatus
+from lifecycle_msgs.msg import State
+from lifecycle_msgs.srv import GetState
+
+from m2pem.api import BehaviorState
+from m2pem_plugin_ros.drivers.nav2.errors import NavigationError, aborted, taken_over
+from m2pem_plugin_ros.drivers.nav2.goal_client import GoalClient
+from m2pem_plugin_ros.installation import require_interfaces
+from m2pem_plugin_ros.runtime import RosRuntime, RosTimeoutError, qos
+
+STATE_S = 1.0
+"""Real seconds in which bt_navigator says what state it is in."""
+
+LOOKS = 2
+"""So often it may leave that unanswered before it counts as not there."""
+
+RIVAL_S = 0.5
+"""Real seconds in which the goal that took the place of ours is heard of, on another topic."""
+
+LOOK_S = 0.05
+
+
+class Nav2:
+    """`namespace`: of the vehicle. `heard` is called whenever Nav2 says something, once it was
+    `looked_at`.
+
+    Raises:
+        RosError: nav2_msgs is not installed.
+    """
+
+    def __init__(
+        self, ros: RosRuntime, namespace: str, heard: Callable[[], None], logger: logging.Logger
+    ) -> None:
+        self.messages = require_interfaces("nav2_msgs")
+        self._ros = ros
+        self._told = heard
+        self._logger = logger
+        self._name = namespace.rstrip("/")
+        self._heard_at_s = self._now_s()
+        self._ours: set[UUID] = set()
+        self._limit_m_s: float | None = None
+        self.state = ""
+        self._looks = 0
+        actions = self.messages.action
+        self.to_pose = self._client(actions.NavigateToPose, "navigate_to_pose")
+        self.through_poses = self._client(actions.NavigateThroughPoses, "navigate_through_poses")
+        self.waypoints = self._client(actions.FollowWaypoints, "follow_waypoints")
+        self.back_up = self._client(actions.BackUp, "backup")
+        self._get_state = ros.client(GetState, f"{self._name}/bt_navigator/get_state")
+        self._speed_limit = ros.node.create_publisher(
+            self.messages.msg.SpeedLimit, f"{self._name}/speed_limit", qos.COMMANDS
+        )
+
+    # --- how it is ------------------------------------------------------------------------------
+
+    @property
+    def is_active(self) -> bool:
+        """Whether it takes goals."""
+        return not self.trouble
+
+    @property
+    def looked_at(self) -> bool:
+        """Whether it has answered by now, or had the time to: who is told of it may give it an
+        order at once. An answer may get lost while DDS finds who is there."""
+        return bool(self.state) or self._looks >= LOOKS
+
+    @property
+    def trouble(self) -> str:
+        """Why it takes no goals; "" if it does."""
+        if not self.state:
+            return "Nav2 is not heard"
+        return "" if self.state == "active" else f"Nav2 is not active: {self.state}"
+
+    @property
+    def silent_s(self) -> float:
+        """For how many real seconds nothing was heard of it."""
+        return self._now_s() - self._heard_at_s
+
+    @property
+    def doing(self) -> str:
+        """The action that it carries out, or "idle"."""
+        for client in self._clients():
+            if client.active:
+                return client.name.rpartition("/")[2]
+        return "idle"
+
+    async def look(self) -> None:
+        """Ask it for its state, and notice one that was started anew. To be called once a second.
+
+        Raises:
+            RosError: the connection was closed.
+        """
+        try:
+            answer = await self._ros.call(self._get_state, GetState.Request(), STATE_S)
+        except RosTimeoutError:
+            self.state = ""
+        else:
+            state = answer.current_state
+            active = state.id == State.PRIMARY_STATE_ACTIVE
+            self.state = "active" if active else state.label or f"state {state.id}"
+        self._looks += 1
+        if self.state:
+            self._heard()
+        for client in self._clients():
+            client.look_for_server()
+
+    def rival(self) -> str:
+        """The action by which Nav2 drives for somebody else; "" if it does not."""
+        return self._rival((self.waypoints, self.through_poses, self.to_pose))
+
+    def ours(self) -> set[UUID]:
+        """Goals that it was given here, and that go on."""
+        return {goal for client in self._clients() for goal in client.active & self._ours}
+
+    # --- what it is to do -----------------------------------------------------------------------
+
+    async def drive(
+        self, client: GoalClient, goal_id: UUID, goal: Any, begun: Callable[[], None]
+    ) -> Any:
+        """Have a goal carried out in place of what is done; returns its result when it succeeded.
+
+        Raises:
+            NavigationError: it did not succeed.
+            RosError: Nav2 does not answer.
+        """
+        await self._make_way(client)
+        self._ours = self._ours & client.active | {goal_id}
+        try:
+            accepted = await client.send(goal_id, goal)
+        except RosTimeoutError as error:
+            raise NavigationError(f"Nav2 does not answer: {error}") from error
+        if not accepted:
+            why = self.trouble or "it said no"
+            rejected = BehaviorState.REJECTED
+            raise NavigationError(f"Nav2 rejected the goal: {why}", "REJECTED", rejected)
+        begun()
+        return await self.finish(client, goal_id)
+
+    async def finish(self, client: GoalClient, goal_id: UUID) -> Any:
+        """Wait for the end of a goal that Nav2 has; returns its result when it succeeded.
+
+        Raises:
+            NavigationError: it did not succeed.
+        """
+        self._ours.add(goal_id)
+        ended = await client.result(goal_id)
+        self._heard()
+        if ended.status == GoalStatus.STATUS_SUCCEEDED:
+            return ended.result
+        if ended.status == GoalStatus.STATUS_CANCELED:
+            raise taken_over("somebody else has cancelled its goal at Nav2")
+        if ended.status == GoalStatus.STATUS_ABORTED:
+            raise await self.why_aborted(client, ended.result)
+        raise NavigationError("Nav2 knows nothing of its goal any more: it was started anew")
+
+    async def why_aborted(self, client: GoalClient, result: Any) -> NavigationError:
+        """Why a goal of ours was aborted, by its result, and by what else is going on."""
+        if int(getattr(result, "error_code", 0)) == 0:
+            # Nav2 says nothing to who is preempted, or when it is deactivated.
+            if rival := await self._awaited_rival(client):
+                return taken_over(f"somebody else has given Nav2 another goal: {rival}")
+            await self.look()
+            if not self.is_active:
+                return NavigationError(f"Nav2 gave it up: {self.trouble}")
+        return aborted(result)
+
+    async def stop(self) -> None:
+        """Cancel all that it does, whoever has asked for it, and wait until that has ended.
+
+        Raises:
+            RosError: it does not answer, or does not stop.
+        """
+        await self._all([client for client in self._clients() if client.there or client.active])
+
+    async def stop_ours(self, which: Callable[[UUID], bool] = lambda _: True) -> None:
+        """Cancel what it was given here, and leave the rest.
+
+        Raises:
+            RosError: it does not answer, or does not stop.
+        """
+        for client in self._clients():
+            for goal in filter(which, client.active & self._ours):
+                await client.cancel(goal)
+
+    def limit_speed(self, speed_m_s: float | None) -> None:
+        """Set the highest speed; None takes back what was set before."""
+        if speed_m_s is None and self._limit_m_s is None:
+            return  # there may be limits of others, which are left alone
+        self._limit_m_s = speed_m_s
+        if not self._speed_limit.get_subscription_count():
+            self._logger.warning(
+                "%s: nobody listens: Nav2 drives at its own speed", self._speed_limit.topic_name
+            )
+        self._speed_limit.publish(
+            self.messages.msg.SpeedLimit(percentage=False, speed_limit=speed_m_s or 0.0)
+        )
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _client(self, action: Any, name: str) -> GoalClient:
+        return GoalClient(self._ros, action, f"{self._name}/{name}", self._heard)
+
+    def _clients(self) -> tuple[GoalClient, ...]:
+        return self.waypoints, self.through_poses, self.to_pose, self.back_up
+
+    async def _make_way(self, client: GoalClient) -> None:
+        """Only bt_navigator lets a new goal take the place of one, and only of the same action."""
+        preempts = client in (self.to_pose, self.through_poses) and not self.waypoints.active
+        others = [c for c in self._clients() if c.busy and not (preempts and c is client)]
+        if preempts and client.active:
+            others = [c for c in others if c is not self.back_up]  # it may be a recovery's
+        try:
+            await self._all(others)
+        except RosTimeoutError as error:
+            raise NavigationError(f"Nav2 does not end what it does: {error}") from error
+
+    async def _all(self, clients: list[GoalClient]) -> None:
+        """The waypoint follower first: goals that it has given itself end with what it does."""
+        failed: list[BaseException] = []
+        for some in (
+            [client for client in clients if client is self.waypoints],
+            [client for client in clients if client is not self.waypoints],
+        ):
+            ends = await asyncio.gather(*(c.cancel() for c in some), return_exceptions=True)
+            failed += [end for end in ends if end is not None]
+        if failed:
+            raise failed[0]
+
+    async def _awaited_rival(self, client: GoalClient) -> str:
+        clients = (self.waypoints, self.through_poses, self.to_pose, client)
+        deadline_s = self._now_s() + RIVAL_S
+        while not (rival := self._rival(clients)) and self._now_s() < deadline_s:  # noqa: ASYNC110
+            await asyncio.sleep(LOOK_S)
+        return rival
+
+    def _rival(self, clients: Iterable[GoalClient]) -> str:
+        """Goals that Nav2 gives itself are nobody's: the waypoint follower those of navigation,
+        and navigation those of backing up."""
+        follows = self._ours & self.waypoints.active
+        for client in clients:
+            if not (follows and client is self.to_pose) and client.active - self._ours:
+                return client.name
+        return ""
+
+    def _heard(self) -> None:
+        self._heard_at_s = self._now_s()
+        if self.looked_at:
+            self._told()
+
+    @staticmethod
+    def _now_s() -> float:
+        return asyncio.get_running_loop().time()

@@ -1,0 +1,116 @@
+"""An order's parameters, in the fleet's local frame."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+from m2pem.api import (
+    ArbiterContext,
+    GeoPosition,
+    LinkState,
+    Point,
+    ResolvedValue,
+    ResourceId,
+    Route,
+    VehiclePosition,
+    VehicleState,
+)
+from m2pem_plugin_ros.drivers.nav2.errors import NavigationError
+from m2pem_plugin_ros.frames import to_local
+from m2pem_plugin_ros.pose import Pose, bow_rad
+
+STALE_S = 3.0
+"""Where a vehicle was so long ago, it need not be any more."""
+
+SAME_PLACE_M = 0.1
+
+
+@dataclass(slots=True)
+class Wishes:
+    """What was asked for; it may change on the way."""
+
+    context: ArbiterContext
+    values: dict[str, ResolvedValue] = field(default_factory=dict)
+
+    def change(self, parameters: Mapping[str, ResolvedValue]) -> None:
+        """Take these in place of those of the same names."""
+        self.values.update(parameters)
+
+    def number(self, name: str, default: float | None = None) -> float | None:
+        """A number in SI; `default` if not given."""
+        value = self.values.get(name)
+        return float(value) if isinstance(value, int | float) else default
+
+    def flag(self, name: str) -> bool:
+        """Whether something is wished."""
+        return self.values.get(name) is True
+
+    def yaw_rad(self) -> float | None:
+        """`heading`, as yaw: from east, counter-clockwise."""
+        heading = self.number("heading")
+        return None if heading is None else math.pi / 2 - heading
+
+    def target_vehicle(self) -> ResourceId | None:
+        """The vehicle that `target` names, if it names one."""
+        value = self.values.get("target")
+        return ResourceId(value.vehicle) if isinstance(value, VehiclePosition) else None
+
+    def target(self) -> Pose:
+        """Where `target` is now, and where it points if it is a vehicle.
+
+        Raises:
+            NavigationError: it is a vehicle that is not heard.
+        """
+        value = self.values.get("target")
+        if isinstance(value, Point):
+            return self._at(value.position[0], value.position[1])
+        vehicle = self.target_vehicle()
+        if vehicle is None:
+            raise NavigationError("it has no target")
+        state = self.context.bus.latest(vehicle)
+        now_us = self.context.clock.now_us()
+        if (
+            not isinstance(state, VehicleState)
+            or state.position is None
+            or state.link is LinkState.LOST
+            or now_us - state.time_us > STALE_S * 1e6
+        ):
+            raise NavigationError(f"{vehicle} has not been heard for {STALE_S:g} s")
+        position = state.position
+        place = self._at(position.latitude_deg, position.longitude_deg)
+        return replace(place, yaw_rad=bow_rad(state))
+
+    def way(self) -> list[Pose]:
+        """`route`, each pose in the direction of the next."""
+        value = self.values.get("route")
+        if not isinstance(value, Route):
+            raise NavigationError("it has no route")
+        return along([self._at(latitude, longitude) for latitude, longitude, _ in value.waypoints])
+
+    def _at(self, latitude_deg: float, longitude_deg: float) -> Pose:
+        position = GeoPosition(latitude_deg, longitude_deg, self.context.origin[2])
+        east_m, north_m, _ = to_local(position, self.context.origin)
+        return Pose(east_m, north_m, 0.0)
+
+
+def along(places: list[Pose]) -> list[Pose]:
+    """The same places, each in the direction of the next; the last as the one before it."""
+    turned: list[Pose] = []
+    yaw_rad = 0.0
+    for place, following in pairwise([*places, None]):
+        if place is not None:
+            if following is not None and apart_m(place, following) > SAME_PLACE_M:
+                yaw_rad = towards_rad(place, following)
+            turned.append(replace(place, yaw_rad=yaw_rad))
+    return turned
+
+
+def apart_m(a: Pose, b: Pose) -> float:
+    """The distance on the ground."""
+    return math.hypot(a.east_m - b.east_m, a.north_m - b.north_m)
+
+
+def towards_rad(a: Pose, b: Pose) -> float:
+    """The yaw from one place to the other."""
+    return math.atan2(b.north_m - a.north_m, b.east_m - a.east_m)

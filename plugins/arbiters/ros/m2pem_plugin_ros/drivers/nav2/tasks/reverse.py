@@ -1,0 +1,55 @@
+"""Backwards."""
+
+import math
+from typing import Any
+
+from builtin_interfaces.msg import Duration
+from geometry_msgs.msg import Point
+
+from m2pem_plugin_ros.catalogue import REVERSE_M
+from m2pem_plugin_ros.drivers.nav2.goal_client import GoalClient
+from m2pem_plugin_ros.drivers.nav2.tasks.task import GoalErrand, Job
+
+SPEED_M_S = 0.5
+NOTHING_M = 0.01
+ALLOWED = 3.0
+ALLOWED_MORE_S = 10.0
+"""Nav2 gives up after so many times as long as it should take, and so much more."""
+
+
+class Reverse(GoalErrand):
+    """BackUp, over what is left of the distance."""
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        distance_m = self.wishes.number("distance", REVERSE_M) or 0.0
+        self._left_m = self._goal_m = distance_m
+
+    @property
+    def client(self) -> GoalClient:
+        """Of the behavior server."""
+        return self.nav2.back_up
+
+    async def run(self) -> None:
+        """Drive over the distance."""
+        if self._left_m <= NOTHING_M:
+            self.job.begun()
+            return
+        self._goal_m = self._left_m
+        await self.drive(self._goal())
+
+    def fed_back(self, feedback: Any) -> None:
+        """How far it came."""
+        driven_m = float(feedback.distance_traveled)
+        if math.isfinite(driven_m):
+            self._left_m = min(self._left_m, max(0.0, self._goal_m - driven_m))
+
+    def _goal(self) -> Any:
+        fastest_m_s = self.job.seat.settings.bounds.reverse_m_s
+        speed_m_s = min(self.wishes.number("speed") or SPEED_M_S, fastest_m_s)
+        allowed_s = ALLOWED * self._left_m / speed_m_s + ALLOWED_MORE_S
+        return self.client.action.Goal(
+            target=Point(x=self._left_m),
+            speed=speed_m_s,
+            time_allowance=Duration(sec=math.ceil(allowed_s)),
+        )

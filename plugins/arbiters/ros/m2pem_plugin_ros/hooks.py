@@ -1,0 +1,43 @@
+"""The hooks of this plugin: the arbiter `ros`, and the commands `sim ros` and `ros onboard`."""
+
+from collections.abc import Callable, MutableMapping
+from typing import TYPE_CHECKING
+
+from m2pem import hookimpl
+
+if TYPE_CHECKING:
+    import click
+
+    from m2pem.api import Arbiter
+
+
+@hookimpl
+def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], None]") -> None:
+    """Register the arbiter `ros`."""
+    from m2pem_plugin_ros.arbiter import RosArbiter  # noqa: PLC0415  # starting up must be fast
+
+    register("ros", RosArbiter)
+
+
+@hookimpl
+def m2pem_register_commands(cli: "click.Group") -> None:
+    """Add `sim ros` and `ros onboard`. Both groups may have commands of other plugins."""
+    add_commands(cli.commands)
+
+
+def add_commands(commands: "MutableMapping[str, click.Command]") -> None:
+    """Add the commands. The module of a command is imported only when it is called."""
+    from m2pem_plugin_ros.command_options import LazyCommand, group  # noqa: PLC0415  # click
+
+    group(commands, "sim", "Simulate vehicles that speak as real ones do.").add_command(
+        LazyCommand(
+            "ros", "m2pem_plugin_ros.simulator.command_line", "Simulate ROS vehicles on 127.0.0.1."
+        )
+    )
+    group(commands, "ros", "For vehicles that speak ROS 2.").add_command(
+        LazyCommand(
+            "onboard",
+            "m2pem_plugin_ros.onboard.command_line",
+            "Be the m2pem node of a vehicle, on board of it.",
+        )
+    )

@@ -1,0 +1,177 @@
+"""What a command asks for, as m2pem_interfaces/msg/BehaviorCommand carries it. Needs no ROS."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+from uuid import UUID
+
+from m2pem.api import BehaviorRequest, BehaviorSpec, ResolvedValue, ResourceId
+from m2pem.api.refusal import refusal
+from m2pem_plugin_ros.drivers.driver import Order
+from m2pem_plugin_ros.interfaces import set_stamp
+from m2pem_plugin_ros.interfaces.key_values import WireError, decode_parameters, encode_parameters
+
+
+class Verb(IntEnum):
+    """The constants of the message."""
+
+    START = 1
+    CANCEL = 2
+    HOLD = 3
+    RESUME = 4
+    QUERY = 5
+    ADJUST = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A command that is one. `of_vehicle`: it is about whatever the vehicle does."""
+
+    verb: Verb
+    id: str
+    run: str
+    epoch: int
+
+    @property
+    def of_vehicle(self) -> bool:
+        """Whether it names no behavior."""
+        return self.verb in (Verb.HOLD, Verb.RESUME)
+
+
+def read_command(message: Any) -> Asked:
+    """What a message asks for.
+
+    Raises:
+        WireError: an unknown verb, or no id where one is needed.
+    """
+    try:
+        verb = Verb(message.verb)
+    except ValueError:
+        raise WireError(f"a command with a verb of {message.verb}") from None
+    asked = Asked(verb, message.id, message.run, message.epoch)
+    if not asked.id and not asked.of_vehicle:
+        raise WireError(f"a command to {verb.name} without an id")
+    return asked
+
+
+def read_parameters(message: Any) -> dict[str, ResolvedValue]:
+    """The parameters of a START or an ADJUST.
+
+    Raises:
+        WireError: one cannot be understood.
+    """
+    return decode_parameters((pair.key, pair.value) for pair in message.parameters)
+
+
+def read_request(message: Any, vehicle: str) -> BehaviorRequest:
+    """What a START asks for. `vehicle`: or the payload, such as evsg2/ptz, whose node this is.
+
+    Raises:
+        WireError: a parameter cannot be understood, or it is for another vehicle.
+    """
+    roles = {
+        allocation.role: tuple(ResourceId(resource) for resource in allocation.resources)
+        for allocation in message.allocation
+    }
+    resources = tuple(dict.fromkeys(resource for role in roles.values() for resource in role))
+    ours = {vehicle, *(each for each in resources if each.startswith(f"{vehicle}/"))}
+    if resources and ours.isdisjoint(resources):
+        raise WireError(f"it is for {', '.join(resources)}, and this is {vehicle}")
+    return BehaviorRequest(
+        message.id,
+        message.epoch,
+        message.behavior,
+        read_parameters(message),
+        resources or (ResourceId(vehicle),),
+        roles,
+        tuple(message.preempts),
+    )
+
+
+def misfit(
+    catalogue: Sequence[BehaviorSpec],
+    vehicle: str,
+    behavior: str,
+    parameters: Mapping[str, ResolvedValue],
+) -> str:
+    """Why a behavior is not one of the catalogue; "" if it is."""
+    for spec in catalogue:
+        if spec.name == behavior:
+            return refusal(spec, parameters)
+    known = ", ".join(spec.name for spec in catalogue)
+    return f"{vehicle} has no behavior '{behavior[:100]}'; it has {known}"
+
+
+def start_command(order: Order, now_us: int) -> Any:
+    """START, also the goal of the action.
+
+    Raises:
+        WireError: a parameter is none that the wire can carry.
+    """
+    message = behavior_command(Verb.START, order, now_us)
+    message.behavior = order.request.behavior
+    message.parameters = _parameters(order.request.parameters)
+    message.allocation = [
+        _interfaces().Allocation(role=role, resources=list(resources))
+        for role, resources in _roles(order.request).items()
+    ]
+    message.preempts = [str(goal) for goal in order.preempts]
+    return message
+
+
+def adjust_command(order: Order, parameters: Mapping[str, ResolvedValue], now_us: int) -> Any:
+    """ADJUST.
+
+    Raises:
+        WireError: a parameter is none that the wire can carry.
+    """
+    message = behavior_command(Verb.ADJUST, order, now_us)
+    message.parameters = _parameters(parameters)
+    return message
+
+
+def behavior_command(verb: int, order: Order, now_us: int, epoch: int = 0) -> Any:
+    """CANCEL or QUERY. `epoch`: that of the executive that sends it, if it is known; an order that
+    was given before a restart has the one of its START."""
+    return _message(
+        verb,
+        now_us,
+        id=str(order.goal),
+        run=str(order.run),
+        epoch=max(epoch, order.request.epoch),
+    )
+
+
+def goal_command(verb: int, goal: UUID, now_us: int) -> Any:
+    """CANCEL or QUERY of a behavior of which nothing else is known."""
+    return _message(verb, now_us, id=str(goal))
+
+
+def vehicle_command(verb: int, now_us: int) -> Any:
+    """HOLD or RESUME: whatever it does."""
+    return _message(verb, now_us)
+
+
+def _roles(request: BehaviorRequest) -> Mapping[str, tuple[str, ...]]:
+    """The resources by role; those of a request without roles are of the role ""."""
+    return {role: tuple(resources) for role, resources in request.roles.items()} or {
+        "": tuple(request.resources)
+    }
+
+
+def _parameters(parameters: Mapping[str, ResolvedValue]) -> list[Any]:
+    key_value = _interfaces().KeyValue
+    return [key_value(key=key, value=value) for key, value in encode_parameters(parameters)]
+
+
+def _message(verb: int, now_us: int, **fields: Any) -> Any:
+    message = _interfaces().BehaviorCommand(verb=verb, **fields)
+    set_stamp(message.stamp, now_us)
+    return message
+
+
+def _interfaces() -> Any:
+    from m2pem_interfaces import msg  # noqa: PLC0415  # it needs ROS
+
+    return msg

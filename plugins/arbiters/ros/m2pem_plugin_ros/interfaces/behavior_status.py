@@ -1,0 +1,86 @@
+"""Statuses of behaviors between an arbiter's node on a vehicle and the executive.
+
+Needs no ROS: what is read and written are messages of m2pem_interfaces/msg/BehaviorStatus.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from m2pem.api import BehaviorState, Value
+from m2pem_plugin_ros.interfaces.key_values import WireError, decode_outputs, encode_outputs
+
+STATES: Mapping[int, BehaviorState] = {
+    1: BehaviorState.ACCEPTED,
+    2: BehaviorState.RUNNING,
+    3: BehaviorState.SUCCEEDED,
+    4: BehaviorState.FAILED,
+    5: BehaviorState.CANCELLED,
+    6: BehaviorState.REJECTED,
+    7: BehaviorState.LOST,
+    8: BehaviorState.UNKNOWN,
+}
+"""By the constants of the message."""
+
+CONSTANTS: Mapping[BehaviorState, int] = {state: number for number, state in STATES.items()}
+
+ENDS = frozenset(state for state in STATES.values() if state.terminal) - {BehaviorState.UNKNOWN}
+"""One of them comes last."""
+
+LONGEST_CODE = 64
+LONGEST_REASON = 2000
+"""Characters that are kept of what a vehicle says for people: it goes into journals."""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What is said of a behavior. `number` rises with each change, from 1; UNKNOWN has 0.
+    `outputs`: of one that has ended; what the mission's data store gets."""
+
+    id: str
+    number: int
+    state: BehaviorState
+    code: str = ""
+    reason: str = ""
+    native_ref: str = ""
+    outputs: Mapping[str, Value] = field(default_factory=dict)
+
+
+def read_status(message: Any) -> Status:
+    """What a message says. An end counts also if an output of it is wrong: `reason` tells then.
+
+    Raises:
+        WireError: it breaks the rules of BehaviorStatus.msg; the text says which.
+    """
+    if not message.id:
+        raise WireError("a status without an id")
+    state = STATES.get(message.state)
+    if state is None:
+        raise WireError(f"a status of {message.id} with a state of {message.state}")
+    if (state is BehaviorState.UNKNOWN) != (message.number == 0):
+        raise WireError(f"a status of {message.id} that is {state} with number {message.number}")
+    outputs, wrong = decode_outputs((pair.key, pair.value) for pair in message.outputs)
+    reason = "; ".join(each for each in (message.reason, *wrong) if each)
+    return Status(
+        message.id,
+        message.number,
+        state,
+        message.code[:LONGEST_CODE],
+        reason[:LONGEST_REASON],
+        message.native_ref,
+        outputs if state in ENDS else {},
+    )
+
+
+def write_status(message: Any, status: Status, make_pair: Callable[..., Any]) -> Any:
+    """Fill a message, but for its stamp, and return it. `make_pair`: a KeyValue of `key` and
+    `value`."""
+    message.id = status.id
+    message.number = status.number
+    message.state = CONSTANTS[status.state]
+    message.code = status.code
+    message.reason = status.reason
+    message.native_ref = status.native_ref
+    pairs = encode_outputs(status.outputs)
+    message.outputs = [make_pair(key=key, value=value) for key, value in pairs]
+    return message

@@ -1,0 +1,88 @@
+"""How full a vehicle's battery is: sensor_msgs/BatteryState."""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from m2pem.api import ArbiterContext, Clock, ResourceId
+from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.settings import Settings
+
+if TYPE_CHECKING:
+    from m2pem_plugin_ros.runtime import RosRuntime
+
+
+class Battery:
+    """Subscribed from the beginning. `fraction` of a full one; None: it was not said."""
+
+    def __init__(
+        self, ros: "RosRuntime", resource: ResourceId, settings: Settings, context: ArbiterContext
+    ) -> None:
+        from sensor_msgs.msg import BatteryState  # noqa: PLC0415  # it is loaded where ROS is only
+
+        from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415
+
+        self.fraction: float | None = None
+        self._complaints = Complaints(context.logger, resource)
+        topic = settings.topic(settings.topics.battery)
+        ros.subscribe(BatteryState, topic, self._hear, qos.TELEMETRY)
+
+    def _hear(self, message: Any) -> None:
+        share = message.percentage
+        if 0.0 <= share <= 1.0:
+            self.fraction = share
+        elif not math.isnan(share):  # NaN: the battery does not measure it
+            hint = "; BatteryState.percentage is from 0 to 1" if 1.0 < share <= 100.0 else ""
+            self._complaints.add("a charge that cannot be", f"{share:g}{hint}")
+
+
+OLD_AFTER_S = 5.0
+"""Parts say how they are once a second; what one that fell silent said last no longer counts."""
+
+OWN = "m2pem:"
+"""So begin the names of what m2pem itself says of the vehicles; it is no news to it."""
+
+_ERROR = 2
+MOST_PARTS = 1000
+
+
+class Diagnostics:
+    """One topic with the diagnostics of many vehicles, heard once for all of them.
+
+    `watch` each of them; what is said of others is not kept.
+    """
+
+    def __init__(self, ros: "RosRuntime", topic: str, clock: Clock) -> None:
+        from diagnostic_msgs.msg import (  # noqa: PLC0415  # it is loaded where ROS is only
+            DiagnosticArray,
+        )
+
+        from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415
+
+        self._clock = clock
+        self._errors: dict[str, dict[str, tuple[str, int]]] = {}
+        ros.subscribe(DiagnosticArray, topic, self._hear, qos.TELEMETRY)
+
+    def watch(self, hardware_id: str) -> None:
+        """Keep what is said of a vehicle from now on."""
+        self._errors.setdefault(hardware_id, {})
+
+    def errors(self, hardware_id: str) -> tuple[str, ...]:
+        """What is wrong with a vehicle now, for people, in the order of the parts' names."""
+        said = self._errors.get(hardware_id)
+        if not said:
+            return ()
+        oldest_us = self._clock.now_us() - round(OLD_AFTER_S * 1e6)
+        for name in [name for name, (_, at_us) in said.items() if at_us < oldest_us]:
+            del said[name]
+        return tuple(said[name][0] for name in sorted(said))
+
+    def _hear(self, message: Any) -> None:
+        now_us = self._clock.now_us()
+        for status in message.status:
+            said = self._errors.get(status.hardware_id)
+            if said is None or status.name.startswith(OWN):
+                continue
+            if ord(status.level) < _ERROR:
+                said.pop(status.name, None)
+            elif status.name in said or len(said) < MOST_PARTS:
+                said[status.name] = (f"{status.name}: {status.message or 'error'}", now_us)

@@ -1,0 +1,136 @@
+"""Where a payload looks, as its m2pem node says: m2pem_interfaces/msg/PayloadStatus."""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from m2pem.api import GeoPosition, LinkState, PayloadState, ResourceId
+from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.pose import Pose, Twist
+from m2pem_plugin_ros.sensors.endpoints import Endpoints
+from m2pem_plugin_ros.sensors.localization import Localization
+from m2pem_plugin_ros.settings import Settings
+
+if TYPE_CHECKING:
+    from m2pem_plugin_ros.runtime import RosRuntime
+
+TOPIC = "payload_status"
+MOST_CORNERS = 1000
+LARGEST = 1e6
+"""Of an angle or a zoom. What claims more is wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """As in `PayloadState`; None: not said."""
+
+    pan_rad: float | None = None
+    tilt_rad: float | None = None
+    zoom: float | None = None
+    footprint: tuple[GeoPosition, ...] = ()
+
+
+class PayloadSight:
+    """Subscribed from the beginning. `look`: what was said last."""
+
+    def __init__(
+        self, ros: "RosRuntime", resource: ResourceId, settings: Settings, complaints: Complaints
+    ) -> None:
+        from m2pem_plugin_ros.installation import require_interfaces  # noqa: PLC0415
+        from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415  # it needs rclpy
+
+        self.look = Look()
+        self.changes = 0
+        self._resource = resource
+        self._complaints = complaints
+        messages = require_interfaces("m2pem_interfaces").msg
+        ros.subscribe(messages.PayloadStatus, settings.topic(TOPIC), self._hear, qos.TELEMETRY)
+
+    def state(self, time_us: int, link: LinkState, behavior: str) -> PayloadState:
+        """What the fleet is told. Where a lost payload looks is not known."""
+        look = Look() if link is LinkState.LOST else self.look
+        return PayloadState(
+            self._resource,
+            time_us,
+            look.pan_rad,
+            look.tilt_rad,
+            look.zoom,
+            link=link,
+            behavior=behavior,
+            footprint=look.footprint,
+        )
+
+    def _hear(self, message: Any) -> None:
+        if message.payload not in ("", self._resource):
+            self._complaints.add("where another payload looks", message.payload[:100])
+            return
+        self.look = Look(
+            _number(message.pan_rad),
+            _number(message.tilt_rad),
+            _number(message.zoom),
+            self._footprint(message.footprint),
+        )
+        self.changes += 1
+
+    def _footprint(self, corners: Any) -> tuple[GeoPosition, ...]:
+        if len(corners) > MOST_CORNERS:
+            self._complaints.add("a footprint that has too many corners", f"{len(corners)}")
+            return ()
+        found = tuple(
+            GeoPosition(corner.latitude_deg, corner.longitude_deg, corner.altitude_m)
+            for corner in corners
+        )
+        if not all(map(_is_on_earth, found)):
+            self._complaints.add("a footprint that is not on Earth")
+            return ()
+        return found
+
+
+class PayloadSenses:
+    """Implements `Senses`: of a payload itself, not of the vehicle that carries it. It is its own
+    `Localization`, which knows nothing."""
+
+    battery_fraction: float | None = None
+    errors: tuple[str, ...] = ()
+    troubles: tuple[str, ...] = ()
+    pose: Pose | None = None
+    twist: Twist | None = None
+    position: GeoPosition | None = None
+    age_s = math.inf
+
+    def __init__(self, sight: PayloadSight, endpoints: Endpoints) -> None:
+        self._sight = sight
+        self._endpoints = endpoints
+
+    @property
+    def refusal(self) -> str:
+        """Why nothing may be commanded, for people; "" if it may."""
+        return self._endpoints.trouble
+
+    @property
+    def absence(self) -> str:
+        """Where its node is awaited, and who is there, for people."""
+        return self._endpoints.absence
+
+    @property
+    def localization(self) -> Localization:
+        """Nothing."""
+        return self
+
+    @property
+    def changes(self) -> int:
+        """Another number whenever something was heard."""
+        return self._sight.changes
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) and abs(value) <= LARGEST else None
+
+
+def _is_on_earth(corner: GeoPosition) -> bool:
+    """NaN is not."""
+    return (
+        abs(corner.latitude_deg) <= 90.0
+        and abs(corner.longitude_deg) <= 180.0
+        and math.isfinite(corner.altitude_m)
+    )

@@ -1,0 +1,270 @@
+"""`m2pem sim ros`: simulated vehicles, until Ctrl-C."""
+
+import asyncio
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import click
+
+from m2pem.api import GeoPosition
+from m2pem.errors import PluginError
+from m2pem_plugin_ros.command_options import Place
+from m2pem_plugin_ros.frames import Origin, to_local
+from m2pem_plugin_ros.loopback import keep_on_loopback
+from m2pem_plugin_ros.settings import DriverName
+from m2pem_plugin_ros.simulator.faults import WORDS as WHAT
+from m2pem_plugin_ros.simulator.faults import FaultError, PlannedFault, parse
+from m2pem_plugin_ros.simulator.fleet import make_crew
+from m2pem_plugin_ros.simulator.sensors import Target
+from m2pem_plugin_ros.simulator.specification import FORT, VehicleSpec, WordError
+
+MOST = 100
+"""Vehicles in one process; 20 are moderate, see docs/ros.md."""
+
+
+class Word(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """KEY=VALUE."""
+
+    name = "key=value"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, str]:
+        """The word and what it is to be."""
+        if isinstance(value, tuple):
+            return value
+        key, equals, said = str(value).partition("=")
+        if not (key.strip() and equals and said.strip()):
+            self.fail(f"{value!r} is not KEY=VALUE, such as max_speed=3 m/s", param, ctx)
+        return key.strip(), said.strip()
+
+
+class PlantedTarget(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """TYPE@LAT,LON."""
+
+    name = "type@lat,lon"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, GeoPosition]:
+        """What it is, and where."""
+        if isinstance(value, tuple):
+            return value
+        kind, at, place = str(value).partition("@")
+        if not (kind.strip() and at):
+            self.fail(f"{value!r} is not TYPE@LAT,LON, such as gpr@38.1,-77.3", param, ctx)
+        return kind.strip(), Place().convert(place, param, ctx)
+
+
+class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """A fault in words, such as evsg1: silent at 20 s for 5 s."""
+
+    name = "fault"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> PlannedFault:
+        """When and where it happens."""
+        if isinstance(value, PlannedFault):
+            return value
+        try:
+            return parse(str(value))
+        except FaultError as error:
+            self.fail(str(error), param, ctx)
+
+
+@click.command()
+@click.option(
+    "--fleet",
+    "fleet_file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Simulate what this fleet file has of arbiter ros, marked `sitl: true`.",
+)
+@click.option("--ground", type=click.IntRange(0, MOST), help="[default: 1 without --fleet]")
+@click.option("--surface", type=click.IntRange(0, MOST), default=0, show_default=True)
+@click.option(
+    "--driver",
+    type=click.Choice([str(each) for each in DriverName]),
+    help="How vehicles without a fleet are reached.  [default: m2pem]",
+)
+@click.option("--home", type=Place(), help="Where the first vehicle without a fleet stands.")
+@click.option(
+    "--target",
+    "targets",
+    type=PlantedTarget(),
+    multiple=True,
+    help="Something that detectors of vehicles without a fleet find, such as gpr@38.1,-77.3.",
+)
+@click.option(
+    "--speed",
+    type=click.FloatRange(0.1, 20),
+    default=1.0,
+    show_default=True,
+    help="Simulated seconds per second.",
+)
+@click.option(
+    "--domain-id",
+    type=click.IntRange(0, 101),
+    help="The ROS domain of vehicles whose fleet does not say.  [default: ROS_DOMAIN_ID]",
+)
+@click.option(
+    "--set",
+    "words",
+    type=Word(),
+    multiple=True,
+    help="Of all vehicles, such as max_speed=3 m/s. May be given more than once.",
+)
+@click.option(
+    "--fault",
+    "faults",
+    type=Fault(),
+    multiple=True,
+    help='What goes wrong, such as "evsg1: silent at 20 s for 5 s": [VEHICLES:] ACTION '
+    "[at SECONDS s] [for SECONDS s]. May be given more than once; also a line of standard input.",
+)
+def ros(
+    fleet_file: Path | None,
+    ground: int | None,
+    surface: int,
+    driver: str | None,
+    home: GeoPosition | None,
+    targets: tuple[tuple[str, GeoPosition], ...],
+    speed: float,
+    domain_id: int | None,
+    words: tuple[tuple[str, str], ...],
+    faults: tuple[PlannedFault, ...],
+) -> None:
+    """Simulate ROS vehicles, on 127.0.0.1 alone, until Ctrl-C.
+
+    Example: m2pem sim ros --ground 4 --speed 10
+    """
+    said = dict(words)
+    try:
+        if fleet_file is not None:
+            if ground is not None or surface or driver or home or targets:
+                raise click.UsageError(
+                    "--fleet says which vehicles there are, of which driver and where: leave "
+                    "--ground, --surface, --driver, --home and --target out"
+                )
+            specs = _of_fleet(fleet_file, said)
+        else:
+            counts = [1 if ground is None and not surface else ground or 0, surface]
+            domains = ["ground"] * counts[0] + ["surface"] * counts[1]
+            name = DriverName(driver or DriverName.NODE)
+            specs = _crew(domains, name, home or FORT, targets, said)
+    except WordError as error:
+        raise click.UsageError(f"--set {error}") from error
+    keep_on_loopback()
+    try:
+        asyncio.run(_run(specs, speed, domain_id, faults))
+    except (FaultError, ValueError) as error:
+        raise click.UsageError(str(error)) from error
+
+
+def _of_fleet(file: Path, words: dict[str, Any]) -> list[VehicleSpec]:
+    from m2pem import load_fleet  # noqa: PLC0415  # readers of files are needed here alone
+    from m2pem_plugin_ros.simulator.fleet import ARBITER, read_specs  # noqa: PLC0415
+
+    fleet = load_fleet(file)
+    try:
+        specs = list(read_specs(fleet, words))
+    except PluginError as error:
+        raise click.UsageError(f"{file}: {error}") from error
+    if not specs:
+        raise click.UsageError(
+            f"{file} has nothing to simulate: no vehicle has `arbiter: {ARBITER}` and `sitl: true`"
+        )
+    return specs
+
+
+def _crew(
+    domains: list[str],
+    driver: DriverName,
+    home: GeoPosition,
+    targets: Iterable[tuple[str, GeoPosition]],
+    words: dict[str, Any],
+) -> list[VehicleSpec]:
+    if not domains:
+        raise click.UsageError("no vehicles: say how many, such as --ground 2")
+    if "home" in words:
+        raise click.UsageError("--set home: say --home, which places vehicles beside each other")
+    origin: Origin = (home.latitude_deg, home.longitude_deg, home.altitude_m)
+    planted = [
+        Target(
+            kind, *to_local(GeoPosition(at.latitude_deg, at.longitude_deg, origin[2]), origin)[:2]
+        )
+        for kind, at in targets
+    ]
+    return list(make_crew(domains, driver, origin, planted, words))
+
+
+async def _run(
+    specs: list[VehicleSpec], speed: float, domain_id: int | None, faults: Iterable[PlannedFault]
+) -> None:
+    from m2pem_plugin_ros.simulator.simulation import Simulation  # noqa: PLC0415  # imports rclpy
+
+    pass
+
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop.set)
+    async with Simulation(specs, speed=speed, domain_id=domain_id, faults=faults) as vehicles:
+        for spec in specs:
+            click.echo(_line(spec))
+        click.echo("ready")
+
+        def hear(line: str) -> None:
+            try:
+                vehicles.plan(parse(line))
+            except FaultError as error:
+                click.echo(f"m2pem: {error}", err=True)
+            else:
+                click.echo(f"fault: {line}")
+
+        hear_lines(hear)
+        ended = asyncio.create_task(vehicles.stopped())
+        stopped = asyncio.create_task(stop.wait())
+        await asyncio.wait((ended, stopped), return_when=asyncio.FIRST_COMPLETED)
+        stopped.cancel()
+        if ended.done():
+            ended.result()
+        ended.cancel()
+        with suppress(asyncio.CancelledError):
+            await ended
+
+
+def _line(spec: VehicleSpec) -> str:
+    from m2pem_plugin_ros.simulator.vehicle import Vehicle  # noqa: PLC0415
+
+    place = Vehicle(spec).position
+    where = f"{place.latitude_deg:.6f},{place.longitude_deg:.6f}"
+    what = WHAT[spec.settings.driver].removeprefix("an ").removeprefix("a ")
+    return f"{spec.name}: {spec.settings.namespace or '/'}, {what}, at {where}"
+
+
+def hear_lines(hear: Callable[[str], None]) -> None:
+    """Have `hear` called on the running loop with each line, until the input ends.
+
+    In the background of a terminal, reading ends, instead of stopping the program.
+    """
+    with suppress(ValueError):  # not the main thread: then the signal is its business
+        signal.signal(signal.SIGTTIN, signal.SIG_IGN)
+    loop = asyncio.get_running_loop()
+    threading.Thread(target=_read, args=(loop, hear), name="stdin", daemon=True).start()
+
+
+def _read(loop: asyncio.AbstractEventLoop, hear: Callable[[str], None]) -> None:
+    """`os.read`, since a reader of `sys.stdin` would hold a lock that Python's end waits for."""
+    rest = b""
+    with suppress(OSError, RuntimeError):  # no input; the loop is closed
+        while data := os.read(0, 4096):
+            *lines, rest = (rest + data).split(b"\n")
+            for line in lines:
+                if text := line.decode(errors="replace").strip():
+                    loop.call_soon_threadsafe(hear, text)

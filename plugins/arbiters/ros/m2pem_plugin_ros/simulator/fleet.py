@@ -1,0 +1,164 @@
+"""The vehicles of a fleet file that are to be simulated: of arbiter `ros`, marked `sitl: true`."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from m2pem.api import Connection, Fleet
+from m2pem.errors import PluginError
+from m2pem_plugin_ros.frames import Origin
+from m2pem_plugin_ros.pose import Pose
+from m2pem_plugin_ros.settings import (
+    Bounds,
+    DetectorMessage,
+    DetectorSettings,
+    DriverName,
+    Settings,
+    read_detectors,
+    read_settings,
+)
+from m2pem_plugin_ros.simulator.dynamics import Chassis
+from m2pem_plugin_ros.simulator.sensors import DetectorSpec, Target
+from m2pem_plugin_ros.simulator.specification import VehicleSpec, WordError, apply, detector
+
+ARBITER = "ros"
+SIM = "sim"
+"""The map in a connection with what is said of the simulated vehicle."""
+
+
+def read_specs(fleet: Fleet, words: Mapping[str, Any]) -> Iterator[VehicleSpec]:
+    """What to simulate for a fleet, so that an executive with the same file finds it.
+
+    `words`: of all vehicles, over those of the file.
+
+    Raises:
+        PluginError: a connection is wrong; the text names the resource and the key.
+        WordError: one of `words` is wrong.
+    """
+    vehicles = [each for each in fleet.vehicles.values() if each.arbiter == ARBITER and each.sitl]
+    connections = {
+        each.id: Connection(each.id, each.domain.value, each.settings, sitl=True)
+        for each in vehicles
+    }
+    payloads = {
+        payload.id: Connection(
+            payload.id, vehicle.domain.value, payload.settings, detector=True, sitl=True
+        )
+        for vehicle in vehicles
+        for payload in (fleet.payloads[name] for name in vehicle.payloads)
+        if payload.arbiter == ARBITER and payload.detector
+    }
+    settings = read_settings(connections)
+    detectors = read_detectors({**connections, **payloads})
+    for number, vehicle in enumerate(vehicles):
+        domain, own = vehicle.domain.value, settings[vehicle.id]
+        spec = VehicleSpec(
+            vehicle.id,
+            own,
+            domain,
+            start_of(number),
+            fleet.origin,
+            _chassis(domain, own),
+            detectors=tuple(
+                _detector(payloads[name], vehicle.settings, detectors[name], fleet.origin)
+                for name in payloads
+                if fleet.payloads[name].vehicle == vehicle.id
+            ),
+        )
+        try:
+            spec = apply(vehicle.settings.get(SIM, {}), spec)
+        except WordError as error:
+            raise PluginError(f"{vehicle.id}: connection.{SIM}.{error}") from error
+        yield apply(words, spec)
+
+
+def _chassis(domain: str, settings: Settings) -> Chassis:
+    """A base can do what the fleet says that it can; else what is usual for its domain."""
+    usual, bounds = chassis_of(domain), settings.bounds
+    if settings.driver is not DriverName.BASE and bounds == Bounds():
+        return usual
+    return replace(
+        usual,
+        speed_m_s=bounds.speed_m_s,
+        reverse_m_s=bounds.reverse_m_s,
+        acceleration_m_s2=bounds.acceleration_m_s2,
+        yaw_rate_rad_s=bounds.yaw_rate_rad_s,
+        turn_radius_m=bounds.turn_radius_m,
+    )
+
+
+def _detector(
+    payload: Connection,
+    vehicle_settings: Mapping[str, Any],
+    settings: DetectorSettings,
+    origin: Origin,
+) -> DetectorSpec:
+    usual = DetectorSpec()
+    spec = replace(
+        usual,
+        payload=payload.resource,
+        topic=settings.topic,
+        type=settings.type or usual.type,
+        plain=settings.message is DetectorMessage.STRING,
+    )
+    words = payload.settings.get(SIM, {})
+    if words == vehicle_settings.get(SIM):  # a payload inherits what is said of its vehicle
+        return spec
+    try:
+        return detector(words, spec, origin)
+    except WordError as error:
+        raise PluginError(f"{payload.resource}: connection.{SIM}.{error}") from error
+
+
+APART_M = 5.0
+"""Vehicles stand in a row to the east, so far from each other, and face north."""
+
+NORTH_RAD = 1.5707963267948966
+
+BOAT = Chassis(
+    speed_m_s=3.0,
+    reverse_m_s=0.5,
+    acceleration_m_s2=0.5,
+    yaw_rate_rad_s=0.5,
+    yaw_acceleration_rad_s2=0.5,
+    lag_s=0.5,
+)
+ROVER = Chassis()
+
+
+def chassis_of(domain: str) -> Chassis:
+    """How vehicles of a domain move unless something else is said."""
+    return BOAT if domain == "surface" else ROVER
+
+
+def start_of(number: int) -> Pose:
+    """Where the vehicle with that number stands, from 0."""
+    return Pose(number * APART_M, 0.0, NORTH_RAD)
+
+
+def make_crew(
+    domains: Sequence[str],
+    driver: DriverName,
+    origin: Origin,
+    targets: Sequence[Target] = (),
+    words: Mapping[str, Any] | None = None,
+) -> Iterator[VehicleSpec]:
+    """A vehicle for each domain, named by it; each carries a detector.
+
+    Raises:
+        WordError: a word is not known, or its value has no sense.
+    """
+    counts = {"ground": 0, "surface": 0}
+    for number, domain in enumerate(domains):
+        counts[domain] += 1
+        name = f"{'usv' if domain == 'surface' else 'ugv'}{counts[domain]}"
+        spec = VehicleSpec(
+            name,
+            Settings(f"/{name}", driver=driver, hardware_id=name),
+            domain,
+            start_of(number),
+            origin,
+            chassis_of(domain),
+            detectors=(DetectorSpec(targets=tuple(targets)),),
+        )
+        yield apply(words or {}, spec)

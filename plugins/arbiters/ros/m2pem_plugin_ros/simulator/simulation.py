@@ -1,0 +1,236 @@
+"""Many simulated vehicles in one process: time passes for all of them."""
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import TimeoutError as NoAnswerError
+from dataclasses import replace
+from types import TracebackType
+from typing import Any, Self
+
+from rcl_interfaces.msg import SetParametersResult
+
+from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros.simulator.clock import SimulatedClock
+from m2pem_plugin_ros.simulator.faults import FaultError, PlannedFault, parse
+from m2pem_plugin_ros.simulator.host import Host
+from m2pem_plugin_ros.simulator.specification import VehicleSpec
+from m2pem_plugin_ros.simulator.vehicle import Vehicle
+
+TICK_S = 0.02
+"""How often vehicles are moved on and publish, in seconds of the wall clock: at most 50 Hz."""
+
+LATE_S = 0.2
+"""In seconds of the wall clock. A process that was not run for longer simulates no more of it than
+that: nobody could have steered a vehicle meanwhile."""
+
+COMMANDS_WITHIN_S = 0.5
+"""A base never stops for want of commands before so long, in seconds of the wall clock."""
+
+NODE = "m2pem_sim"
+
+
+class Simulation:
+    """The vehicles; `speed`: simulated seconds in a second. `async with` opens and closes it.
+
+    `domain_id`: where those are that do not say; None takes ROS_DOMAIN_ID.
+
+    Raises:
+        ValueError: there is none, or two have the same name or namespace.
+        FaultError: a fault is for a vehicle that is not there, or cannot happen to it.
+    """
+
+    def __init__(
+        self,
+        specs: Sequence[VehicleSpec],
+        *,
+        speed: float = 1.0,
+        domain_id: int | None = None,
+        faults: Iterable[PlannedFault] = (),
+        seed: int = 0,
+    ) -> None:
+        _check(specs)
+        self.clock = SimulatedClock(speed)
+        self._specs, self._domain_id, self._seed = specs, domain_id, seed
+        self._hosts: dict[str, Host] = {}
+        self._runtimes: dict[int | None, RosRuntime] = {}
+        self._agenda: list[tuple[float, Callable[[], None]]] = []
+        self._planned = tuple(faults)
+        for fault in self._planned:
+            self.check(fault)
+        self._now_s = 0.0
+        self._left_out_s = 0.0
+        self._task: asyncio.Task[None] | None = None
+
+    def __getitem__(self, name: str) -> Host:
+        return self._hosts[name]
+
+    def __iter__(self) -> Iterator[Host]:
+        return iter(self._hosts.values())
+
+    async def __aenter__(self) -> Self:
+        try:
+            for spec in self._specs:
+                vehicle = Vehicle(_patient(spec, self.clock.speed), self._seed)
+                host = Host(self._runtime(spec), vehicle, self.clock)
+                self._hosts[spec.name] = host
+                await host.open()
+        except BaseException:
+            await self._close()
+            raise
+        self._now_s = self.clock.elapsed_s
+        for fault in self._planned:
+            self.plan(fault)
+        self._task = asyncio.create_task(self._run())
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+        await self._close()
+
+    async def stopped(self) -> None:
+        """Wait for its end, which comes only by an error.
+
+        Raises:
+            Exception: whatever ended it.
+        """
+        if self._task is not None:
+            await asyncio.shield(self._task)
+
+    # --- faults -----------------------------------------------------------------------------------
+
+    def check(self, fault: PlannedFault) -> None:
+        """See that a fault can happen.
+
+        Raises:
+            FaultError: one of its vehicles is not there, or it cannot happen to it.
+        """
+        specs = {spec.name: spec for spec in self._specs}
+        for name in fault.vehicles or specs:
+            if name not in specs:
+                known = ", ".join(specs)
+                raise FaultError(
+                    f"fault {fault.text!r}: there is no vehicle {name!r}; there are: {known}"
+                )
+            fault.check(specs[name])
+
+    def plan(self, fault: PlannedFault) -> None:
+        """Let a fault happen when its time comes, counted from now.
+
+        Raises:
+            FaultError: one of its vehicles is not there, or it cannot happen to it.
+        """
+        self.check(fault)
+        for host in [self[name] for name in fault.vehicles or self._hosts]:
+            self._after(fault.at_s, lambda host=host: self._begin(fault, host))  # type: ignore[misc]
+
+    def _begin(self, fault: PlannedFault, host: Host) -> None:
+        fault.begin(host)
+        end = fault.end
+        if end is not None and fault.for_s is not None:
+            self._after(fault.for_s, lambda: end(host))
+
+    def _after(self, seconds: float, action: Callable[[], None]) -> None:
+        if seconds <= 0:
+            action()
+        else:
+            self._agenda.append((self._now_s + seconds, action))
+
+    # --- time -------------------------------------------------------------------------------------
+
+    async def _run(self) -> None:
+        loop = asyncio.get_running_loop()
+        last_s = due_s = loop.time()
+        while True:
+            due_s = max(due_s + TICK_S, loop.time())
+            await asyncio.sleep(due_s - loop.time())
+            wall_s = loop.time()
+            late_s = max(0.0, wall_s - last_s - LATE_S)
+            self._left_out_s += late_s * self.clock.speed
+            self._now_s = self.clock.elapsed_s - self._left_out_s
+            for host in self:
+                host.step(self._now_s, wall_s - last_s)
+            last_s = wall_s
+            self._do_what_is_due()
+
+    def _do_what_is_due(self) -> None:
+        due = [each for each in self._agenda if each[0] <= self._now_s]
+        if due:
+            self._agenda = [each for each in self._agenda if each[0] > self._now_s]
+            for _, action in sorted(due, key=lambda each: each[0]):
+                action()
+
+    # --- ROS --------------------------------------------------------------------------------------
+
+    def _runtime(self, spec: VehicleSpec) -> RosRuntime:
+        domain = spec.settings.domain_id
+        domain = self._domain_id if domain is None else domain
+        if domain not in self._runtimes:
+            self._runtimes[domain] = RosRuntime(NODE, domain_id=domain)
+            FaultSwitch(self._runtimes[domain].node, self.plan)
+        return self._runtimes[domain]
+
+    async def _close(self) -> None:
+        await asyncio.gather(*(host.close() for host in self), return_exceptions=True)
+        await asyncio.gather(*(ros.close() for ros in self._runtimes.values()))
+
+
+def _patient(spec: VehicleSpec, speed: float) -> VehicleSpec:
+    """At high speed, what is between two commands for a base is long in simulated time."""
+    timeout_s = max(spec.chassis.command_timeout_s, COMMANDS_WITHIN_S * speed)
+    return replace(spec, chassis=replace(spec.chassis, command_timeout_s=timeout_s))
+
+
+def _check(specs: Sequence[VehicleSpec]) -> None:
+    if not specs:
+        raise ValueError("there are no vehicles")
+    for number, spec in enumerate(specs):
+        for other in specs[:number]:
+            if spec.name == other.name:
+                raise ValueError(f"two vehicles are called {spec.name}")
+            mine, theirs = spec.settings, other.settings
+            if (mine.namespace, mine.domain_id) == (theirs.namespace, theirs.domain_id):
+                raise ValueError(
+                    f"{other.name} and {spec.name} share the namespace {mine.namespace}"
+                )
+
+
+PARAMETER = "fault"
+WITHIN_S = 2.0
+
+logger = logging.getLogger(__name__)
+
+
+class FaultSwitch:
+    """Declares the parameter. Setting it begins the fault, or is refused with what is wrong."""
+
+    def __init__(self, node: Any, plan: Callable[[PlannedFault], None]) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._plan = plan
+        node.declare_parameter(PARAMETER, "")
+        node.add_on_set_parameters_callback(self._set)
+
+    def _set(self, parameters: Any) -> Any:
+        """Runs in the thread of ROS, and waits until the loop has done it."""
+        for parameter in parameters:
+            if parameter.name != PARAMETER or not parameter.value:
+                continue
+            done = asyncio.run_coroutine_threadsafe(self._begin(str(parameter.value)), self._loop)
+            try:
+                done.result(WITHIN_S)
+            except FaultError as error:
+                return SetParametersResult(successful=False, reason=str(error))
+            except NoAnswerError:
+                return SetParametersResult(successful=False, reason="the simulation is too slow")
+        return SetParametersResult(successful=True)
+
+    async def _begin(self, text: str) -> None:
+        self._plan(parse(text))
+        logger.info("fault: %s", text)

@@ -1,0 +1,219 @@
+"""What a simulated vehicle is: its names, where it stands, how it moves and what it carries."""
+
+import difflib
+import math
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from m2pem.api import Dimension, GeoPosition, UnitError, quantity
+from m2pem_plugin_ros.frames import Origin, to_local
+from m2pem_plugin_ros.pose import Pose
+from m2pem_plugin_ros.settings import Settings
+from m2pem_plugin_ros.simulator.dynamics import Chassis
+from m2pem_plugin_ros.simulator.sensors import Capacity, DetectorSpec, Inaccuracy, Target
+
+FORT = GeoPosition(38.1075, -77.3192, 60.0)
+"""Where vehicles stand that no fleet places: near the field of the vignettes."""
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleSpec:
+    """One simulated vehicle.
+
+    `settings`: the connection as an executive has it, so that both mean the same topics. `start`:
+    in the fleet's local frame. `origin`: of that frame, latitude and longitude in degrees, altitude
+    in metres above mean sea level. `battery`: charge at first, 0 to 1.
+    """
+
+    name: str
+    settings: Settings
+    domain: str = "ground"
+    start: Pose = field(default_factory=lambda: Pose(0.0, 0.0, 0.0))
+    origin: tuple[float, float, float] = (FORT.latitude_deg, FORT.longitude_deg, FORT.altitude_m)
+    chassis: Chassis = field(default_factory=Chassis)
+    inaccuracy: Inaccuracy = field(default_factory=Inaccuracy)
+    capacity: Capacity = field(default_factory=Capacity)
+    battery: float = 1.0
+    detectors: tuple[DetectorSpec, ...] = ()
+
+    @property
+    def hardware_id(self) -> str:
+        """What it is called in /diagnostics."""
+        return self.settings.hardware_id or self.name
+
+
+OF_REHEARSALS = frozenset(
+    [
+        "cruise_speed",
+        "deceleration",
+        "climb_rate",
+        "endurance",
+        "default_altitude",
+        "kind",
+        "detections",
+        "faults",
+        "telemetry_hz",
+        "state",
+    ]
+)
+"""Words that `m2pem run --simulate` alone reads from the same map."""
+
+OF_DETECTORS = ("range", "targets")
+
+
+class WordError(ValueError):
+    """It cannot be used. The text says what would be right."""
+
+
+def apply(words: Mapping[str, Any], spec: VehicleSpec) -> VehicleSpec:
+    """The vehicle with what was said of it.
+
+    Raises:
+        WordError: a word is not known, or its value has no sense.
+    """
+    for key, value in words.items():
+        if key in WORDS:
+            spec = _applied(key, value, spec)
+        elif key not in OF_REHEARSALS:
+            raise _unknown(key, WORDS)
+    return spec
+
+
+def detector(words: Mapping[str, Any], spec: DetectorSpec, origin: Origin) -> DetectorSpec:
+    """The detector with what was said of it: `range` and `targets`.
+
+    Raises:
+        WordError: a word is not known, or its value has no sense.
+    """
+    for key in words:
+        if key not in OF_DETECTORS and key not in OF_REHEARSALS:
+            raise _unknown(key, OF_DETECTORS)
+    try:
+        targets = words.get("targets", [])
+        if not isinstance(targets, list | tuple):
+            raise WordError("it is no list, such as [{type: gpr, position: [38.1, -77.3]}]")
+        found = tuple(_target(each, origin) for each in targets)
+    except ValueError as error:
+        raise WordError(f"targets: {error}") from error
+    if "range" not in words:
+        return replace(spec, targets=found)
+    reach_m = _positive(Dimension.DISTANCE)("range", words["range"])
+    return replace(spec, range_m=reach_m, targets=found)
+
+
+def _unknown(key: str, known: Collection[str]) -> WordError:
+    near = difflib.get_close_matches(str(key), known, n=1)
+    hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
+    return WordError(f"{key}: simulated vehicles know no such setting; {hint}")
+
+
+def position(value: Any, altitude_m: float = 0.0) -> GeoPosition:
+    """[lat, lon] or [lat, lon, alt], in degrees and metres above mean sea level.
+
+    Raises:
+        WordError: it is something else.
+    """
+    if isinstance(value, Mapping):
+        value = [value[key] for key in ("lat", "lon", "alt") if key in value]
+    if not isinstance(value, list | tuple) or len(value) not in (2, 3):
+        raise WordError(f"{value!r} is not [lat, lon] or [lat, lon, alt], such as [38.1, -77.3]")
+    try:
+        latitude, longitude, altitude = (*map(float, value), altitude_m)[:3]
+    except (TypeError, ValueError):
+        raise WordError(f"{value!r} is not [lat, lon], such as [38.1, -77.3]") from None
+    if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
+        raise WordError(f"{value!r} is not on Earth: latitude comes first, in degrees")
+    return GeoPosition(latitude, longitude, altitude)
+
+
+def _target(item: Any, origin: Origin) -> Target:
+    if not isinstance(item, Mapping) or set(item) != {"type", "position"}:
+        raise WordError(f"{item!r} is not {{type: gpr, position: [38.1, -77.3]}}")
+    place = position(item["position"], origin[2])
+    east_m, north_m, _ = to_local(place, origin)
+    return Target(str(item["type"]), east_m, north_m)
+
+
+Read = Callable[[str, Any], float]
+
+
+def _number(key: str, value: Any) -> float:
+    try:
+        number = math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise WordError(f"{key}: {value!r} is not a number")
+    return number
+
+
+def _fraction(key: str, value: Any) -> float:
+    percent = isinstance(value, str) and value.strip().endswith("%")
+    number = _number(key, value.strip()[:-1] if percent else value) / (100 if percent else 1)
+    if not 0 <= number <= 1:
+        raise WordError(f"{key}: {value!r} is neither a percentage ('80 %') nor a fraction (0.8)")
+    return number
+
+
+def _quantity(dimension: Dimension) -> Read:
+    def read(key: str, value: Any) -> float:
+        try:
+            return quantity(value, dimension)
+        except UnitError as error:
+            raise WordError(f"{key}: {error}") from error
+
+    return read
+
+
+def _positive(dimension: Dimension, *, zero: bool = False) -> Read:
+    read = _quantity(dimension)
+
+    def positive(key: str, value: Any) -> float:
+        number = read(key, value)
+        if number < 0 or (number == 0 and not zero):
+            raise WordError(f"{key}: {value!r} is {'below' if zero else 'not above'} 0")
+        return number
+
+    return positive
+
+
+_DISTANCE, _SPEED = _positive(Dimension.DISTANCE), _positive(Dimension.SPEED)
+_NO_DISTANCE = _positive(Dimension.DISTANCE, zero=True)
+_DURATION, _NO_DURATION = (_positive(Dimension.DURATION, zero=zero) for zero in (False, True))
+
+WORDS: Mapping[str, tuple[str, str, Read | None]] = {
+    "home": ("", "start", None),
+    "heading": ("", "start", _quantity(Dimension.ANGLE)),
+    "battery": ("", "battery", _fraction),
+    "max_speed": ("chassis", "speed_m_s", _SPEED),
+    "max_reverse": ("chassis", "reverse_m_s", _positive(Dimension.SPEED, zero=True)),
+    "acceleration": ("chassis", "acceleration_m_s2", _positive(Dimension.ACCELERATION)),
+    "turn_rate": ("chassis", "yaw_rate_rad_s", _positive(Dimension.ANGULAR_SPEED)),
+    "turn_radius": ("chassis", "turn_radius_m", _NO_DISTANCE),
+    "lag": ("chassis", "lag_s", _NO_DURATION),
+    "drift": ("inaccuracy", "drift", _fraction),
+    "noise": ("inaccuracy", "noise_m", _NO_DISTANCE),
+    "battery_range": ("capacity", "range_m", _DISTANCE),
+    "battery_life": ("capacity", "standing_s", _DURATION),
+}
+"""Each word, the part of the vehicle and the field that it is about, and how it is read."""
+
+
+def _applied(key: str, value: Any, spec: VehicleSpec) -> VehicleSpec:
+    part, field, read = WORDS[key]
+    if read is None:
+        try:
+            place = position(value, spec.origin[2])
+        except WordError as error:
+            raise WordError(f"{key}: {error}") from error
+        east_m, north_m, _ = to_local(place, spec.origin)
+        return replace(
+            spec, start=Pose(east_m, north_m, spec.start.yaw_rad, place.altitude_m - spec.origin[2])
+        )
+    number = read(key, value)
+    if key == "heading":
+        return replace(spec, start=replace(spec.start, yaw_rad=math.pi / 2 - number))
+    if not part:
+        return replace(spec, battery=number)
+    return replace(spec, **{part: replace(getattr(spec, part), **{field: number})})
