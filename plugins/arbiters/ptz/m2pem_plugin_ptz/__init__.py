@@ -1,27 +1,5 @@
 """Cameras that turn: over ROS, MAVLink and ONVIF (docs/ptz.md)."""
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from m2pem_plugin_ptz.hooks import m2pem_register_arbiters, m2pem_register_commands
 
-from m2pem import hookimpl
-
-if TYPE_CHECKING:
-    import click
-
-    from m2pem.api import Arbiter
-
-
-@hookimpl
-def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], None]") -> None:
-    """Register `ptz`."""
-    from m2pem_plugin_ptz.arbiter import PtzArbiter  # noqa: PLC0415  # starting up must be fast
-
-    register("ptz", PtzArbiter)
-
-
-@hookimpl
-def m2pem_register_commands(cli: "click.Group") -> None:
-    """Add `sim onvif` and `sim ros-cameras`."""
-    from m2pem_plugin_ptz.commands import add_to  # noqa: PLC0415  # starting up must be fast
-
-    add_to(cli.commands)
+__all__ = ["m2pem_register_arbiters", "m2pem_register_commands"]

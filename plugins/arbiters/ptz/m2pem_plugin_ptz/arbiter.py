@@ -22,14 +22,14 @@ from m2pem.api import (
     VehicleState,
 )
 from m2pem_plugin_ptz.catalogue import offered
+from m2pem_plugin_ptz.checkpoint import Kept, native_ref, read_native_ref
 from m2pem_plugin_ptz.drivers import make_driver as _make_driver
 from m2pem_plugin_ptz.drivers.driver import CameraDriver, Seat
-from m2pem_plugin_ptz.native_ref import Kept, native_ref, read_native_ref
 from m2pem_plugin_ptz.settings import read_settings
 
 if TYPE_CHECKING:
     from m2pem_plugin_ptz.behaviors.behavior import Behavior
-    from m2pem_plugin_ptz.camera import Camera
+    from m2pem_plugin_ptz.controller import Camera
 
 LOST_AFTER_S = 3.0
 HOLD_WITHIN_S = 1.0
@@ -88,8 +88,8 @@ class PtzArbiter:
         Raises:
             PluginError: what a driver needs is not installed, or its settings cannot be.
         """
-        from m2pem_plugin_ptz.camera import Camera  # noqa: PLC0415  # it needs NumPy
-        from m2pem_plugin_ptz.sight import Sight  # noqa: PLC0415
+        from m2pem_plugin_ptz.camera_model.model import Sight  # noqa: PLC0415
+        from m2pem_plugin_ptz.controller import Camera  # noqa: PLC0415  # it needs NumPy
 
         context, cameras = self._context, self._cameras
         for resource, settings in self._settings.items():

@@ -1,4 +1,4 @@
-"""The commands of this plugin. What simulates cameras is loaded only when it is called."""
+"""The commands of this plugin. The module of a command is imported only when it is called."""
 
 from collections.abc import Collection, MutableMapping
 from importlib import import_module
@@ -9,8 +9,8 @@ import click
 from m2pem.errors import PluginError
 
 
-class Later(click.Command):
-    """Stands for a command of another module in the list of commands.
+class LazyCommand(click.Command):
+    """A command in the list of commands whose module is imported when the command is called.
 
     `needs`: the top packages that the extra `extra` of this plugin brings.
     """
@@ -28,7 +28,7 @@ class Later(click.Command):
         parent: click.Context | None = None,
         **extra: Any,
     ) -> click.Context:
-        """That of the command itself, which then is what is invoked."""
+        """Import the command, and return its context, so that click invokes it."""
         try:
             module = import_module(self._module)
         except ModuleNotFoundError as error:
@@ -42,15 +42,15 @@ class Later(click.Command):
         return command.make_context(info_name, args, parent, **extra)
 
 
-def add_to(commands: MutableMapping[str, click.Command]) -> None:
-    """Add `sim onvif` and `sim ros-cameras`; the group `sim` may have others' commands, too."""
+def add_commands(commands: MutableMapping[str, click.Command]) -> None:
+    """Add `sim onvif` and `sim ros-cameras`. The group `sim` may have commands of other plugins."""
     group = commands.get("sim")
     if not isinstance(group, click.Group):
         group = click.Group("sim", help="Simulate vehicles that speak as real ones do.")
         commands["sim"] = group
-    simulators = "m2pem_plugin_ptz.sim"
+    simulators = "m2pem_plugin_ptz.simulator"
     group.add_command(
-        Later(
+        LazyCommand(
             "onvif",
             f"{simulators}.onvif.command_line",
             "Simulate a camera that turns and speaks ONVIF.",
@@ -59,7 +59,7 @@ def add_to(commands: MutableMapping[str, click.Command]) -> None:
         )
     )
     group.add_command(
-        Later(
+        LazyCommand(
             "ros-cameras",
             f"{simulators}.ros.command_line",
             "Simulate cameras that turn over ROS, on 127.0.0.1.",

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from m2pem_plugin_ptz.drivers.driver import Seat
 from m2pem_plugin_ptz.drivers.onvif import OnvifDriver
-from m2pem_plugin_ptz.head import Reach
+from m2pem_plugin_ptz.gimbal import Reach
 from m2pem_plugin_ptz.settings import DriverName, Settings
-from m2pem_plugin_ptz.sim.onvif.server import OnvifServer
-from m2pem_plugin_ptz.sim.onvif.specification import Account, CameraSpec
+from m2pem_plugin_ptz.simulator.onvif.camera import Account, CameraSpec
+from m2pem_plugin_ptz.simulator.onvif.server import OnvifServer
 
 from m2pem.api import Connection, ResourceId
 from m2pem.executive.clock import SystemClock

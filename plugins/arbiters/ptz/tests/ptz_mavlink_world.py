@@ -15,7 +15,7 @@ from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
 from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
 from m2pem_plugin_ptz.drivers.driver import Seat
 from m2pem_plugin_ptz.drivers.mavlink import MavlinkDriver
-from m2pem_plugin_ptz.head import Reach
+from m2pem_plugin_ptz.gimbal import Reach
 from m2pem_plugin_ptz.settings import DriverName, Settings
 
 from m2pem.api import ArbiterContext, Connection, ResourceId, VehicleState

@@ -6,10 +6,10 @@ import signal
 import sys
 
 from m2pem_plugin_ptz.drivers.ros.settings import read_settings
-from m2pem_plugin_ptz.head import Reach
-from m2pem_plugin_ptz.sim.ros.camera import CameraSpec
-from m2pem_plugin_ptz.sim.ros.clock import SimulatedClock
-from m2pem_plugin_ptz.sim.ros.simulation import simulate
+from m2pem_plugin_ptz.gimbal import Reach
+from m2pem_plugin_ptz.simulator.ros.camera import CameraSpec
+from m2pem_plugin_ptz.simulator.ros.simulation import simulate
+from m2pem_plugin_ros import SimulatedClock
 
 from m2pem.api import Connection, ResourceId
 

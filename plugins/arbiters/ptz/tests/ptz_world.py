@@ -5,7 +5,7 @@ import math
 
 import pymap3d
 from m2pem_plugin_ptz.arbiter import PtzArbiter
-from ptz_head import ORIGIN, Head, HeadDriver, connection, vehicle
+from ptz_fake_camera import ORIGIN, Head, HeadDriver, connection, vehicle
 
 from m2pem.api import Area, Point, ResourceId
 from m2pem.executive.clock import run_virtual
@@ -17,7 +17,8 @@ CAMERA = ResourceId("ugv/ptz")
 
 class World:
     """`bench` has what the arbiter says; `looks` are kept if `watch` is called. `head`: the camera
-    itself; `moves` tells how the vehicle stands, from seconds (arguments of `ptz_head.vehicle`)."""
+    itself; `moves` tells how the vehicle stands, from seconds (arguments of
+    `ptz_fake_camera.vehicle`)."""
 
     def __init__(self, clock, head, moves, domain):
         self.clock, self.head, self.moves, self.domain = clock, head, moves, domain

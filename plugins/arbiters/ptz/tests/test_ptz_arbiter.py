@@ -4,7 +4,7 @@ import math
 
 import pytest
 from m2pem_plugin_ptz.arbiter import PtzArbiter
-from ptz_head import Head, HeadDriver, connection, rad, vehicle
+from ptz_fake_camera import Head, HeadDriver, connection, rad, vehicle
 from ptz_world import CAMERA, START_US, play, point
 
 from m2pem.api import BehaviorState, LinkState, PayloadState, VehiclePosition

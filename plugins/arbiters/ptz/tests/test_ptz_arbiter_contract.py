@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import pytest
 from m2pem_plugin_ptz.arbiter import PtzArbiter
-from ptz_head import Head, HeadDriver, connection, rad, vehicle
+from ptz_fake_camera import Head, HeadDriver, connection, rad, vehicle
 
 from m2pem.api import ResourceId
 from m2pem.testing import ArbiterCase, ArbiterContract
@@ -100,7 +100,7 @@ class TestZooming(_Heads):
 class TestPictures(_Heads):
     unsupported: ClassVar[Mapping[str, str]] = {
         **_Heads.unsupported,
-        "effects": "taking pictures moves nothing (test_ptz_pictures counts them)",
+        "effects": "taking pictures moves nothing (test_ptz_image_files counts them)",
         "reconnect": "whether pictures were taken cannot be seen: they are taken again",
     }
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from m2pem_plugin_ptz.arbiter import PtzArbiter
 from onvif_bench import ACCOUNT, camera, write_credentials
 from PIL import Image
-from ptz_head import at, rad, vehicle
+from ptz_fake_camera import at, rad, vehicle
 
 from m2pem.api import ArbiterContext, BehaviorState, Connection, Point, ResourceId
 from m2pem.executive.clock import SystemClock

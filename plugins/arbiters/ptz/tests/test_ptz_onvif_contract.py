@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import pytest
 from m2pem_plugin_ptz.arbiter import PtzArbiter
-from m2pem_plugin_ptz.sim.onvif.server import OnvifServer
-from m2pem_plugin_ptz.sim.onvif.specification import CameraSpec
+from m2pem_plugin_ptz.simulator.onvif.camera import CameraSpec
+from m2pem_plugin_ptz.simulator.onvif.server import OnvifServer
 from onvif_bench import ACCOUNT, write_credentials
-from ptz_head import rad, vehicle
+from ptz_fake_camera import rad, vehicle
 
 from m2pem.api import Connection, ResourceId
 from m2pem.testing import ArbiterCase, ArbiterContract

@@ -3,8 +3,7 @@
 import os
 
 import pytest
-from m2pem_plugin_ptz.drivers.onvif.credentials import read_credentials
-from m2pem_plugin_ptz.drivers.onvif.settings import read_onvif
+from m2pem_plugin_ptz.drivers.onvif.settings import read_credentials, read_onvif
 
 from m2pem.api import ResourceId
 from m2pem.errors import PluginError

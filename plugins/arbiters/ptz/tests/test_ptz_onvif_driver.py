@@ -6,8 +6,8 @@ import os
 from datetime import datetime
 
 import pytest
-from m2pem_plugin_ptz.head import Reach
-from m2pem_plugin_ptz.sim.onvif.specification import Account
+from m2pem_plugin_ptz.gimbal import Reach
+from m2pem_plugin_ptz.simulator.onvif.camera import Account
 from onvif_bench import ACCOUNT, camera, driven, until
 
 rad = math.radians

@@ -7,11 +7,11 @@ import re
 
 import pytest
 from m2pem_plugin_ptz.drivers.driver import CameraError
-from m2pem_plugin_ptz.drivers.onvif import snapshot
+from m2pem_plugin_ptz.drivers.onvif import media
 from m2pem_plugin_ptz.drivers.onvif.session import Session
 from m2pem_plugin_ptz.drivers.onvif.settings import OnvifSettings
-from m2pem_plugin_ptz.sim.onvif.picture import draw
-from m2pem_plugin_ptz.sim.onvif.specification import Asks
+from m2pem_plugin_ptz.simulator.onvif.camera import Asks
+from m2pem_plugin_ptz.simulator.onvif.server import draw
 from onvif_bench import ACCOUNT, camera, driven, until
 from PIL import Image
 
@@ -64,7 +64,7 @@ async def test_what_is_no_picture_is_an_error(tmp_path):
 
 
 async def test_a_picture_has_a_largest_size(tmp_path, monkeypatch):
-    monkeypatch.setattr(snapshot, "LARGEST", 100_000)
+    monkeypatch.setattr(media, "LARGEST", 100_000)
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
         server.camera.troubles.picture = b"\xff\xd8\xff" + bytes(200_000)

@@ -12,23 +12,23 @@ import click
 import m2pem_plugin_ptz
 import pytest
 from click.testing import CliRunner
-from m2pem_plugin_ptz.commands import add_to
-from m2pem_plugin_ptz.sim.onvif.faults import parse
+from m2pem_plugin_ptz.commands import add_commands
+from m2pem_plugin_ptz.simulator.onvif.faults import parse
 from onvif_bench import camera, until, write_credentials
 
 ROOT = Path(m2pem_plugin_ptz.__file__).parents[1]
 COMMAND = """
 import click
-from m2pem_plugin_ptz.commands import add_to
+from m2pem_plugin_ptz.commands import add_commands
 cli = click.Group("m2pem")
-add_to(cli.commands)
+add_commands(cli.commands)
 cli()
 """
 
 
 def group():
     cli = click.Group("m2pem")
-    add_to(cli.commands)
+    add_commands(cli.commands)
     return cli
 
 

@@ -5,8 +5,8 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from m2pem_plugin_ptz.drivers.onvif.space_reader import Described, Offer, read_spaces
-from m2pem_plugin_ptz.head import Reach
+from m2pem_plugin_ptz.drivers.onvif.spaces import Described, Offer, read_spaces
+from m2pem_plugin_ptz.gimbal import Reach
 
 BASE = "http://www.onvif.org/ver10/tptz"
 GENERIC = f"{BASE}/PanTiltSpaces/PositionGenericSpace"

@@ -7,8 +7,8 @@ from random import Random
 
 import pytest
 from m2pem_plugin_ptz.drivers.onvif.steering import TAKES_EFFECT, Drive, Steering, Turn
-from m2pem_plugin_ptz.head import Reach
-from m2pem_plugin_ptz.sim.onvif.head import Axis, Head
+from m2pem_plugin_ptz.gimbal import Reach
+from m2pem_plugin_ptz.simulator.onvif.camera import Axis, Head
 
 rad, deg = math.radians, math.degrees
 QUICK, SLOW, MIXED = (0.05, 0.05), (0.2, 0.2), (0.05, 0.2)

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from m2pem_plugin_ptz.behaviors.aiming import PointAt
 from m2pem_plugin_ptz.behaviors.behavior import BehaviorFailedError, Job
-from ptz_head import ORIGIN, Head, rad
+from m2pem_plugin_ptz.behaviors.pointing import PointAt
+from ptz_fake_camera import ORIGIN, Head, rad
 from ptz_world import CAMERA, play, point
 
 from m2pem.api import BehaviorState, VehiclePosition

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from m2pem_plugin_ptz.drivers.driver import CameraError
-from m2pem_plugin_ptz.drivers.ros import image_feed
+from m2pem_plugin_ptz.drivers.ros import images
 from ptz_ros_world import until, world
 
 
@@ -26,7 +26,7 @@ async def test_a_picture_shows_where_the_camera_looked(ros_domain, tmp_path) -> 
 async def test_images_are_listened_to_only_while_they_are_wanted(
     ros_domain, tmp_path, monkeypatch
 ) -> None:
-    monkeypatch.setattr(image_feed, "LINGER_S", 0.2)
+    monkeypatch.setattr(images, "LINGER_S", 0.2)
     async with world(ros_domain, tmp_path) as it:
         await it.ready()
         topic = "/evsg2/camera/image_raw/compressed"
@@ -39,7 +39,7 @@ async def test_images_are_listened_to_only_while_they_are_wanted(
 
 
 async def test_a_camera_that_shows_nothing_is_an_error(ros_domain, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(image_feed, "WITHIN_S", 0.5)
+    monkeypatch.setattr(images, "WITHIN_S", 0.5)
     async with world(ros_domain, tmp_path) as it:
         await it.ready()
         await it.fault("blind")

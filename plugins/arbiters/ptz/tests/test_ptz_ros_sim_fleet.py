@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from m2pem_plugin_ptz.drivers.ros.joints import Axis
-from m2pem_plugin_ptz.sim.ros.command_line import ros_cameras
+from m2pem_plugin_ptz.drivers.ros.settings import Axis
+from m2pem_plugin_ptz.simulator.ros.command_line import ros_cameras
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.testing import Peer
 from ptz_ros_world import until
@@ -50,7 +50,7 @@ def fleet_file(folder: Path, text: str = FLEET) -> Path:
 
 
 def test_cameras_over_ros_on_simulated_vehicles_are_simulated(tmp_path: Path) -> None:
-    from m2pem_plugin_ptz.sim.ros.fleet import read_specs
+    from m2pem_plugin_ptz.simulator.ros.fleet import read_specs
 
     (spec,) = read_specs(load_fleet(fleet_file(tmp_path)))
     assert spec.name == "evsg2/ptz"
@@ -61,7 +61,7 @@ def test_cameras_over_ros_on_simulated_vehicles_are_simulated(tmp_path: Path) ->
 
 
 def test_what_is_wrong_in_the_file_is_named(tmp_path: Path) -> None:
-    from m2pem_plugin_ptz.sim.ros.fleet import read_specs
+    from m2pem_plugin_ptz.simulator.ros.fleet import read_specs
 
     file = fleet_file(tmp_path, FLEET.replace("command: positions", "command: position"))
     with pytest.raises(PluginError, match=r"evsg2/ptz: connection\.command"):

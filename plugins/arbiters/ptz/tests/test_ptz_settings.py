@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from m2pem_plugin_ptz.settings import DriverName, read_settings
-from ptz_head import rad
+from ptz_fake_camera import rad
 from ptz_world import CAMERA
 
 from m2pem.api import BehaviorType, Connection, ResourceId

@@ -21,12 +21,14 @@ if TYPE_CHECKING:
     from m2pem_plugin_ros.onboard.target_bus import Targets
     from m2pem_plugin_ros.runtime import RosRuntime, qos
     from m2pem_plugin_ros.settings import read_payloads, read_settings
+    from m2pem_plugin_ros.simulator.clock import SimulatedClock
 
 __all__ = [
     "ArbiterDriver",
     "Onboard",
     "RosError",
     "RosRuntime",
+    "SimulatedClock",
     "Targets",
     "Told",
     "keep_on_loopback",
@@ -53,6 +55,7 @@ _MODULES = {
     "onboard.target_bus": "Targets",
     "runtime": "RosRuntime qos",
     "settings": "read_payloads read_settings",
+    "simulator.clock": "SimulatedClock",
 }
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 

@@ -2,13 +2,10 @@
 
 from collections.abc import Mapping
 
-from m2pem_plugin_ptz.behaviors.aiming import PointAt, Track
 from m2pem_plugin_ptz.behaviors.behavior import Behavior
-from m2pem_plugin_ptz.behaviors.polygon import ScanPolygon
-from m2pem_plugin_ptz.behaviors.recording import RecordVideo
-from m2pem_plugin_ptz.behaviors.sector import ScanSector
-from m2pem_plugin_ptz.behaviors.shooting import TakePicture
-from m2pem_plugin_ptz.behaviors.zooming import Zoom
+from m2pem_plugin_ptz.behaviors.capture import RecordVideo, TakePicture
+from m2pem_plugin_ptz.behaviors.pointing import PointAt, Track, Zoom
+from m2pem_plugin_ptz.behaviors.scanning import ScanPolygon, ScanSector
 
 BEHAVIORS: Mapping[str, type[Behavior]] = {
     each.name: each

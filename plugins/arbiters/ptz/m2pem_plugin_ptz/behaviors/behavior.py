@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from m2pem.api import BehaviorId, BehaviorState, ResolvedValue, Value
-from m2pem_plugin_ptz.sight import Sight
+from m2pem_plugin_ptz.camera_model.model import Sight
 
 TICK_S = 0.05
 """So often is a camera told where to look, while something has it look somewhere."""

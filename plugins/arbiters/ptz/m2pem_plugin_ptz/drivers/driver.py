@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from m2pem.api import ArbiterContext, Connection
-from m2pem_plugin_ptz.head import Look, Picture, Reach
+from m2pem_plugin_ptz.gimbal import Look, Picture, Reach
 from m2pem_plugin_ptz.settings import Settings
 
 

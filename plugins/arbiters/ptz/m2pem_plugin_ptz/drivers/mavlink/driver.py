@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 from m2pem.api import ResourceId
 from m2pem.errors import PluginError
 from m2pem_plugin_ptz.drivers.driver import CameraError, Seat
-from m2pem_plugin_ptz.drivers.mavlink.carrier import Carrier
+from m2pem_plugin_ptz.drivers.mavlink.context import Carrier
 from m2pem_plugin_ptz.drivers.mavlink.settings import read_settings
-from m2pem_plugin_ptz.head import Look, Picture, Reach
+from m2pem_plugin_ptz.gimbal import Look, Picture, Reach
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink import RoutedLink
 
-    from m2pem_plugin_ptz.drivers.mavlink.camera_unit import CameraUnit
-    from m2pem_plugin_ptz.drivers.mavlink.gimbal_head import GimbalHead
+    from m2pem_plugin_ptz.drivers.mavlink.camera import CameraUnit
+    from m2pem_plugin_ptz.drivers.mavlink.gimbal import GimbalHead
 
 MISSING = (
     "cameras over MAVLink need the plugin m2pem-plugin-mavlink: "
@@ -47,9 +47,9 @@ class MavlinkDriver:
         try:
             from m2pem_plugin_mavlink import Address, open_link  # noqa: PLC0415  # optional
 
-            from m2pem_plugin_ptz.drivers.mavlink.camera_unit import CameraUnit  # noqa: PLC0415
-            from m2pem_plugin_ptz.drivers.mavlink.gimbal_head import GimbalHead  # noqa: PLC0415
-            from m2pem_plugin_ptz.drivers.mavlink.post import Post  # noqa: PLC0415
+            from m2pem_plugin_ptz.drivers.mavlink.camera import CameraUnit  # noqa: PLC0415
+            from m2pem_plugin_ptz.drivers.mavlink.context import Post  # noqa: PLC0415
+            from m2pem_plugin_ptz.drivers.mavlink.gimbal import GimbalHead  # noqa: PLC0415
         except ModuleNotFoundError as error:
             raise PluginError(f"{self._resource}: {MISSING} ({error})") from error
         own, context = self._settings, self._seat.context

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from m2pem.api import Connection
-from m2pem_plugin_ptz.drivers.own_settings import OwnSettings
+from m2pem_plugin_ptz.settings import OwnSettings
 
 AUTOPILOT_COMPONENT, CAMERA_COMPONENT = 1, 100
 GCS_SYSTEM_ID = 255

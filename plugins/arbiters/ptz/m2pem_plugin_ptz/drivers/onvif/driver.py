@@ -6,16 +6,23 @@ import math
 
 from m2pem.errors import PluginError
 from m2pem_plugin_ptz.drivers.driver import CameraError, Seat
-from m2pem_plugin_ptz.drivers.onvif.abilities import Abilities, read_abilities
-from m2pem_plugin_ptz.drivers.onvif.credentials import Credentials, read_credentials
+from m2pem_plugin_ptz.drivers.onvif.capabilities import Abilities, read_abilities
+from m2pem_plugin_ptz.drivers.onvif.media import (
+    Recording,
+    fetch_snapshot,
+    start_recording,
+    stop_recording,
+)
 from m2pem_plugin_ptz.drivers.onvif.mover import Mover
-from m2pem_plugin_ptz.drivers.onvif.onvif_zeep import require
-from m2pem_plugin_ptz.drivers.onvif.recording import Recording, start_recording, stop_recording
-from m2pem_plugin_ptz.drivers.onvif.session import Session
-from m2pem_plugin_ptz.drivers.onvif.settings import read_onvif
-from m2pem_plugin_ptz.drivers.onvif.snapshot import fetch_snapshot
-from m2pem_plugin_ptz.drivers.onvif.troubles import RefusedError, UnauthorizedError, camera
-from m2pem_plugin_ptz.head import Look, Picture, Reach
+from m2pem_plugin_ptz.drivers.onvif.session import (
+    RefusedError,
+    Session,
+    UnauthorizedError,
+    camera,
+    require,
+)
+from m2pem_plugin_ptz.drivers.onvif.settings import Credentials, read_credentials, read_onvif
+from m2pem_plugin_ptz.gimbal import Look, Picture, Reach
 
 FIRST_RETRY_S = 0.5
 LONGEST_RETRY_S = 5.0

@@ -7,12 +7,11 @@ from collections.abc import Callable
 
 from m2pem.api import Clock
 from m2pem_plugin_ptz.drivers.driver import CameraError
-from m2pem_plugin_ptz.drivers.onvif.abilities import Abilities
-from m2pem_plugin_ptz.drivers.onvif.session import Session
+from m2pem_plugin_ptz.drivers.onvif.capabilities import Abilities
+from m2pem_plugin_ptz.drivers.onvif.session import RefusedError, Session, SilentError
 from m2pem_plugin_ptz.drivers.onvif.spaces import Spaces
 from m2pem_plugin_ptz.drivers.onvif.steering import TAKES_EFFECT, Drive, Steering, Turn
-from m2pem_plugin_ptz.drivers.onvif.troubles import RefusedError, SilentError
-from m2pem_plugin_ptz.head import Look, Reach
+from m2pem_plugin_ptz.gimbal import Look, Reach
 
 IDLE_S = 0.25
 """How often a camera that need not turn is asked where it looks."""

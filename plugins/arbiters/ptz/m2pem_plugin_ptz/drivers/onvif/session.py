@@ -1,19 +1,133 @@
-"""A conversation with one ONVIF camera: its services, and every call bounded in time.
-
-It is made anew when the camera was away: it may have another clock then.
-"""
+"""The package onvif: whether it is there, and what it may not touch."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+import importlib
+import logging
+import os
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
-from m2pem_plugin_ptz.drivers.onvif.credentials import Credentials
-from m2pem_plugin_ptz.drivers.onvif.onvif_zeep import kept_environment, require
-from m2pem_plugin_ptz.drivers.onvif.settings import OnvifSettings
-from m2pem_plugin_ptz.drivers.onvif.troubles import RefusedError, camera, translated
+from m2pem.errors import PluginError
+from m2pem_plugin_ptz.drivers.driver import CameraError
+from m2pem_plugin_ptz.drivers.onvif.settings import Credentials, OnvifSettings
+
+INSTALL = "pip install 'm2pem-plugin-ptz[onvif]'"
+PROXIES = ("http_proxy", "https_proxy")
+
+
+def require(module: str = "onvif.client") -> ModuleType:
+    """Import a module of the package.
+
+    Raises:
+        PluginError: the package is not installed, or another one of the same name is.
+    """
+    root = logging.getLogger()
+    handlers, level = root.handlers[:], root.level
+    try:
+        found = importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in ("onvif", "zeep", "aiohttp"):
+            raise
+        raise PluginError(
+            f"`driver: onvif` needs onvif-zeep-async 4.3 or newer: {INSTALL}"
+        ) from error
+    finally:
+        # When it is imported, it has all loggers of the process write to the terminal.
+        root.handlers[:] = handlers
+        root.setLevel(level)
+    if not hasattr(found, "DigestAuthMiddleware") and module == "onvif.client":
+        raise PluginError(
+            "`driver: onvif` needs onvif-zeep-async 4.3 or newer; another package has taken its "
+            f"name, such as onvif-zeep: uninstall that, then {INSTALL}"
+        )
+    return found
+
+
+@contextmanager
+def kept_environment() -> Iterator[None]:
+    """It takes proxies away from the whole process; here they are put back."""
+    kept = {key: os.environ[key] for key in PROXIES if key in os.environ}
+    try:
+        yield
+    finally:
+        os.environ.update(kept)
+
+
+class SilentError(CameraError):
+    """The camera did not answer."""
+
+
+class UnauthorizedError(CameraError):
+    """The camera did not let this user do it."""
+
+
+class RefusedError(CameraError):
+    """The camera answered with a fault, or with something that is no answer."""
+
+
+def camera(settings: OnvifSettings) -> str:
+    """Which one, for people."""
+    return f"the ONVIF camera at {settings.address}"
+
+
+def silent(settings: OnvifSettings, error: BaseException) -> SilentError:
+    """Nothing came back."""
+    if isinstance(error, TimeoutError):
+        why = f"nothing within {settings.timeout_s:g} s"
+    else:
+        why = str(error) or type(error).__name__
+    return SilentError(f"{camera(settings)} does not answer: {why}", "LINK_LOST")
+
+
+def unauthorized(settings: OnvifSettings, user: str | None) -> UnauthorizedError:
+    """Wrong user, wrong password, or none."""
+    if user is None or settings.credentials is None:
+        return UnauthorizedError(
+            f"{camera(settings)} asks for a user and a password: write them into a file, and name "
+            "it as connection.credentials",
+            "REJECTED",
+        )
+    return UnauthorizedError(
+        f"{camera(settings)} refuses user {user!r}: correct user or password in "
+        f"{settings.credentials}, or what the user may do in the camera",
+        "REJECTED",
+    )
+
+
+def translated(
+    error: Exception, operation: str, settings: OnvifSettings, user: str | None
+) -> CameraError:
+    """What a call of the library raised, as the operator should read it."""
+    import aiohttp  # noqa: PLC0415  # comes with the library
+    import zeep.exceptions  # noqa: PLC0415
+
+    if isinstance(error, CameraError):
+        return error
+    if isinstance(
+        error, TimeoutError | aiohttp.ClientConnectionError | aiohttp.ClientPayloadError | OSError
+    ):
+        return silent(settings, error)
+    if isinstance(error, zeep.exceptions.Fault):
+        if require("onvif.util").is_auth_error(error):
+            return unauthorized(settings, user)
+        return RefusedError(f"{camera(settings)} refuses {operation}: {fault_text(error)}")
+    if isinstance(error, zeep.exceptions.TransportError) and error.status_code in (401, 403):
+        return unauthorized(settings, user)
+    text = " ".join(str(error).split())[:200]
+    return RefusedError(f"{camera(settings)} answers {operation} with what is no ONVIF: {text}")
+
+
+def fault_text(fault: Any) -> str:
+    """Its text and its codes."""
+    codes = [str(getattr(code, "localname", code)) for code in fault.subcodes or ()]
+    text = " ".join(str(fault.message or "").split())[:200]
+    return f"{text} ({', '.join(codes)})" if codes else text or "no reason given"
+
 
 MEDIA2 = "http://www.onvif.org/ver20/media/wsdl"
 NAMESPACES = {

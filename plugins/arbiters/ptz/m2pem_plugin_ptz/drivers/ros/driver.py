@@ -1,22 +1,58 @@
-"""Reaches a camera on a pan-tilt head by the topics of its joints and its images."""
+"""One connection to ROS for all cameras of a domain, while any of them needs it."""
 
-from dataclasses import replace
+import asyncio
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 from m2pem.api import ResourceId
 from m2pem.errors import PluginError
 from m2pem_plugin_ptz.drivers.driver import CameraError, Seat
-from m2pem_plugin_ptz.drivers.ros import shared_runtime
-from m2pem_plugin_ptz.drivers.ros.joints import Axis
-from m2pem_plugin_ptz.drivers.ros.settings import Command, read_settings
-from m2pem_plugin_ptz.head import Look, Picture, Reach
+from m2pem_plugin_ptz.drivers.ros.settings import Axis, Command, read_settings
+from m2pem_plugin_ptz.gimbal import Look, Picture, Reach
 
 if TYPE_CHECKING:
     from m2pem_plugin_ros import RosRuntime
 
-    from m2pem_plugin_ptz.drivers.ros.image_feed import ImageFeed
-    from m2pem_plugin_ptz.drivers.ros.recorder import Recorder
+    from m2pem_plugin_ptz.drivers.ros.images import ImageFeed, Recorder
     from m2pem_plugin_ptz.drivers.ros.steering import Steering
+
+
+@dataclass(slots=True)
+class _Shared:
+    runtime: "RosRuntime"
+    users: int = 0
+
+
+_shared: WeakKeyDictionary[asyncio.AbstractEventLoop, dict[int | None, _Shared]] = (
+    WeakKeyDictionary()
+)
+
+
+def join_runtime(domain_id: int | None, name: str) -> "RosRuntime":
+    """The connection to a domain, which is named `name` if it is new.
+
+    Raises:
+        RosError: ROS cannot be used; the text says what would be right.
+    """
+    from m2pem_plugin_ros import RosRuntime  # noqa: PLC0415  # it needs rclpy
+
+    domains = _shared.setdefault(asyncio.get_running_loop(), {})
+    if domain_id not in domains:
+        domains[domain_id] = _Shared(RosRuntime(name, domain_id=domain_id))
+    domains[domain_id].users += 1
+    return domains[domain_id].runtime
+
+
+async def leave_runtime(domain_id: int | None) -> None:
+    """Undo one `join`."""
+    domains = _shared[asyncio.get_running_loop()]
+    shared = domains[domain_id]
+    shared.users -= 1
+    if not shared.users:
+        del domains[domain_id]
+        await shared.runtime.close()
+
 
 MISSING = "cameras over ROS need the plugin m2pem-plugin-ros: pip install 'm2pem-plugin-ptz[ros]'"
 NOT_OPEN = "the camera is not connected"
@@ -67,7 +103,7 @@ class RosDriver:
                 self._seat.context.logger.info("%s: DDS is not on 127.0.0.1 alone", self._resource)
         # Two executives on one network have two journals, and so two names.
         name = f"m2pem_ptz_{self._seat.context.journal.hex[:8]}"
-        return shared_runtime.join(self._settings.domain_id, name)
+        return join_runtime(self._settings.domain_id, name)
 
     def _listen(self, ros: "RosRuntime") -> None:
         from m2pem_plugin_ros import qos  # noqa: PLC0415  # they need ROS
@@ -75,8 +111,7 @@ class RosDriver:
         from std_msgs.msg import Float64MultiArray  # noqa: PLC0415
         from trajectory_msgs.msg import JointTrajectory  # noqa: PLC0415
 
-        from m2pem_plugin_ptz.drivers.ros.image_feed import ImageFeed  # noqa: PLC0415
-        from m2pem_plugin_ptz.drivers.ros.recorder import Recorder  # noqa: PLC0415
+        from m2pem_plugin_ptz.drivers.ros.images import ImageFeed, Recorder  # noqa: PLC0415
         from m2pem_plugin_ptz.drivers.ros.steering import Steering  # noqa: PLC0415
 
         own, clock = self._settings, self._seat.context.clock
@@ -112,7 +147,7 @@ class RosDriver:
             for each in self._made[1:]:
                 ros.node.destroy_subscription(each)
             self._made = []
-            await shared_runtime.leave(self._settings.domain_id)
+            await leave_runtime(self._settings.domain_id)
 
     # --- what is known --------------------------------------------------------------------------
 

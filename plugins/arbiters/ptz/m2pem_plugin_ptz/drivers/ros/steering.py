@@ -11,9 +11,8 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from m2pem.api import Clock
-from m2pem_plugin_ptz.drivers.ramp import Ramp
-from m2pem_plugin_ptz.drivers.ros.joints import Axis, Joints, nearest_turn
-from m2pem_plugin_ptz.head import Look, Reach
+from m2pem_plugin_ptz.drivers.ros.settings import Axis, Joints, nearest_turn
+from m2pem_plugin_ptz.gimbal import Look, Ramp, Reach
 
 STEP_S = 0.1
 """Joints that know no speed are given their way in steps of so long."""

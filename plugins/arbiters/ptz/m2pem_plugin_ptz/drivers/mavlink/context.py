@@ -1,0 +1,107 @@
+"""From directions as a camera is mounted on a deck to those from the horizon, and back. Pure.
+
+MAVLink's gimbals are level whatever the vehicle does, and are told so. `roll_rad` and `pitch_rad`
+are those of a VehicleState (REP-103): roll is positive when the right side is down, pitch when the
+nose is down.
+"""
+
+import logging
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from m2pem.api import Clock, FleetBus, ResourceId, VehicleState
+from m2pem_plugin_ptz.drivers.mavlink.settings import MavlinkSettings
+from m2pem_plugin_ptz.gimbal import Reach
+
+if TYPE_CHECKING:
+    from m2pem_plugin_mavlink import VehicleLink
+
+
+Direction = tuple[float, float]
+"""Pan from the bow, clockwise, and tilt upwards; radians."""
+
+
+def deck_to_horizon(direction: Direction, roll_rad: float, pitch_rad: float) -> Direction:
+    """The same direction, from the horizon."""
+    x, y, z = _vector(direction)
+    y, z = _turned(y, z, roll_rad)
+    z, x = _turned(z, x, pitch_rad)
+    return _direction(x, y, z)
+
+
+def horizon_to_deck(direction: Direction, roll_rad: float, pitch_rad: float) -> Direction:
+    """The inverse."""
+    x, y, z = _vector(direction)
+    z, x = _turned(z, x, -pitch_rad)
+    y, z = _turned(y, z, -roll_rad)
+    return _direction(x, y, z)
+
+
+def _vector(direction: Direction) -> tuple[float, float, float]:
+    """Forward, left, up."""
+    pan, tilt = direction
+    return math.cos(tilt) * math.cos(pan), -math.cos(tilt) * math.sin(pan), math.sin(tilt)
+
+
+def _direction(x: float, y: float, z: float) -> Direction:
+    return math.atan2(-y, x), math.asin(max(-1.0, min(1.0, z)))
+
+
+def _turned(first: float, second: float, angle_rad: float) -> tuple[float, float]:
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    return cos * first - sin * second, sin * first + cos * second
+
+
+class Carrier:
+    """What was heard last of it. `stabilized`: directions are said from the horizon already."""
+
+    def __init__(self, vehicle: ResourceId, bus: FleetBus, *, stabilized: bool) -> None:
+        self._vehicle = vehicle
+        self._bus = bus
+        self._stabilized = stabilized
+
+    @property
+    def heading_rad(self) -> float | None:
+        """From true north, clockwise; None: not known."""
+        yaw_rad = self._state.yaw_rad if self._state is not None else None
+        return None if yaw_rad is None else math.remainder(math.pi / 2 - yaw_rad, math.tau)
+
+    def from_horizon(self, direction: Direction) -> Direction:
+        """What is meant as the camera is mounted, for a gimbal that is level."""
+        state = self._state
+        if self._stabilized or state is None:
+            return direction
+        return deck_to_horizon(direction, state.roll_rad, state.pitch_rad)
+
+    def from_deck(self, direction: Direction) -> Direction:
+        """Where a gimbal that is level points, as the camera is mounted."""
+        state = self._state
+        if self._stabilized or state is None:
+            return direction
+        return horizon_to_deck(direction, state.roll_rad, state.pitch_rad)
+
+    @property
+    def _state(self) -> VehicleState | None:
+        state = self._bus.latest(self._vehicle)
+        return state if isinstance(state, VehicleState) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Post:
+    """`reach`: as the fleet says. `heard`: is called when a part of the camera has said something
+    that shows that it is there."""
+
+    resource: ResourceId
+    settings: MavlinkSettings
+    reach: Reach
+    carrier: Carrier
+    link: "VehicleLink"
+    clock: Clock
+    logger: logging.Logger
+    heard: Callable[[], None]
+
+    def now_s(self) -> float:
+        """Seconds of the clock."""
+        return self.clock.now_us() / 1e6

@@ -1,0 +1,158 @@
+"""Video that the camera keeps itself: its recording control service."""
+
+import asyncio
+import base64
+from dataclasses import dataclass
+from typing import Any
+
+from m2pem_plugin_ptz.drivers.onvif.session import (
+    RefusedError,
+    Session,
+    camera,
+    translated,
+    unauthorized,
+)
+
+PROFILE = "http://www.onvif.org/ver10/schema/Profile"
+TIME = "%Y-%m-%dT%H:%M:%SZ"
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """One that goes on. `own`: the job was made for it. `begun`: by the camera's clock."""
+
+    token: str
+    job: str
+    own: bool
+    begun: str
+
+
+async def start_recording(session: Session, profile: str) -> Recording:
+    """Have the camera record.
+
+    Raises:
+        CameraError: it does not.
+    """
+    found = await session.call("recording", "GetRecordings")
+    if not found:
+        raise RefusedError(
+            f"{camera(session.settings)} has no recording to write to: make one in the camera"
+        )
+    token = str(found[0].RecordingToken)
+    begun = session.camera_time.strftime(TIME)
+    try:
+        job = await session.call(
+            "recording",
+            "CreateRecordingJob",
+            JobConfiguration={
+                "RecordingToken": token,
+                "Mode": "Active",
+                "Priority": 1,
+                "Source": [{"SourceToken": {"Token": profile, "Type": PROFILE}}],
+            },
+        )
+        recording = Recording(token, str(job.JobToken), True, begun)
+    except RefusedError:
+        # It may have all its jobs already, one of which can be used.
+        idle = await _idle_job(session, token)
+        if idle is None:
+            raise
+        await session.call("recording", "SetRecordingJobMode", JobToken=idle, Mode="Active")
+        recording = Recording(token, idle, False, begun)
+    state = await session.call("recording", "GetRecordingJobState", JobToken=recording.job)
+    if state.State not in ("Active", "PartiallyActive"):
+        await stop_recording(session, recording)
+        raise RefusedError(
+            f"{camera(session.settings)} took the recording job, but its state is {state.State}"
+        )
+    return recording
+
+
+async def stop_recording(session: Session, recording: Recording) -> str:
+    """End it; returns the camera's name for it, with the time by the camera's clock.
+
+    Raises:
+        CameraError: it could not be told.
+    """
+    ended = session.camera_time.strftime(TIME)
+    job = recording.job
+    await session.call("recording", "SetRecordingJobMode", JobToken=job, Mode="Idle")
+    if recording.own:
+        await session.call("recording", "DeleteRecordingJob", JobToken=job)
+    return (
+        f"onvif://{session.settings.address}/recordings/{recording.token}"
+        f"?from={recording.begun}&to={ended}"
+    )
+
+
+async def _idle_job(session: Session, token: str) -> str | None:
+    jobs: Any = await session.call("recording", "GetRecordingJobs")
+    for each in jobs or ():
+        settings = each.JobConfiguration
+        if str(settings.RecordingToken) == token and settings.Mode == "Idle":
+            return str(each.JobToken)
+    return None
+
+
+LARGEST = 32 * 1024 * 1024
+"""Bytes."""
+
+PATIENCE = 4.0
+"""So many times as long as a call: a picture is more to carry."""
+
+CHUNK = 64 * 1024
+KINDS = {b"\xff\xd8\xff": ".jpg", b"\x89PNG": ".png"}
+"""How a picture begins. What a camera says of its type is wrong too often."""
+
+
+async def fetch_snapshot(session: Session, url: str) -> tuple[bytes, str]:
+    """The picture, and the suffix for its file.
+
+    Raises:
+        CameraError: there is none; the text says why.
+    """
+    import aiohttp  # noqa: PLC0415  # comes with the library
+
+    settings = session.settings
+    try:
+        async with asyncio.timeout(settings.timeout_s * PATIENCE):
+            async with aiohttp.ClientSession() as client:
+                content = await _ask(client, session, url)
+    except Exception as error:
+        raise translated(error, "a picture", settings, session.user) from error
+    suffix = next((kind for start, kind in KINDS.items() if content.startswith(start)), None)
+    if suffix is None:
+        raise RefusedError(f"{camera(settings)} gives {len(content)} bytes that are no picture")
+    return content, suffix
+
+
+async def _ask(client: Any, session: Session, url: str) -> bytes:
+    """The password goes out as a digest, and in the clear only if the camera takes nothing else."""
+    import aiohttp  # noqa: PLC0415
+
+    account = session.credentials
+    digest = (
+        () if account is None else (aiohttp.DigestAuthMiddleware(account.user, account.password),)
+    )
+    async with client.get(url, middlewares=digest, allow_redirects=False) as answer:
+        asked = answer.headers.get("WWW-Authenticate", "").lower()
+        if answer.status != 401 or account is None or not asked.startswith("basic"):
+            return await _read(answer, session)
+    basic = base64.b64encode(f"{account.user}:{account.password}".encode()).decode()
+    headers = {"Authorization": f"Basic {basic}"}
+    async with client.get(url, headers=headers, allow_redirects=False) as answer:
+        return await _read(answer, session)
+
+
+async def _read(answer: Any, session: Session) -> bytes:
+    settings = session.settings
+    if answer.status in (401, 403):
+        raise unauthorized(settings, session.user)
+    if answer.status != 200:
+        raise RefusedError(f"{camera(settings)} refuses a picture: HTTP status {answer.status}")
+    content = bytearray()
+    async for chunk in answer.content.iter_chunked(CHUNK):
+        content += chunk
+        if len(content) > LARGEST:
+            raise RefusedError(f"{camera(settings)} gives a picture of more than {LARGEST} bytes")
+    return bytes(content)

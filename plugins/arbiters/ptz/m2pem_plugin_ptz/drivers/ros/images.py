@@ -1,0 +1,226 @@
+"""The images of a camera: they are listened to only while somebody wants them, as they are big."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from sensor_msgs.msg import CompressedImage
+
+from m2pem.api import Clock, ResourceId
+from m2pem_plugin_ptz.drivers.driver import CameraError
+
+if TYPE_CHECKING:
+    from m2pem_plugin_ros import RosRuntime
+
+
+WITHIN_S = 5.0
+"""Of real time: a camera that shows nothing for so long shows nothing."""
+
+LINGER_S = 10.0
+"""It is listened to for so much longer: the next picture then needs no looking for its camera."""
+
+SUFFIXES = {b"\xff\xd8\xff": ".jpg", b"\x89PNG": ".png"}
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """An image; `suffix`: of its file. `taken_us`: since the Unix epoch."""
+
+    content: bytes
+    suffix: str
+    taken_us: int
+
+
+class ImageFeed:
+    """Frames of one topic of sensor_msgs/CompressedImage."""
+
+    def __init__(self, ros: "RosRuntime", topic: str, clock: Clock) -> None:
+        self.topic = topic
+        self._ros = ros
+        self._clock = clock
+        self._readers: set[Callable[[Frame], None]] = set()
+        self._subscription: Any = None
+        self._lingering: asyncio.TimerHandle | None = None
+
+    @property
+    def has_publisher(self) -> bool:
+        """Whether anybody publishes images there."""
+        return bool(self._ros.node.count_publishers(self.topic))
+
+    def read(self, reader: Callable[[Frame], None]) -> Callable[[], None]:
+        """Have each frame from now on handed over; the function that is returned ends it."""
+        self._readers.add(reader)
+        if self._lingering is not None:
+            self._lingering.cancel()
+            self._lingering = None
+        if self._subscription is None:
+            from m2pem_plugin_ros import qos  # noqa: PLC0415  # it needs rclpy
+
+            self._subscription = self._ros.subscribe(
+                CompressedImage, self.topic, self._hear, qos.TELEMETRY, waiting=2
+            )
+
+        def end() -> None:
+            self._readers.discard(reader)
+            if not self._readers and self._lingering is None:
+                loop = asyncio.get_running_loop()
+                self._lingering = loop.call_later(LINGER_S, self.close)
+
+        return end
+
+    async def next(self) -> Frame:
+        """The next frame.
+
+        Raises:
+            CameraError: none comes, or it is of no known kind.
+        """
+        came: asyncio.Future[Frame] = asyncio.get_running_loop().create_future()
+
+        def take(frame: Frame) -> None:
+            if not came.done():
+                came.set_result(frame)
+
+        end = self.read(take)
+        try:
+            async with asyncio.timeout(WITHIN_S):
+                frame = await came
+        except TimeoutError:
+            who = "its publisher" if self.has_publisher else "nobody"
+            raise CameraError(
+                f"no image came on {self.topic} within {WITHIN_S:g} s: {who} publishes there"
+                f"{', but sends none' if self.has_publisher else ''}"
+            ) from None
+        finally:
+            end()
+        if not frame.suffix:
+            raise CameraError(f"what came on {self.topic} is neither a JPEG nor a PNG")
+        return frame
+
+    def close(self) -> None:
+        """Listen no more."""
+        if self._lingering is not None:
+            self._lingering.cancel()
+            self._lingering = None
+        if self._subscription is not None:
+            self._ros.node.destroy_subscription(self._subscription)
+            self._subscription = None
+
+    def _hear(self, message: Any) -> None:
+        content = bytes(message.data)
+        stamp = message.header.stamp
+        stamp_us = stamp.sec * 1_000_000 + stamp.nanosec // 1000
+        suffix = next((each for start, each in SUFFIXES.items() if content.startswith(start)), "")
+        frame = Frame(content, suffix, stamp_us or self._clock.now_us())
+        for reader in tuple(self._readers):
+            reader(frame)
+
+
+MOST_WAITING = 60
+"""Of more images that a slow disk has not taken yet, the oldest are left out."""
+
+
+class Recorder:
+    """One video at a time, in `folder`."""
+
+    def __init__(self, feed: ImageFeed, folder: Path, resource: ResourceId, clock: Clock) -> None:
+        self._feed = feed
+        self._folder = folder
+        self._name = resource.replace("/", "_")
+        self._clock = clock
+        self._file: IO[bytes] | None = None
+        self._path = Path()
+        self._waiting: deque[bytes] = deque(maxlen=MOST_WAITING)
+        self._news = asyncio.Event()
+        self._writing: asyncio.Task[None] | None = None
+        self._end_reading = _nothing
+        self._failure = ""
+
+    async def start(self) -> None:
+        """Begin; what goes on already goes on.
+
+        Raises:
+            CameraError: there are no images, or no file can be written.
+        """
+        if self._file is not None:
+            return
+        first = await self._feed.next()
+        if first.suffix != ".jpg":
+            raise CameraError(f"only JPEG images make a video, and {self._feed.topic} has others")
+        began = datetime.fromtimestamp(self._clock.now_us() / 1e6, UTC)
+        try:
+            self._file = await asyncio.to_thread(self._create, f"{began:%Y%m%dT%H%M%SZ}")
+        except OSError as error:
+            raise CameraError(f"no video can be stored in {self._folder}: {error}") from error
+        self._failure = ""
+        self._take(first)
+        self._end_reading = self._feed.read(self._take)
+        self._writing = asyncio.get_running_loop().create_task(self._write(self._file))
+
+    async def stop(self) -> str:
+        """End it, and return the path of the file.
+
+        Raises:
+            CameraError: none was begun, or not all could be written.
+        """
+        file, self._file = self._file, None
+        if file is None:
+            raise CameraError("no video was begun")
+        self._end_reading()
+        self._news.set()
+        if self._writing is not None:
+            await self._writing
+        try:
+            await asyncio.to_thread(file.close)
+        except OSError as error:
+            self._failure = self._failure or str(error)
+        if self._failure:
+            raise CameraError(f"the video {self._path} is not whole: {self._failure}")
+        return str(self._path)
+
+    async def close(self) -> None:
+        """End what goes on; what was written stays."""
+        if self._file is not None:
+            try:
+                await self.stop()
+            except CameraError:
+                return
+
+    def _create(self, began: str) -> IO[bytes]:
+        self._folder.mkdir(parents=True, exist_ok=True)
+        for number in range(1, 1000):
+            again = "" if number == 1 else f"_{number}"
+            path = (self._folder / f"{self._name}_{began}{again}.mjpeg").absolute()
+            try:
+                file = path.open("xb")
+            except FileExistsError:
+                continue
+            self._path = path
+            return file
+        raise FileExistsError(f"there are too many videos of {began}")
+
+    def _take(self, frame: Frame) -> None:
+        if frame.suffix == ".jpg":
+            self._waiting.append(frame.content)
+            self._news.set()
+
+    async def _write(self, file: IO[bytes]) -> None:
+        while self._file is not None or self._waiting:
+            await self._news.wait()
+            self._news.clear()
+            content = b"".join(self._waiting)
+            self._waiting.clear()
+            try:
+                await asyncio.to_thread(file.write, content)
+            except OSError as error:
+                self._failure = str(error)
+                self._end_reading()
+                self._waiting.clear()
+                return
+
+
+def _nothing() -> None:
+    """There is nothing to end."""

@@ -1,1 +1,0 @@
-"""What the simulated camera answers, one module a service."""

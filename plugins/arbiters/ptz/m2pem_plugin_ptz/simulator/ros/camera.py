@@ -1,0 +1,131 @@
+"""One simulated camera on a head: its topics. Needs ROS."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from m2pem_plugin_ros import RosRuntime, qos
+from sensor_msgs.msg import CompressedImage, JointState
+from std_msgs.msg import Float64MultiArray, String
+from trajectory_msgs.msg import JointTrajectory
+
+from m2pem.api import Clock, Connection
+from m2pem_plugin_ptz.drivers.ros.settings import Axis, Command, RosSettings
+from m2pem_plugin_ptz.gimbal import Reach
+from m2pem_plugin_ptz.simulator.ros.gimbal import Head
+from m2pem_plugin_ptz.simulator.ros.image import picture
+
+JOINTS_EVERY_S, IMAGES_EVERY_S = 0.05, 0.2
+US_PER_S = 1_000_000
+
+FAULTS = ("silent", "stuck", "blind", "garbled", "well")
+"""Its joints say nothing; they do not turn; it shows nothing; nothing that is a picture; none."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeSpec:
+    """`connection`: how the arbiter on board reaches the head. `origin`: as in `ArbiterContext`."""
+
+    connection: Connection
+    namespace: str
+    origin: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSpec:
+    """`name`: of the payload, such as evsg1/ptz; `settings` as an executive has them. `node`: the
+    m2pem node that it has of its own, if any."""
+
+    name: str
+    settings: RosSettings
+    reach: Reach
+    node: NodeSpec | None = None
+
+
+class SimulatedCamera:
+    """Faults are switched by a std_msgs/String on `sim_fault` beside its joint states, and
+    `sim_fault_is` says which one there is."""
+
+    def __init__(self, ros: RosRuntime, spec: CameraSpec, clock: Clock) -> None:
+        self.spec = spec
+        self.head = Head(spec.reach)
+        self.fault = "well"
+        self._clock = clock
+        own, create = spec.settings, ros.node.create_publisher
+        self._joints = create(JointState, own.joint_states, qos.TELEMETRY)
+        self._images = create(CompressedImage, own.image, qos.TELEMETRY)
+        as_trajectory = own.command is Command.TRAJECTORY
+        if as_trajectory:
+            ros.subscribe(JointTrajectory, own.command_topic, self._follow, qos.COMMANDS)
+        else:
+            ros.subscribe(Float64MultiArray, own.command_topic, self._go, qos.COMMANDS)
+        switch = f"{own.joint_states.rpartition('/')[0]}/sim_fault"
+        ros.subscribe(String, switch, self._switch, qos.COMMANDS)
+        self._fault_is = create(String, f"{switch}_is", qos.STATUS)
+        self._now_us = clock.now_us()
+        self._joints_us = self._images_us = self._now_us
+
+    def step(self) -> None:
+        """Move on, and say what is due."""
+        now_us = self._clock.now_us()
+        self.head.stuck = self.fault == "stuck"
+        self.head.step((now_us - self._now_us) / US_PER_S)
+        self._now_us = now_us
+        if now_us >= self._joints_us:
+            self._joints_us = now_us + round(JOINTS_EVERY_S * US_PER_S)
+            if self.fault != "silent":
+                self._joints.publish(self._joint_state())
+        if now_us >= self._images_us:
+            self._images_us = now_us + round(IMAGES_EVERY_S * US_PER_S)
+            if self.fault != "blind" and self._images.get_subscription_count():
+                self._images.publish(self._image())
+
+    # --- commands -------------------------------------------------------------------------------
+
+    def _follow(self, message: Any) -> None:
+        if not message.points:
+            return
+        point = message.points[-1]
+        self._move(message.joint_names, point.positions, _seconds(point.time_from_start))
+
+    def _go(self, message: Any) -> None:
+        self._move(list(self.spec.settings.joints.names.values()), message.data, 0.0)
+
+    def _move(self, names: Any, positions: Any, seconds: float) -> None:
+        joints = self.spec.settings.joints
+        told = {**joints.positions(self.head.look), **joints.heard(names, positions)}
+        to = joints.look(told)
+        if to is not None:
+            self.head.move(to, seconds)
+
+    def _switch(self, message: Any) -> None:
+        if message.data in FAULTS:
+            self.fault = message.data
+            self._fault_is.publish(message)
+
+    # --- what it says ---------------------------------------------------------------------------
+
+    def _joint_state(self) -> Any:
+        joints = self.spec.settings.joints
+        positions = joints.positions(self.head.look)
+        names = [joints.names[axis] for axis in positions]
+        message = JointState(name=["wheel", *names], position=[0.0, *positions.values()])
+        self._stamp(message)
+        return message
+
+    def _image(self) -> Any:
+        content = picture(self.head.look, self.spec.reach.view_rad)
+        if self.fault == "garbled":
+            content = b"GIF89a" + content
+        message = CompressedImage(format="jpeg", data=content)
+        self._stamp(message)
+        return message
+
+    def _stamp(self, message: Any) -> None:
+        stamp = message.header.stamp
+        stamp.sec, rest_us = divmod(self._clock.now_us(), US_PER_S)
+        stamp.nanosec = rest_us * 1000
+        message.header.frame_id = self.spec.settings.joints.names[Axis.PAN]
+
+
+def _seconds(duration: Any) -> float:
+    return float(duration.sec) + float(duration.nanosec) / 1e9

@@ -1,0 +1,82 @@
+"""The cameras of a fleet file that are to be simulated, on vehicles marked `sitl: true`: of arbiter
+`ptz` and driver `ros`, and payloads of arbiter `ros` that have an m2pem node of their own."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from m2pem_plugin_ros import read_payloads
+from m2pem_plugin_ros import read_settings as read_vehicles
+
+from m2pem.api import Connection, Fleet, ResourceId
+from m2pem.errors import PluginError
+from m2pem_plugin_ptz.drivers.ros.settings import read_settings as read_own_settings
+from m2pem_plugin_ptz.settings import DriverName, read_settings
+from m2pem_plugin_ptz.simulator.ros.camera import CameraSpec, NodeSpec
+
+ARBITER, NODES = "ptz", "ros"
+
+
+def read_specs(fleet: Fleet) -> Iterator[CameraSpec]:
+    """What to simulate, so that an executive with the same file finds it.
+
+    Raises:
+        PluginError: a connection is wrong; the text names the resource and the key.
+    """
+    for payload in fleet.payloads.values():
+        vehicle = fleet.vehicles[payload.vehicle]
+        if payload.arbiter != ARBITER or not vehicle.sitl:
+            continue
+        connection = Connection(payload.id, vehicle.domain.value, payload.settings, sitl=True)
+        settings = read_settings({payload.id: connection})[payload.id]
+        if settings.driver is DriverName.ROS:
+            yield CameraSpec(payload.id, read_own_settings(connection), settings.reach)
+    yield from _with_nodes(fleet)
+
+
+def _with_nodes(fleet: Fleet) -> Iterator[CameraSpec]:
+    connections: dict[ResourceId, Connection] = {}
+    for vehicle in fleet.vehicles.values():
+        if vehicle.arbiter == NODES:
+            connections[vehicle.id] = Connection(
+                vehicle.id, vehicle.domain.value, vehicle.settings, sitl=vehicle.sitl
+            )
+    for payload in fleet.payloads.values():
+        owner = fleet.vehicles[payload.vehicle]
+        if payload.arbiter == NODES:
+            connections[payload.id] = Connection(
+                payload.id,
+                owner.domain.value,
+                payload.settings,
+                payload.behaviors,
+                payload.detector,
+                sitl=owner.sitl,
+            )
+    for resource, settings in read_payloads(connections, read_vehicles(connections)).items():
+        if not connections[resource].sitl:
+            continue
+        own = {
+            **_simulated(resource, connections),
+            "driver": DriverName.ROS.value,
+            "namespace": settings.namespace or "/",
+        }
+        if settings.domain_id is not None:
+            own["domain_id"] = settings.domain_id
+        on_board = Connection(resource, connections[resource].domain, own, sitl=True)
+        reach = read_settings({resource: on_board})[resource].reach
+        node = NodeSpec(on_board, settings.namespace, fleet.origin)
+        yield CameraSpec(resource, read_own_settings(on_board), reach, node)
+
+
+def _simulated(
+    resource: ResourceId, connections: Mapping[ResourceId, Connection]
+) -> Mapping[str, Any]:
+    """What its `sim` says: what the arbiter `ptz` would be told of the camera."""
+    said = connections[resource].settings.get("sim", {})
+    vehicle = connections.get(ResourceId(resource.partition("/")[0]))
+    if vehicle is not None and said == vehicle.settings.get("sim"):
+        return {}  # that is what its vehicle is like
+    if not isinstance(said, Mapping):
+        raise PluginError(
+            f"{resource}: connection.sim: {said!r} is no map, such as {{reach: {{}}}}"
+        )
+    return said

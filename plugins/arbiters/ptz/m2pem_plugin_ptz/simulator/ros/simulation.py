@@ -1,0 +1,61 @@
+"""All simulated cameras of a process: time passes for them."""
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import replace
+
+from m2pem_plugin_ros import RosRuntime
+
+from m2pem.api import Clock
+from m2pem_plugin_ptz.onboard import CameraNode
+from m2pem_plugin_ptz.simulator.ros.camera import CameraSpec, NodeSpec, SimulatedCamera
+
+TICK_S = 0.02
+NODE = "m2pem_sim_cameras"
+
+
+async def simulate(
+    specs: Sequence[CameraSpec], clock: Clock, domain_id: int | None, ready: asyncio.Event
+) -> None:
+    """Simulate them until it is cancelled. `ready` is set when they listen. `domain_id`: of those
+    whose fleet does not say; None takes ROS_DOMAIN_ID."""
+    runtimes: dict[int | None, RosRuntime] = {}
+    nodes: list[CameraNode] = []
+    moving: asyncio.Task[None] | None = None
+    try:
+        cameras = []
+        for spec in specs:
+            domain = spec.settings.domain_id
+            domain = domain_id if domain is None else domain
+            if domain not in runtimes:
+                runtimes[domain] = RosRuntime(NODE, domain_id=domain)
+            ros = runtimes[domain]
+            cameras.append(SimulatedCamera(ros, spec, clock))
+            if spec.node is not None:
+                nodes.append(_node(ros, spec.node, domain, clock))
+        moving = asyncio.get_running_loop().create_task(_move(cameras))
+        await asyncio.gather(*(node.open() for node in nodes))
+        ready.set()
+        await moving
+    finally:
+        await asyncio.gather(*(node.close() for node in nodes), return_exceptions=True)
+        if moving is not None:
+            moving.cancel()
+            await asyncio.gather(moving, return_exceptions=True)
+        for runtime in runtimes.values():
+            await runtime.close()
+
+
+def _node(ros: RosRuntime, spec: NodeSpec, domain: int | None, clock: Clock) -> CameraNode:
+    settings = dict(spec.connection.settings)
+    if domain is not None:
+        settings["domain_id"] = domain
+    connection = replace(spec.connection, settings=settings)
+    return CameraNode(ros, connection, spec.namespace, clock, spec.origin)
+
+
+async def _move(cameras: Sequence[SimulatedCamera]) -> None:
+    while True:
+        for camera in cameras:
+            camera.step()
+        await asyncio.sleep(TICK_S)

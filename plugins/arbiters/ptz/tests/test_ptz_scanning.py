@@ -1,0 +1,302 @@
+"""Looking over sectors and areas. What was seen is counted by a check of its own: places at random
+in the area, each of which must have been in the picture at some time, by pymap3d."""
+
+import math
+import random
+from itertools import pairwise
+
+import numpy as np
+import pymap3d
+import pytest
+from m2pem_plugin_ptz.camera_model.field_of_view import View
+from m2pem_plugin_ptz.camera_model.pose import Stance, eye
+from m2pem_plugin_ptz.settings import Mounting
+from ptz_fake_camera import ORIGIN, Head, rad
+from ptz_world import CAMERA, area, play
+
+from m2pem.api import BehaviorState
+
+VIEW = (rad(60), rad(34))
+SQUARE = ((-40, 60), (40, 60), (40, 140), (-40, 140))
+CONCAVE = ((-60, 30), (60, 30), (60, 120), (30, 120), (30, 60), (-30, 60), (-30, 120), (-60, 120))
+FIELD = ((-150, 20), (150, 20), (150, 320), (-150, 320))
+AROUND = ((-60, -60), (60, -60), (60, 60), (-60, 60))
+
+
+def inside(ring, east, north):
+    odd = False
+    for (x1, y1), (x2, y2) in zip(ring, (*ring[1:], ring[0]), strict=True):
+        if (y1 > north) != (y2 > north) and east < x1 + (north - y1) / (y2 - y1) * (x2 - x1):
+            odd = not odd
+    return odd
+
+
+class Witness:
+    """Places at random, and which of them were in the picture of a level camera."""
+
+    def __init__(self, ring, holes=(), count=1500):
+        dice = random.Random(7)
+        xs, ys = [x for x, _ in ring], [y for _, y in ring]
+        points = []
+        while len(points) < count:
+            east, north = dice.uniform(min(xs), max(xs)), dice.uniform(min(ys), max(ys))
+            if inside(ring, east, north) and not any(inside(hole, east, north) for hole in holes):
+                points.append((east, north))
+        east, north = np.array(points).T
+        lat, lon, _ = pymap3d.enu2geodetic(east, north, 0.0, *ORIGIN)
+        self.lat, self.lon = lat, lon
+        self.seen = np.zeros(count, dtype=bool)
+
+    def look(self, world, mast_m=2.0):
+        state, head = world.truth(), world.head
+        head.move()
+        here = state.position
+        azimuth, elevation, _ = pymap3d.geodetic2aer(
+            self.lat,
+            self.lon,
+            ORIGIN[2],
+            here.latitude_deg,
+            here.longitude_deg,
+            here.altitude_m + mast_m,
+        )
+        heading = math.pi / 2 - state.yaw_rad + head.pan
+        az, el = np.radians(azimuth) - heading, np.radians(elevation)
+        ahead = np.cos(el) * np.cos(az) * math.cos(head.tilt) + np.sin(el) * math.sin(head.tilt)
+        right = np.cos(el) * np.sin(az)
+        up = np.sin(el) * math.cos(head.tilt) - np.cos(el) * np.cos(az) * math.sin(head.tilt)
+        wide, high = (math.tan(angle / 2) / head.zoom for angle in VIEW)
+        self.seen |= (ahead > 0) & (abs(right) <= wide * ahead) & (abs(up) <= high * ahead)
+
+    @property
+    def share(self):
+        return float(self.seen.mean())
+
+
+def scan(ring, head=None, moves=lambda _: {}, domain="ground", holes=(), within_s=900, **options):
+    """Scan the area; returns the report, the witness and how long it took, in s."""
+    witness = options.pop("witness", None) or Witness(ring, holes)
+    parameters = options.pop("parameters", {})
+
+    async def main(world):
+        began = world.seconds
+        target = area(*ring, holes=holes)
+        await world.bench.start("r1.b1", "ptz_scan_polygon", CAMERA, area=target, **parameters)
+        while not any(state.terminal for state in world.bench.states_of("r1.b1")):
+            assert world.seconds - began < within_s
+            witness.look(world)
+            await world.clock.sleep(0.05)
+        return world.bench.of("r1.b1")[-1], witness, world.seconds - began
+
+    head = head or Head()
+    settings = {"tilt": ["-90 deg", "90 deg"], "view": ["60 deg", "34 deg"], "zoom_max": 30}
+    return play(main, head, moves, domain, reach=settings, **options)
+
+
+def zoomed(level, **reach):
+    head = Head(zoom_max=30.0, **reach)
+    head.zoom = level
+    return head
+
+
+AIRBORNE = {"up": 60.0, "altitude_above_home_m": 60.0}
+
+
+@pytest.mark.parametrize(
+    ("ring", "zoom", "where", "domain"),
+    [
+        (SQUARE, 1.0, {}, "ground"),
+        (SQUARE, 8.0, AIRBORNE, "air"),
+        (CONCAVE, 4.0, {"up": 30.0, "altitude_above_home_m": 30.0}, "air"),
+        (FIELD, 2.0, AIRBORNE, "air"),
+        (AROUND, 1.0, AIRBORNE, "air"),
+        (AROUND, 1.0, {}, "ground"),
+    ],
+    ids=["square", "zoomed in", "concave", "field", "all around from above", "all around"],
+)
+def test_at_least_99_percent_of_an_area_is_seen(ring, zoom, where, domain):
+    end, witness, _ = scan(ring, zoomed(zoom), lambda _: where, domain)
+    assert end.state is BehaviorState.SUCCEEDED, end
+    assert witness.share >= 0.99
+
+
+def test_a_vehicle_that_drives_past_sees_all_of_the_area_all_the_same():
+    def moves(t):
+        return {**AIRBORNE, "east": -80 + 6 * t, "velocity": (6, 0, 0), "yaw": 0.05 * t}
+
+    end, witness, took_s = scan(SQUARE, zoomed(6.0), moves, "air")
+    assert end.state is BehaviorState.SUCCEEDED, end
+    assert took_s > 5, "it took long enough to have moved"
+    assert witness.share >= 0.99
+
+
+def test_a_vehicle_that_leans_sees_all_of_the_area_too():
+    """The camera's rows are not level then. Seen is what `Deck.axes` has in the picture."""
+
+    def moves(t):
+        return {**AIRBORNE, "roll_rad": rad(12), "pitch_rad": rad(-8) + 0.05 * math.sin(t)}
+
+    class Leaning(Witness):
+        def look(self, world, mast_m=2.0):
+            state, head = world.truth(), world.head
+            head.move()
+            stance = Stance(state.position, state.yaw_rad, state.roll_rad, state.pitch_rad)
+            here = eye(stance, Mounting(up_m=mast_m), stabilized=False)
+            ground = [ORIGIN[2]] * len(self.lat)
+            places = np.column_stack(pymap3d.geodetic2ecef(self.lat, self.lon, ground))
+            axes = here.deck.axes(head.pan, head.tilt)
+            self.seen |= View(*VIEW).zoomed(head.zoom).holds(axes, here.seen(places))
+
+    end, witness, _ = scan(SQUARE, zoomed(5.0), moves, "air", witness=Leaning(SQUARE))
+    assert end.state is BehaviorState.SUCCEEDED, end
+    assert witness.share >= 0.99
+
+
+def test_a_hole_of_the_area_need_not_be_seen():
+    ring = ((-150, 50), (150, 50), (150, 200), (-150, 200))
+    hole = ((-90, 60), (90, 60), (90, 190), (-90, 190))
+    end, witness, took_s = scan(ring, zoomed(3.0), lambda _: AIRBORNE, "air", holes=(hole,))
+    assert end.state is BehaviorState.SUCCEEDED
+    assert witness.share >= 0.99
+    assert took_s < scan(ring, zoomed(3.0), lambda _: AIRBORNE, "air")[2]
+
+
+def test_more_overlap_means_more_rows():
+    quick = scan(SQUARE, zoomed(5.0), lambda _: AIRBORNE, "air", parameters={"overlap": 0.0})
+    slow = scan(SQUARE, zoomed(5.0), lambda _: AIRBORNE, "air", parameters={"overlap": 0.6})
+    assert slow[2] > 1.5 * quick[2]
+    assert min(slow[1].share, quick[1].share) >= 0.99
+
+
+def test_speed_is_that_of_the_turning():
+    slow = scan(SQUARE, zoomed(4.0), lambda _: AIRBORNE, "air", parameters={"speed": rad(4)})
+    quick = scan(SQUARE, zoomed(4.0), lambda _: AIRBORNE, "air", parameters={"speed": rad(12)})
+    assert slow[2] > 1.8 * quick[2]
+    assert quick[1].share >= 0.99
+
+
+def test_a_held_scan_goes_on_with_what_is_left():
+    witness = Witness(SQUARE)
+    alone = scan(SQUARE, zoomed(5.0), lambda _: AIRBORNE, "air")[2]
+
+    async def main(world):
+        began, held = world.seconds, 0.0
+        target = area(*SQUARE)
+        await world.bench.start("r1.b1", "ptz_scan_polygon", CAMERA, area=target)
+        while not any(state.terminal for state in world.bench.states_of("r1.b1")):
+            witness.look(world)
+            await world.clock.sleep(0.05)
+            if not held and witness.share > 0.5:
+                held = 30.0
+                await world.bench.arbiter.hold(CAMERA)
+                await world.clock.sleep(held)
+                await world.bench.arbiter.resume(CAMERA)
+        assert world.bench.states_of("r1.b1")[-1] is BehaviorState.SUCCEEDED
+        assert world.seconds - began - held < 1.1 * alone, "it did not begin anew"
+        assert witness.share >= 0.99
+
+    play(
+        main,
+        zoomed(5.0),
+        lambda _: AIRBORNE,
+        "air",
+        reach={"tilt": ["-90 deg", "90 deg"], "zoom_max": 30},
+    )
+
+
+def test_an_area_that_is_out_of_reach_is_rejected_with_how_much_is_in_reach():
+    head = Head(pan_rad=(rad(-60), rad(60)), tilt_rad=(rad(-90), rad(0)))
+    end, _, _ = scan(AROUND, head)
+    assert end.state is BehaviorState.REJECTED
+    assert head.told is None, "nothing has turned"
+    assert end.reason.startswith("only "), end.reason
+    assert end.reason.endswith("of the area is within reach: pan -60 to 60, tilt -90 to 0 deg")
+
+
+def test_an_area_beyond_the_horizon_is_rejected():
+    far = ((0, 30_000), (100, 30_000), (100, 30_100), (0, 30_100))
+    end, _, _ = scan(far, Head())
+    assert end.state is BehaviorState.REJECTED
+    assert end.reason == "100 % of the area is beyond the horizon of the camera"
+
+
+def test_a_vehicle_that_turns_its_blind_side_to_the_area_fails_and_says_why():
+    head = zoomed(8.0, pan_rad=(rad(-60), rad(60)))
+
+    def moves(t):
+        return {**AIRBORNE, "yaw": math.pi / 2 + (math.pi if t > 4 else 0.0)}
+
+    end, witness, _ = scan(SQUARE, head, moves, "air")
+    assert end.state is BehaviorState.FAILED
+    assert end.reason.startswith("out of reach for 10 s: pan ")
+    assert witness.share < 0.99
+
+
+# --- sectors ------------------------------------------------------------------------------------
+
+
+def sector(parameters, head=None, moves=lambda _: {}, **settings):
+    """Scan a sector; the report, and the headings (deg) that were looked at meanwhile."""
+
+    async def main(world):
+        headings = []
+        await world.bench.start("r1.b1", "ptz_scan_sector", CAMERA, **parameters)
+        while not any(state.terminal for state in world.bench.states_of("r1.b1")):
+            world.head.move()
+            yaw = world.truth().yaw_rad
+            headings.append(math.degrees(math.pi / 2 - yaw + world.head.pan))
+            await world.clock.sleep(0.05)
+        return world.bench.of("r1.b1")[-1], headings, world
+
+    return play(main, head or Head(), moves, **settings)
+
+
+def test_a_sector_is_swept_from_its_nearer_edge_to_the_other():
+    end, headings, world = sector({"heading": rad(60), "sector": rad(80), "elevation": rad(5)})
+    assert end.state is BehaviorState.SUCCEEDED
+    assert (min(headings), max(headings)) == pytest.approx((0, 100), abs=1.5)
+    assert headings[-1] == pytest.approx(100, abs=1.5)
+    assert world.head.tilt == pytest.approx(rad(5), abs=rad(0.5))
+
+
+def test_a_sector_stays_in_the_world_while_the_vehicle_turns():
+    _, headings, world = sector(
+        {"heading": 0.0, "sector": rad(60), "elevation": 0.0, "speed": rad(6)},
+        moves=lambda t: {"yaw": math.pi / 2 + 0.1 * t},
+    )
+    assert max(headings) - min(headings) == pytest.approx(60, abs=3)
+    assert world.seconds > 9
+
+
+def test_a_whole_turn_is_swept_by_a_camera_with_stops_too():
+    end, headings, _ = sector({"heading": rad(90), "sector": math.tau, "elevation": 0.0})
+    assert end.state is BehaviorState.SUCCEEDED
+    seen = {round(heading) % 360 // 10 for heading in headings}
+    assert seen == set(range(36))
+
+
+def test_an_endless_camera_sweeps_a_whole_turn_without_turning_back():
+    end, headings, _ = sector(
+        {"heading": 0.0, "sector": math.tau, "elevation": 0.0},
+        Head(endless=True),
+        reach={"endless": True},
+    )
+    assert end.state is BehaviorState.SUCCEEDED
+    steps = [math.remainder(b - a, 360) for a, b in pairwise(headings)]
+    assert min(steps) > -1.0
+    assert sum(steps) == pytest.approx(360, abs=2)
+
+
+def test_a_sector_beyond_the_stops_is_rejected():
+    head = Head(pan_rad=(rad(-60), rad(60)))
+    end, _, _ = sector({"heading": rad(90), "sector": rad(80), "elevation": 0.0}, head)
+    assert end.state is BehaviorState.REJECTED
+    assert end.reason == (
+        "heading 78 deg is out of reach: pan 78 deg is beyond its stops, -60 to 60 deg"
+    )
+
+
+def test_without_an_elevation_it_looks_as_high_as_before():
+    head = Head()
+    head.tilt = rad(-12)
+    sector({"heading": 0.0, "sector": rad(60)}, head)
+    assert head.tilt == pytest.approx(rad(-12), abs=rad(0.5))
