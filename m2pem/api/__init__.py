@@ -69,11 +69,11 @@ if TYPE_CHECKING:
     from m2pem.engine.records import Record
     from m2pem.findings import Finding, Severity
     from m2pem.fleet.behaviors import SHARED
-    from m2pem.fleet.fence import Fence
     from m2pem.fleet.fleet import Fleet
-    from m2pem.fleet.geojson import as_geojson, parse_geojson
-    from m2pem.fleet.lawn_mower import lawn_mower, longest_edge_yaw
-    from m2pem.fleet.units import Dimension, UnitError, quantity
+    from m2pem.geo.fence import Fence
+    from m2pem.geo.geojson import as_geojson, parse_geojson
+    from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
+    from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame, distance_m, offset
     from m2pem.mission.behavior import BehaviorType, Decision
     from m2pem.mission.catalogue import (
         BehaviorSpec,
@@ -87,6 +87,7 @@ if TYPE_CHECKING:
     from m2pem.mission.library import MissionFile
     from m2pem.mission.mission import Mission
     from m2pem.mission.values import Value
+    from m2pem.units import Dimension, UnitError, quantity
 
 # Loaded when asked for: an arbiter's module need not pay for what an OCU imports.
 _MODULES = {
@@ -126,11 +127,12 @@ _MODULES = {
     "m2pem.mission.geometry": "Area Point Route VehiclePosition",
     "m2pem.mission.values": "Value",
     "m2pem.fleet.behaviors": "SHARED",
-    "m2pem.fleet.fence": "Fence",
+    "m2pem.geo.fence": "Fence",
     "m2pem.fleet.fleet": "Fleet",
-    "m2pem.fleet.geojson": "as_geojson parse_geojson",
-    "m2pem.fleet.lawn_mower": "lawn_mower longest_edge_yaw",
-    "m2pem.fleet.units": "Dimension UnitError quantity",
+    "m2pem.geo.geojson": "as_geojson parse_geojson",
+    "m2pem.geo.lawn_mower": "lawn_mower longest_edge_yaw",
+    "m2pem.geo.local_frame": "EastNorth LatLon LocalFrame distance_m offset",
+    "m2pem.units": "Dimension UnitError quantity",
 }
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 
@@ -156,6 +158,7 @@ __all__ = [
     "Detection",
     "Dimension",
     "Draft",
+    "EastNorth",
     "Editable",
     "Fence",
     "Finding",
@@ -165,8 +168,10 @@ __all__ = [
     "GoalArbiter",
     "HandedOver",
     "BehaviorTracker",
+    "LatLon",
     "Limits",
     "LinkState",
+    "LocalFrame",
     "AsyncQueue",
     "Mission",
     "MissionControl",
@@ -211,8 +216,10 @@ __all__ = [
     "VehiclePosition",
     "VehicleState",
     "as_geojson",
+    "distance_m",
     "lawn_mower",
     "longest_edge_yaw",
+    "offset",
     "parse_geojson",
     "parse_mission",
     "quantity",

@@ -8,9 +8,9 @@ from m2pem.api import refusal as parameters
 from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.async_queue import AsyncQueue
 from m2pem.api.epoch_fence import EpochFence
-from m2pem.fleet.nearmiss import suggest
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.mission.values import Value
+from m2pem.suggestions import suggest
 
 REMEMBERED = 10_000
 

@@ -4,9 +4,9 @@ import math
 from collections.abc import Mapping
 
 from m2pem.api.arbiter import ResolvedValue
-from m2pem.fleet.nearmiss import suggest
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ParameterSpec
 from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
+from m2pem.suggestions import suggest
 
 ALTITUDE_FRAME = "altitude_frame"
 

@@ -22,6 +22,11 @@ class GeoPosition:
     longitude_deg: float
     altitude_m: float
 
+    @property
+    def latlon(self) -> tuple[float, float]:
+        """Latitude and longitude in degrees."""
+        return self.latitude_deg, self.longitude_deg
+
 
 class LinkState(StrEnum):
     """Whether the vehicle is heard."""

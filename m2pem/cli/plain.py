@@ -242,8 +242,8 @@ class PlainOcu:
 
     async def _hand_over(self, kind: str, words: list[str]) -> None:
         """To every run, now and later (paper, section 4.3)."""
-        from m2pem.fleet.geofiles import read_geometry
-        from m2pem.fleet.geojson import as_geojson
+        from m2pem.geo.files import read_geometry
+        from m2pem.geo.geojson import as_geojson
 
         if len(words) < 2:
             raise OperatorError(f"say which, and from where: {kind} NAME FILE")

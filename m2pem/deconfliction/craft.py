@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 
 from m2pem.api.telemetry import VehicleState
-from m2pem.deconfliction.shapes import Hull, Place, hull
+from m2pem.geo.local_frame import EastNorth, LocalFrame
+from m2pem.geo.polygon import Hull, convex_hull
 from m2pem.mission.catalogue import ResourceId
-from m2pem.teams.plane import Plane
 
 GROUNDED_BELOW_M = 1.0
 """Above home; lower than this, what is neither armed nor moving is on the ground."""
@@ -48,13 +48,13 @@ class Craft:
     of its home; None: not known. `homes`: where a return may lead to."""
 
     vehicle: ResourceId
-    place: Place
+    place: EastNorth
     stop: Hull
     span: Span
     home_m: float | None
     flies: bool
     stands: bool
-    homes: tuple[Place, ...] = ()
+    homes: tuple[EastNorth, ...] = ()
 
 
 def flies(state: VehicleState) -> bool:
@@ -65,12 +65,12 @@ def flies(state: VehicleState) -> bool:
 
 
 def craft_of(
-    state: VehicleState, plane: Plane, nominal_m: float | None, homes: tuple[Place, ...]
+    state: VehicleState, frame: LocalFrame, nominal_m: float | None, homes: tuple[EastNorth, ...]
 ) -> Craft | None:
     """None: its position is not known. `nominal_m`: the height that it was sent to last."""
     if state.position is None:
         return None
-    place = plane.level(state.position.latitude_deg, state.position.longitude_deg)
+    place = frame.to_local(state.position.latlon)
     east, north, up = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
     speed = _speed_m_s(state)
     stands = speed < STANDS_BELOW_M_S
@@ -83,7 +83,7 @@ def craft_of(
     return Craft(
         state.resource,
         place,
-        hull([place, (place[0] + east * ahead_s, place[1] + north * ahead_s)]),
+        convex_hull([place, (place[0] + east * ahead_s, place[1] + north * ahead_s)]),
         Span(min(height_m, then_m), max(height_m, then_m)),
         None if above_m is None else state.position.altitude_m - above_m,
         flies(state),

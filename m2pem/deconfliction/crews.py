@@ -14,10 +14,11 @@ from m2pem.deconfliction.planning import (
     volume_of,
     way_to,
 )
-from m2pem.deconfliction.shapes import Place, grown, hull
 from m2pem.deconfliction.volume import Piece, Volume
 from m2pem.deconfliction.wishes import Wishes
-from m2pem.fleet.offsets import read_offsets
+from m2pem.fleet.parameters import read_offsets
+from m2pem.geo.local_frame import EastNorth
+from m2pem.geo.polygon import buffered_hull, convex_hull
 from m2pem.teams.shapes import SPACING_M, Vector, shifted, slot, trimmed
 
 _SHAPES = {
@@ -52,13 +53,13 @@ def _march(behavior: str, wishes: Wishes, lead: Craft | None, index: int) -> Vol
         if lead is None:
             wishes.unknown = "where its lead stands is not known"
             return way_to(wishes, None, wishes.span())
-        around = grown(lead.stop, math.hypot(back_m, left_m))
+        around = buffered_hull(lead.stop, math.hypot(back_m, left_m))
         return way_to(wishes, around if index else wishes.craft.stop, wishes.span())
     places: list[Vector] = [(*wishes.level(each), 0.0) for each in route.waypoints]
     spans = wishes.waypoint_spans(route)
     if len({place[:2] for place in places}) == 1:
         reach_m = 2 * math.hypot(back_m, left_m)
-        return way_to(wishes, grown([places[0][:2], *_stop(lead)], reach_m), spans[0])
+        return way_to(wishes, buffered_hull([places[0][:2], *_stop(lead)], reach_m), spans[0])
     moved = [place[:2] for place in shifted(places, left_m)]
     volume = along(wishes, moved, spans, BEND_M)
     if back_m <= sum(math.dist(a, b) for a, b in pairwise(moved)):
@@ -68,13 +69,13 @@ def _march(behavior: str, wishes: Wishes, lead: Craft | None, index: int) -> Vol
     over = spans[0]
     for span in (*spans, wishes.craft.span):
         over = over.to(span)
-    detour = hull([*wishes.craft.stop, *moved, end])
+    detour = convex_hull([*wishes.craft.stop, *moved, end])
     low_m = over.low_m if wishes.craft.flies else min(span.low_m for span in spans)
     extra = Piece(detour, low_m, over.high_m)
     return Volume((*volume.pieces, extra), volume.end_m, volume.unknown)
 
 
-def _stop(lead: Craft | None) -> Sequence[Place]:
+def _stop(lead: Craft | None) -> Sequence[EastNorth]:
     return () if lead is None else lead.stop
 
 
@@ -91,7 +92,7 @@ def _observe(wishes: Wishes) -> Volume:
 def _escort(wishes: Wishes) -> Volume:
     place, span = wishes.target()
     reach_m = wishes.number("spacing") or SPACING_M
-    area = None if place is None else grown([place], reach_m)
+    area = None if place is None else buffered_hull([place], reach_m)
     return way_to(wishes, area, span.to(wishes.span()))
 
 

@@ -11,14 +11,14 @@ from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.deconfliction.craft import Craft, Span, craft_of, flies
 from m2pem.deconfliction.crews import member_volume
 from m2pem.deconfliction.planning import volume_of
-from m2pem.deconfliction.shapes import Place, apart_m
 from m2pem.deconfliction.volume import Piece, Separation, Volume, too_near
 from m2pem.deconfliction.wishes import Wishes
 from m2pem.deconfliction.words import Conflict, Occupant, refusal
 from m2pem.fleet.fleet import Domain, Fleet
+from m2pem.geo.local_frame import EastNorth, LocalFrame
+from m2pem.geo.polygon import hull_distance_m
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
-from m2pem.teams.plane import Plane
 
 STOPS = frozenset({"hold", "drive_stop"})
 """Never refused: it is no safer not to stop."""
@@ -51,10 +51,10 @@ class Airspace:
     def __init__(self, fleet: Fleet, policy: Separation) -> None:
         self.aircraft = tuple(v.id for v in fleet.vehicles.values() if v.domain is Domain.AIR)
         self._policy = policy
-        self._plane: Plane | None = None
+        self._frame: LocalFrame | None = None
         self._states: dict[ResourceId, VehicleState] = {}
         self._nominal_m: dict[ResourceId, float] = {}
-        self._homes: dict[ResourceId, list[Place]] = {}
+        self._homes: dict[ResourceId, list[EastNorth]] = {}
         self._lost: set[ResourceId] = set()
         self._claims: dict[BehaviorId, _Claim] = {}
 
@@ -64,8 +64,8 @@ class Airspace:
         """A vehicle, of any domain, has said where it is."""
         if state.position is None:
             return
-        if self._plane is None:
-            self._plane = Plane(state.position.latitude_deg, state.position.longitude_deg)
+        if self._frame is None:
+            self._frame = LocalFrame(state.position.latlon)
         self._states[state.resource] = state
         if state.resource not in self.aircraft:
             return
@@ -140,9 +140,9 @@ class Airspace:
 
     def _note_home(self, vehicle: ResourceId, state: VehicleState) -> None:
         """Where it stood at first, and where it stood last: autopilots mean one or the other."""
-        if state.position is None or self._plane is None:
+        if state.position is None or self._frame is None:
             return
-        place = self._plane.level(state.position.latitude_deg, state.position.longitude_deg)
+        place = self._frame.to_local(state.position.latlon)
         homes = self._homes.setdefault(vehicle, [place])
         homes[1:] = [place]
 
@@ -154,10 +154,10 @@ class Airspace:
     def _craft(self, vehicle: str) -> Craft | None:
         name = ResourceId(vehicle)
         state = self._states.get(name)
-        if state is None or self._plane is None:
+        if state is None or self._frame is None:
             return None
         homes = tuple(dict.fromkeys(self._homes.get(name, ())))
-        return craft_of(state, self._plane, self._nominal_m.get(name), homes)
+        return craft_of(state, self._frame, self._nominal_m.get(name), homes)
 
     def _conflict_at(
         self,
@@ -192,12 +192,12 @@ class Airspace:
         vehicles = [each for each in request.resources if "/" not in each]
         for index, vehicle in enumerate(vehicles):
             craft = self._craft(vehicle) if vehicle in self.aircraft else None
-            if craft is None or self._plane is None:
+            if craft is None or self._frame is None:
                 continue
             if from_m is not None and craft.home_m is not None:
                 there_m = craft.home_m + from_m
                 craft = replace(craft, span=Span(there_m, there_m), flies=True)
-            wishes = Wishes(craft, request.parameters, self._plane, self._height_m)
+            wishes = Wishes(craft, request.parameters, self._frame, self._height_m)
             start_s, timed = now_us / US_PER_S, self._policy.time_s is not None
             if kind is BehaviorType.TEAM:
                 volume = member_volume(request.behavior, wishes, lead, index, start_s)
@@ -247,7 +247,7 @@ class Airspace:
         policy = self._policy
         if other is None or not (craft.flies and other.flies):
             return [policy]
-        far_m = apart_m(craft.stop, other.stop)
+        far_m = hull_distance_m(craft.stop, other.stop)
         high_m = craft.span.apart_m(other.span)
         if far_m >= policy.horizontal_m or high_m >= policy.vertical_m:
             return [policy]

@@ -9,9 +9,10 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 
 from m2pem.deconfliction.craft import Span
-from m2pem.deconfliction.shapes import Hull, Place, grown, hull
 from m2pem.deconfliction.volume import NOTHING_M, Piece, Volume
 from m2pem.deconfliction.wishes import Wishes
+from m2pem.geo.local_frame import EastNorth
+from m2pem.geo.polygon import Hull, buffered_hull, convex_hull
 
 BEND_M = 4.0
 """How far from a route's corner a bend may pass it."""
@@ -46,19 +47,23 @@ def ascent(wishes: Wishes, span: Span) -> tuple[list[Piece], Span]:
 def way_to(wishes: Wishes, area: Hull | None, span: Span) -> Volume:
     """From where it is into an area, and anywhere in it."""
     pieces, flown = ascent(wishes, span)
-    there = None if area is None else hull([*wishes.craft.stop, *area])
+    there = None if area is None else convex_hull([*wishes.craft.stop, *area])
     pieces.append(Piece(there, flown.low_m, flown.high_m))
     return Volume(tuple(pieces), _end(span), wishes.unknown)
 
 
-def along(wishes: Wishes, places: Sequence[Place], spans: Sequence[Span], wide_m: float) -> Volume:
+def along(
+    wishes: Wishes, places: Sequence[EastNorth], spans: Sequence[Span], wide_m: float
+) -> Volume:
     """From where it is to the first of some places, and on from each to the next."""
     pieces, flown = ascent(wishes, spans[0])
-    pieces.append(Piece(grown([*wishes.craft.stop, places[0]], wide_m), flown.low_m, flown.high_m))
+    pieces.append(
+        Piece(buffered_hull([*wishes.craft.stop, places[0]], wide_m), flown.low_m, flown.high_m)
+    )
     legs = zip(pairwise(places), pairwise(spans), strict=True)
     for (begin, end), (first, second) in legs:
         over = first.to(second)
-        pieces.append(Piece(grown([begin, end], wide_m), over.low_m, over.high_m))
+        pieces.append(Piece(buffered_hull([begin, end], wide_m), over.low_m, over.high_m))
     return Volume(tuple(pieces), _end(spans[-1]), wishes.unknown)
 
 
@@ -89,7 +94,7 @@ def _scheduled(behavior: str, wishes: Wishes, start_s: float) -> Volume | None:
     pieces = [Piece((craft.place,), height_m, height_m, to_s=start_s)]
     for begin, end in pairwise([craft.place, *places]):
         then_s = now_s + math.dist(begin, end) / speed_m_s
-        area = grown([begin, end], wide_m)
+        area = buffered_hull([begin, end], wide_m)
         pieces.append(Piece(area, height_m, height_m, now_s, then_s, (begin, end), wide_m))
         now_s = then_s
     pieces.append(Piece((places[-1],), height_m, height_m, from_s=now_s))
@@ -129,7 +134,7 @@ def _to_target(wishes: Wishes) -> Volume:
 def _around(wishes: Wishes) -> Volume:
     place, span = wishes.target()
     radius_m = wishes.number("radius") or RADIUS_M
-    return way_to(wishes, None if place is None else grown([place], radius_m), span)
+    return way_to(wishes, None if place is None else buffered_hull([place], radius_m), span)
 
 
 def _climb(wishes: Wishes) -> Volume:
@@ -159,7 +164,7 @@ def _return(wishes: Wishes) -> Volume:
     low_m = craft.span.low_m if craft.flies else top_m
     pieces = [Piece(craft.stop, craft.span.low_m, top_m)]
     for home in craft.homes:
-        pieces.append(Piece(hull([*craft.stop, home]), low_m, top_m))
+        pieces.append(Piece(convex_hull([*craft.stop, home]), low_m, top_m))
         pieces.append(Piece((home,), -math.inf, top_m))
     return Volume(tuple(pieces), unknown=wishes.unknown)
 
@@ -175,7 +180,7 @@ def survey_area(wishes: Wishes) -> tuple[Hull, Span] | None:
     present = wishes.span() if corner_m is None else wishes.span(corner_m, area.altitude_frame)
     if corner_m is not None:  # not everybody heeds the heights of an area
         present = present.to(wishes.span())
-    return grown(wishes.ring(area), reach_m), present
+    return buffered_hull(wishes.ring(area), reach_m), present
 
 
 def _survey(wishes: Wishes) -> Volume:
@@ -187,14 +192,14 @@ def observed(wishes: Wishes, reach_m: float) -> tuple[Hull | None, Span]:
     """Around an area or a target, from `reach_m` away, or as far as its farthest corner."""
     if wishes.area is None:
         place, span = wishes.target()
-        return None if place is None else grown([place], reach_m), span
+        return None if place is None else buffered_hull([place], reach_m), span
     ring = wishes.ring(wishes.area)
     centre = (
         sum(east for east, _ in ring) / len(ring),
         sum(north for _, north in ring) / len(ring),
     )
     reach_m = max(reach_m, *(math.dist(centre, corner) for corner in ring))
-    return grown([centre], reach_m), wishes.span()
+    return buffered_hull([centre], reach_m), wishes.span()
 
 
 def _observe(wishes: Wishes) -> Volume:

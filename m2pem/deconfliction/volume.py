@@ -7,7 +7,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from m2pem.deconfliction.shapes import Hull, Place, apart_m
+from m2pem.geo.local_frame import EastNorth
+from m2pem.geo.polygon import Hull, hull_distance_m
 
 NOTHING_M = 0.01
 """What two ways to reckon one place may differ by."""
@@ -39,7 +40,7 @@ class Piece:
     high_m: float
     from_s: float = -math.inf
     to_s: float = math.inf
-    way: tuple[Place, Place] | None = None
+    way: tuple[EastNorth, EastNorth] | None = None
     aside_m: float = 0.0
 
 
@@ -62,7 +63,7 @@ class Volume:
         pieces = [replace(each, from_s=-math.inf, to_s=math.inf, way=None) for each in self.pieces]
         return replace(self, pieces=tuple(pieces))
 
-    def passes(self, place: Place, from_s: float, to_s: float) -> bool:
+    def passes(self, place: EastNorth, from_s: float, to_s: float) -> bool:
         """Whether the vehicle is at a place at some time from then to then, if it keeps to it."""
         for piece in self.pieces:
             if piece.to_s < from_s or piece.from_s > to_s:
@@ -71,7 +72,7 @@ class Volume:
             if piece.way is not None:
                 times = max(from_s, piece.from_s), min(to_s, piece.to_s)
                 area = tuple(_on(piece.way, _share(piece, time)) for time in times)
-            if apart_m((place,), area) <= piece.aside_m + OFF_M:
+            if hull_distance_m((place,), area) <= piece.aside_m + OFF_M:
                 return True
         return False
 
@@ -89,7 +90,7 @@ def _near(a: Piece, b: Piece, policy: Separation) -> bool:
     if max(a.low_m - b.high_m, b.low_m - a.high_m) >= policy.vertical_m - NOTHING_M:
         return False
     reach_m = policy.horizontal_m - NOTHING_M
-    if apart_m(a.area, b.area) >= reach_m:
+    if hull_distance_m(a.area, b.area) >= reach_m:
         return False
     if policy.time_s is None:
         return True
@@ -105,7 +106,7 @@ def _when(piece: Piece, other: Piece, reach_m: float) -> tuple[float, float]:
     reach_m += piece.aside_m
 
     def off_m(share: float) -> float:
-        return apart_m((_on(way, share),), other.area)
+        return hull_distance_m((_on(way, share),), other.area)
 
     # How far off it is, is a convex function of the way: the near part is one stretch.
     low, high = 0.0, 1.0
@@ -135,7 +136,7 @@ def _edge(off_m: Callable[[float], float], near: float, far: float, reach_m: flo
     return far
 
 
-def _on(way: tuple[Place, Place], share: float) -> Place:
+def _on(way: tuple[EastNorth, EastNorth], share: float) -> EastNorth:
     (ae, an), (be, bn) = way
     return ae + (be - ae) * share, an + (bn - an) * share
 

@@ -1,4 +1,4 @@
-"""What a behavior's parameters ask of an aircraft: places in the plane, and heights."""
+"""What a behavior's parameters ask of an aircraft: places in the frame, and heights."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.deconfliction.craft import Craft, Span
-from m2pem.deconfliction.shapes import Place
+from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
-from m2pem.teams.plane import Plane
 
 ANY_HEIGHT = Span(-math.inf, math.inf)
 
@@ -20,7 +19,7 @@ class Wishes:
 
     craft: Craft
     parameters: Mapping[str, ResolvedValue]
-    plane: Plane
+    frame: LocalFrame
     height_of: Callable[[str], float | None]
     unknown: str = ""
 
@@ -47,11 +46,11 @@ class Wishes:
         value = self.parameters.get("target")
         return value.vehicle if isinstance(value, VehiclePosition) else None
 
-    def level(self, place: Coordinate) -> Place:
-        """A coordinate in the plane."""
-        return self.plane.level(place[0], place[1])
+    def level(self, place: Coordinate) -> EastNorth:
+        """A coordinate in the frame."""
+        return self.frame.to_local(place[:2])
 
-    def ring(self, area: Area) -> list[Place]:
+    def ring(self, area: Area) -> list[EastNorth]:
         """The corners of an area's outer ring, each once."""
         return [self.level(corner) for corner in area.rings[0][:-1]]
 
@@ -59,7 +58,7 @@ class Wishes:
         """The height at each waypoint of a route."""
         return [self.span(each[2], route.altitude_frame) for each in route.waypoints]
 
-    def target(self) -> tuple[Place | None, Span]:
+    def target(self) -> tuple[EastNorth | None, Span]:
         """Where `target` is, None if that is wherever a vehicle goes; and the height to be at."""
         value = self.parameters.get("target")
         if isinstance(value, Point):

@@ -54,10 +54,10 @@ from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.findings import Severity
 from m2pem.fleet.allocation import spelled_out
 from m2pem.fleet.availability import Availability
-from m2pem.fleet.distance import NO_ORIGIN, geometry_out_of_reach
 from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.geojson import GeometryError, parse_geojson
 from m2pem.fleet.snapshot import dump
+from m2pem.geo.geojson import GeometryError, parse_geojson
+from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.journal.base import Journal, RunHeader
 from m2pem.journal.mission import mission_of
 from m2pem.mission.catalogue import ResourceId

@@ -12,8 +12,8 @@ from m2pem.engine.inputs import ControlReturned, ControlTaken
 from m2pem.errors import OperatorError
 from m2pem.executive.runner import Runner
 from m2pem.fleet.availability import Availability
-from m2pem.fleet.nearmiss import did_you_mean
 from m2pem.mission.catalogue import ResourceId
+from m2pem.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from m2pem.executive.arbiters import FleetArbiters

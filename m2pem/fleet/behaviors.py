@@ -7,7 +7,7 @@ An arbiter offers those of them that its vehicles and payloads can do, and may a
 import math
 from collections.abc import Mapping
 
-from m2pem.fleet.geojson import ALTITUDE_FRAMES
+from m2pem.geo.geojson import ALTITUDE_FRAMES
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ParameterSpec, ResumePolicy
 

@@ -9,10 +9,8 @@ from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check_roles import TaskFindings, check_roles, place
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.graph import Catalogue, ResourceGraph
-from m2pem.fleet.nearmiss import did_you_mean
 from m2pem.fleet.parameters import ParameterProblem, examine
 from m2pem.fleet.team_needs import lacking
-from m2pem.fleet.units import Dimension, UnitError, article, quantity
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ResourceId
 from m2pem.mission.elements import (
@@ -22,6 +20,8 @@ from m2pem.mission.elements import (
     ServiceTask,
 )
 from m2pem.mission.mission import Mission
+from m2pem.suggestions import did_you_mean
+from m2pem.units import Dimension, UnitError, article, quantity
 
 DETECTOR_SERVICE = "Detector"
 

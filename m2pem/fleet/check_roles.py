@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import resources_of
 from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.nearmiss import did_you_mean, suggest
 from m2pem.mission.behavior import Role, RoleKind
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.elements import Activity
+from m2pem.suggestions import did_you_mean, suggest
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,15 +7,16 @@ from typing import Any
 from pydantic import ValidationError
 
 from m2pem.errors import FleetError
-from m2pem.fleet.distance import NO_ORIGIN, Origin, geometry_out_of_reach
 from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy, Payload, Team, Vehicle
 from m2pem.fleet.fleet_schema import DeconflictionModel, FleetModel, VehicleModel
-from m2pem.fleet.geofiles import GeometryError, read_geometry
-from m2pem.fleet.nearmiss import suggest
 from m2pem.fleet.shape_findings import note_shape_findings
 from m2pem.fleet.yaml_source import YamlSource, read_yaml
+from m2pem.geo.files import GeometryError, read_geometry
+from m2pem.geo.local_frame import Origin
+from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
+from m2pem.suggestions import suggest
 
 _GEOMETRY_KINDS = {"routes": "route", "areas": "area", "points": "point"}
 

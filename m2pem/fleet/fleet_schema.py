@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 from pydantic.json_schema import WithJsonSchema
 
-from m2pem.fleet.units import UNITS, Dimension, quantity
+from m2pem.units import UNITS, Dimension, quantity
 
 
 def _reader(dimension: Dimension) -> Callable[[object], float]:

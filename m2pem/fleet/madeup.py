@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import DETECTOR_SERVICE
 from m2pem.fleet.fleet import Domain, Fleet, Payload, Team, Vehicle
-from m2pem.fleet.local_positions import is_local
+from m2pem.geo.positions import is_local
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import ParameterKind, ResourceId
 from m2pem.mission.elements import ScriptTask, SendTask, ServiceTask

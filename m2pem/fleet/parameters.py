@@ -5,27 +5,32 @@ when the task starts.
 """
 
 import json
+import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
 from m2pem.errors import M2pemError
 from m2pem.fleet.behaviors import ALTITUDE_FRAME, takes_altitude
-from m2pem.fleet.distance import NO_ORIGIN, Origin, out_of_reach
-from m2pem.fleet.geojson import GeometryError, coordinate, kind_of
-from m2pem.fleet.local_positions import is_local, local_point
-from m2pem.fleet.nearmiss import did_you_mean, suggest
-from m2pem.fleet.offsets import REMEDY, read_offsets
-from m2pem.fleet.units import UNITS, Dimension, UnitError, article, plain_number, quantity
+from m2pem.geo.geojson import GeometryError, coordinate, kind_of
+from m2pem.geo.local_frame import Origin
+from m2pem.geo.positions import NO_ORIGIN, is_local, local_point, out_of_reach
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ParameterSpec
 from m2pem.mission.geometry import Geometry, Point, VehiclePosition
 from m2pem.mission.values import Value
+from m2pem.suggestions import did_you_mean, suggest
+from m2pem.units import UNITS, Dimension, UnitError, article, plain_number, quantity
 
 ResolvedValue: TypeAlias = float | int | bool | str | Geometry | None
 """A parameter's value after units and names are resolved: SI numbers, texts, geometries."""
 
 FindGeometry: TypeAlias = Callable[[str], Geometry | None]
 """The geometry of a name: what an operator handed over, else the fleet's; None if there is none."""
+
+Offset: TypeAlias = tuple[float, float]
+"""Metres behind the lead, and to its left; less than 0: ahead of it, and to its right."""
+
+_OFFSETS_REMEDY = "write [[behind, left], ...] in metres, one for each member after the lead"
 
 _DIMENSIONS = {
     ParameterKind.DURATION: Dimension.DURATION,
@@ -255,7 +260,7 @@ def _offsets(value: Value) -> str:
     try:
         return json.dumps(read_offsets(value))
     except ValueError as error:
-        raise _ProblemError("bad-value", str(error), REMEDY) from None
+        raise _ProblemError("bad-value", str(error), _OFFSETS_REMEDY) from None
 
 
 def _boolean(value: Value) -> bool:
@@ -290,3 +295,32 @@ def _bounded(spec: ParameterSpec, number: float | int) -> float | int:
         message = f"{number:g}{unit} is above {spec.maximum:g}{unit}"
         raise _ProblemError("out-of-bounds", message)
     return number
+
+
+def read_offsets(value: Value) -> tuple[Offset, ...]:
+    """The offsets of the members after the lead, from a list or its text.
+
+    Raises:
+        ValueError: it is no list of pairs of numbers, or two members would be in one place.
+    """
+    if isinstance(value, str):
+        try:
+            value = json.loads(value)
+        except (ValueError, RecursionError):
+            raise ValueError(f"{value!r} is no list of offsets") from None
+    if not isinstance(value, list) or not value:
+        raise ValueError(f"{value!r} is no list of offsets")
+    found: list[Offset] = [(0.0, 0.0)]
+    for pair in value:
+        if not isinstance(pair, list) or len(pair) != 2 or not all(map(_is_number, pair)):
+            raise ValueError(f"{pair!r} is no offset")
+        place = float(pair[0]), float(pair[1])  # type: ignore[arg-type]  # numbers, as was seen
+        if place in found:
+            raise ValueError(f"two members would be at {pair!r}")
+        found.append(place)
+    return tuple(found[1:])
+
+
+def _is_number(value: Value) -> bool:
+    plain = isinstance(value, int | float) and not isinstance(value, bool)
+    return plain and math.isfinite(float(value))  # type: ignore[arg-type]  # it is a number

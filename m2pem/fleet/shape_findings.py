@@ -6,8 +6,8 @@ from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from m2pem.fleet.nearmiss import did_you_mean, suggest
 from m2pem.fleet.yaml_source import KeyPath, YamlSource
+from m2pem.suggestions import did_you_mean, suggest
 
 _EXPECTED = {
     "model_type": "is not a map",

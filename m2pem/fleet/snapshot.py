@@ -9,7 +9,7 @@ import msgspec
 
 from m2pem.errors import JournalError
 from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.geojson import kind_of
+from m2pem.geo.geojson import kind_of
 from m2pem.mission.geometry import Area, Geometry, Point, Route, VehiclePosition
 
 VERSION = 1

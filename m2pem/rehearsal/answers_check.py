@@ -5,7 +5,6 @@ from collections.abc import Collection, Mapping
 from m2pem.engine.elements.behaviors import RECOVERY_DECISIONS
 from m2pem.engine.elements.subprocesses import COMPLETE
 from m2pem.findings import Finding
-from m2pem.fleet.nearmiss import suggest
 from m2pem.fleet.yaml_source import YamlSource
 from m2pem.mission.elements import (
     Activity,
@@ -18,6 +17,7 @@ from m2pem.mission.elements import (
 )
 from m2pem.mission.mission import Mission
 from m2pem.rehearsal.answers_file import AnswersModel, TimedEntry
+from m2pem.suggestions import suggest
 
 
 def check(model: AnswersModel, source: YamlSource, mission: Mission) -> list[Finding]:

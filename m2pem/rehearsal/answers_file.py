@@ -18,8 +18,8 @@ from pydantic import (
 
 from m2pem.errors import AnswersError
 from m2pem.fleet.shape_findings import note_shape_findings
-from m2pem.fleet.units import Dimension, quantity
 from m2pem.fleet.yaml_source import YamlSource, parse_yaml, read_yaml
+from m2pem.units import Dimension, quantity
 
 _NAME = "answers.yaml"
 """What findings call a text that did not come from a file."""

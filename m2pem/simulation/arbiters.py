@@ -26,7 +26,7 @@ from m2pem.simulation.detectors import Detectors
 from m2pem.simulation.effects import Effect
 from m2pem.simulation.executions import Body, Execution, Strike
 from m2pem.simulation.faults import Fault, FaultList
-from m2pem.simulation.frame import Frame
+from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.launch import Launcher
 from m2pem.simulation.links import Links
 from m2pem.simulation.memory import Memory
@@ -61,7 +61,7 @@ class SimArbiter:
         self._logger = context.logger
         self._context = context
         now_us = context.clock.now_us()
-        self._frame = frame = Frame(context.origin)
+        self._frame = frame = FlatFrame(context.origin)
         self._settings = {
             resource: read_settings(connection, context.origin)
             for resource, connection in connections.items()

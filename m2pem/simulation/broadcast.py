@@ -7,7 +7,7 @@ from m2pem.api.telemetry import Detection, GeoPosition, PayloadState, VehicleSta
 from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.agenda import Agenda, Entry
 from m2pem.simulation.executions import Body
-from m2pem.simulation.frame import Frame
+from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.phases import Look, Vector
 from m2pem.simulation.track import US_PER_S
@@ -27,7 +27,7 @@ class Broadcast:
         self,
         bodies: Mapping[ResourceId, Body],
         rates_hz: Mapping[ResourceId, float],
-        frame: Frame,
+        frame: FlatFrame,
         agenda: Agenda,
         audible: Callable[[ResourceId], bool],
     ) -> None:
@@ -95,5 +95,5 @@ class Broadcast:
         if self._seen_from.get(payload.id) != seen_from:
             self._seen_from[payload.id] = seen_from
             corners = payload.ground(now_us, pose, carrier.home[2])
-            self._seen[payload.id] = tuple(self._frame.geo(corner) for corner in corners)
+            self._seen[payload.id] = tuple(self._frame.to_position(corner) for corner in corners)
         return self._seen[payload.id]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from m2pem.api.telemetry import Detection, GeoPosition
 from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.agenda import Agenda, Entry
-from m2pem.simulation.frame import Frame
+from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.settings import Coordinates
 from m2pem.simulation.track import US_PER_S
@@ -35,7 +35,7 @@ class Detectors:
     def __init__(
         self,
         bodies: Mapping[ResourceId, SimVehicle | SimPayload],
-        frame: Frame,
+        frame: FlatFrame,
         agenda: Agenda,
         found: Callable[[SimPayload, Detection, int], None],
         keep: Callable[[ResourceId, Iterable[int]], None],
@@ -73,7 +73,7 @@ class Detectors:
         """A vehicle that is not simulated was heard: its simulated detector may find something."""
         for detector in self._detectors:
             if detector.payload.carrier == vehicle and detector.carrier is None:
-                place = self._frame.level(position.latitude_deg, position.longitude_deg)
+                place = self._frame.to_place(position.latlon)
                 reach = detector.payload.settings.detection_range_m
                 for number, target in self._unfound(detector):
                     if math.dist(place, target) <= reach:
@@ -102,7 +102,7 @@ class Detectors:
         for index, target in enumerate(settings.targets):
             number = len(settings.detections) + index
             if number not in detector.found:
-                yield number, self._frame.level(target.position[0], target.position[1])
+                yield number, self._frame.to_place(target.position[:2])
 
     def _look(self, detector: _Detector, now_us: int) -> None:
         for entry in detector.entries:
@@ -145,7 +145,7 @@ class Detectors:
         if position is None:
             if detector.carrier is None:
                 return GeoPosition(*self._frame.origin)
-            return self._frame.geo(detector.carrier.pose(at_us).place)
+            return self._frame.to_position(detector.carrier.pose(at_us).place)
         altitude = self._frame.origin[2] if position[2] is None else position[2]
         return GeoPosition(position[0], position[1], altitude)
 

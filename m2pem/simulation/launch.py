@@ -9,12 +9,11 @@ from msgspec.structs import replace
 from m2pem.api.arbiter import ArbiterContext, BehaviorRequest, Connection
 from m2pem.api.refusal import refusal
 from m2pem.api.telemetry import GeoPosition, VehicleState
-from m2pem.fleet.nearmiss import suggest
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.simulation.abilities import payload_behaviors, vehicle_behaviors
 from m2pem.simulation.executions import Aim, Body, Chase
-from m2pem.simulation.frame import Frame
+from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.gimbals import GAZES, MAST_M
 from m2pem.simulation.manoeuvres import MANOEUVRES, Manoeuvre
 from m2pem.simulation.payloads import SimPayload
@@ -23,6 +22,7 @@ from m2pem.simulation.shots import Shots
 from m2pem.simulation.track import Plan
 from m2pem.simulation.vehicles import SimVehicle, carrier_of
 from m2pem.simulation.wishes import RefusedError, Wishes
+from m2pem.suggestions import suggest
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Launcher:
         self,
         connections: Mapping[ResourceId, Connection],
         context: ArbiterContext,
-        frame: Frame,
+        frame: FlatFrame,
         bodies: Mapping[ResourceId, Body],
     ) -> None:
         self._connections = connections
@@ -61,7 +61,9 @@ class Launcher:
         if not isinstance(state, VehicleState) or state.position is None:
             return None
         try:
-            level = self._frame.level(state.position.latitude_deg, state.position.longitude_deg)
+            level = self._frame.to_place(
+                (state.position.latitude_deg, state.position.longitude_deg)
+            )
         except ValueError:
             return None
         up = state.position.altitude_m - self._frame.origin[2]
@@ -74,7 +76,7 @@ class Launcher:
         if pose is None:
             return None
         east, north, up = pose.place
-        return self._frame.geo((east, north, up + MAST_M))
+        return self._frame.to_position((east, north, up + MAST_M))
 
     def assign(self, request: BehaviorRequest, now_us: int) -> list[Assignment]:
         """What each of the request's resources does.

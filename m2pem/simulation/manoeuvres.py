@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
-from m2pem.fleet.lawn_mower import lawn_mower, longest_edge_yaw
+from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
 from m2pem.mission.geometry import Area
 from m2pem.simulation.course import Course, Craft
 from m2pem.simulation.phases import Pose, Vector

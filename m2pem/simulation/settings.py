@@ -13,11 +13,12 @@ from typing import Any
 from m2pem.api.arbiter import Connection
 from m2pem.errors import FleetError
 from m2pem.findings import Finding, Severity
-from m2pem.fleet.distance import NO_ORIGIN, Origin, out_of_reach
-from m2pem.fleet.units import Dimension, quantity
+from m2pem.geo.local_frame import Origin
+from m2pem.geo.positions import NO_ORIGIN, out_of_reach
 from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.domains import DEFAULTS, Kinematics
 from m2pem.simulation.faults import FAULT_KINDS, Fault
+from m2pem.units import Dimension, quantity
 
 Coordinates = tuple[float, float, float | None]
 

@@ -7,7 +7,7 @@ from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.course import ALOFT_M, Course, Craft
 from m2pem.simulation.domains import STANDING_LOAD
-from m2pem.simulation.frame import Frame
+from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.manoeuvres import yaw_of
 from m2pem.simulation.phases import Pose, Stand, Vector
 from m2pem.simulation.retiming import retimed
@@ -25,7 +25,7 @@ class SimVehicle:
     """
 
     def __init__(
-        self, connection: Connection, settings: Settings, frame: Frame, place: int, now_us: int
+        self, connection: Connection, settings: Settings, frame: FlatFrame, place: int, now_us: int
     ) -> None:
         self.id: ResourceId = connection.resource
         self.domain = connection.domain
@@ -42,12 +42,12 @@ class SimVehicle:
         yaw = yaw_of(settings.heading_rad)
         self.track: Track[Pose] = Track(Plan([Stand(self.home, yaw, 0.0, 0.0)]), now_us)
 
-    def _home(self, frame: Frame, place: int) -> Vector:
+    def _home(self, frame: FlatFrame, place: int) -> Vector:
         if self.settings.home is None:
             return (0.0, -_PARKING_GAP_M * place, 0.0)
         latitude, longitude, altitude = self.settings.home
         up = 0.0 if altitude is None else altitude - frame.origin[2]
-        return (*frame.level(latitude, longitude), up)
+        return (*frame.to_place((latitude, longitude)), up)
 
     def pose(self, now_us: int) -> Pose:
         """Where it is, and how it moves."""
@@ -139,7 +139,7 @@ class SimVehicle:
                 high = middle
         return high
 
-    def state(self, now_us: int, frame: Frame) -> VehicleState:
+    def state(self, now_us: int, frame: FlatFrame) -> VehicleState:
         """What it says about itself."""
         pose = self.pose(now_us)
         battery = self.battery_at(now_us)
@@ -147,7 +147,7 @@ class SimVehicle:
         return VehicleState(
             resource=self.id,
             time_us=now_us,
-            position=frame.geo(pose.place),
+            position=frame.to_position(pose.place),
             altitude_above_home_m=pose.place[2] - self.home[2],
             velocity_enu_m_s=pose.velocity,
             yaw_rad=math.remainder(pose.yaw, math.tau),

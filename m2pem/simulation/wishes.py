@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
 from m2pem.simulation.course import Craft
-from m2pem.simulation.frame import Frame
+from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.phases import Pose, Vector
 
 
@@ -27,7 +27,7 @@ class Wishes:
     """
 
     values: Mapping[str, ResolvedValue]
-    frame: Frame
+    frame: FlatFrame
     whereabouts: Callable[[str], Pose | None]
 
     def number(self, name: str) -> float | None:
@@ -128,6 +128,6 @@ class Wishes:
 
     def _level(self, parameter: str, place: Coordinate) -> tuple[float, float]:
         try:
-            return self.frame.level(place[0], place[1])
+            return self.frame.to_place(place[:2])
         except ValueError as error:
             raise RefusedError(f"parameter '{parameter}': {error}") from None

@@ -269,7 +269,7 @@ class Teams:
             scheme.plan,
             members,
             self._context.clock,
-            lambda member: self._scene.look(member, scheme.plane),
+            lambda member: self._scene.look(member, scheme.frame),
             tell,
             lambda reference: self._ledger.refer(request.id, reference.text()),
             show,

@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from m2pem.fleet.lawn_mower import lawn_mower, longest_edge_yaw
 from m2pem.fleet.parameters import accepted
+from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
 from m2pem.mission.geometry import Area, Route, VehiclePosition
 from m2pem.teams.bands import Pass, bands, strips, turned
 from m2pem.teams.plan import Leg, Plan, Setting, TeamRefusedError

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from itertools import accumulate, combinations, pairwise
 
-from m2pem.fleet.offsets import read_offsets
+from m2pem.fleet.parameters import read_offsets
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
 from m2pem.teams.path import Path

@@ -5,12 +5,15 @@ from dataclasses import dataclass, field, replace
 
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.fleet.parameters import accepted
+from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
 from m2pem.teams.motion import MOTIONS, Motion
 from m2pem.teams.path import Path
-from m2pem.teams.plane import MAX_RANGE_M, Plane
 from m2pem.teams.shapes import Vector
+
+MAX_RANGE_M = 100_000.0
+"""Farther from its members than this a team does not work."""
 
 _FLYING_OR_DIVING = ("air", "subsurface")
 
@@ -90,7 +93,7 @@ class Setting:
     domains: Mapping[ResourceId, str]
     offered: Mapping[ResourceId, Mapping[str, BehaviorSpec]]
     parameters: Mapping[str, ResolvedValue]
-    plane: Plane
+    frame: LocalFrame
     stands: Mapping[ResourceId, Stand] = field(default_factory=dict)
     target: Stand | None = None
     begun: bool = False
@@ -133,12 +136,12 @@ class Setting:
         raise TeamRefusedError(f"parameter 'target': the position of {what} is not known")
 
     def level(self, place: Coordinate) -> tuple[float, float]:
-        """A coordinate on the plane.
+        """A coordinate on the frame.
 
         Raises:
             TeamRefusedError: it is too far away.
         """
-        east, north = self.plane.level(place[0], place[1])
+        east, north = self.frame.to_local(place[:2])
         if max(abs(east), abs(north)) > MAX_RANGE_M:
             raise TeamRefusedError(
                 f"[{place[0]}, {place[1]}] is more than {MAX_RANGE_M / 1000:.0f} km away"
@@ -147,7 +150,7 @@ class Setting:
 
     def coordinate(self, place: Vector | tuple[float, float], up_m: float | None) -> Coordinate:
         """A place of the plane as a coordinate, with that altitude."""
-        return (*self.plane.geo(place[0], place[1]), up_m)
+        return (*self.frame.to_latlon(place[:2]), up_m)
 
     def motion(self, member: ResourceId) -> Motion:
         """How a member moves."""

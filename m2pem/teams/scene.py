@@ -8,11 +8,11 @@ from m2pem.api.bus import FleetBus
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import VehicleState
 from m2pem.fleet.fleet import Fleet
+from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import VehiclePosition
 from m2pem.teams.offers import Offers
 from m2pem.teams.plan import Plan, Setting, Stand, TeamRefusedError
-from m2pem.teams.plane import Plane
 from m2pem.teams.planning import PLANS, alike
 
 SEEN_WITHIN_S = 1.5
@@ -26,7 +26,7 @@ class Scheme:
     """A plan, and the plane that its places are in."""
 
     plan: Plan
-    plane: Plane
+    frame: LocalFrame
 
 
 class Scene:
@@ -60,7 +60,7 @@ class Scene:
         if not request.resources:
             raise TeamRefusedError(f"{request.behavior} has no members")
         if request.behavior not in PLANS:
-            return Scheme(alike(request), Plane(0.0, 0.0))
+            return Scheme(alike(request), LocalFrame((0.0, 0.0)))
         states = {member: self._state(member) for member in request.resources}
         for member, state in states.items():
             if state is None:
@@ -68,19 +68,19 @@ class Scene:
         first = states[request.resources[0]]
         if first is None or first.position is None:
             raise TeamRefusedError(f"the position of {request.resources[0]} is not known")
-        plane = Plane(first.position.latitude_deg, first.position.longitude_deg)
+        frame = LocalFrame(first.position.latlon)
         target = request.parameters.get("target")
         seen = None
         if isinstance(target, VehiclePosition):
-            seen = self.look(ResourceId(target.vehicle), plane)
+            seen = self.look(ResourceId(target.vehicle), frame)
         vehicles = {each: self._fleet.vehicles[each] for each in request.resources}
         setting = Setting(
             request.resources,
             {each: vehicle.domain.value for each, vehicle in vehicles.items()},
             {each: self._offers.alone(each) for each in request.resources},
             request.parameters,
-            plane,
-            {each: stand_of(plane, state) for each, state in states.items() if state is not None},
+            frame,
+            {each: stand_of(frame, state) for each, state in states.items() if state is not None},
             seen,
             begun,
             {each: v.cruise_speed_m_s for each, v in vehicles.items() if v.cruise_speed_m_s},
@@ -91,7 +91,7 @@ class Scene:
             },
             split,
         )
-        return Scheme(PLANS[request.behavior](setting), plane)
+        return Scheme(PLANS[request.behavior](setting), frame)
 
     async def until_seen(self, request: BehaviorRequest, clock: Clock) -> None:
         """Wait a moment for members that have not been heard since the start of the executive."""
@@ -101,10 +101,10 @@ class Scene:
             await clock.sleep(LOOK_EVERY_S)
             waited_s += LOOK_EVERY_S
 
-    def look(self, vehicle: ResourceId, plane: Plane) -> Stand | None:
+    def look(self, vehicle: ResourceId, frame: LocalFrame) -> Stand | None:
         """Where a vehicle is; None: nobody knows."""
         state = self._state(vehicle)
-        return None if state is None else stand_of(plane, state)
+        return None if state is None else stand_of(frame, state)
 
     def _state(self, vehicle: ResourceId) -> VehicleState | None:
         sighted = self._sighted.get(vehicle)
@@ -123,9 +123,9 @@ def lasts_s(endurance_s: float, state: VehicleState | None) -> float:
     return endurance_s * max(0.0, (1.0 if charged is None else charged) - LEFT_OVER)
 
 
-def stand_of(plane: Plane, state: VehicleState) -> Stand:
+def stand_of(frame: LocalFrame, state: VehicleState) -> Stand:
     """A vehicle on the plane; its position must be known."""
     if state.position is None:
         raise ValueError(f"the position of {state.resource} is not known")
-    place = plane.level(state.position.latitude_deg, state.position.longitude_deg)
+    place = frame.to_local(state.position.latlon)
     return Stand(place, state.yaw_rad)

@@ -1,6 +1,6 @@
 """Where the members of a team stand to each other, and the routes that keep them so.
 
-Pure geometry in a local plane: east, north and up in metres.
+Pure geometry in a local frame: east, north and up in metres.
 """
 
 import math

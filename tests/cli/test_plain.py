@@ -22,8 +22,8 @@ from m2pem.cli.plain import PlainOcu
 from m2pem.cli.writer import writer_for
 from m2pem.engine.records import Record, RunEnded, RunOutcome, RunStarted
 from m2pem.errors import BusyError, OperatorError
-from m2pem.fleet.geofiles import read_geometry
-from m2pem.fleet.geojson import parse_geojson
+from m2pem.geo.files import read_geometry
+from m2pem.geo.geojson import parse_geojson
 from m2pem.mission.behavior import Decision
 from tests.command_line import REPOSITORY
 

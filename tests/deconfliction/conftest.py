@@ -19,10 +19,10 @@ from m2pem.mission.geometry import Geometry
 from m2pem.plugins import PluginManager
 from tests.executive.conftest import mission, sequence
 
-from .sky import GROUND_M, PLANE
+from .sky import FRAME, GROUND_M
 
 START_US = 1_767_225_600_000_000
-ORIGIN = (*PLANE.geo(0.0, 0.0), GROUND_M)
+ORIGIN = (*FRAME.to_latlon((0.0, 0.0)), GROUND_M)
 Homes = Mapping[str, tuple[float, float]]
 
 
@@ -91,7 +91,7 @@ class World:
         state = self.executive.bus.latest(ResourceId(name))
         assert isinstance(state, VehicleState)
         assert state.position is not None
-        where = PLANE.level(state.position.latitude_deg, state.position.longitude_deg)
+        where = FRAME.to_local(state.position.latlon)
         return (*where, state.position.altitude_m - GROUND_M)
 
     def apart_m(self, one: str, other: str) -> tuple[float, float]:
@@ -147,7 +147,7 @@ def play(tmp_path: Path) -> Play:
         vehicles = {}
         for name, home in homes.items():
             domain = Domain.GROUND if name in ground else Domain.AIR
-            given = {"home": [*PLANE.geo(*home)], **(settings or {})}
+            given = {"home": [*FRAME.to_latlon(home)], **(settings or {})}
             vehicles[ResourceId(name)] = Vehicle(ResourceId(name), domain, "sim", given)
         members = tuple(name for name in vehicles if name not in others)
         fleet = Fleet(

@@ -1,4 +1,4 @@
-"""Aircraft over a plane, and requests for them, in metres east and north of one place."""
+"""Aircraft over a frame, and requests for them, in metres east and north of one place."""
 
 import itertools
 from typing import Any
@@ -8,12 +8,12 @@ from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.deconfliction.ledger import Airspace
 from m2pem.deconfliction.volume import Separation
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle
+from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Area, Point, Route
-from m2pem.teams.plane import Plane
 
-PLANE = Plane(38.0, -77.0)
+FRAME = LocalFrame((38.0, -77.0))
 GROUND_M = 60.0
 """Of the ground, above mean sea level."""
 
@@ -23,7 +23,7 @@ NUMBERS = itertools.count(1)
 
 def place(east: float, north: float, up: float | None = None) -> Any:
     """A coordinate."""
-    return (*PLANE.geo(east, north), up)
+    return (*FRAME.to_latlon((east, north)), up)
 
 
 def point(east: float, north: float, up: float | None = None) -> Point:
@@ -70,7 +70,7 @@ def state(
     return VehicleState(
         ResourceId(name),
         time_us,
-        GeoPosition(*PLANE.geo(east, north), GROUND_M + up),
+        GeoPosition(*FRAME.to_latlon((east, north)), GROUND_M + up),
         up,
         **{"velocity_enu_m_s": (0.0, 0.0, 0.0), "armed": up > 0, **more},
     )

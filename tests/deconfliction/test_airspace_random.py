@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from m2pem.api.arbiter import BehaviorRequest
-from m2pem.fleet.lawn_mower import lawn_mower, longest_edge_yaw
+from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
 
-from .sky import NOW_US, PLANE, airspace, area, claim, point, request, route, state
+from .sky import FRAME, NOW_US, airspace, area, claim, point, request, route, state
 
 VERTICAL_M, HORIZONTAL_M = 10.0, 20.0
 STEP_M = 2.0
@@ -77,16 +77,16 @@ def flight(task: tuple[str, dict[str, Any], Where], home: Where, steep: bool) ->
             to(home[0], home[1], max(up, 30.0))
         to(way[-1][0], way[-1][1], 0.0)
     elif behavior == "single_vehicle_routing":
-        points = [(*PLANE.level(*each[:2]), each[2]) for each in parameters["route"].waypoints]
+        points = [(*FRAME.to_local(each[:2]), each[2]) for each in parameters["route"].waypoints]
         for e, n, u in [*points, points[0]] if parameters.get("loop") else points:
             to(e, n, height if u is None else u)
     elif behavior == "area_survey":
-        ring = [PLANE.level(*corner[:2]) for corner in parameters["area"].rings[0]]
+        ring = [FRAME.to_local(corner[:2]) for corner in parameters["area"].rings[0]]
         for e, n in lawn_mower([ring], parameters["spacing"], longest_edge_yaw(ring)):
             to(e, n, height)
     elif behavior in ("orbit", "area_observe", "goto"):
         target = parameters["target"].position
-        e, n = PLANE.level(*target[:2])
+        e, n = FRAME.to_local(target[:2])
         height = height if target[2] is None or "altitude" in parameters else target[2]
         if behavior == "goto":
             to(e, n, height)

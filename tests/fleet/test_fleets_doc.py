@@ -10,8 +10,8 @@ from ruamel.yaml import YAML
 
 from m2pem.fleet.behaviors import ALTITUDE_FRAME, SHARED
 from m2pem.fleet.fleet_schema import fleet_schema
-from m2pem.fleet.units import UNITS
 from m2pem.mission.catalogue import ParameterKind
+from m2pem.units import UNITS
 
 TEXT = (Path(__file__).parents[2] / "docs" / "fleets.md").read_text(encoding="utf-8")
 

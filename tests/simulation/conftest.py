@@ -14,7 +14,7 @@ from m2pem.executive.clock import run_virtual
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Area, Coordinate, Route
 from m2pem.simulation.arbiters import SimArbiter
-from m2pem.simulation.frame import Frame
+from m2pem.simulation.frame import FlatFrame
 from m2pem.testing.contracts.bench import JOURNAL, ORIGIN, ArbiterBench, context
 
 START_US = 1_767_225_600_000_000
@@ -67,7 +67,7 @@ def simulate() -> Simulate:
 
 def place(east_m: float, north_m: float, altitude_m: float | None = None) -> Coordinate:
     """A coordinate so far from the origin of the bench."""
-    geo = Frame(ORIGIN).geo((east_m, north_m, 0.0))
+    geo = FlatFrame(ORIGIN).to_position((east_m, north_m, 0.0))
     return geo.latitude_deg, geo.longitude_deg, altitude_m
 
 
@@ -85,4 +85,4 @@ def area(*corners: tuple[float, float]) -> Area:
 def local(position: GeoPosition | None) -> tuple[float, float]:
     """Metres east and north of the origin."""
     assert position is not None
-    return Frame(ORIGIN).level(position.latitude_deg, position.longitude_deg)
+    return FlatFrame(ORIGIN).to_place(position.latlon)

@@ -8,7 +8,7 @@ from conftest import ORIGIN, Fleet, Simulate
 from m2pem.api.telemetry import PayloadState
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.footprints import RANGE_M, around, seen
-from m2pem.simulation.frame import Frame
+from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.gimbals import MAST_M
 from m2pem.simulation.phases import Look, Pose
 from m2pem.simulation.settings import Gimbal
@@ -84,12 +84,12 @@ def test_states_of_payloads_tell_what_they_see(simulate: Simulate) -> None:
     async def main(bench: ArbiterBench, _: SimArbiter) -> None:
         await bench.start("r1.b1", "ptz_point_at", "uav/ptz", bearing=0.0, elevation=-1.0)
         await bench.ended("r1.b1", 60)
-        frame = Frame(ORIGIN)
+        frame = FlatFrame(ORIGIN)
 
         def places(resource: str) -> list[tuple[float, float]]:
             state = bench.latest(resource)
             assert isinstance(state, PayloadState)
-            return [frame.level(c.latitude_deg, c.longitude_deg) for c in state.footprint]
+            return [frame.to_place(c.latlon) for c in state.footprint]
 
         ahead = places("uav/ptz")
         assert len(ahead) == 4

@@ -321,7 +321,7 @@ def test_a_target_elsewhere_is_followed_as_it_is_heard_on_the_bus(simulate: Simu
         frame = arbiter._launcher._frame
         stranger = ResourceId("stranger")
         arbiter._context.bus.publish(
-            VehicleState(stranger, START_US, frame.geo((200.0, 0.0, 0.0)), yaw_rad=0.0)
+            VehicleState(stranger, START_US, frame.to_position((200.0, 0.0, 0.0)), yaw_rad=0.0)
         )
         await bench.start("r1.b1", "follow", "ugv", target=VehiclePosition("stranger"), offset=10.0)
         await bench.clock.sleep(120)

@@ -9,13 +9,13 @@ from m2pem.api.arbiter import ArbiterContext, BehaviorId, BehaviorRequest, Conne
 from m2pem.api.goals import GoalArbiter
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.fleet.behaviors import SHARED
+from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, Route, VehiclePosition
-from m2pem.teams.plane import Plane
 
 ORIGIN = (38.1075, -77.3192, 60.0)
-PLANE = Plane(ORIGIN[0], ORIGIN[1])
+FRAME = LocalFrame((ORIGIN[0], ORIGIN[1]))
 STEP_S = 0.1
 _NEAR_M = 1e-6
 
@@ -120,7 +120,7 @@ class CartArbiter(GoalArbiter):
             if not driven.mute:
                 self._step(resource, driven)
                 cart = driven.cart
-                latitude, longitude = PLANE.geo(*cart.place)
+                latitude, longitude = FRAME.to_latlon(cart.place)
                 state = VehicleState(
                     resource,
                     self.context.clock.now_us(),
@@ -152,9 +152,9 @@ class CartArbiter(GoalArbiter):
         cart.wished_m_s = speed if isinstance(speed, float) else 5.0
         match request.parameters:
             case {"route": Route(waypoints=waypoints)}:
-                cart.ahead = [PLANE.level(each[0], each[1]) for each in waypoints]
+                cart.ahead = [FRAME.to_local(each[:2]) for each in waypoints]
             case {"target": Point(position=position)}:
-                cart.ahead = [PLANE.level(position[0], position[1])]
+                cart.ahead = [FRAME.to_local(position[:2])]
             case {"target": VehiclePosition(vehicle=vehicle)}:
                 driven.target = vehicle
                 driven.offset_m = float(request.parameters.get("offset") or 0.0)  # type: ignore[arg-type]
@@ -189,7 +189,9 @@ class CartArbiter(GoalArbiter):
         if driven.target and driven.became is None:
             state = self.context.bus.latest(ResourceId(driven.target))
             if isinstance(state, VehicleState) and state.position and state.yaw_rad is not None:
-                east, north = PLANE.level(state.position.latitude_deg, state.position.longitude_deg)
+                east, north = FRAME.to_local(
+                    (state.position.latitude_deg, state.position.longitude_deg)
+                )
                 way = state.yaw_rad - driven.bearing_rad
                 cart.ahead = [
                     (

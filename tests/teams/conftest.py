@@ -17,19 +17,19 @@ from m2pem.mission.geometry import Area, Geometry, Route
 from m2pem.plugins import PluginManager
 from tests.executive.conftest import mission, sequence
 
-from .carts import ORIGIN, PLANE, CartArbiter, WillingCartArbiter, Yard
+from .carts import FRAME, ORIGIN, CartArbiter, WillingCartArbiter, Yard
 
 START_US = 1_767_225_600_000_000
 
 
 def route(*places: tuple[float, float]) -> Route:
     """A route through places in metres east and north of the origin."""
-    return Route(tuple((*PLANE.geo(*place), None) for place in places))
+    return Route(tuple((*FRAME.to_latlon(place), None) for place in places))
 
 
 def area(*corners: tuple[float, float]) -> Area:
     """A polygon with these corners."""
-    ring = tuple((*PLANE.geo(*corner), None) for corner in corners)
+    ring = tuple((*FRAME.to_latlon(corner), None) for corner in corners)
     return Area(((*ring, ring[0]),))
 
 

@@ -16,7 +16,7 @@ from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import SETTINGS
 from m2pem.simulation.arbiters import SimArbiter
 
-from .carts import ORIGIN, PLANE
+from .carts import FRAME, ORIGIN
 from .conftest import START_US
 
 Places = Mapping[str, tuple[float, float]]
@@ -36,7 +36,11 @@ def sim_fleet(
     payloads = {}
     for name, place in places.items():
         vehicle, camera = ResourceId(name), ResourceId(f"{name}/cam")
-        own = {"home": [*PLANE.geo(*place)], "heading": "90 deg", **(settings or {}).get(name, {})}
+        own = {
+            "home": [*FRAME.to_latlon(place)],
+            "heading": "90 deg",
+            **(settings or {}).get(name, {}),
+        }
         domain = (domains or {}).get(name, Domain.GROUND)
         vehicles[vehicle] = Vehicle(vehicle, domain, "sim", own, payloads=(camera,))
         payloads[camera] = Payload(camera, vehicle, "sim", {"kind": "ptz"})
@@ -69,7 +73,7 @@ class Rehearsed:
         """Where a vehicle is, in metres; it must be heard."""
         state = self.sim.sight(ResourceId(name))
         assert state is not None and state.position is not None, name
-        return PLANE.level(state.position.latitude_deg, state.position.longitude_deg)
+        return FRAME.to_local(state.position.latlon)
 
     def speed_m_s(self, name: str) -> float:
         """How fast a vehicle is; it must be heard."""

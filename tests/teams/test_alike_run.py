@@ -8,7 +8,7 @@ from m2pem.api.control import RunStatus
 from m2pem.mission.catalogue import BehaviorState
 from tests.executive.conftest import mission, sequence
 
-from .carts import PLANE, Yard
+from .carts import FRAME, Yard
 from .conftest import Play, World
 
 
@@ -25,7 +25,7 @@ def all_do(name: str, *vehicles: str, **parameters: str) -> bytes:
 
 
 def far(east_m: float) -> str:
-    latitude, longitude = PLANE.geo(east_m, 0.0)
+    latitude, longitude = FRAME.to_latlon((east_m, 0.0))
     return f"[{latitude}, {longitude}]"
 
 

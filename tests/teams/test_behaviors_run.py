@@ -14,7 +14,7 @@ from m2pem.engine.records import BehaviorProgressed
 from m2pem.fleet.fleet import Domain
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 
-from .carts import PLANE, Yard
+from .carts import FRAME, Yard
 from .conftest import Play, World, area, one_task, route
 
 BRIDGE = {"bridge": route((50, 0), (150, 0))}
@@ -29,7 +29,9 @@ def places(world: World) -> dict[str, tuple[float, float]]:
         state = world.executive.bus.latest(name)
         assert isinstance(state, VehicleState)
         assert state.position is not None
-        found[str(name)] = PLANE.level(state.position.latitude_deg, state.position.longitude_deg)
+        found[str(name)] = FRAME.to_local(
+            (state.position.latitude_deg, state.position.longitude_deg)
+        )
     return found
 
 

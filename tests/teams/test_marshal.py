@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from m2pem.fleet.behaviors import SHARED
+from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.behavior import PERIOD_S
@@ -15,9 +16,8 @@ from m2pem.teams.columns import lane_mates, march
 from m2pem.teams.marshal import Marshal
 from m2pem.teams.motion import MOTIONS
 from m2pem.teams.plan import March, Plan, Setting, Stand
-from m2pem.teams.plane import Plane
 
-from .carts import PLANE, Cart
+from .carts import FRAME, Cart
 from .conftest import route
 
 STEP_S = 0.05
@@ -45,7 +45,7 @@ class Field:
             dict.fromkeys(names, "ground"),
             {name: {"single_vehicle_routing": ROUTING} for name in names},
             {"route": route(*places), "shape": shape, "spacing": spacing_m, "speed": speed_m_s},
-            _PLANE,
+            _FRAME,
             stands,
         )
         self.plan: Plan = march(setting, shape)
@@ -58,7 +58,7 @@ class Field:
                 starts[index],
                 wished_m_s=self.march.speed_m_s,
                 brake_m_s2=brakes[index],
-                ahead=[PLANE.level(each[0], each[1]) for each in waypoints],
+                ahead=[FRAME.to_local(each[:2]) for each in waypoints],
             )
         self.marshal = Marshal(self.march, [ResourceId(name) for name in steady])
         self._steady = steady
@@ -123,7 +123,7 @@ class Field:
                     assert gap >= self.nearest_m[pair] - 0.5, "who is too near comes no nearer"
 
 
-_PLANE = Plane(38.1075, -77.3192)
+_FRAME = LocalFrame((38.1075, -77.3192))
 
 turns = st.lists(st.tuples(st.floats(20, 120), st.floats(-1.2, 1.2)), min_size=1, max_size=5)
 

@@ -10,21 +10,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from m2pem.fleet.behaviors import SHARED
-from m2pem.fleet.lawn_mower import lawn_mower
 from m2pem.fleet.parameters import accepted
 from m2pem.fleet.team_needs import TEAM_NEEDS
+from m2pem.geo.lawn_mower import lawn_mower
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Point, Route, VehiclePosition
 from m2pem.teams.bands import strips
 from m2pem.teams.path import Path
 from m2pem.teams.plan import Plan, Setting, Stand, TeamRefusedError
-from m2pem.teams.plane import Plane
 from m2pem.teams.planning import PLANS
 from m2pem.teams.reference import Reference, read_reference
 from m2pem.teams.shapes import slot
 
-from .carts import PLANE
+from .carts import FRAME
 from .conftest import area, route
 
 OFFERED = ("single_vehicle_routing", "goto", "follow")
@@ -41,7 +40,7 @@ def setting(
         dict(zip(names, domains, strict=True)),
         {name: specs for name in names},  # noqa: C420
         parameters,
-        PLANE,
+        FRAME,
         {name: Stand((-20.0 * index, 0.0), yaw) for index, name in enumerate(names)},
     )
 
@@ -50,7 +49,7 @@ def waypoints(plan: Plan, member: str) -> list[tuple[float, float, float | None]
     leg = next(leg for leg in plan.legs if leg.member == member)
     found = leg.parameters["route"]
     assert isinstance(found, Route)
-    return [(*PLANE.level(each[0], each[1]), each[2]) for each in found.waypoints]
+    return [(*FRAME.to_local(each[:2]), each[2]) for each in found.waypoints]
 
 
 def test_every_shared_team_behavior_has_a_plan_and_says_what_it_needs() -> None:
@@ -79,7 +78,9 @@ def test_the_slowest_domain_sets_the_speed_when_nobody_does() -> None:
 
 
 def test_altitudes_of_a_route_are_kept() -> None:
-    high = Route(tuple((*PLANE.geo(east, 0.0), 30.0 + east / 10) for east in (50.0, 150.0)), "amsl")
+    high = Route(
+        tuple((*FRAME.to_latlon((east, 0.0)), 30.0 + east / 10) for east in (50.0, 150.0)), "amsl"
+    )
     plan = PLANS["road_following_formation"](setting("air", "air", route=high, spacing=50.0))
     assert waypoints(plan, "v0")[-1][2] == 45.0
     assert waypoints(plan, "v1")[-1][2] == pytest.approx(40.0, abs=0.1)
@@ -97,7 +98,7 @@ def test_a_place_behind_the_beginning_of_a_route_is_gone_to_at_once() -> None:
     assert [leg.behavior for leg in plan.legs] == ["single_vehicle_routing", "goto", "goto"]
     target = plan.legs[2].parameters["target"]
     assert isinstance(target, Point)
-    assert PLANE.level(*target.position[:2]) == pytest.approx((0, 0), abs=0.01)
+    assert FRAME.to_local(target.position[:2]) == pytest.approx((0, 0), abs=0.01)
 
 
 def test_who_has_no_goto_takes_a_route_of_two_places() -> None:
@@ -138,25 +139,6 @@ def test_what_cannot_be_done_is_refused_by_name(behavior: str, wished: Setting, 
         PLANS[behavior](wished)
 
 
-@given(
-    st.floats(-80, 80), st.floats(-180, 180), st.floats(-50_000, 50_000), st.floats(-50_000, 50_000)
-)
-def test_the_plane_and_back(latitude: float, longitude: float, east: float, north: float) -> None:
-    plane = Plane(latitude, longitude)
-    assert plane.level(*plane.geo(east, north)) == pytest.approx((east, north), abs=1e-3)
-
-
-def test_the_plane_agrees_with_the_ellipsoid() -> None:
-    import pymap3d
-
-    plane = Plane(38.1, -77.3)
-    for east, north in ((1000.0, 0.0), (0.0, 1000.0), (-3000.0, 2000.0)):
-        latitude, longitude, _ = pymap3d.enu2geodetic(east, north, 0.0, 38.1, -77.3, 0.0)
-        assert plane.level(float(latitude), float(longitude)) == pytest.approx(
-            (east, north), rel=2e-3, abs=2.0
-        )
-
-
 def test_the_way_back_is_told_from_the_way_there() -> None:
     path = Path([(0, 0, 0), (100, 0, 0), (100, 4, 0), (0, 4, 0)], [0, 100, 104, 204])
     assert path.find((40, 2.5), None, 0, yaw_rad=0.0) == pytest.approx(40)
@@ -184,7 +166,7 @@ def test_a_reference_is_read_as_it_was_written() -> None:
 
 def ring_of(leg: Any) -> list[tuple[float, float]]:
     """The corners of the area that a member surveys."""
-    return [PLANE.level(*corner[:2]) for corner in leg.parameters["area"].rings[0]]
+    return [FRAME.to_local(corner[:2]) for corner in leg.parameters["area"].rings[0]]
 
 
 def test_who_can_survey_itself_is_given_the_area_of_its_band() -> None:

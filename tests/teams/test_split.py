@@ -28,7 +28,7 @@ def way_m(plan: Plan, member: str) -> float:
         return 0.0
     route = legs[0].parameters["route"]
     assert isinstance(route, Route)
-    places = [setting("ground").plane.level(each[0], each[1]) for each in route.waypoints]
+    places = [setting("ground").frame.to_local(each[:2]) for each in route.waypoints]
     return sum(math.dist(*places[index : index + 2]) for index in range(0, len(places), 2))
 
 

@@ -22,13 +22,13 @@ from m2pem.engine.throwing import catcher_of_error, throw_error
 from m2pem.engine.triggering import throw_signal
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.fleet.allocation import AllocationError, allocate
-from m2pem.fleet.units import Dimension, UnitError, quantity
 from m2pem.mission.behavior import Behavior as BehaviorOfTask
 from m2pem.mission.catalogue import BehaviorState, ResumePolicy
 from m2pem.mission.duration import duration_us
 from m2pem.mission.elements import Event
 from m2pem.mission.expression import Expression
 from m2pem.mission.values import Value
+from m2pem.units import Dimension, UnitError, quantity
 
 YEAR_10000_US = 253_402_300_800_000_000
 """The end of the calendar, in microseconds since the Unix epoch: no timer runs longer."""

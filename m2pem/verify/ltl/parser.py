@@ -10,11 +10,11 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from m2pem.errors import ExpressionSyntaxError
-from m2pem.fleet.nearmiss import did_you_mean
 from m2pem.mission.expression import Expression
 from m2pem.mission.expression.dialect import Dialect
 from m2pem.mission.expression.functions import FUNCTIONS
 from m2pem.mission.expression.parser import Parser
+from m2pem.suggestions import did_you_mean
 from m2pem.verify.ltl import formula as f
 
 _SPACE = re.compile(r"\s*")

@@ -12,8 +12,8 @@ from lxml import etree
 from m2pem.bpmn.names import BPMN, M2PEM
 from m2pem.bpmn.xml import Document, parse_xml
 from m2pem.findings import Finding, Severity
-from m2pem.fleet.nearmiss import suggest
 from m2pem.fleet.yaml_source import KeyPath, YamlSource, dotted, parse_yaml, read_yaml
+from m2pem.suggestions import suggest
 from m2pem.verify.requirements.names import Names
 from m2pem.verify.requirements.reader import UnusableError, Written, made
 from m2pem.verify.requirements.requirement import Requirement, RequirementsError, misread

@@ -9,13 +9,13 @@ from m2pem.errors import ExpressionSyntaxError
 from m2pem.fleet.allocation import resources_of, spelled_out
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.nearmiss import suggest
 from m2pem.mission import elements as e
 from m2pem.mission.behavior import Assignment, Behavior, Parameter
 from m2pem.mission.elements import FlowNode, UserTask
 from m2pem.mission.expression import Expression
 from m2pem.mission.loops import MultiInstance, StandardLoop
 from m2pem.mission.mission import Mission
+from m2pem.suggestions import suggest
 from m2pem.verify.ltl.formula import (
     Active,
     Commanded,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from m2pem.errors import ExpressionSyntaxError, M2pemError
-from m2pem.fleet.nearmiss import suggest
+from m2pem.suggestions import suggest
 from m2pem.verify.ltl import parse
 from m2pem.verify.ltl.formula import Completed, Formula, negated
 from m2pem.verify.ltl.observer import Observer

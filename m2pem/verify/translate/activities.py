@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 from m2pem.engine.execution import Waits, waits_when_entered
-from m2pem.fleet.units import Dimension, UnitError, quantity
 from m2pem.mission import elements as e
 from m2pem.mission.behavior import Assignment, Behavior
 from m2pem.mission.expression.expression import literal
+from m2pem.units import Dimension, UnitError, quantity
 from m2pem.verify.net.petri_net import BEGINS, Action, Exactness, Flag, Kind, Role, Step, Trigger
 from m2pem.verify.translate import subprocesses
 from m2pem.verify.translate.catching import boundaries, caught_before_work

@@ -4,9 +4,10 @@ import math
 from dataclasses import dataclass, field
 
 from m2pem_plugin_mavlink.behaviors.fingerprint import is_navigation
-from m2pem_plugin_mavlink.plane import Plane
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
+
+from m2pem.api import LocalFrame
 
 HOME = (47.397742, 8.545594)
 SPEED_M_S = 5.0
@@ -110,7 +111,7 @@ class Body:
         while self.current is not None and self.current < len(self.mission):
             item = self.mission[self.current]
             if is_navigation(item):
-                level = Plane(HOME).level((item.latitude_deg, item.longitude_deg))
+                level = LocalFrame(HOME).to_local((item.latitude_deg, item.longitude_deg))
                 if self._towards((*level, item.altitude_m), dt):
                     self.reached = self.current
                     self._next()

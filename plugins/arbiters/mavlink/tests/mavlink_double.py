@@ -10,7 +10,6 @@ import math
 
 from m2pem_plugin_mavlink.behaviors.behavior import Job
 from m2pem_plugin_mavlink.foreign import TakeoverWatch
-from m2pem_plugin_mavlink.plane import Plane
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError, RefusedError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place, Readiness
@@ -20,7 +19,15 @@ from m2pem_plugin_mavlink.vehicle.ours import Ours
 from m2pem_plugin_mavlink.vehicle.waiters import Waiters
 from mavlink_body import HOME, SPEED_M_S, Body
 
-from m2pem.api import ArbiterContext, Connection, GeoPosition, LinkState, ResourceId, VehicleState
+from m2pem.api import (
+    ArbiterContext,
+    Connection,
+    GeoPosition,
+    LinkState,
+    LocalFrame,
+    ResourceId,
+    VehicleState,
+)
 
 HOME_ALTITUDE_M = 488.0
 STEP_S = 0.1
@@ -87,7 +94,7 @@ class DoubleDriver:
     async def go_to(self, place: Place, speed_m_s: float | None = None) -> None:
         await self._tell("go_to", place, speed_m_s)
         self.body.armed = True
-        level = Plane(HOME).level((place.latitude_deg, place.longitude_deg))
+        level = LocalFrame(HOME).to_local((place.latitude_deg, place.longitude_deg))
         up = self.body.up if place.altitude_m is None else place.altitude_m
         if place.altitude_frame == "amsl" and place.altitude_m is not None:
             up -= HOME_ALTITUDE_M
@@ -104,7 +111,7 @@ class DoubleDriver:
         if not self.body.circles:
             return False
         await self._tell("orbit", center, radius_m, speed_m_s)
-        level = Plane(HOME).level((center.latitude_deg, center.longitude_deg))
+        level = LocalFrame(HOME).to_local((center.latitude_deg, center.longitude_deg))
         self.body.center = (*level, center.altitude_m, radius_m)
         self._enter(FlightMode.ORBIT)
         return True
@@ -195,7 +202,7 @@ class DoubleVehicle:
         body, heard = self.body, self.heard
         if not body.heard_by_us:
             return
-        latitude, longitude = Plane(HOME).place((body.east, body.north))
+        latitude, longitude = LocalFrame(HOME).to_latlon((body.east, body.north))
         heard.position = GeoPosition(latitude, longitude, HOME_ALTITUDE_M + body.up)
         heard.home = GeoPosition(*HOME, HOME_ALTITUDE_M)
         heard.altitude_above_home_m = heard.altitude_above_terrain_m = body.up
@@ -321,7 +328,7 @@ def job(vehicle: DoubleVehicle, bus=None, **parameters) -> Job:
 
 def at(east: float, north: float) -> tuple[float, float]:
     """A place so far from home, in metres."""
-    return Plane(HOME).place((east, north))
+    return LocalFrame(HOME).to_latlon((east, north))
 
 
 LOGGER = logging.getLogger("test")

@@ -19,7 +19,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from m2pem_plugin_mavlink.plane import distance_m, offset
 from m2pem_plugin_mavlink.sim.specification import Kind
 from m2pem_plugin_mavlink.sitl.frames import FRAMES
 from m2pem_plugin_mavlink.sitl.launch import Launch, Start, ardupilot_launch
@@ -31,6 +30,7 @@ from mavlink_wires import UdpWire
 from pymavlink import DFReader
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem.api import distance_m, offset
 from m2pem.testing.scenarios import ORIGIN, side_by_side
 
 PLACE = ORIGIN[:2]

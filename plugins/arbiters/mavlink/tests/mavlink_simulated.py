@@ -6,12 +6,11 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
-from m2pem_plugin_mavlink.plane import Plane, offset
 from m2pem_plugin_mavlink.sim.geometry import Location
 from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
 from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
 
-from m2pem.api import Connection, ResourceId
+from m2pem.api import Connection, LocalFrame, ResourceId, offset
 from m2pem.executive.clock import SystemClock
 from m2pem.testing.contracts.bench import ArbiterBench, context
 
@@ -72,7 +71,7 @@ class Bench(ArbiterBench):
     def level(self, number: int = 1) -> tuple[float, float]:
         """East and north of the first home."""
         where = self.truth(number).location
-        return Plane(HOME).level((where.latitude_deg, where.longitude_deg))
+        return LocalFrame(HOME).to_local((where.latitude_deg, where.longitude_deg))
 
     async def do(self, id_: str, behavior: str, vehicle: str = "v1", **parameters: Any) -> None:
         """Start it and see it succeed."""

@@ -15,9 +15,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from m2pem_plugin_mavlink.plane import offset
 from pymavlink import DFReader
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import offset
 
 At = tuple[float, float]
 """East and north, m."""

@@ -5,13 +5,12 @@ from itertools import pairwise
 
 import pytest
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
-from m2pem_plugin_mavlink.plane import Plane
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
 from mavlink_double import HOME, Body, at
 from mavlink_play import after_a_restart, play
 
-from m2pem.api import Area, BehaviorState, Point, Route
+from m2pem.api import Area, BehaviorState, LocalFrame, Point, Route
 
 SUCCEEDED, RUNNING = BehaviorState.SUCCEEDED, BehaviorState.RUNNING
 WAYPOINT, CHANGE_SPEED = 16, 178
@@ -33,8 +32,10 @@ FIELD = Area((square(20, 20, 60),))
 
 
 def levels(items) -> list[tuple[float, float]]:
-    plane = Plane(HOME)
-    return [plane.level((i.latitude_deg, i.longitude_deg)) for i in items if i.command == WAYPOINT]
+    frame = LocalFrame(HOME)
+    return [
+        frame.to_local((i.latitude_deg, i.longitude_deg)) for i in items if i.command == WAYPOINT
+    ]
 
 
 @pytest.mark.parametrize("firmware", [Firmware.ARDUPILOT, Firmware.PX4])

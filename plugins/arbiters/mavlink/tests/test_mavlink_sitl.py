@@ -11,11 +11,10 @@ import mavlink_sitl as sitl
 import pytest
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
 from m2pem_plugin_mavlink.link.routed_link import open_link
-from m2pem_plugin_mavlink.plane import offset
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
-from m2pem.api import Arbiter, ArbiterContext, Connection, Point, ResourceId
+from m2pem.api import Arbiter, ArbiterContext, Connection, Point, ResourceId, offset
 from m2pem.executive.clock import SystemClock
 from m2pem.testing import ArbiterCase, ArbiterContract
 

@@ -4,11 +4,11 @@ from collections import Counter
 from itertools import pairwise
 
 import pytest
-from m2pem_plugin_mavlink.plane import distance_m
 from m2pem_plugin_mavlink.sitl.fleet import read_vehicles
 from test_mavlink_demo import FLEETS
 
 from m2pem import load_fleet
+from m2pem.api import distance_m
 from m2pem.api.control import RunStatus
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse

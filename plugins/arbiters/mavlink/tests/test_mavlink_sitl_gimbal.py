@@ -12,12 +12,12 @@ from typing import NamedTuple, TypeAlias
 
 import mavlink_sitl
 import pytest
-from m2pem_plugin_mavlink.plane import offset
 from mavlink_mission_flights import Flight, fly
 from mavlink_tracks import At, east_north
 from pymavlink import DFReader
 from test_mavlink_sitl_tracks import completed, said
 
+from m2pem.api import offset
 from m2pem.testing.scenarios import ORIGIN, side_by_side
 
 pytestmark = [pytest.mark.timeout(400), pytest.mark.sitl("M2PEM_ARDUCOPTER")]

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import mavlink_sitl
 import pytest
-from m2pem_plugin_mavlink.plane import offset
 from mavlink_mission_flights import Flight, fly
 from mavlink_tracks import At, covered, cross_track, formation_error
 from test_mavlink_demo import FLEETS
+
+from m2pem.api import offset
 
 MISSIONS = FLEETS.parent / "missions"
 AUTO = 3

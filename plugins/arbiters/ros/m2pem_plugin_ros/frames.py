@@ -6,7 +6,7 @@ As everywhere in m2pem, heights above mean sea level and above the ellipsoid are
 import math
 from typing import NamedTuple, Protocol
 
-from m2pem.api import GeoPosition
+from m2pem.api import GeoPosition, LocalFrame
 
 Origin = tuple[float, float, float]
 """Latitude and longitude in degrees, altitude in metres."""
@@ -36,20 +36,14 @@ class AnyQuaternion(Protocol):
 
 def to_local(position: GeoPosition, origin: Origin) -> tuple[float, float, float]:
     """East, north and up of the origin, in metres."""
-    import pymap3d  # noqa: PLC0415  # it loads NumPy
-
-    east, north, up = pymap3d.geodetic2enu(
-        position.latitude_deg, position.longitude_deg, position.altitude_m, *origin
+    return LocalFrame(origin).to_enu(
+        position.latitude_deg, position.longitude_deg, position.altitude_m
     )
-    return float(east), float(north), float(up)
 
 
 def to_geodetic(east_m: float, north_m: float, up_m: float, origin: Origin) -> GeoPosition:
     """The position that is so far east, north and up of the origin."""
-    import pymap3d  # noqa: PLC0415  # it loads NumPy
-
-    latitude, longitude, altitude = pymap3d.enu2geodetic(east_m, north_m, up_m, *origin)
-    return GeoPosition(float(latitude), float(longitude), float(altitude))
+    return GeoPosition(*LocalFrame(origin).from_enu(east_m, north_m, up_m))
 
 
 def yaw_of_quaternion(q: AnyQuaternion) -> float:

@@ -4,7 +4,7 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import BehaviorState
+from m2pem.api import BehaviorState, LatLon, offset
 from m2pem_plugin_mavlink.behaviors.behavior import (
     MOVES_WITHIN_S,
     Behavior,
@@ -14,7 +14,6 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
 )
 from m2pem_plugin_mavlink.behaviors.looking import away_m, stands, where
 from m2pem_plugin_mavlink.behaviors.wishes import Wishes
-from m2pem_plugin_mavlink.plane import LatLon, offset
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 
 SPEED_M_S = 1.0

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import BehaviorState
+from m2pem.api import BehaviorState, LatLon
 from m2pem_plugin_mavlink.behaviors.behavior import (
     ANY_MODE,
     MOVES_WITHIN_S,
@@ -29,7 +29,6 @@ from m2pem_plugin_mavlink.behaviors.looking import (
     where,
 )
 from m2pem_plugin_mavlink.behaviors.wishes import AMSL, Wishes
-from m2pem_plugin_mavlink.plane import LatLon
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 from m2pem_plugin_mavlink.vehicle.landing import landing_begins

@@ -2,11 +2,10 @@
 
 import math
 
-from m2pem.api import BehaviorState, LinkState, VehicleState
+from m2pem.api import BehaviorState, LatLon, LinkState, VehicleState, distance_m, offset
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError, Job
 from m2pem_plugin_mavlink.behaviors.looking import accepts, unless_airborne, where
 from m2pem_plugin_mavlink.behaviors.wishes import Wishes, state_of
-from m2pem_plugin_mavlink.plane import LatLon, distance_m, offset
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 
 OFFSET_M = 15.0

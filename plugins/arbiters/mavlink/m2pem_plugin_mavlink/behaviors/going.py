@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 from typing import ClassVar
 
-from m2pem.api import BehaviorState
+from m2pem.api import BehaviorState, LatLon, distance_m
 from m2pem_plugin_mavlink.behaviors.behavior import (
     MOVES_WITHIN_S,
     Behavior,
@@ -28,7 +28,6 @@ from m2pem_plugin_mavlink.behaviors.looking import (
     where,
 )
 from m2pem_plugin_mavlink.behaviors.wishes import Wishes
-from m2pem_plugin_mavlink.plane import LatLon, distance_m
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 
 TOLERANCES_M = {"air": 2.0, "ground": 2.5, "surface": 5.0, "subsurface": 3.0}

@@ -2,9 +2,9 @@
 
 import math
 
+from m2pem.api import LatLon, LocalFrame, distance_m
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, Job
 from m2pem_plugin_mavlink.behaviors.wishes import AMSL, RELATIVE
-from m2pem_plugin_mavlink.plane import LatLon, Plane, distance_m
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 from m2pem_plugin_mavlink.vehicle.exchanges import position_target
@@ -161,7 +161,7 @@ def _towards(vehicle: Vehicle, place: Place) -> bool:
     here, velocity = where(vehicle), vehicle.heard.velocity_enu_m_s
     if here is None or velocity is None or vehicle.heard.speed_m_s < STANDS_BELOW_M_S:
         return False
-    east, north = Plane(here).level((place.latitude_deg, place.longitude_deg))
+    east, north = LocalFrame(here).to_local((place.latitude_deg, place.longitude_deg))
     height = height_m(vehicle.heard, place.altitude_frame)
     up = 0.0
     if place.altitude_m is not None and height is not None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import BehaviorState
+from m2pem.api import BehaviorState, LatLon
 from m2pem_plugin_mavlink.behaviors.behavior import (
     MOVES_WITHIN_S,
     Behavior,
@@ -25,7 +25,6 @@ from m2pem_plugin_mavlink.behaviors.looking import (
 )
 from m2pem_plugin_mavlink.behaviors.wishes import AMSL, RELATIVE, TERRAIN, Wishes
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
-from m2pem_plugin_mavlink.plane import LatLon
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.landing import without_landing
 

@@ -3,12 +3,11 @@
 import math
 from itertools import pairwise
 
-from m2pem.api import Area, BehaviorState
+from m2pem.api import Area, BehaviorState, EastNorth, LatLon, LocalFrame
 from m2pem_plugin_mavlink.behaviors.behavior import BehaviorFailedError, Job, Memory
 from m2pem_plugin_mavlink.behaviors.going import Goto
 from m2pem_plugin_mavlink.behaviors.looking import accepts, stands, where
 from m2pem_plugin_mavlink.behaviors.orbit import Orbit
-from m2pem_plugin_mavlink.plane import LatLon, Level, Plane
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 
 RADII_M = (15.0, 300.0)
@@ -57,16 +56,16 @@ class ObserveFromTheEdge(Goto):
             raise BehaviorFailedError("its position is not known yet")
         area = self.wishes.area
         if area is not None:
-            plane = Plane(area.rings[0][0][:2])
-            ring = [plane.level(corner[:2]) for corner in area.rings[0]]
-            return plane.place(_nearest(ring, plane.level(here)))
+            frame = LocalFrame(area.rings[0][0][:2])
+            ring = [frame.to_local(corner[:2]) for corner in area.rings[0]]
+            return frame.to_latlon(_nearest(ring, frame.to_local(here)))
         target = self.wishes.target()
-        plane = Plane((target.latitude_deg, target.longitude_deg))
-        east, north = plane.level(here)
+        frame = LocalFrame((target.latitude_deg, target.longitude_deg))
+        east, north = frame.to_local(here)
         away = math.hypot(east, north)
         if away <= STANDOFF_M:
             return here
-        return plane.place((east * STANDOFF_M / away, north * STANDOFF_M / away))
+        return frame.to_latlon((east * STANDOFF_M / away, north * STANDOFF_M / away))
 
     async def begin(self) -> None:
         """Go there, or stay there."""
@@ -120,16 +119,16 @@ class ObserveFromTheEdge(Goto):
 
 def middle(area: Area) -> tuple[LatLon, float]:
     """The middle of an area, and how far its farthest corner is from it."""
-    plane = Plane(area.rings[0][0][:2])
-    corners = [plane.level(corner[:2]) for corner in area.rings[0][:-1]]
+    frame = LocalFrame(area.rings[0][0][:2])
+    corners = [frame.to_local(corner[:2]) for corner in area.rings[0][:-1]]
     center = (
         sum(east for east, _ in corners) / len(corners),
         sum(north for _, north in corners) / len(corners),
     )
-    return plane.place(center), max(math.dist(center, corner) for corner in corners)
+    return frame.to_latlon(center), max(math.dist(center, corner) for corner in corners)
 
 
-def _nearest(ring: list[Level], here: Level) -> Level:
+def _nearest(ring: list[EastNorth], here: EastNorth) -> EastNorth:
     candidates = []
     for (ae, an), (be, bn) in pairwise(ring):
         de, dn = be - ae, bn - an

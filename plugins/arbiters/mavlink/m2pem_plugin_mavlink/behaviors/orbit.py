@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from m2pem.api import BehaviorState
+from m2pem.api import BehaviorState, LocalFrame
 from m2pem_plugin_mavlink.behaviors.behavior import BehaviorFailedError, Job, Memory
 from m2pem_plugin_mavlink.behaviors.looking import (
     away_m,
@@ -14,7 +14,6 @@ from m2pem_plugin_mavlink.behaviors.looking import (
 )
 from m2pem_plugin_mavlink.behaviors.mission_flight import MissionFlight, waypoint
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
-from m2pem_plugin_mavlink.plane import Plane
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 
 RADIUS_M = 30.0
@@ -67,29 +66,29 @@ class Orbit(MissionFlight):
     def way(self) -> Sequence[MissionItem]:
         """A polygon on the circle: all turns, or one lap that is begun anew each time."""
         center = self.center
-        plane = Plane((center.latitude_deg, center.longitude_deg))
+        frame = LocalFrame((center.latitude_deg, center.longitude_deg))
         sides = self._sides()
         laps = 1.0 if self._turns is None else self._turns
         self.loop = self._turns is None or laps * sides > MOST_ITEMS
         sweep = math.tau if self.loop else math.tau * laps
         count = max(1, math.ceil(sides * sweep / math.tau - 1e-9))
-        began = self._begins_at(plane)
+        began = self._begins_at(frame)
         angles = [began - sweep * index / count for index in range(count + 1)]
         if self.loop:
             angles.pop()  # the lap's end is its beginning
         height = (center.altitude_m or 0.0, center.altitude_frame)
         around = [(self._radius_m * math.cos(a), self._radius_m * math.sin(a)) for a in angles]
-        return [waypoint(plane.place(level), *height) for level in around]
+        return [waypoint(frame.to_latlon(level), *height) for level in around]
 
     def _sides(self) -> int:
         """Of the polygon: corners that stand no more than a metre or so off the circle."""
         return max(8, min(36, math.ceil(math.tau * self._radius_m / 12.0)))
 
-    def _begins_at(self, plane: Plane) -> float:
+    def _begins_at(self, frame: LocalFrame) -> float:
         here = where(self.vehicle)
         if here is None:
             return math.pi / 2
-        east, north = plane.level(here)
+        east, north = frame.to_local(here)
         return math.atan2(north, east)
 
     def named(self, index: int) -> str:
@@ -157,7 +156,7 @@ class Orbit(MissionFlight):
         if here is None or not self._radius_m - near_m <= away <= farthest_m:
             self._bearing_rad = None
             return False
-        east, north = Plane(center).level(here)
+        east, north = LocalFrame(center).to_local(here)
         bearing = math.atan2(north, east)
         if self._bearing_rad is not None:
             self._turned_rad += abs(math.remainder(bearing - self._bearing_rad, math.tau))

@@ -3,12 +3,11 @@
 import math
 from collections.abc import Sequence
 
-from m2pem.api import lawn_mower, longest_edge_yaw
+from m2pem.api import LocalFrame, lawn_mower, longest_edge_yaw
 from m2pem_plugin_mavlink.behaviors.behavior import BehaviorFailedError
 from m2pem_plugin_mavlink.behaviors.looking import away_m
 from m2pem_plugin_mavlink.behaviors.mission_flight import MissionFlight, waypoint
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
-from m2pem_plugin_mavlink.plane import Plane
 
 SPACING_M = 20.0
 
@@ -23,8 +22,8 @@ class Survey(MissionFlight):
         area = self.wishes.area
         if area is None:
             raise BehaviorFailedError("parameter 'area': there is none")
-        plane = Plane(area.rings[0][0][:2])
-        rings = [[plane.level(corner[:2]) for corner in ring] for ring in area.rings]
+        frame = LocalFrame(area.rings[0][0][:2])
+        rings = [[frame.to_local(corner[:2]) for corner in ring] for ring in area.rings]
         heading = self.wishes.number("heading")
         yaw = longest_edge_yaw(rings[0]) if heading is None else math.pi / 2 - heading
         try:
@@ -36,7 +35,7 @@ class Survey(MissionFlight):
             )
         except ValueError as error:
             raise BehaviorFailedError(f"parameter 'spacing': {error}") from None
-        places = [plane.place(point) for point in points]
+        places = [frame.to_latlon(point) for point in points]
         if away_m(self.vehicle, places[-1]) < away_m(self.vehicle, places[0]):
             places.reverse()
         height = self.wishes.altitude_to_fly(area.rings[0][0][2], area.altitude_frame)

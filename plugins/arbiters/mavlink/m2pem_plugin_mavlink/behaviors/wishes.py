@@ -1,8 +1,7 @@
 """A request's parameters, as behaviors ask for them."""
 
-from m2pem.api import Area, Point, ResourceId, Route, VehiclePosition, VehicleState
+from m2pem.api import Area, LatLon, Point, ResourceId, Route, VehiclePosition, VehicleState
 from m2pem_plugin_mavlink.behaviors.behavior import BehaviorFailedError, Job
-from m2pem_plugin_mavlink.plane import LatLon
 from m2pem_plugin_mavlink.vehicle.driver import Place
 
 RELATIVE, AMSL, TERRAIN = "relative", "amsl", "terrain"

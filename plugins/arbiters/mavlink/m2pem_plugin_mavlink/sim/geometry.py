@@ -1,13 +1,9 @@
-"""Where things are: WGS-84, and metres around a vehicle's home.
-
-As an autopilot does, latitude and longitude are scaled to metres at the home, so that going there
-and back again loses nothing; over some kilometres that differs from the geodesic by centimetres.
-"""
+"""Where things are: WGS-84, and metres around a vehicle's home."""
 
 import math
 from typing import NamedTuple
 
-from pymap3d.rcurve import meridian, transverse
+from m2pem import api
 
 
 class Location(NamedTuple):
@@ -47,32 +43,21 @@ class Point(NamedTuple):
 
 
 class LocalFrame:
-    """Metres north, east and up of an origin."""
+    """Metres north, east and up of an origin, over flat ground."""
 
     def __init__(self, origin: Location) -> None:
         self.origin = origin
-        self._north_m_per_deg = math.radians(float(meridian(origin.latitude_deg)))
-        self._east_m_per_deg = math.radians(
-            float(transverse(origin.latitude_deg)) * math.cos(math.radians(origin.latitude_deg))
-        )
+        self._frame = api.LocalFrame(origin)
 
     def to_point(self, location: Location) -> Point:
         """From WGS-84."""
-        east_deg = (location.longitude_deg - self.origin.longitude_deg + 180.0) % 360.0 - 180.0
-        return Point(
-            (location.latitude_deg - self.origin.latitude_deg) * self._north_m_per_deg,
-            east_deg * self._east_m_per_deg,
-            location.altitude_amsl_m - self.origin.altitude_amsl_m,
-        )
+        east_m, north_m = self._frame.to_local((location.latitude_deg, location.longitude_deg))
+        return Point(north_m, east_m, location.altitude_amsl_m - self.origin.altitude_amsl_m)
 
     def to_location(self, point: Point) -> Location:
         """To WGS-84."""
-        longitude_deg = self.origin.longitude_deg + point.east_m / self._east_m_per_deg
-        return Location(
-            self.origin.latitude_deg + point.north_m / self._north_m_per_deg,
-            (longitude_deg + 180.0) % 360.0 - 180.0,
-            self.origin.altitude_amsl_m + point.up_m,
-        )
+        latitude_deg, longitude_deg = self._frame.to_latlon((point.east_m, point.north_m))
+        return Location(latitude_deg, longitude_deg, self.origin.altitude_amsl_m + point.up_m)
 
 
 def wrapped_rad(angle_rad: float) -> float:

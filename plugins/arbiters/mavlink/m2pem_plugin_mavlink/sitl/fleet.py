@@ -5,10 +5,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from m2pem.api import Connection, Fleet, ResourceId
+from m2pem.api import Connection, Fleet, ResourceId, offset
 from m2pem.errors import PluginError
 from m2pem_plugin_mavlink.failsafe import link_parameters
-from m2pem_plugin_mavlink.plane import offset
 from m2pem_plugin_mavlink.protocol.url import SocketUrl, Way, parse_url
 from m2pem_plugin_mavlink.settings import SITL, Settings, read_settings
 from m2pem_plugin_mavlink.sitl.frames import FRAMES, FRAMES_OF, PX4_MODELS, Frame

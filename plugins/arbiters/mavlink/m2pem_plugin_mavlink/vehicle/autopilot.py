@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem.api import LatLon
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType
-from m2pem_plugin_mavlink.plane import LatLon
 from m2pem_plugin_mavlink.protocol.messages import message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from m2pem.fleet.geojson import GeometryError, as_geojson, kind_of, parse_geojson
+from m2pem.geo.geojson import GeometryError, as_geojson, kind_of, parse_geojson
 from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]

@@ -1,7 +1,7 @@
 import pytest
 
-from m2pem.fleet.csv_waypoints import parse_csv
-from m2pem.fleet.geojson import GeometryError
+from m2pem.geo.csv_waypoints import parse_csv
+from m2pem.geo.geojson import GeometryError
 from m2pem.mission.geometry import Area, Point, Route
 
 

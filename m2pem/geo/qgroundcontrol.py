@@ -7,7 +7,7 @@ the mission. MAVLink's MAV_CMD and MAV_FRAME numbers: https://mavlink.io/en/mess
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from m2pem.fleet.geojson import GeometryError, checked, coordinate
+from m2pem.geo.geojson import GeometryError, checked, coordinate
 from m2pem.mission.geometry import Area, Coordinate, Route
 
 _PLACE_COMMANDS = frozenset({16, 17, 18, 19, 21, 22, 31, 82, 84, 85})

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from m2pem.findings import unreadable_remedy
-from m2pem.fleet.csv_waypoints import parse_csv
-from m2pem.fleet.geojson import GeometryError, kind_of, parse_geojson
-from m2pem.fleet.qgroundcontrol import parse_plan, parse_waypoints
-from m2pem.fleet.units import article
+from m2pem.geo.csv_waypoints import parse_csv
+from m2pem.geo.geojson import GeometryError, kind_of, parse_geojson
+from m2pem.geo.qgroundcontrol import parse_plan, parse_waypoints
 from m2pem.mission.geometry import Area, Point, Route
+from m2pem.units import article
 
 __all__ = ["GeometryError", "parse_geojson", "read_geometry"]
 

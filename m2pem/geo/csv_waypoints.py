@@ -9,10 +9,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import StringIO
 
-from m2pem.fleet.geojson import ALTITUDE_FRAMES, GeometryError, checked, coordinate
-from m2pem.fleet.nearmiss import suggest
-from m2pem.fleet.units import UNITS, Dimension
+from m2pem.geo.geojson import ALTITUDE_FRAMES, GeometryError, checked, coordinate
 from m2pem.mission.geometry import Area, Coordinate, Point, Route
+from m2pem.suggestions import suggest
+from m2pem.units import UNITS, Dimension
 
 _EXAMPLE = "lat_deg,lon_deg,alt_m"
 _QUANTITIES = {"lat": "deg", "lon": "deg", "alt": "m"}

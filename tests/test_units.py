@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from m2pem.fleet.units import UNITS, Dimension, UnitError, plain_number, quantity
+from m2pem.units import UNITS, Dimension, UnitError, plain_number, quantity
 
 
 @pytest.mark.parametrize(

@@ -3,18 +3,12 @@
 The fence is a polygon; its holes are places where nobody may go. It has no ceiling.
 """
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from typing import TypeAlias
 
+from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame
+from m2pem.geo.polygon import Edge, contains, edge_distance_m
 from m2pem.mission.geometry import Area
-
-LatLon: TypeAlias = tuple[float, float]
-"""Latitude and longitude in WGS-84 degrees."""
-
-_Level: TypeAlias = tuple[float, float]
-"""East and north of the fence's first corner, in metres."""
 
 MARGIN_M = 0.1
 """A way may run along the fence."""
@@ -27,15 +21,14 @@ class Fence:
     """An area that may not be left."""
 
     def __init__(self, area: Area) -> None:
-        self._touches = area.rings[0][0][:2]
-        self._edges: list[tuple[_Level, _Level]] = []
+        self._frame = LocalFrame(area.rings[0][0][:2])
+        self._edges: list[Edge] = []
         for ring in area.rings:
-            levels = [self._level(corner[:2]) for corner in ring]
-            self._edges += pairwise(levels)
+            self._edges += pairwise(self._frame.to_local(corner[:2]) for corner in ring)
 
     def outside_m(self, place: LatLon) -> float:
         """How far a place is from where one may be; 0 inside."""
-        return self._outside_m(self._level(place))
+        return self._outside_m(self._frame.to_local(place))
 
     def breach(
         self,
@@ -48,12 +41,12 @@ class Fence:
         `start`: where the vehicle is. One that is outside already may come back. `name`: what
         people call a point of the way.
         """
-        levels = [self._level(place) for place in way]
+        levels = [self._frame.to_local(place) for place in way]
         for index, (place, level) in enumerate(zip(way, levels, strict=True)):
             if (by_m := self._outside_m(level)) > MARGIN_M:
                 return f"{name(index)}, {_text(place)}, is {_by(by_m)} outside the fleet's fence"
         if start is not None and levels:
-            began = self._level(start)
+            began = self._frame.to_local(start)
             if self._outside_m(began) <= MARGIN_M and (out := self._worst(began, levels[0])):
                 return f"the way to {name(0)} leaves the fleet's fence {self._told(*out)}"
         for index, (a, b) in enumerate(pairwise(levels)):
@@ -62,32 +55,20 @@ class Fence:
                 return f"the way between {ends} leaves the fleet's fence {self._told(*out)}"
         return ""
 
-    def _level(self, place: LatLon) -> _Level:
-        import pymap3d  # noqa: PLC0415  # it loads NumPy, and few fleets have a fence
+    def _told(self, level: EastNorth, by_m: float) -> str:
+        return f"by {_by(by_m)} at {_text(self._frame.to_latlon(level))}"
 
-        east, north, _ = pymap3d.geodetic2enu(*place, 0.0, *self._touches, 0.0)
-        return float(east), float(north)
-
-    def _place(self, level: _Level) -> LatLon:
-        import pymap3d  # noqa: PLC0415
-
-        latitude, longitude, _ = pymap3d.enu2geodetic(*level, 0.0, *self._touches, 0.0)
-        return float(latitude), float(longitude)
-
-    def _told(self, level: _Level, by_m: float) -> str:
-        return f"by {_by(by_m)} at {_text(self._place(level))}"
-
-    def _outside_m(self, level: _Level) -> float:
-        if _inside(self._edges, level):
+    def _outside_m(self, level: EastNorth) -> float:
+        if contains(self._edges, level):
             return 0.0
-        return min(_distance(level, a, b) for a, b in self._edges)
+        return min(edge_distance_m(level, edge) for edge in self._edges)
 
-    def _worst(self, a: _Level, b: _Level) -> tuple[_Level, float] | None:
+    def _worst(self, a: EastNorth, b: EastNorth) -> tuple[EastNorth, float] | None:
         """Of the parts of a line that lie outside, the point farthest out, and how far."""
-        worst: tuple[_Level, float] | None = None
+        worst: tuple[EastNorth, float] | None = None
         cuts = sorted({0.0, 1.0, *self._cuts(a, b)})
         for low, high in pairwise(cuts):
-            if _inside(self._edges, _between(a, b, (low + high) / 2)):
+            if contains(self._edges, _between(a, b, (low + high) / 2)):
                 continue
             for look in range(_LOOKS + 1):
                 level = _between(a, b, low + (high - low) * look / _LOOKS)
@@ -96,7 +77,7 @@ class Fence:
                     worst = (level, by_m)
         return worst
 
-    def _cuts(self, a: _Level, b: _Level) -> Iterator[float]:
+    def _cuts(self, a: EastNorth, b: EastNorth) -> Iterator[float]:
         """Where a line crosses edges, as parts of its length."""
         de, dn = b[0] - a[0], b[1] - a[1]
         for c, d in self._edges:
@@ -110,24 +91,7 @@ class Fence:
                 yield along
 
 
-def _inside(edges: Sequence[tuple[_Level, _Level]], level: _Level) -> bool:
-    """By counting the edges that a ray to the east crosses; holes are outside."""
-    east, north = level
-    odd = False
-    for (ae, an), (be, bn) in edges:
-        if (an > north) != (bn > north) and east < (be - ae) * (north - an) / (bn - an) + ae:
-            odd = not odd
-    return odd
-
-
-def _distance(level: _Level, a: _Level, b: _Level) -> float:
-    de, dn = b[0] - a[0], b[1] - a[1]
-    length2 = de * de + dn * dn
-    part = ((level[0] - a[0]) * de + (level[1] - a[1]) * dn) / length2 if length2 else 0.0
-    return math.dist(level, _between(a, b, max(0.0, min(1.0, part))))
-
-
-def _between(a: _Level, b: _Level, part: float) -> _Level:
+def _between(a: EastNorth, b: EastNorth, part: float) -> EastNorth:
     return a[0] + (b[0] - a[0]) * part, a[1] + (b[1] - a[1]) * part
 
 

@@ -1,32 +1,29 @@
-"""How far a position is from the fleet's origin: a swapped latitude and longitude shows there."""
+"""Positions and the fleet's origin: what is too far from it, and positions in metres from it.
 
+A position that is too far away has most often its latitude and longitude swapped.
+"""
+
+import json
 import math
 from collections.abc import Iterator
-from typing import TypeAlias
 
+from m2pem.geo.geojson import GeometryError
+from m2pem.geo.local_frame import LocalFrame, Origin, distance_m
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
-
-Origin: TypeAlias = tuple[float, float, float]
-"""Latitude and longitude in degrees, altitude in metres above mean sea level."""
 
 NO_ORIGIN: Origin = (0.0, 0.0, 0.0)
 """Of a fleet that gives none."""
 
 MAX_RANGE_M = 500_000.0
-"""Farther from the origin its local plane is no longer a picture of the Earth."""
+"""Farther from the origin than this its local frame is not used."""
 
-_EARTH_RADIUS_M = 6_371_000.0
+FARTHEST_ENU_M = 1_000_000.0
+"""The largest number that a local position may hold."""
+
+_ENU = "enu"
 _NEAR_M = 10_000.0
 _SWAPPED_IS_NEARER = 20.0
 """A position this many times as far from the origin as its mirror image is taken as swapped."""
-
-
-def distance_m(a: tuple[float, float], b: tuple[float, float]) -> float:
-    """The great-circle distance of two places (latitude, longitude in degrees), in metres."""
-    lat_a, lat_b = math.radians(a[0]), math.radians(b[0])
-    half_lat, half_lon = (lat_b - lat_a) / 2, math.radians(b[1] - a[1]) / 2
-    part = math.sin(half_lat) ** 2 + math.cos(lat_a) * math.cos(lat_b) * math.sin(half_lon) ** 2
-    return 2 * _EARTH_RADIUS_M * math.asin(min(1.0, math.sqrt(part)))
 
 
 def out_of_reach(place: Coordinate, origin: Origin) -> tuple[str, str] | None:
@@ -71,3 +68,34 @@ def _places(geometry: Geometry) -> Iterator[tuple[str, Coordinate]]:
 
 def _km(metres: float) -> str:
     return f"{metres / 1000:.0f} km" if metres >= 10_000 else f"{metres / 1000:.1f} km"
+
+
+def is_local(text: str) -> bool:
+    """Whether it is meant as a local position."""
+    start = text.strip()
+    return start.startswith(_ENU) and start[len(_ENU) :].lstrip().startswith("[")
+
+
+def local_point(text: str, origin: Origin) -> Point:
+    """The position on Earth; with `up` its altitude is above mean sea level, without it not given.
+
+    Raises:
+        GeometryError: not two or three finite numbers, or too far away.
+    """
+    try:
+        metres = json.loads(text.strip()[len(_ENU) :])
+    except (ValueError, RecursionError):
+        metres = None
+    if not isinstance(metres, list) or not 2 <= len(metres) <= 3:
+        raise GeometryError(f"{text!r} is not a local position")
+    for number in metres:
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            raise GeometryError(f"{text!r}: {number!r} is not a number of metres")
+        if not math.isfinite(number) or abs(number) > FARTHEST_ENU_M:
+            raise GeometryError(f"{text!r}: {number!r} m is not within {FARTHEST_ENU_M:g} m")
+    east, north, *up = map(float, metres)
+    frame = LocalFrame(origin)
+    latitude, longitude, altitude = frame.from_enu(east, north, up[0] if up else 0.0)
+    if up:
+        return Point((latitude, longitude, altitude), "amsl")
+    return Point((latitude, longitude, None))

@@ -1,4 +1,4 @@
-from m2pem.fleet.nearmiss import did_you_mean, suggest
+from m2pem.suggestions import did_you_mean, suggest
 
 
 def test_a_near_name_is_suggested_whatever_its_case() -> None:

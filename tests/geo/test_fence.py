@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from m2pem.api import Area
-from m2pem.fleet.fence import MARGIN_M, Fence
+from m2pem.geo.fence import MARGIN_M, Fence
 
 HOME = (38.1, -77.3)
 

@@ -8,11 +8,11 @@ import pytest
 
 from m2pem.errors import FleetError
 from m2pem.fleet.fleet_file import load_fleet
-from m2pem.fleet.geofiles import read_geometry
-from m2pem.fleet.geojson import GeometryError, parse_geojson
-from m2pem.fleet.rings import MAX_CORNERS, ring_problem
+from m2pem.geo.files import read_geometry
+from m2pem.geo.geojson import GeometryError, parse_geojson
+from m2pem.geo.polygon import MAX_CORNERS, ring_problem
 
-from .fleets import write_fleet, write_json
+from ..fleet.fleets import write_fleet, write_json
 
 SQUARE = [[0, 0], [10, 0], [10, 10], [0, 10], [0, 0]]
 HOLE = [[2, 2], [4, 2], [4, 4], [2, 4], [2, 2]]

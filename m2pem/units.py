@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from enum import StrEnum
 
 from m2pem.errors import M2pemError
-from m2pem.fleet.nearmiss import did_you_mean
+from m2pem.suggestions import did_you_mean
 
 
 class Dimension(StrEnum):

@@ -2,8 +2,8 @@ from typing import Any
 
 import pytest
 
-from m2pem.fleet.geojson import GeometryError
-from m2pem.fleet.qgroundcontrol import parse_plan, parse_waypoints
+from m2pem.geo.geojson import GeometryError
+from m2pem.geo.qgroundcontrol import parse_plan, parse_waypoints
 from m2pem.mission.geometry import Area, Route
 
 

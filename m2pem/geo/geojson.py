@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from m2pem.errors import M2pemError
-from m2pem.fleet.nearmiss import suggest
-from m2pem.fleet.rings import ring_problem
+from m2pem.geo.polygon import ring_problem
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
+from m2pem.suggestions import suggest
 
 ALTITUDE_FRAMES = ("relative", "amsl", "terrain")
 

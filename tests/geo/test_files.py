@@ -2,11 +2,11 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.fleet import geofiles
-from m2pem.fleet.geofiles import GeometryError, read_geometry
+from m2pem.geo import files as geofiles
+from m2pem.geo.files import GeometryError, read_geometry
 from m2pem.mission.geometry import Area, Point, Route
 
-from .fleets import LINE, POINT, SQUARE, write_json
+from ..fleet.fleets import LINE, POINT, SQUARE, write_json
 from .test_qgroundcontrol import SURVEY, WAYPOINTS, plan
 
 

@@ -9,15 +9,26 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import TypeAlias
 
-Ring: TypeAlias = Sequence[tuple[float, float]]
-"""A closed ring of (east, north) in metres; the first point is repeated last."""
+from m2pem.geo.local_frame import EastNorth
+
+Ring: TypeAlias = Sequence[EastNorth]
+"""A closed ring; the first point is repeated last."""
 
 MAX_STRIPS = 5_000
 
+_SAME_LENGTH = 1e-5
+"""Edges whose lengths differ by less than this part are equally long."""
+
 
 def longest_edge_yaw(ring: Ring) -> float:
-    """Direction of the longest edge: few turns. From east, counter-clockwise, in rad."""
-    a, b = max(pairwise(ring), key=lambda edge: math.dist(*edge))
+    """Return the direction of the longest edge, along which there are the fewest turns.
+
+    It is from east, counter-clockwise, in rad. Of edges that are equally long, as those of a square
+    are but for rounding, the first one counts.
+    """
+    edges = list(pairwise(ring))
+    longest_m = max(math.dist(*edge) for edge in edges)
+    a, b = next(edge for edge in edges if math.dist(*edge) >= longest_m * (1 - _SAME_LENGTH))
     return math.atan2(b[1] - a[1], b[0] - a[0])
 
 

@@ -1,0 +1,204 @@
+"""Polygons: whether rings bound an area, what is inside, convex hulls and distances.
+
+Rings of areas are in degrees: GeoJSON draws straight edges in the plane of longitude and latitude
+(RFC 7946, 3.1.1). All else is in metres east and north of a local frame.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from typing import TypeAlias
+
+from m2pem.geo.local_frame import EastNorth, LatLon
+from m2pem.mission.geometry import Coordinate
+
+Edge: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
+"""From a corner to the next: of degrees or metres, as the ring is."""
+
+Hull: TypeAlias = tuple[EastNorth, ...]
+"""The corners of a convex polygon, counter-clockwise. One is a place, two are a straight way."""
+
+MAX_CORNERS = 10_000
+
+BUFFER_SIDES = 16
+"""Sides of the polygon that stands for a circle, and lies around it."""
+
+_OUTER = 1 / math.cos(math.pi / BUFFER_SIDES)
+_ANGLES = tuple(math.tau * side / BUFFER_SIDES for side in range(BUFFER_SIDES))
+_CIRCLE = tuple((_OUTER * math.cos(angle), _OUTER * math.sin(angle)) for angle in _ANGLES)
+
+
+def contains(edges: Iterable[Edge], point: EastNorth) -> bool:
+    """Whether edges of closed rings enclose a point: of an outer ring, and of holes in it.
+
+    The edges that a ray to the east crosses are counted. Coordinates are (east, north), or
+    (longitude, latitude).
+    """
+    east, north = point
+    odd = False
+    for (ae, an), (be, bn) in edges:
+        if (an > north) != (bn > north) and east < (be - ae) * (north - an) / (bn - an) + ae:
+            odd = not odd
+    return odd
+
+
+def edge_distance_m(point: EastNorth, edge: Edge) -> float:
+    """Return the distance from a point to the nearest one of an edge."""
+    (ae, an), (be, bn) = edge
+    de, dn = be - ae, bn - an
+    length2 = de * de + dn * dn
+    part = ((point[0] - ae) * de + (point[1] - an) * dn) / length2 if length2 else 0.0
+    part = min(1.0, max(0.0, part))
+    return math.dist(point, (ae + de * part, an + dn * part))
+
+
+def convex_hull(points: Iterable[EastNorth]) -> Hull:
+    """Return the smallest convex polygon around points; at least one is needed."""
+    ordered = sorted(set(points))
+    if len(ordered) < 3:
+        return tuple(ordered)
+    lower, upper = _chain(ordered), _chain(ordered[::-1])
+    return (*lower[:-1], *upper[:-1])
+
+
+def buffered_hull(points: Iterable[EastNorth], distance_m: float) -> Hull:
+    """Return a convex polygon around all that is within a distance of the hull of points."""
+    if distance_m <= 0:
+        return convex_hull(points)
+    return convex_hull(
+        (east + distance_m * cos, north + distance_m * sin)
+        for east, north in points
+        for cos, sin in _CIRCLE
+    )
+
+
+def hull_distance_m(a: Hull | None, b: Hull | None) -> float:
+    """Return the distance between two convex polygons; 0 if they touch. None is everywhere."""
+    if a is None or b is None or _holds(a, b[0]) or _holds(b, a[0]):
+        return 0.0
+    return min(_edges_distance_m(first, other) for first in _edges(a) for other in _edges(b))
+
+
+def _chain(points: Sequence[EastNorth]) -> list[EastNorth]:
+    kept: list[EastNorth] = []
+    for point in points:
+        while len(kept) >= 2 and _turn(kept[-2], kept[-1], point) <= 0:
+            kept.pop()
+        kept.append(point)
+    return kept
+
+
+def _turn(a: EastNorth, b: EastNorth, c: EastNorth) -> float:
+    """Above 0: c is to the left of the way from a to b."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _holds(polygon: Hull, point: EastNorth) -> bool:
+    return len(polygon) > 2 and all(_turn(a, b, point) >= 0 for a, b in _edges(polygon))
+
+
+def _edges(polygon: Hull) -> list[Edge]:
+    if len(polygon) == 1:
+        return [(polygon[0], polygon[0])]
+    if len(polygon) == 2:
+        return [(polygon[0], polygon[1])]
+    return [*pairwise(polygon), (polygon[-1], polygon[0])]
+
+
+def _edges_distance_m(first: Edge, other: Edge) -> float:
+    (a, b), (c, d) = first, other
+    if _turn(a, b, c) * _turn(a, b, d) < 0 and _turn(c, d, a) * _turn(c, d, b) < 0:
+        return 0.0
+    return min(
+        edge_distance_m(a, other),
+        edge_distance_m(b, other),
+        edge_distance_m(c, first),
+        edge_distance_m(d, first),
+    )
+
+
+# --- rings of areas, in degrees -------------------------------------------------------------------
+
+
+def ring_problem(rings: Sequence[Sequence[Coordinate]]) -> str:
+    """What keeps closed rings from bounding an area, with its edges; "" if nothing does.
+
+    No edge may cross another or the antimeridian (RFC 7946, 3.1.9), and each hole lies within the
+    outer ring and in no other hole. Rings may touch in corners.
+    """
+    if sum(map(len, rings)) > MAX_CORNERS:
+        return f"has more than {MAX_CORNERS:,} corners; simplify it"
+    edges = [edge for ring in rings for edge in pairwise(c[:2] for c in ring) if edge[0] != edge[1]]
+    for edge in edges:
+        if abs(edge[1][1] - edge[0][1]) > 180.0:
+            return (
+                f"its edge {_text(edge)} crosses the antimeridian (longitude 180); "
+                "use an area for each side of it"
+            )
+    for a, b in _overlapping(edges):
+        if _crosses(a, b):
+            return f"its edge {_text(a)} crosses its edge {_text(b)}; a ring may not cross itself"
+    return _hole_problem(rings)
+
+
+def _overlapping(edges: list[Edge]) -> Iterator[tuple[Edge, Edge]]:
+    """The pairs of edges whose bounding boxes overlap."""
+    boxes = [(min(a[1], b[1]), max(a[1], b[1]), min(a[0], b[0]), max(a[0], b[0])) for a, b in edges]
+    active: list[int] = []
+    for index in sorted(range(len(edges)), key=boxes.__getitem__):
+        west, _, south, north = boxes[index]
+        active = [other for other in active if boxes[other][1] >= west]
+        for other in active:
+            if boxes[other][2] <= north and boxes[other][3] >= south:
+                yield edges[min(index, other)], edges[max(index, other)]
+        active.append(index)
+
+
+def _crosses(a: Edge, b: Edge) -> bool:
+    """Whether two edges have more in common than a corner of both."""
+    sides = [_side(*a, b[0]), _side(*a, b[1]), _side(*b, a[0]), _side(*b, a[1])]
+    if sides[0] * sides[1] < 0 and sides[2] * sides[3] < 0:
+        return True
+    if set(a) & set(b):
+        return False
+    touches = ((a, b[0]), (a, b[1]), (b, a[0]), (b, a[1]))
+    return any(
+        side == 0 and _within(corner, edge)
+        for side, (edge, corner) in zip(sides, touches, strict=True)
+    )
+
+
+def _side(a: LatLon, b: LatLon, c: LatLon) -> int:
+    """On which side of the line from a to b the corner c lies: 1, -1, or 0 when it is on it."""
+    turn = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    return (turn > 0) - (turn < 0)
+
+
+def _within(corner: LatLon, edge: Edge) -> bool:
+    (lat_a, lon_a), (lat_b, lon_b) = edge
+    return min(lat_a, lat_b) <= corner[0] <= max(lat_a, lat_b) and min(lon_a, lon_b) <= corner[
+        1
+    ] <= max(lon_a, lon_b)
+
+
+def _hole_problem(rings: Sequence[Sequence[Coordinate]]) -> str:
+    for index, hole in enumerate(rings[1:], 1):
+        if not _any_inside(hole, rings[0]):
+            return f"its hole {index} lies outside of its outer ring"
+        for number, other in enumerate(rings[1:], 1):
+            if number != index and _any_inside(hole, other):
+                return f"its hole {index} lies in its hole {number}"
+    return ""
+
+
+def _any_inside(ring: Sequence[Coordinate], around: Sequence[Coordinate]) -> bool:
+    """Whether a ring that does not cross another lies within it; corners may be common."""
+    common = {corner[:2] for corner in around}
+    own = [corner for corner in ring if corner[:2] not in common]
+    corners = [(longitude, latitude) for latitude, longitude, _ in around]
+    return bool(own) and contains(pairwise(corners), (own[0][1], own[0][0]))
+
+
+def _text(edge: Edge) -> str:
+    (lat_a, lon_a), (lat_b, lon_b) = edge
+    return f"from [{lat_a:.9g}, {lon_a:.9g}] to [{lat_b:.9g}, {lon_b:.9g}] (latitude, longitude)"
