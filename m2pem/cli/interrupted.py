@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from m2pem.cli.journals import journal_to_read
 from m2pem.cli.standing import Standing
-from m2pem.journal import Journal, RunLine
+from m2pem.journal import Journal, RunInfo
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ async def interrupted_runs(url: str | None) -> list[Interrupted]:
         ]
 
 
-async def _interrupted(journal: Journal, line: RunLine) -> Interrupted:
+async def _interrupted(journal: Journal, line: RunInfo) -> Interrupted:
     standing = Standing(line)
     async for entry in journal.read(line.run):
         for record in entry.records:

@@ -13,7 +13,7 @@ import click
 from m2pem.cli.options import UnusableError
 from m2pem.errors import JournalError
 from m2pem.executive.runtime_folder import runtime_folder
-from m2pem.journal import Journal, MemoryJournal, RunLine, default_url, file_of, open_journal
+from m2pem.journal import Journal, MemoryJournal, RunInfo, default_url, file_of, open_journal
 
 if TYPE_CHECKING:
     from m2pem.journal.sqlite import SqliteJournal
@@ -101,7 +101,7 @@ async def existing_journal(url: str | None) -> AsyncIterator[Journal]:
         yield MemoryJournal()
 
 
-async def find_run(journal: Journal, run: str) -> RunLine:
+async def find_run(journal: Journal, run: str) -> RunInfo:
     """What the journal says of a run.
 
     Raises:
@@ -129,7 +129,7 @@ async def accept(journal: Journal, run: str) -> None:
     await cast("SqliteJournal", journal).accept_loss(run)
 
 
-async def last_decided_us(journal: Journal, line: RunLine) -> int:
+async def last_decided_us(journal: Journal, line: RunInfo) -> int:
     """When the last input of a run was decided, in microseconds since the Unix epoch."""
     back = 1
     while True:

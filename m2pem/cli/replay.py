@@ -11,7 +11,7 @@ from m2pem.cli.options import as_json, example, fleet_option, format_option, jou
 
 if TYPE_CHECKING:
     from m2pem.cli.progress import Progress
-    from m2pem.journal.base import Journal, RunLine
+    from m2pem.journal.base import Journal, RunInfo
 
 
 @click.command(epilog=example("m2pem replay r1 --verify"))
@@ -87,7 +87,7 @@ async def _replay(run_id: str, url: str | None, verify: bool, state_only: bool, 
 
 
 async def _print(
-    journal: "Journal", line: "RunLine", state_only: bool, output: str, done: "Progress"
+    journal: "Journal", line: "RunInfo", state_only: bool, output: str, done: "Progress"
 ) -> int:
     from m2pem.api.control import StampedRecord
     from m2pem.cli.output import US_PER_S, wants_colour
@@ -114,7 +114,7 @@ async def _print(
     return 0
 
 
-async def _verify(journal: "Journal", line: "RunLine", output: str, done: "Progress") -> int:
+async def _verify(journal: "Journal", line: "RunInfo", output: str, done: "Progress") -> int:
     from m2pem.cli.verification import Verification
 
     verification = Verification(line)

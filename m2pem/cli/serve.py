@@ -22,7 +22,7 @@ from m2pem.cli.options import (
 if TYPE_CHECKING:
     from m2pem.executive.executive import Executive
     from m2pem.fleet.fleet import Fleet
-    from m2pem.journal.base import Journal, RunLine
+    from m2pem.journal.base import Journal, RunInfo
 
 
 @click.command(epilog=example("m2pem serve --fleet fleet_configs/vignette1.yaml --ocu plain"))
@@ -105,13 +105,13 @@ async def _serve(
 
 async def _interrupted(
     journal: "Journal", fleet: "Fleet", simulated: bool, speed: float
-) -> "tuple[list[RunLine], list[RunLine]]":
+) -> "tuple[list[RunInfo], list[RunInfo]]":
     """The runs that nobody drives: those with this very fleet, and the others."""
     from m2pem.fleet.snapshot import dump
 
     here = (dump(fleet), simulated, speed)
-    mine: list[RunLine] = []
-    others: list[RunLine] = []
+    mine: list[RunInfo] = []
+    others: list[RunInfo] = []
     for line in await journal.runs():
         taken_up = line.loss is None or line.loss.resumable
         if line.outcome is None and not line.driven and taken_up:
@@ -121,7 +121,7 @@ async def _interrupted(
     return mine, others
 
 
-async def _start_us(journal: "Journal", lines: "list[RunLine]") -> int:
+async def _start_us(journal: "Journal", lines: "list[RunInfo]") -> int:
     """Now, or when the last of these runs was, if simulated time has run ahead."""
     from m2pem.cli.journals import last_decided_us
 
@@ -129,7 +129,7 @@ async def _start_us(journal: "Journal", lines: "list[RunLine]") -> int:
     return max([time.time_ns() // 1000, *times])
 
 
-async def _take_up(executive: "Executive", lines: "list[RunLine]") -> None:
+async def _take_up(executive: "Executive", lines: "list[RunInfo]") -> None:
     from m2pem.errors import M2pemError
 
     for line in lines:

@@ -9,12 +9,12 @@ from m2pem.engine.records import DataWritten, Record
 from m2pem.engine.run import MissionRun
 from m2pem.executive.control import summary
 from m2pem.fleet.snapshot import restore
-from m2pem.journal.base import RunLine
+from m2pem.journal.base import RunInfo
 from m2pem.journal.mission import mission_of
 from m2pem.mission.values import Value
 
 
-def run_of(line: RunLine) -> MissionRun:
+def run_of(line: RunInfo) -> MissionRun:
     """The run of a journal before anything has happened in it."""
     header = line.header
     return MissionRun(mission_of(header), restore(header.fleet) if header.fleet else None, line.run)
@@ -23,7 +23,7 @@ def run_of(line: RunLine) -> MissionRun:
 class Standing:
     """The state of a run, rebuilt by applying its records."""
 
-    def __init__(self, line: RunLine) -> None:
+    def __init__(self, line: RunInfo) -> None:
         self._summary = summary(line)
         self._run = run_of(line)
         self._data: dict[str, Value] = {}

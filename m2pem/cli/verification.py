@@ -3,14 +3,14 @@
 from typing import Any
 
 from m2pem.cli.standing import run_of
-from m2pem.journal.base import Entry, RunLine
+from m2pem.journal.base import Entry, RunInfo
 from m2pem.journal.codec import record_line
 
 
 class Verification:
     """`difference` says where the first one is; it is empty as long as there is none."""
 
-    def __init__(self, line: RunLine) -> None:
+    def __init__(self, line: RunInfo) -> None:
         self.difference: dict[str, Any] = {}
         self._run_id = line.run
         self._loss = line.loss

@@ -38,7 +38,7 @@ from m2pem.executive.prover import verify_apart
 from m2pem.executive.requiring import requirement_findings
 from m2pem.findings import Finding
 from m2pem.fleet.fleet import Fleet
-from m2pem.journal.base import RunLine
+from m2pem.journal.base import RunInfo
 from m2pem.journal.mission import mission_of
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.events import Signal
@@ -365,7 +365,7 @@ def _named(name: str, signals: Mapping[str, Signal]) -> list[str]:
     return [key for key, signal in signals.items() if name and signal.name == name]
 
 
-def summary(line: RunLine) -> RunSummary:
+def summary(line: RunInfo) -> RunSummary:
     """A journal's line as operators see it."""
     if line.outcome is not None:
         status = RunStatus(line.outcome.value)

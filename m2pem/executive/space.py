@@ -6,7 +6,7 @@ from pathlib import Path
 
 from m2pem.api.control import Alert
 from m2pem.executive.notices import Notices
-from m2pem.journal.space import shortage
+from m2pem.journal.storage_checks import space_shortage
 
 log = logging.getLogger("m2pem.executive")
 
@@ -24,7 +24,7 @@ async def watch_space(journal: Path, notices: Notices) -> None:
     short_for = 0
     while True:
         try:
-            text = await asyncio.to_thread(shortage, journal)
+            text = await asyncio.to_thread(space_shortage, journal)
         except OSError as error:
             log.warning("%s: its disk cannot be asked for free space: %s", journal, error.strerror)
             text = ""

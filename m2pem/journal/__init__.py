@@ -5,7 +5,7 @@ from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
 from m2pem.errors import JournalError
-from m2pem.journal.base import Entry, Journal, RunHeader, RunLine
+from m2pem.journal.base import Entry, Journal, RunHeader, RunInfo
 from m2pem.journal.memory import MemoryJournal
 
 __all__ = [
@@ -13,7 +13,7 @@ __all__ = [
     "Journal",
     "MemoryJournal",
     "RunHeader",
-    "RunLine",
+    "RunInfo",
     "default_url",
     "file_of",
     "open_journal",

@@ -16,9 +16,9 @@ from m2pem.mission.library import Source
 
 @dataclass(frozen=True, slots=True)
 class RunHeader:
-    """What a run needs to be rebuilt from nothing else: the mission and the fleet themselves.
+    """What a run is rebuilt from: the mission and the fleet themselves.
 
-    `mission_name` is the file's name for people, `mission` its bytes, `library` the other files
+    `mission_name` is the file's name, `mission` its bytes, `library` the other files
     that it uses; `fleet` is `m2pem.fleet.snapshot.dump(fleet)`, or b"" without one.
     `simulated`: every arbiter was replaced by the simulated one; `speed`: of the clock against
     the wall clock. `created_us`: by the wall clock, also where the executive's runs ahead of it.
@@ -54,7 +54,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """Entries that were durable and are not in the journal any more.
+    """Entries that were reported as durable and are not in the journal any more.
 
     `acknowledged` is the last record that was reported as durable, `found` the last one that the
     journal has now (0: none; None: the run itself is gone). `resumable`: the run can be taken up.
@@ -66,11 +66,11 @@ class Loss:
 
     @property
     def records(self) -> int:
-        """How many records are missing at least; 0: their number is right, their content is not."""
+        """The least number of missing records; 0: the number is right, the content is not."""
         return max(0, self.acknowledged - (self.found or 0))
 
     def remedy(self, run: str) -> str:
-        """What a person should do about it."""
+        """Say what an operator should do about it."""
         if self.resumable:
             return f"`m2pem resume {run}` holds its vehicles and asks"
         return f"Look at its vehicles, then `m2pem runs --accept-loss {run}` lets new runs begin"
@@ -92,10 +92,10 @@ class Loss:
 
 
 @dataclass(frozen=True, slots=True)
-class RunLine:
+class RunInfo:
     """What the journal knows of a run without reading its records.
 
-    `driven`: an executive that is alive holds it. `outcome` None: not ended. `loss`: what was
+    `driven`: a living executive holds the run's lock. `outcome` None: not ended. `loss`: what was
     acknowledged and is gone; of a run that is gone whole, the header is empty and the epoch 0.
     """
 
@@ -113,7 +113,7 @@ class RunLine:
 
     @property
     def gone(self) -> bool:
-        """Whether the journal has lost the run whole: the line is made of its mark alone."""
+        """Whether the journal has lost the run whole: all fields are those of its mark."""
         return self.loss is not None and self.loss.found is None
 
 
@@ -122,36 +122,36 @@ class Journal(Protocol):
 
     @property
     def identity(self) -> UUID:
-        """Tells this journal from every other one; the same each time that it is opened."""
+        """A unique id of this journal; the same each time that it is opened."""
         ...
 
     @property
     def file(self) -> Path | None:
-        """Where it is, for what belongs beside it; None for one that ends with its process."""
+        """The journal's path, for files beside it; None for a journal in memory."""
         ...
 
     async def create(self, header: RunHeader) -> str:
-        """Make a run, durable on return, claimed with epoch 1; the id is r1, r2, ...
+        """Create a run, durable on return and claimed with epoch 1; the id is r1, r2, ...
 
         Raises:
-            JournalError: it cannot be written, space runs short, or a loss is not settled yet.
+            JournalError: it cannot be written, there is too little free space, or a loss is open.
         """
         ...
 
     async def claim(self, run: str) -> int:
-        """Take a run over: its epoch rises by one and is returned; older ones are shut out.
+        """Claim a run: its epoch rises by one and is returned; older epochs cannot append.
 
         Raises:
-            JournalError: no such run, or an executive that is alive holds it (named).
+            JournalError: no such run, or a living executive holds it (its process is named).
         """
         ...
 
     async def release(self, run: str) -> None:
-        """Let go of a run, so that another may claim it."""
+        """Release a run, so that another executive may claim it."""
         ...
 
     async def append(self, entries: Sequence[Entry]) -> None:
-        """Write entries; durable on return. Calls that wait together share one commit.
+        """Write entries; durable on return. Calls that wait at the same time share one commit.
 
         Raises:
             StaleEpochError: the run was claimed by another since; nothing of the call is written.
@@ -161,17 +161,18 @@ class Journal(Protocol):
         ...
 
     def read(self, run: str, after_seq: int = 0) -> AsyncIterator[Entry]:
-        """Entries whose first record comes after `after_seq`, in order, in constant memory.
+        """Yield the entries whose first record comes after `after_seq`, in order, in constant
+        memory.
 
         Raises:
             JournalError: no such run; or an entry is damaged or missing, by run and record.
         """
         ...
 
-    async def runs(self) -> Sequence[RunLine]:
-        """Every run, in order of its number."""
+    async def runs(self) -> Sequence[RunInfo]:
+        """Return every run, in order of its number."""
         ...
 
     async def close(self) -> None:
-        """Finish what is being written, let go of all runs."""
+        """Finish what is being written, and release all runs."""
         ...

@@ -1,4 +1,4 @@
-"""How entries, records and the names of runs are written, in the journal and for people.
+"""The encoding of entries, records and run ids, in the journal and for people.
 
 An entry's input and records are one JSON text, `[input, [record, ...]]`, and come back as exactly
 equal objects. It is JSON because a journal outlives the program that wrote it.
@@ -29,7 +29,7 @@ def encode_body(entry: Entry) -> bytes:
     """The input and records of an entry as JSON.
 
     Raises:
-        InternalError: a value is not one that JSON can say (NaN, infinity, half a surrogate pair).
+        InternalError: JSON has no such value (NaN, infinity, half a surrogate pair).
     """
     content = (entry.input, entry.records)
     try:
@@ -86,15 +86,15 @@ def record_line(run: str, seq: int, t_us: int, record: Record) -> bytes:
 
 
 def run_id(number: int) -> str:
-    """The name of a journal's `number`th run: r1, r2, ..."""
+    """Return the id of a journal's `number`th run: r1, r2, ..."""
     return f"r{number}"
 
 
 def run_number(run: str) -> int:
-    """The number of a run's name.
+    """Return the number of a run's id.
 
     Raises:
-        JournalError: it is not a run's name.
+        JournalError: it is not the id of a run.
     """
     if not _RUN_ID.fullmatch(run):
         raise unknown_run(run)
@@ -102,5 +102,5 @@ def run_number(run: str) -> int:
 
 
 def unknown_run(run: str) -> JournalError:
-    """What to raise about a run that the journal does not have."""
+    """Return the error for a run that the journal does not have."""
     return JournalError(f"the journal has no run {run!r}; `m2pem runs` lists what it has")

@@ -1,4 +1,4 @@
-"""The SQLite file of a journal: making and opening it, and its errors in plain words."""
+"""The SQLite file of a journal: making it, opening it, and explaining its errors."""
 
 import logging
 import os
@@ -46,7 +46,7 @@ def open_for_writing(path: Path, marked: UUID | None = None) -> sqlite3.Connecti
             connection.close()
             raise
     except sqlite3.Error as error:
-        raise in_plain_words(error, path) from error
+        raise explained_error(error, path) from error
     except OSError as error:
         raise JournalError(f"{path} cannot be opened: {error.strerror}") from error
     return connection
@@ -94,7 +94,8 @@ def _lengthen_log(connection: sqlite3.Connection) -> None:
         connection.execute("CREATE TABLE filling (content BLOB)")
         connection.execute("INSERT INTO filling VALUES (zeroblob(?))", (LOG_BYTES + (1 << 16),))
     except sqlite3.Error:
-        # It is a matter of speed alone: where the disk is too full for it, it may do for a mission.
+        # Only speed depends on it: a disk that is too full for this may be large enough for a
+        # mission.
         _logger.debug("the log of the journal stays short", exc_info=True)
     if connection.in_transaction:
         connection.execute("ROLLBACK")
@@ -119,7 +120,7 @@ def open_for_reading(path: Path) -> sqlite3.Connection:
         connection = _connect(path, "rw")
         connection.execute("PRAGMA query_only = ON")
     except sqlite3.Error as error:
-        raise in_plain_words(error, path) from error
+        raise explained_error(error, path) from error
     return connection
 
 
@@ -133,7 +134,7 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
     )
 
 
-_WORDS = {
+_EXPLANATIONS = {
     sqlite3.SQLITE_FULL: "the disk is full; make room",
     sqlite3.SQLITE_READONLY: "it, its folder or its file system can only be read; allow writing",
     sqlite3.SQLITE_NOTADB: "it is not a journal of m2pem, nor any SQLite database",
@@ -144,23 +145,23 @@ _WORDS = {
     sqlite3.SQLITE_IOERR: "the disk failed to read or write",
 }
 
-_PASSING = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_BUSY)
+_TRANSIENT = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_BUSY)
 
 
-def in_plain_words(error: sqlite3.Error, path: Path) -> JournalError:
-    """What went wrong with a journal's file, and what to do about it."""
-    words = _WORDS.get(_primary_code(error), "SQLite refused")
+def explained_error(error: sqlite3.Error, path: Path) -> JournalError:
+    """Return an error that says what is wrong with a journal's file, and the remedy."""
+    explanation = _EXPLANATIONS.get(_primary_code(error), "SQLite refused")
     name = getattr(error, "sqlite_errorname", type(error).__name__)
-    return JournalError(f"{path}: {words} ({error}, {name})")
+    return JournalError(f"{path}: {explanation} ({error}, {name})")
 
 
-def passes(error: sqlite3.Error) -> bool:
-    """Whether nothing of the transaction was written for certain, and a later one may succeed.
+def is_transient(error: sqlite3.Error) -> bool:
+    """Whether surely nothing of the transaction was written, and a later one may succeed.
 
     After a failed write or fsync neither is known: the kernel may have dropped what it could not
-    write, and a second fsync would say that all is well.
+    write, and a second fsync would report success.
     """
-    return _primary_code(error) in _PASSING
+    return _primary_code(error) in _TRANSIENT
 
 
 def _primary_code(error: sqlite3.Error) -> int:

@@ -1,17 +1,21 @@
-"""The mark file: the last acknowledged entry of each run, outside SQLite's files.
+"""The mark file: the last acknowledged entry of each run (a high-water mark), outside SQLite.
 
-SQLite drops what follows a damaged frame of its log, and says nothing. The mark file, `FILE-mark`
+SQLite drops what follows a damaged frame of its log, without an error. The mark file, `FILE-mark`
 beside the journal, says what was acknowledged. It is written and flushed after each commit and
-before anybody learns of that commit. So the journal may be ahead of the mark, and never behind it.
+before that commit is reported as durable. So the journal may be ahead of the mark, and never behind
+it.
 
 The file has slots of 128 bytes. Slot 0 is the head: `m2pem mark 1`, the journal's identity, a
 checksum. Slot N is run rN: two copies of 64 bytes, written in turn, so that a write that a power
 cut tears leaves the copy before it. A copy has big-endian numbers of 8 bytes: the run, the
 generation (the copy with the higher one counts), epoch, last record, state; then the last entry's
 hash (16 bytes) and a checksum (8).
+
+A loss is what the mark file says was acknowledged and the journal does not have any more.
 """
 
 import os
+import sqlite3
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,7 +25,8 @@ from pathlib import Path
 from uuid import UUID
 
 from m2pem.errors import JournalError
-from m2pem.journal.chain import HASH_BYTES
+from m2pem.journal.base import Loss
+from m2pem.journal.hash_chain import HASH_BYTES
 
 _MAGIC = b"m2pem mark 1\n\0\0\0"
 _SLOT_BYTES = 128
@@ -36,7 +41,7 @@ NO_HASH = bytes(HASH_BYTES)
 
 
 class MarkState(IntEnum):
-    """Of a run: not ended; ended; or its loss was accepted by a person who looked."""
+    """State of a run: not ended, ended, or its loss was accepted by a person."""
 
     OPEN = 0
     ENDED = 1
@@ -45,7 +50,7 @@ class MarkState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """What was acknowledged last of a run: its epoch, last record, and the last entry's hash."""
+    """The last acknowledged entry of a run: its epoch, last record and hash."""
 
     epoch: int
     seq: int
@@ -124,7 +129,7 @@ class MarkFile:
         _flush(self._file)
 
     def forget(self, number: int) -> None:
-        """Another executive may write the run's slot from now on."""
+        """Forget a run's slot: another executive may write it from now on."""
         self._generations.pop(number, None)
 
     def close(self) -> None:
@@ -181,10 +186,56 @@ def _flush_folder(folder: Path) -> None:
 
 
 def of_another_journal(path: Path) -> JournalError:
-    """What to raise when a mark file and the journal beside it do not belong together."""
+    """Return the error for when a mark file and the journal beside it do not belong together."""
     journal = path.name.removesuffix("-mark")
     return JournalError(
         f"{path} is the mark of another journal: {journal} has been replaced, or has lost all that "
         f"it had. Put the right {journal} back; or, if you replaced it yourself, look at the "
         f"vehicles and remove {path.name}"
     )
+
+
+_POSITIONS = "SELECT run, epoch, last_seq, hash, outcome FROM standings"
+
+
+def find_losses(connection: sqlite3.Connection, marks: Mapping[int, Mark]) -> dict[int, Loss]:
+    """Return the losses by run number. Read the marks first: both grow meanwhile."""
+    rows = {row[0]: row[1:] for row in connection.execute(_POSITIONS)}
+    found = {
+        number: _loss(connection, number, rows.get(number), mark) for number, mark in marks.items()
+    }
+    return {number: loss for number, loss in found.items() if loss is not None}
+
+
+def find_loss(connection: sqlite3.Connection, number: int, mark: Mark | None) -> Loss | None:
+    """Return what one run has lost."""
+    if mark is None:
+        return None
+    row = connection.execute(f"{_POSITIONS} WHERE run = ?", (number,)).fetchone()
+    return _loss(connection, number, None if row is None else row[1:], mark)
+
+
+def _loss(
+    connection: sqlite3.Connection,
+    number: int,
+    position: tuple[int, int, bytes | None, str | None] | None,
+    mark: Mark,
+) -> Loss | None:
+    if mark.state is MarkState.ACCEPTED:
+        return None
+    if position is None:
+        return Loss(mark.seq, None, resumable=False)
+    epoch, last_seq, hash_, outcome = position
+    if epoch >= mark.epoch and last_seq >= mark.seq:
+        if last_seq == mark.seq:
+            there = hash_
+        else:
+            row = connection.execute(
+                "SELECT hash FROM entries WHERE run = ? AND seq <= ? ORDER BY seq DESC LIMIT 1",
+                (number, mark.seq),
+            ).fetchone()
+            there = row and row[0]
+        # The mark before the first entry has the hash of the header, which no entry has.
+        if (there or NO_HASH) == mark.hash or (mark.seq == 0 and last_seq > 0):
+            return None
+    return Loss(mark.seq, last_seq, resumable=last_seq > 0 and outcome is None)

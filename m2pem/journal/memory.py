@@ -9,9 +9,9 @@ from pathlib import Path
 from uuid import UUID, uuid4
 
 from m2pem.errors import InternalError, JournalError
-from m2pem.journal.base import Entry, RunHeader, RunLine
+from m2pem.journal.base import Entry, RunHeader, RunInfo
 from m2pem.journal.codec import run_id, run_number, unknown_run
-from m2pem.journal.standing import Standing
+from m2pem.journal.position import RunPosition
 
 _BATCH_ENTRIES = 500
 
@@ -19,17 +19,17 @@ _BATCH_ENTRIES = 500
 @dataclass(slots=True)
 class _Run:
     header: RunHeader
-    standing: Standing
+    position: RunPosition
     driven: bool = True
     entries: list[Entry] = field(default_factory=list)
     dropped_seq: int = 0
 
 
 class MemoryJournal:
-    """Promises what the others promise, until the process ends.
+    """Keeps the contract of a journal until the process ends.
 
-    `keep`: how many of a run's last entries are kept for certain (at most twice as many are held),
-    for long runs that nobody reads; None: all.
+    `keep`: how many of a run's last entries are kept at least (at most twice as many are held), for
+    long runs that are not read; None: all.
     """
 
     def __init__(self, keep: int | None = None) -> None:
@@ -51,8 +51,8 @@ class MemoryJournal:
     async def create(self, header: RunHeader) -> str:
         """See `Journal.create`."""
         self._check_open()
-        standing = Standing(epoch=1, pid=os.getpid(), started_us=header.created_us)
-        self._runs.append(_Run(header, standing))
+        position = RunPosition(epoch=1, pid=os.getpid(), started_us=header.created_us)
+        self._runs.append(_Run(header, position))
         return run_id(len(self._runs))
 
     async def claim(self, run: str) -> int:
@@ -61,8 +61,8 @@ class MemoryJournal:
         if found.driven:
             raise JournalError(f"run {run} is already driven, by this process ({os.getpid()})")
         found.driven = True
-        found.standing = found.standing.claimed(os.getpid())
-        return found.standing.epoch
+        found.position = found.position.claimed(os.getpid())
+        return found.position.epoch
 
     async def release(self, run: str) -> None:
         """See `Journal.release`."""
@@ -73,15 +73,15 @@ class MemoryJournal:
     async def append(self, entries: Sequence[Entry]) -> None:
         """See `Journal.append`."""
         self._check_open()
-        changed: dict[str, Standing] = {}
+        changed: dict[str, RunPosition] = {}
         for entry in entries:
-            before = changed.get(entry.run) or self._find(entry.run).standing
+            before = changed.get(entry.run) or self._find(entry.run).position
             changed[entry.run] = before.after(entry)
         for run in changed:
             if not self._find(run).driven:
                 raise InternalError(f"{run}: written to without having been claimed")
-        for run, standing in changed.items():
-            self._find(run).standing = standing
+        for run, position in changed.items():
+            self._find(run).position = position
         for entry in entries:
             self._keep_entry(self._find(entry.run), entry)
 
@@ -97,7 +97,7 @@ class MemoryJournal:
         """See `Journal.read`.
 
         Raises:
-            JournalError: there is no such run, or `keep` has dropped some of what is asked for.
+            JournalError: there is no such run, or `keep` has dropped some of these entries.
         """
         found = self._find(run)
         while batch := self._batch(found, run, after_seq):
@@ -114,11 +114,11 @@ class MemoryJournal:
         first = bisect_right(found.entries, after_seq, key=attrgetter("seq"))
         return found.entries[first : first + _BATCH_ENTRIES]
 
-    async def runs(self) -> Sequence[RunLine]:
+    async def runs(self) -> Sequence[RunInfo]:
         """See `Journal.runs`."""
         self._check_open()
         return [
-            found.standing.line(run_id(number), found.header, found.driven)
+            found.position.info(run_id(number), found.header, found.driven)
             for number, found in enumerate(self._runs, 1)
         ]
 

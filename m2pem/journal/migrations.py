@@ -1,6 +1,6 @@
-"""The tables of the SQLite journal, as the steps that made them what they are.
+"""The tables of the SQLite journal, as a sequence of migrations.
 
-A step that was released is never changed; what has to change becomes a new step at the end of
+A released step is never changed; a change becomes a new step at the end of
 `MIGRATIONS`. `PRAGMA user_version` is how many of them a database has had.
 """
 
@@ -12,11 +12,11 @@ from uuid import uuid4
 from m2pem.errors import JournalError
 
 APPLICATION_ID = 0x6D327065
-"""What tells a journal from another program's database: "m2pe"."""
+"""Marks a database as a journal of m2pem: "m2pe"."""
 
 
 def runs_standings_and_entries(connection: sqlite3.Connection) -> None:
-    """0.1: runs never change; where one stands is a row of its own, small and often rewritten."""
+    """0.1: runs never change; the position of each is a small row that is often rewritten."""
     connection.execute(
         """CREATE TABLE runs (
             run INTEGER PRIMARY KEY,
@@ -61,7 +61,7 @@ def other_files_of_missions(connection: sqlite3.Connection) -> None:
 
 
 def identity_of_the_journal(connection: sqlite3.Connection) -> None:
-    """0.3: a name of its own, so that what vehicles are told apart by is unique for ever."""
+    """0.3: a unique id of the journal, which makes the ids of behaviors globally unique."""
     connection.execute("CREATE TABLE identity (uuid TEXT NOT NULL)")
     connection.execute("INSERT INTO identity VALUES (?)", (str(uuid4()),))
 
@@ -69,7 +69,7 @@ def identity_of_the_journal(connection: sqlite3.Connection) -> None:
 def hash_chain(connection: sqlite3.Connection) -> None:
     """0.4: each entry carries a hash over what was before it; entries from before have none.
 
-    `seal` covers the other columns of a standing. `marked`: there has been a mark file.
+    `seal` covers the other columns of the row in `standings`. `marked`: there has been a mark file.
     """
     connection.execute("ALTER TABLE entries ADD COLUMN hash BLOB")
     connection.execute("ALTER TABLE standings ADD COLUMN hash BLOB")

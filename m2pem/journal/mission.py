@@ -1,4 +1,7 @@
-"""The mission of a run, as it was when the run began: from the journal, and from nothing else."""
+"""The mission of a run, as it was when the run began, read from the journal alone.
+
+It is apart from the rest of the journal, which needs no parser of BPMN.
+"""
 
 from m2pem.bpmn import parse_mission
 from m2pem.journal.base import RunHeader
@@ -9,11 +12,11 @@ from m2pem.mission.mission import Mission
 def mission_of(header: RunHeader) -> Mission:
     """Read a run's mission, and the files that it uses, again.
 
-    What this m2pem refuses, and the one that began the run did not, is an error among the
+    Errors that this release finds and the release that began the run did not are among the
     mission's `warnings`: a run goes on as it was begun.
 
     Raises:
-        MissionError: nothing that could be executed can be read any more.
+        MissionError: no executable mission can be read any more.
     """
     library = KeptLibrary(header.library)
     return parse_mission(header.mission, header.mission_name, library, accepted=True)

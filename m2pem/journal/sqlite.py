@@ -1,4 +1,4 @@
-"""The journal in an SQLite file: for one host, any number of executives."""
+"""The journal in an SQLite file, for any number of executives on one host."""
 
 import asyncio
 import logging
@@ -13,8 +13,7 @@ from typing import Any, TypeVar
 from uuid import UUID
 
 from m2pem.errors import JournalError
-from m2pem.journal.base import Entry, Loss, RunHeader, RunLine
-from m2pem.journal.chain import beginning, link
+from m2pem.journal.base import Entry, Loss, RunHeader, RunInfo
 from m2pem.journal.codec import (
     decode_body,
     decode_library,
@@ -23,13 +22,12 @@ from m2pem.journal.codec import (
     run_number,
     unknown_run,
 )
-from m2pem.journal.database import in_plain_words, open_for_reading, open_for_writing
-from m2pem.journal.lease import RunLocks, run_locks
-from m2pem.journal.ledger import Ledger, Row, mark_of, standing_of
-from m2pem.journal.losses import losses
-from m2pem.journal.marks import MarkFile, identity_in, of_another_journal
-from m2pem.journal.presence import Presence
-from m2pem.journal.space import bound_mb
+from m2pem.journal.database import explained_error, open_for_reading, open_for_writing
+from m2pem.journal.hash_chain import entry_hash, header_hash
+from m2pem.journal.marks import MarkFile, find_losses, identity_in, of_another_journal
+from m2pem.journal.run_locks import RunLocks, run_locks
+from m2pem.journal.storage_checks import OpenFiles, min_free_mb
+from m2pem.journal.transaction import EntryRow, WriteTransaction, mark_of, position_from
 from m2pem.journal.writer import GroupWriter
 
 T = TypeVar("T")
@@ -38,16 +36,16 @@ log = logging.getLogger("m2pem.journal")
 
 _BATCH_BYTES = 1 << 20
 _BATCH_ENTRIES = 500
-_STANDING_COLUMNS = 11
+_POSITION_COLUMNS = 11
 NO_HEADER = RunHeader("", b"", "")
-"""Of a run that the journal has lost whole."""
+"""The header of a run that the journal has lost whole."""
 
 
 class SqliteJournal:
     """WAL and `synchronous=FULL`: an append that returned survives a power cut.
 
-    One thread writes, another reads; the event loop never waits for the disk. `FILE-lock` beside
-    the file says which runs are driven, `FILE-mark` what was acknowledged last.
+    One thread writes, another reads; the event loop never waits for the disk. Beside the
+    file, `FILE-lock` locks the runs that are driven and `FILE-mark` has what was acknowledged last.
     """
 
     def __init__(
@@ -65,9 +63,9 @@ class SqliteJournal:
         self._marks = marks
         self._writing = writing
         self._reading = reading
-        presence = Presence([path, _beside(path, "wal"), _beside(path, "lock"), marks.path])
-        ledger = Ledger(writing, locks, marks, presence)
-        self._writer = GroupWriter(ledger, path, finish=self._finish)
+        open_files = OpenFiles([path, _beside(path, "wal"), _beside(path, "lock"), marks.path])
+        transaction = WriteTransaction(writing, locks, marks, open_files)
+        self._writer = GroupWriter(transaction, path, finish=self._finish)
         self._reader = ThreadPoolExecutor(1, thread_name_prefix=f"reading {path}")
         self._closed = False
         self._writer.start()
@@ -76,14 +74,14 @@ class SqliteJournal:
     def open(cls, path: Path) -> "SqliteJournal":
         """Open a journal, making its file where it is missing; `close` it in the end.
 
-        What was acknowledged and is gone is logged as an error, and each run's `RunLine.loss`.
+        What was acknowledged and is gone is logged as an error, and each run's `RunInfo.loss`.
 
         Raises:
             JournalError: there is no such folder, it is not a journal, a newer one, it is not the
                 one whose mark file is beside it, ...
         """
         path = path.resolve()
-        bound_mb()  # a wrong setting is reported now, not when a run is to begin
+        min_free_mb()  # a wrong setting is reported now, not when a run is to begin
         marked = identity_in(_beside(path, "mark"))
         if marked is not None and not path.exists():
             raise of_another_journal(_beside(path, "mark"))
@@ -101,7 +99,7 @@ class SqliteJournal:
             try:
                 _compare(writing, marks, path)
             except sqlite3.Error as error:
-                raise in_plain_words(error, path) from error
+                raise explained_error(error, path) from error
             except OSError as error:
                 raise JournalError(f"{marks.path}: {error.strerror}") from error
             undo.pop_all()
@@ -124,35 +122,37 @@ class SqliteJournal:
 
     async def create(self, header: RunHeader) -> str:
         """See `Journal.create`."""
-        return await self._holding(lambda ledger: ledger.create(header), run_number)
+        return await self._holding(lambda transaction: transaction.create(header), run_number)
 
     async def claim(self, run: str) -> int:
         """See `Journal.claim`."""
         number = run_number(run)
-        return await self._holding(lambda ledger: ledger.claim(number), lambda _: number)
+        return await self._holding(lambda transaction: transaction.claim(number), lambda _: number)
 
-    async def _holding(self, work: Callable[[Ledger], T], number_of: Callable[[T], int]) -> T:
-        """Do what takes a run's lock; if the caller is cancelled meanwhile, let go of it."""
+    async def _holding(
+        self, work: Callable[[WriteTransaction], T], number_of: Callable[[T], int]
+    ) -> T:
+        """Carry out what takes a run's lock; if the caller is cancelled meanwhile, release it."""
         self._check_open()
         taking = self._writer.submit(work)
 
-        def let_go(taken: asyncio.Future[T]) -> None:
+        def release(taken: asyncio.Future[T]) -> None:
             if taken.exception() is None:
-                self._let_go(number_of(taken.result()))
+                self._release(number_of(taken.result()))
 
         try:
             return await asyncio.shield(taking)
         except asyncio.CancelledError:
-            taking.add_done_callback(let_go)
+            taking.add_done_callback(release)
             raise
 
     async def release(self, run: str) -> None:
-        """See `Journal.release`; what was handed over before is written first."""
+        """See `Journal.release`; what was submitted before is written first."""
         self._check_open()
-        await asyncio.wait([self._let_go(run_number(run))])
+        await asyncio.wait([self._release(run_number(run))])
 
-    def _let_go(self, number: int) -> asyncio.Future[None]:
-        forgotten = self._writer.submit(lambda ledger: ledger.forget(number))
+    def _release(self, number: int) -> asyncio.Future[None]:
+        forgotten = self._writer.submit(lambda transaction: transaction.forget(number))
 
         def unlock(forgotten: asyncio.Future[None]) -> None:
             # Looked at so that asyncio doesn't report it: a failed journal lets go all the same.
@@ -166,8 +166,8 @@ class SqliteJournal:
         """See `Journal.append`. A cancelled call may or may not be written, but never in part."""
         self._check_open()
         if entries:
-            rows = [Row(run_number(e.run), e, encode_body(e)) for e in entries]
-            await self._writer.submit(partial(Ledger.append, rows=rows))
+            rows = [EntryRow(run_number(e.run), e, encode_body(e)) for e in entries]
+            await self._writer.submit(partial(WriteTransaction.append, rows=rows))
 
     async def read(self, run: str, after_seq: int = 0) -> AsyncIterator[Entry]:
         """See `Journal.read`; entries that are appended meanwhile are included."""
@@ -212,8 +212,10 @@ class SqliteJournal:
         with closing(rows):
             for seq, epoch, at_us, t_us, body, hash_ in rows:
                 if hash_ is not None:
-                    link_ = link(before or self._beginning(number), seq, epoch, at_us, t_us, body)
-                if hash_ != (None if before is None and hash_ is None else link_):
+                    expected = entry_hash(
+                        before or self._header_hash(number), seq, epoch, at_us, t_us, body
+                    )
+                if hash_ != (None if before is None and hash_ is None else expected):
                     raise self._damaged(
                         number, seq, "it does not follow from what was before it (its hash differs)"
                     )
@@ -235,47 +237,47 @@ class SqliteJournal:
         ).fetchone()
         return None if row is None else row[0]
 
-    def _beginning(self, number: int) -> bytes:
+    def _header_hash(self, number: int) -> bytes:
         row = self._reading.execute("SELECT * FROM runs WHERE run = ?", (number,)).fetchone()
-        return beginning(row)
+        return header_hash(row)
 
     def _check_end(self, number: int, before: bytes | None) -> None:
         query = "SELECT * FROM standings JOIN runs USING (run) WHERE run = ?"
         row = self._reading.execute(query, (number,)).fetchone()
         if row is None:
             raise unknown_run(run_id(number))
-        standing = standing_of(row[:_STANDING_COLUMNS])
-        if standing.hash is not None and standing.hash != (before or self._beginning(number)):
+        position = position_from(row[:_POSITION_COLUMNS])
+        if position.hash is not None and position.hash != (before or self._header_hash(number)):
             raise self._damaged(
-                number, standing.last_seq, "it, or what was before it, is missing or was changed"
+                number, position.last_seq, "it, or what was before it, is missing or was changed"
             )
 
     def _damaged(self, number: int, seq: int, why: str) -> JournalError:
         return JournalError(f"{self._path}: {run_id(number)}, record {seq}: {why}")
 
-    async def runs(self) -> Sequence[RunLine]:
+    async def runs(self) -> Sequence[RunInfo]:
         """See `Journal.runs`."""
-        return await self._read(self._lines)
+        return await self._read(self._infos)
 
-    def _lines(self) -> list[RunLine]:
+    def _infos(self) -> list[RunInfo]:
         marks = self._marks.read()
         self._reading.execute("BEGIN")
         try:
-            lost = losses(self._reading, marks)
+            lost = find_losses(self._reading, marks)
             rows = self._reading.execute(
                 "SELECT * FROM standings JOIN runs USING (run) ORDER BY run"
             ).fetchall()
         finally:
             self._reading.execute("ROLLBACK")
-        lines = {row[0]: self._line(row, lost.pop(row[0], None)) for row in rows}
+        infos = {row[0]: self._info(row, lost.pop(row[0], None)) for row in rows}
         for number, loss in lost.items():
             mark = marks[number]
-            lines[number] = RunLine(run_id(number), NO_HEADER, mark.epoch, 0, 0, loss=loss)
-        return [lines[number] for number in sorted(lines)]
+            infos[number] = RunInfo(run_id(number), NO_HEADER, mark.epoch, 0, 0, loss=loss)
+        return [infos[number] for number in sorted(infos)]
 
-    def _line(self, row: Sequence[Any], loss: Loss | None) -> RunLine:
+    def _info(self, row: Sequence[Any], loss: Loss | None) -> RunInfo:
         mission_name, mission, process, fleet, simulated, speed, created_us, library = row[
-            _STANDING_COLUMNS:
+            _POSITION_COLUMNS:
         ]
         header = RunHeader(
             mission_name=mission_name,
@@ -288,24 +290,25 @@ class SqliteJournal:
             library=decode_library(library),
         )
         number = row[0]
-        standing = standing_of(row[:_STANDING_COLUMNS])
-        return standing.line(run_id(number), header, self._locks.held(number), loss)
+        position = position_from(row[:_POSITION_COLUMNS])
+        return position.info(run_id(number), header, self._locks.held(number), loss)
 
     async def accept_loss(self, run: str) -> None:
-        """An operator knows what is missing of a run that cannot be resumed: new runs may begin.
+        """Note that an operator accepts the loss of a run that cannot be resumed: new runs may
+        begin.
 
         Raises:
-            JournalError: it has lost nothing, or can be resumed, which asks.
+            JournalError: the run has lost nothing, or can be resumed, which asks the operator.
         """
         self._check_open()
-        await self._writer.submit(partial(Ledger.accept_loss, number=run_number(run)))
+        await self._writer.submit(partial(WriteTransaction.accept_loss, number=run_number(run)))
 
     async def _read(self, work: Callable[[], T]) -> T:
         self._check_open()
         try:
             return await asyncio.get_running_loop().run_in_executor(self._reader, work)
         except sqlite3.Error as error:
-            raise in_plain_words(error, self._path) from error
+            raise explained_error(error, self._path) from error
         except (TypeError, ValueError, struct.error) as error:
             # A flipped bit may make a text of a number.
             raise JournalError(f"{self._path}: it is damaged: {error}") from error
@@ -342,13 +345,13 @@ def _identity_of(connection: sqlite3.Connection, path: Path) -> UUID:
     try:
         return UUID(connection.execute("SELECT uuid FROM identity").fetchone()[0])
     except sqlite3.Error as error:
-        raise in_plain_words(error, path) from error
+        raise explained_error(error, path) from error
     except (TypeError, ValueError, AttributeError) as error:
         raise JournalError(f"{path}: it is damaged: its identity cannot be read") from error
 
 
 def _compare(connection: sqlite3.Connection, marks: MarkFile, path: Path) -> None:
-    """Say what is missing; begin the marks of a journal that has none."""
+    """Log what is missing; make the marks of a journal that has none."""
     (marked,) = connection.execute("SELECT marked FROM identity").fetchone()
     if marks.new:
         if marked:
@@ -359,19 +362,19 @@ def _compare(connection: sqlite3.Connection, marks: MarkFile, path: Path) -> Non
                 path.name,
             )
         _begin_marks(connection, marks)
-    for number, loss in losses(connection, marks.read()).items():
+    for number, loss in find_losses(connection, marks.read()).items():
         log.error("%s: %s: %s", path, run_id(number), loss)
     if not marked:
         connection.execute("UPDATE identity SET marked = 1")
 
 
 def _begin_marks(connection: sqlite3.Connection, marks: MarkFile) -> None:
-    # Nobody else may write meanwhile: a mark must not go back.
+    # No other process may write meanwhile: a mark must not go back.
     connection.execute("BEGIN IMMEDIATE")
     try:
         rows = connection.execute("SELECT * FROM standings").fetchall()
         if rows:
             marks.reserve(max(row[0] for row in rows))
-            marks.write({row[0]: mark_of(standing_of(row)) for row in rows})
+            marks.write({row[0]: mark_of(position_from(row)) for row in rows})
     finally:
         connection.execute("ROLLBACK")

@@ -1,6 +1,6 @@
-"""The thread that writes: whatever waits when it is free goes into one transaction.
+"""Group commit: one thread writes all calls that wait for it in one transaction.
 
-It sleeps on its queue, owns the connection, and wakes each event loop once per transaction.
+The thread owns the connection. It wakes each event loop once per transaction.
 """
 
 import asyncio
@@ -14,15 +14,15 @@ from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from m2pem.errors import InternalError, JournalError, M2pemError
-from m2pem.journal.database import in_plain_words, passes
-from m2pem.journal.ledger import Ledger
+from m2pem.journal.database import explained_error, is_transient
+from m2pem.journal.transaction import WriteTransaction
 
 T = TypeVar("T")
 
 
 @dataclass(slots=True)
 class _Call:
-    work: Callable[[Ledger], Any]
+    work: Callable[[WriteTransaction], Any]
     future: asyncio.Future[Any]
     loop: asyncio.AbstractEventLoop
     last: bool = False
@@ -32,13 +32,13 @@ class _Call:
 
 @dataclass(slots=True)
 class GroupWriter:
-    """Carries out calls on a ledger in the order they come, many to a transaction.
+    """Carries out calls in the order of their submission, many to a transaction.
 
-    A call that was handed over is carried out even if nobody waits for it any more. `finish` is
-    the thread's last act. `commits` counts the transactions that wrote something.
+    A submitted call is carried out even if its caller was cancelled. `finish` is called last in
+    the thread. `commits` counts the transactions that wrote something.
     """
 
-    ledger: Ledger
+    transaction: WriteTransaction
     path: Path
     finish: Callable[[], None]
     commits: int = 0
@@ -46,18 +46,18 @@ class GroupWriter:
     _queue: "SimpleQueue[_Call]" = field(default_factory=SimpleQueue)
 
     def start(self) -> None:
-        """Start the thread. It doesn't keep a process alive that never closes its journal."""
+        """Start the thread, as a daemon: a process that never closes its journal can still end."""
         threading.Thread(target=self._serve, name=f"journal {self.path}", daemon=True).start()
 
-    def submit(self, work: Callable[[Ledger], T]) -> asyncio.Future[T]:
-        """Hand over a call; its result, or error, comes after the commit."""
+    def submit(self, work: Callable[[WriteTransaction], T]) -> asyncio.Future[T]:
+        """Submit a call; its result, or error, is set after the commit."""
         return self._put(work, last=False)
 
     def stop(self) -> asyncio.Future[None]:
-        """End the thread after what was handed over before."""
+        """End the thread after what was submitted before."""
         return self._put(lambda _: None, last=True)
 
-    def _put(self, work: Callable[[Ledger], T], last: bool) -> asyncio.Future[T]:
+    def _put(self, work: Callable[[WriteTransaction], T], last: bool) -> asyncio.Future[T]:
         loop = asyncio.get_running_loop()
         future: asyncio.Future[T] = loop.create_future()
         self._queue.put(_Call(work, future, loop, last))
@@ -86,27 +86,27 @@ class GroupWriter:
             return
         for call in calls:
             if call.error is None:
-                # One each: whoever raises an exception adds to its traceback.
+                # One each: raising an exception adds to its traceback.
                 call.error = type(problem)(*problem.args)
                 call.error.__cause__ = problem.__cause__
 
     def _transact(self, calls: Sequence[_Call]) -> M2pemError | None:
-        """One transaction. What is returned is why nothing of it was written."""
+        """Write one transaction. An error that is returned says why nothing of it was written."""
         try:
-            self.ledger.begin()
+            self.transaction.begin()
             for call in calls:
                 try:
-                    call.result = call.work(self.ledger)
+                    call.result = call.work(self.transaction)
                 except M2pemError as error:
                     call.error = error
-            if self.ledger.commit():
+            if self.transaction.commit():
                 self.commits += 1
         except JournalError as error:
             return self._withdraw(error, for_good=True)
         except sqlite3.Error as error:
-            problem: M2pemError = in_plain_words(error, self.path)
+            problem: M2pemError = explained_error(error, self.path)
             problem.__cause__ = error
-            return self._withdraw(problem, for_good=not passes(error))
+            return self._withdraw(problem, for_good=not is_transient(error))
         except Exception as error:
             problem = InternalError(f"{self.path}: the journal could not be written: {error!r}")
             problem.__cause__ = error
@@ -115,7 +115,7 @@ class GroupWriter:
 
     def _withdraw(self, problem: M2pemError, for_good: bool) -> M2pemError:
         try:
-            self.ledger.rollback()
+            self.transaction.rollback()
         except sqlite3.Error:
             for_good = True
         if not for_good:
@@ -130,7 +130,7 @@ class GroupWriter:
 
 def _deliver(calls: Sequence[_Call]) -> None:
     for loop in {call.loop for call in calls}:
-        # A loop that has been closed has nobody who waits.
+        # No call waits in a loop that has been closed.
         with suppress(RuntimeError):
             loop.call_soon_threadsafe(_settle, [call for call in calls if call.loop is loop])
 

@@ -29,16 +29,16 @@ def m2pem_records_committed(run_id, records):
 
 STALLING = """
 import os, time
-from m2pem.journal.ledger import BehaviorTracker
+from m2pem.journal.transaction import WriteTransaction
 
-commit = BehaviorTracker.commit
+commit = WriteTransaction.commit
 
 def stalled(self):
     while os.path.exists("stalled"):
         time.sleep(0.01)
     return commit(self)
 
-BehaviorTracker.commit = stalled
+WriteTransaction.commit = stalled
 """
 
 

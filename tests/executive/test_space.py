@@ -9,14 +9,14 @@ from m2pem.api.control import Alert
 from m2pem.executive import space
 from m2pem.executive.notices import Notices
 from m2pem.executive.space import watch_space
-from m2pem.journal.space import VARIABLE
+from m2pem.journal.storage_checks import MIN_FREE_VARIABLE
 
 
 async def test_operators_are_warned_when_space_runs_short_and_when_there_is_room_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(space, "EVERY_S", 0.0)
-    monkeypatch.setenv(VARIABLE, "1e15")
+    monkeypatch.setenv(MIN_FREE_VARIABLE, "1e15")
     notices = Notices()
     subscription = notices.subscribe(None, 10)
     watching = asyncio.create_task(watch_space(tmp_path / "journal.db", notices))
@@ -24,7 +24,7 @@ async def test_operators_are_warned_when_space_runs_short_and_when_there_is_room
     assert isinstance(warning, Alert)
     assert (warning.run, warning.code) == ("", "JOURNAL_SPACE")
     assert "no run begins. Make room" in warning.text
-    monkeypatch.setenv(VARIABLE, "0")
+    monkeypatch.setenv(MIN_FREE_VARIABLE, "0")
     while not isinstance(again := await anext(subscription), Alert) or "room again" not in (
         again.text
     ):

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from m2pem.errors import JournalError
-from m2pem.journal import Entry, RunLine
+from m2pem.journal import Entry, RunInfo
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.testing.contracts.journal import opened, written
 from tests.wal import commits
@@ -21,7 +21,7 @@ from tests.wal import commits
 class Content:
     """What a journal has, and what it says is wrong with it."""
 
-    lines: dict[str, RunLine] = field(default_factory=dict)
+    lines: dict[str, RunInfo] = field(default_factory=dict)
     entries: dict[str, list[Entry]] = field(default_factory=dict)
     told: list[str] = field(default_factory=list)
 

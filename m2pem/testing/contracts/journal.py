@@ -30,7 +30,7 @@ from m2pem.engine.records import (
     RunStarted,
 )
 from m2pem.errors import InternalError, JournalError, StaleEpochError
-from m2pem.journal.base import Entry, Journal, RunHeader, RunLine
+from m2pem.journal.base import Entry, Journal, RunHeader, RunInfo
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.library import Source
 from m2pem.mission.values import Value
@@ -77,7 +77,7 @@ async def written(journal: Journal, run: str, after_seq: int = 0) -> list[Entry]
     return [found async for found in journal.read(run, after_seq)]
 
 
-async def line(journal: Journal, run: str) -> RunLine:
+async def line(journal: Journal, run: str) -> RunInfo:
     """What `runs` says of one run."""
     (found,) = [some for some in await journal.runs() if some.run == run]
     return found
@@ -115,7 +115,7 @@ class JournalContract(Contract):
         async with opened(open_journal) as journal:
             run = await journal.create(HEADER)
             assert await journal.runs() == [
-                RunLine(run, HEADER, 1, 0, started_us=HEADER.created_us, driven=True)
+                RunInfo(run, HEADER, 1, 0, started_us=HEADER.created_us, driven=True)
             ]
             assert await written(journal, run) == []
 
@@ -367,7 +367,7 @@ class JournalContract(Contract):
             entries = await written(journal, run)
         async with opened(open_journal) as journal:
             assert await journal.runs() == [
-                RunLine(run, HEADER, 1, 2, started_us=5, driven=False, paused=True)
+                RunInfo(run, HEADER, 1, 2, started_us=5, driven=False, paused=True)
             ]
             assert before.driven
             assert await written(journal, run) == entries

@@ -6,13 +6,13 @@ import sys
 
 import pytest
 
-from m2pem.journal.lease import PosixRunLocks, RunLocks, run_locks
+from m2pem.journal.run_locks import PosixRunLocks, RunLocks, run_locks
 
 HOLD = """
 import sys
 from pathlib import Path
-from m2pem.journal import lease
-locks = getattr(lease, sys.argv[1])(Path(sys.argv[2]))
+from m2pem.journal import run_locks
+locks = getattr(run_locks, sys.argv[1])(Path(sys.argv[2]))
 print(locks.acquire(7), flush=True)
 sys.stdin.read()
 """
@@ -81,9 +81,9 @@ def test_closing_one_journal_frees_nothing_of_another(open_locks, holder, kind, 
     assert two.acquire(2)
     two.close()
     # Asked from another process: within this one the answer needs no lock.
-    probe = "import sys; from pathlib import Path; from m2pem.journal import lease\n"
+    probe = "import sys; from pathlib import Path; from m2pem.journal import run_locks\n"
     probe += (
-        f"locks = lease.{kind.__name__}(Path(sys.argv[1])); print(locks.held(1), locks.held(2))"
+        f"locks = run_locks.{kind.__name__}(Path(sys.argv[1])); print(locks.held(1), locks.held(2))"
     )
     command = [sys.executable, "-c", probe, str(tmp_path / "other-lock")]
     assert subprocess.check_output(command, text=True) == "True False\n"

@@ -1,8 +1,8 @@
-"""Locks that say which runs are driven: one byte a run, in a file beside the journal.
+"""Locks on runs that an executive drives: one byte a run, in a file beside the journal.
 
 The kernel holds a lock for as long as its process lives, so a killed executive frees its runs at
-once and nobody waits for a time-out. The file has no content and is never removed: a lock on a
-removed file excludes nobody.
+once, without a time-out. The file has no content and is never removed: a lock on a removed file
+excludes no other process.
 
 Classic POSIX locks belong to a process and are lost when it closes *any* descriptor of the file.
 Linux's open file description locks belong to the open file; they are used where they are.
@@ -30,28 +30,28 @@ class RunLocks:
         _open_locks.add(self)
 
     def acquire(self, number: int) -> bool:
-        """Take a run's lock; False when anybody holds it, be it through this same object."""
+        """Take a run's lock; False when it is held already, be it through this same object."""
         if number in self._held or not self._lock(number):
             return False
         self._held.add(number)
         return True
 
     def release(self, number: int) -> None:
-        """Let go of a run's lock, if it is held through this object."""
+        """Release a run's lock, if it is held through this object."""
         if number in self._held:
             self._held.remove(number)
             self._unlock(number)
 
     def mine(self, number: int) -> bool:
-        """Whether it is held through this object."""
+        """Whether a run's lock is held through this object."""
         return number in self._held
 
     def held(self, number: int) -> bool:
-        """Whether anybody who is alive holds it."""
+        """Whether a living process holds a run's lock."""
         return number in self._held or self._locked_elsewhere(number)
 
     def close(self) -> None:
-        """Let go of all. Nothing but `close` and `release`, which then do nothing, may follow."""
+        """Release all locks. Only `close` and `release`, which then do nothing, may follow."""
         for number in tuple(self._held):
             self.release(number)
         if self in _open_locks:

@@ -1,7 +1,7 @@
-"""What one transaction of the SQLite journal writes. Used by the writing thread alone.
+"""Write transactions of the SQLite journal. Used by the writing thread alone.
 
-Every call is checked before anything of it is written, so that a refused one leaves nothing behind
-and the others of its group go on. An SQLite error ends the whole transaction.
+Every call is checked before anything of it is written. A refused call therefore leaves nothing
+behind, and the others of its group are written. An SQLite error ends the whole transaction.
 """
 
 import os
@@ -16,31 +16,29 @@ from typing import Any
 from m2pem.engine.records import RunOutcome
 from m2pem.errors import InternalError, JournalError
 from m2pem.journal.base import Entry, RunHeader
-from m2pem.journal.chain import beginning, link, seal
 from m2pem.journal.codec import encode_library, run_id, unknown_run
-from m2pem.journal.lease import RunLocks
-from m2pem.journal.losses import loss_of, losses
-from m2pem.journal.marks import NO_HASH, Mark, MarkFile, MarkState
-from m2pem.journal.presence import Presence
-from m2pem.journal.space import shortage
-from m2pem.journal.standing import Standing
+from m2pem.journal.hash_chain import entry_hash, header_hash, position_seal
+from m2pem.journal.marks import NO_HASH, Mark, MarkFile, MarkState, find_loss, find_losses
+from m2pem.journal.position import RunPosition
+from m2pem.journal.run_locks import RunLocks
+from m2pem.journal.storage_checks import OpenFiles, space_shortage
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """An entry, ready to be written."""
+class EntryRow:
+    """An entry with its encoded body, ready to be written."""
 
     number: int
     entry: Entry
     body: bytes
 
     def hash_after(self, before: bytes) -> bytes:
-        """The hash of the entry, when `before` is that of the one before it."""
+        """Return the hash of the entry; `before` is the hash of the entry before it."""
         entry = self.entry
-        return link(before, entry.seq, entry.epoch, entry.at_us, entry.t_us, self.body)
+        return entry_hash(before, entry.seq, entry.epoch, entry.at_us, entry.t_us, self.body)
 
     def columns(self, hash_: bytes | None) -> tuple[Any, ...]:
-        """As the table has them."""
+        """Return the values of the row in the table `entries`."""
         entry = self.entry
         body = self.body.decode()
         return self.number, entry.seq, entry.epoch, entry.at_us, entry.t_us, body, hash_
@@ -50,29 +48,33 @@ _ROWS = 90
 """To a statement: SQLite before 3.32 takes 999 parameters."""
 
 
-class Ledger:
-    """`begin`, any number of calls, then `commit` or `rollback`; and again.
+class WriteTransaction:
+    """Transactions, one after the other: `begin`, any number of calls, `commit` or `rollback`.
 
-    `presence`: whether the journal's files are still where they were opened.
+    `open_files`: whether the journal's files are still where they were opened.
     """
 
     def __init__(
-        self, connection: sqlite3.Connection, locks: RunLocks, marks: MarkFile, presence: Presence
+        self,
+        connection: sqlite3.Connection,
+        locks: RunLocks,
+        marks: MarkFile,
+        open_files: OpenFiles,
     ) -> None:
         self._connection = connection
         self._locks = locks
         self._marks = marks
-        self._presence = presence
-        self._known: dict[int, Standing] = {}
+        self._presence = open_files
+        self._known: dict[int, RunPosition] = {}
         self._data_version = 0
-        self._changed: dict[int, Standing] = {}
+        self._changed: dict[int, RunPosition] = {}
         self._rows: list[tuple[Any, ...]] = []
         self._locked: list[int] = []
         self._appended: set[int] = set()
         self._lossy: set[int] = set()
 
     def begin(self) -> None:
-        """Start a transaction; what another process has written before is seen in it."""
+        """Start a transaction; it sees what another process has committed before."""
         self._connection.execute("BEGIN IMMEDIATE")
         (version,) = self._connection.execute("PRAGMA data_version").fetchone()
         if version != self._data_version:
@@ -80,7 +82,7 @@ class Ledger:
             self._data_version = version
 
     def create(self, header: RunHeader) -> str:
-        """Add a run, claimed with epoch 1."""
+        """Add a run that is claimed with epoch 1, and return its id."""
         self._refuse_while_short()
         marks = self._marks.read()
         self._refuse_while_lossy(marks)
@@ -97,17 +99,17 @@ class Ledger:
             header.created_us,
             encode_library(header.library),
         )
-        standing = Standing(
-            epoch=1, pid=os.getpid(), started_us=header.created_us, hash=beginning(row)
+        position = RunPosition(
+            epoch=1, pid=os.getpid(), started_us=header.created_us, hash=header_hash(row)
         )
-        self._take(number, standing)
+        self._take(number, position)
         self._connection.execute("INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
-        self._changed[number] = standing
+        self._changed[number] = position
         return run_id(number)
 
     def _refuse_while_short(self) -> None:
         try:
-            text = shortage(self._marks.path)
+            text = space_shortage(self._marks.path)
         except OSError as error:
             raise JournalError(
                 f"{self._marks.path}: its disk cannot be asked for free space: {error.strerror}"
@@ -116,7 +118,7 @@ class Ledger:
             raise JournalError(text)
 
     def _refuse_while_lossy(self, marks: Mapping[int, Mark]) -> None:
-        for number, loss in losses(self._connection, marks).items():
+        for number, loss in find_losses(self._connection, marks).items():
             run = run_id(number)
             raise JournalError(
                 f"no run begins: {run}: {loss}, so its vehicles may do what no mission knows. "
@@ -125,21 +127,21 @@ class Ledger:
 
     def claim(self, number: int) -> int:
         """Take a run's lock and raise its epoch, which is returned."""
-        standing = self._standing(number)
-        self._take(number, standing)
-        # Nobody else writes the mark now.
+        position = self._position(number)
+        self._take(number, position)
+        # With the lock, no other process writes the mark.
         mark = self._marks.of(number)
-        if loss_of(self._connection, number, mark) is not None:
+        if find_loss(self._connection, number, mark) is not None:
             self._lossy.add(number)
         self._changed[number] = replace(
-            standing.claimed(os.getpid()), epoch=1 + max(standing.epoch, mark.epoch if mark else 0)
+            position.claimed(os.getpid()), epoch=1 + max(position.epoch, mark.epoch if mark else 0)
         )
         return self._changed[number].epoch
 
     def accept_loss(self, number: int) -> None:
-        """Let the mark say that what is missing of a run is known; the run must not be driven."""
+        """Note in the mark that a run's loss was accepted; no executive may drive the run."""
         mark = self._marks.of(number)
-        loss = loss_of(self._connection, number, mark)
+        loss = find_loss(self._connection, number, mark)
         if mark is None or loss is None:
             raise JournalError(f"{run_id(number)} has lost nothing")
         if loss.resumable:
@@ -147,13 +149,13 @@ class Ledger:
             raise JournalError(f"{run} can be resumed: {loss.remedy(run)}")
         self._marks.write({number: replace(mark, state=MarkState.ACCEPTED)})
 
-    def append(self, rows: Sequence[Row]) -> None:
+    def append(self, rows: Sequence[EntryRow]) -> None:
         """Add entries."""
-        changed: dict[int, Standing] = {}
+        changed: dict[int, RunPosition] = {}
         columns: list[tuple[Any, ...]] = []
         for row in rows:
-            before = changed.get(row.number) or self._standing(row.number)
-            hash_ = row.hash_after(before.hash or self._beginning(row.number))
+            before = changed.get(row.number) or self._position(row.number)
+            hash_ = row.hash_after(before.hash or self._header_hash(row.number))
             changed[row.number] = before.after(row.entry, hash_)
             columns.append(row.columns(hash_))
         for number in changed:
@@ -163,23 +165,23 @@ class Ledger:
         self._appended.update(changed)
         self._rows.extend(columns)
 
-    def _beginning(self, number: int) -> bytes:
-        """Of a run that has no hash yet: it is from before the chain."""
+    def _header_hash(self, number: int) -> bytes:
+        """Return the header's hash of a run that has none yet: it is from before the chain."""
         query = "SELECT * FROM runs WHERE run = ?"
-        return beginning(self._connection.execute(query, (number,)).fetchone())
+        return header_hash(self._connection.execute(query, (number,)).fetchone())
 
     def forget(self, number: int) -> None:
-        """Drop what is remembered of a run that is let go of."""
+        """Drop what is cached of a run that is released."""
         self._known.pop(number, None)
         self._lossy.discard(number)
         self._marks.forget(number)
 
     def commit(self) -> bool:
-        """Make it durable and mark it; False when there was nothing to write.
+        """Make the transaction durable and write the marks; False: there was nothing to write.
 
         Raises:
-            JournalError: it is in the journal, but must not be acknowledged: the files are not
-                where they were, or the mark cannot be written.
+            JournalError: the entries are in the journal, but must not be acknowledged: the files
+                are not where they were, or the marks cannot be written.
         """
         self._write("INSERT INTO entries", self._rows)
         self._write(
@@ -196,13 +198,13 @@ class Ledger:
 
     def _mark(self) -> None:
         marks: dict[int, Mark] = {}
-        for number, standing in self._changed.items():
+        for number, position in self._changed.items():
             if number in self._lossy:
-                # The mark remembers the loss until an operator has let the run go on, or ended it.
-                if standing.paused or number not in self._appended:
+                # The mark keeps the loss until an operator has resumed the run, or ended it.
+                if position.paused or number not in self._appended:
                     continue
                 self._lossy.discard(number)
-            marks[number] = mark_of(standing)
+            marks[number] = mark_of(position)
         try:
             self._marks.write(marks)
         except OSError as error:
@@ -211,15 +213,15 @@ class Ledger:
             ) from error
 
     def _write(self, into: str, rows: Sequence[tuple[Any, ...]]) -> None:
-        # Many rows to a statement: each execution gives the interpreter's lock away, and with a
-        # busy event loop it takes 5 ms to get it back.
+        # Many rows to a statement: each execution releases the interpreter's lock, and with a busy
+        # event loop it takes 5 ms to acquire it again.
         for first in range(0, len(rows), _ROWS):
             some = rows[first : first + _ROWS]
             statement = f"{into} VALUES {_placeholders(len(some), len(some[0]))}"
             self._connection.execute(statement, tuple(chain.from_iterable(some)))
 
     def rollback(self) -> None:
-        """Write nothing of it."""
+        """Write nothing of the transaction, and release the locks that it took."""
         for number in self._locked:
             self._locks.release(number)
         self._known.clear()
@@ -227,7 +229,7 @@ class Ledger:
         if self._connection.in_transaction:
             self._connection.execute("ROLLBACK")
 
-    def _take(self, number: int, standing: Standing) -> None:
+    def _take(self, number: int, position: RunPosition) -> None:
         run = run_id(number)
         if self._locks.mine(number):
             raise JournalError(f"run {run} is already driven, by this process ({os.getpid()})")
@@ -237,7 +239,7 @@ class Ledger:
             raise JournalError(f"run {run} cannot be locked: {error.strerror}") from error
         if not taken:
             raise JournalError(
-                f"run {run} is driven by process {standing.pid}, which is alive: end that first"
+                f"run {run} is driven by process {position.pid}, which is alive: end that first"
             )
         self._locked.append(number)
         try:
@@ -245,16 +247,16 @@ class Ledger:
         except OSError as error:
             raise JournalError(f"{self._marks.path}: {error.strerror}") from error
 
-    def _standing(self, number: int) -> Standing:
-        standing = self._changed.get(number) or self._known.get(number)
-        if standing is None:
+    def _position(self, number: int) -> RunPosition:
+        position = self._changed.get(number) or self._known.get(number)
+        if position is None:
             row = self._connection.execute(
                 "SELECT * FROM standings WHERE run = ?", (number,)
             ).fetchone()
             if row is None:
                 raise unknown_run(run_id(number))
-            standing = self._known[number] = standing_of(row)
-        return standing
+            position = self._known[number] = position_from(row)
+        return position
 
     def _reset(self) -> None:
         self._changed.clear()
@@ -268,13 +270,13 @@ def _placeholders(rows: int, columns: int) -> str:
     return ", ".join([f"({', '.join('?' * columns)})"] * rows)
 
 
-def mark_of(standing: Standing) -> Mark:
-    """What the mark file says of a run that is there."""
-    state = MarkState.OPEN if standing.outcome is None else MarkState.ENDED
-    return Mark(standing.epoch, standing.last_seq, standing.hash or NO_HASH, state)
+def mark_of(position: RunPosition) -> Mark:
+    """Return the mark of a run at a position."""
+    state = MarkState.OPEN if position.outcome is None else MarkState.ENDED
+    return Mark(position.epoch, position.last_seq, position.hash or NO_HASH, state)
 
 
-def _columns(number: int, s: Standing) -> tuple[Any, ...]:
+def _columns(number: int, s: RunPosition) -> tuple[Any, ...]:
     row = (
         number,
         s.epoch,
@@ -287,11 +289,11 @@ def _columns(number: int, s: Standing) -> tuple[Any, ...]:
         s.ended_us,
         s.hash,
     )
-    return *row, seal(row)
+    return *row, position_seal(row)
 
 
-def standing_of(row: Sequence[Any]) -> Standing:
-    """A standing from its row of the table.
+def position_from(row: Sequence[Any]) -> RunPosition:
+    """Read a position from its row of the table `standings`.
 
     Raises:
         JournalError: it is damaged.
@@ -300,10 +302,10 @@ def standing_of(row: Sequence[Any]) -> Standing:
     whole = sealed is None and hash_ is None  # from before the chain
     if not whole:
         with suppress(TypeError, ValueError, OverflowError):
-            whole = sealed == seal(row[:-1])
+            whole = sealed == position_seal(row[:-1])
     if not whole:
         raise JournalError(f"run {number}: its row in the table `standings` is damaged")
-    return Standing(
+    return RunPosition(
         epoch=epoch,
         pid=pid,
         started_us=started_us,

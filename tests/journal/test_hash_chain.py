@@ -9,8 +9,8 @@ import pytest
 from m2pem.engine.records import RunEnded, RunOutcome, RunPaused, RunResumed
 from m2pem.errors import JournalError
 from m2pem.journal import migrations
-from m2pem.journal.chain import beginning, link
 from m2pem.journal.database import open_for_writing
+from m2pem.journal.hash_chain import entry_hash, header_hash
 from m2pem.journal.migrations import MIGRATIONS
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.testing.contracts.journal import HEADER, entry, line, opened, written
@@ -62,13 +62,13 @@ async def test_each_entry_has_the_hash_of_what_was_before_it_and_its_own_content
 ):
     await fill(open_journal, 3)
     with closing(sqlite3.connect(path)) as connection:
-        before = beginning(connection.execute("SELECT * FROM runs").fetchone())
+        before = header_hash(connection.execute("SELECT * FROM runs").fetchone())
         rows = connection.execute(
             "SELECT seq, epoch, at_us, t_us, CAST(body AS BLOB), hash FROM entries ORDER BY seq"
         ).fetchall()
     assert len(rows) == 3
     for *content, found in rows:
-        before = link(before, *content)
+        before = entry_hash(before, *content)
         assert found == before
 
 

@@ -2,10 +2,10 @@ import pytest
 
 from m2pem.engine.records import RunEnded, RunOutcome, RunPaused, RunResumed, RunStarted
 from m2pem.errors import InternalError, StaleEpochError
-from m2pem.journal.standing import Standing
+from m2pem.journal.position import RunPosition
 from m2pem.testing.contracts.journal import entry
 
-NEW = Standing(epoch=3, pid=1, started_us=5)
+NEW = RunPosition(epoch=3, pid=1, started_us=5)
 
 
 def test_one_entry_may_say_several_things():

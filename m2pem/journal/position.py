@@ -1,17 +1,17 @@
-"""Where a run stands: what every journal keeps beside a run's entries, and checks them against."""
+"""The position of a run: what every journal keeps beside its entries, to check the next entry."""
 
 from dataclasses import dataclass, replace
 
 from m2pem.engine.records import RunEnded, RunOutcome, RunPaused, RunResumed, RunStarted
 from m2pem.errors import InternalError, StaleEpochError
-from m2pem.journal.base import Entry, Loss, RunHeader, RunLine
+from m2pem.journal.base import Entry, Loss, RunHeader, RunInfo
 
-_NOTED = frozenset({RunStarted, RunPaused, RunResumed, RunEnded})
+_CHANGING = frozenset({RunStarted, RunPaused, RunResumed, RunEnded})
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
-    """A run after its last entry. `pid`: the process that claimed it last.
+class RunPosition:
+    """State of a run after its last entry. `pid`: the process that claimed it last.
 
     `hash`: of the last entry, or of the header before the first; None: from before the chain.
     """
@@ -26,8 +26,8 @@ class Standing:
     ended_us: int | None = None
     hash: bytes | None = None
 
-    def after(self, entry: Entry, hash_: bytes | None = None) -> "Standing":
-        """Where the run stands with one more entry, whose hash is `hash_`.
+    def after(self, entry: Entry, hash_: bytes | None = None) -> "RunPosition":
+        """Return the position after one more entry, whose hash is `hash_`.
 
         Raises:
             StaleEpochError: the run was claimed since.
@@ -40,7 +40,7 @@ class Standing:
             )
         if entry.epoch > self.epoch:
             raise InternalError(
-                f"{entry.run}: an entry of epoch {entry.epoch}, which nobody has claimed; "
+                f"{entry.run}: an entry of epoch {entry.epoch}, which was never claimed; "
                 f"the run is at epoch {self.epoch}"
             )
         if entry.seq != self.last_seq + 1:
@@ -50,13 +50,13 @@ class Standing:
             )
         if not entry.records:
             raise InternalError(f"{entry.run}: an entry without a record")
-        standing = replace(self, last_seq=self.last_seq + len(entry.records), hash=hash_)
+        position = replace(self, last_seq=self.last_seq + len(entry.records), hash=hash_)
         for record in entry.records:
-            if type(record) in _NOTED:
-                standing = standing._noting(entry, record)
-        return standing
+            if type(record) in _CHANGING:
+                position = position._with_record(entry, record)
+        return position
 
-    def _noting(self, entry: Entry, record: object) -> "Standing":
+    def _with_record(self, entry: Entry, record: object) -> "RunPosition":
         match record:
             case RunStarted(started_us=started_us):
                 return replace(self, started_us=started_us)
@@ -70,13 +70,13 @@ class Standing:
                 )
         return self
 
-    def claimed(self, pid: int) -> "Standing":
-        """Where the run stands when process `pid` has taken it over."""
+    def claimed(self, pid: int) -> "RunPosition":
+        """Return the position after process `pid` has claimed the run."""
         return replace(self, epoch=self.epoch + 1, pid=pid)
 
-    def line(self, run: str, header: RunHeader, driven: bool, loss: Loss | None = None) -> RunLine:
-        """What `Journal.runs` says of it."""
-        return RunLine(
+    def info(self, run: str, header: RunHeader, driven: bool, loss: Loss | None = None) -> RunInfo:
+        """Return what `Journal.runs` says of the run."""
+        return RunInfo(
             run=run,
             header=header,
             epoch=self.epoch,
