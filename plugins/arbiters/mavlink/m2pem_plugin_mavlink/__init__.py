@@ -1,24 +1,21 @@
 """MAVLink vehicles: ArduPilot and PX4, in the air, on land and on water (docs/mavlink.md).
 
-For plugins that command what a vehicle carries: `open_link` reaches it over the sockets that its
-arbiter uses, too, and the modules `camera`, `camera_images`, `gimbal` and `gimbal_status` have the
-exchanges to perform there. They are loaded when they are asked for.
+The package is the entry point of the plugin: it has the hooks of `hooks`. Plugins that command a
+payload import the other names from here: `open_link` opens a link to a vehicle over the sockets of
+its arbiter, and `camera`, `camera_images`, `gimbal` and `gimbal_status` are the modules with the
+transactions to perform on it. A name is loaded when it is first used.
 """
 
-from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from m2pem import hookimpl
+from m2pem_plugin_mavlink.hooks import m2pem_register_arbiters, m2pem_register_commands
 
 if TYPE_CHECKING:
-    import click
-
-    from m2pem.api import Arbiter
     from m2pem_plugin_mavlink.link.routed_link import RoutedLink, open_link
     from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
     from m2pem_plugin_mavlink.microservices import camera, camera_images, gimbal, gimbal_status
-    from m2pem_plugin_mavlink.microservices.intervals import SetMessageInterval
+    from m2pem_plugin_mavlink.microservices.message_requests import SetMessageInterval
     from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
     from m2pem_plugin_mavlink.protocol.transaction import (
         ExchangeError,
@@ -39,6 +36,8 @@ __all__ = [
     "camera_images",
     "gimbal",
     "gimbal_status",
+    "m2pem_register_arbiters",
+    "m2pem_register_commands",
     "message_type",
     "open_link",
 ]
@@ -46,7 +45,7 @@ __all__ = [
 _MODULES = {
     "link.routed_link": "RoutedLink open_link",
     "link.vehicle_link": "VehicleLink",
-    "microservices.intervals": "SetMessageInterval",
+    "microservices.message_requests": "SetMessageInterval",
     "protocol.messages": "Address Message message_type",
     "protocol.transaction": "ExchangeError NoAnswerError RefusedError",
 }
@@ -60,19 +59,3 @@ def __getattr__(name: str) -> Any:
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_LAZY[name]}"), name)
-
-
-@hookimpl
-def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], None]") -> None:
-    """Register `mavlink`."""
-    from m2pem_plugin_mavlink.arbiter import MavlinkArbiter  # noqa: PLC0415  # starting up must be fast
-
-    register("mavlink", MavlinkArbiter)
-
-
-@hookimpl
-def m2pem_register_commands(cli: "click.Group") -> None:
-    """Add what commands.py has."""
-    from m2pem_plugin_mavlink.commands import add_to  # noqa: PLC0415  # starting up must be fast
-
-    add_to(cli.commands)

@@ -30,9 +30,9 @@ from m2pem_plugin_mavlink.settings import Settings, read_settings
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.behaviors.behavior import Behavior
-    from m2pem_plugin_mavlink.foreign import TakeoverWatch
-    from m2pem_plugin_mavlink.helm import Helm
+    from m2pem_plugin_mavlink.vehicle.takeover_monitor import TakeoverMonitor
     from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+    from m2pem_plugin_mavlink.vehicle_controller import VehicleController
 
 LOST_AFTER_S = 3.0
 HOLD_WITHIN_S = 6.0
@@ -49,14 +49,14 @@ LATE = 2.0
 STATES_WAITING = 1000
 
 
-class Station(Protocol):
+class VehicleConnections(Protocol):
     """The vehicles of a fleet, over whatever carries their messages."""
 
     async def open(self) -> Mapping[ResourceId, "Vehicle"]:
         """Listen; the vehicles need not be heard yet."""
         ...
 
-    def watch(self, vehicle: "Vehicle") -> "TakeoverWatch":
+    def watch(self, vehicle: "Vehicle") -> "TakeoverMonitor":
         """What notices that somebody else steers; not open yet."""
         ...
 
@@ -69,27 +69,27 @@ class Station(Protocol):
         ...
 
 
-MakeStation = Callable[
+MakeVehicleConnections = Callable[
     [
         Mapping[ResourceId, Connection],
         Mapping[ResourceId, Settings],
         ArbiterContext,
         Mapping[ResourceId, float],
     ],
-    Station,
+    VehicleConnections,
 ]
 """Of connections, their settings, the context, and after how many seconds each vehicle is lost."""
 
 
-def _station(
+def _make_connections(
     connections: Mapping[ResourceId, Connection],
     settings: Mapping[ResourceId, Settings],
     context: ArbiterContext,
     lost_after_s: Mapping[ResourceId, float],
-) -> Station:
-    from m2pem_plugin_mavlink.station import LinkedStation  # noqa: PLC0415  # it needs pymavlink
+) -> VehicleConnections:
+    from m2pem_plugin_mavlink.vehicle_connections import MavlinkVehicleConnections  # noqa: PLC0415  # it needs pymavlink
 
-    return LinkedStation(connections, settings, context, lost_after_s)
+    return MavlinkVehicleConnections(connections, settings, context, lost_after_s)
 
 
 class MavlinkArbiter:
@@ -105,20 +105,20 @@ class MavlinkArbiter:
         self,
         connections: Mapping[ResourceId, Connection],
         context: ArbiterContext,
-        make_station: MakeStation = _station,
+        make_vehicle_connections: MakeVehicleConnections = _make_connections,
     ) -> None:
         self._connections = connections
         self._context = context
         self._settings = read_settings(connections)
-        self._make_station = make_station
-        self._station: Station | None = None
-        self._ledger = BehaviorTracker(self._taken, context.logger)
+        self._make_vehicle_connections = make_vehicle_connections
+        self._vehicle_connections: VehicleConnections | None = None
+        self._tracker = BehaviorTracker(self._behaviors_of, context.logger)
         self._states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(STATES_WAITING)
-        self._helms: dict[ResourceId, Helm] = {}
-        self._watches: list[TakeoverWatch] = []
+        self._controllers: dict[ResourceId, VehicleController] = {}
+        self._takeover_monitors: list[TakeoverMonitor] = []
         self._fences: dict[ResourceId, Fence] = {}
         self._pending: dict[BehaviorId, Behavior] = {}
-        self._asked: set[BehaviorId] = set()
+        self._queried: set[BehaviorId] = set()
         self._tasks: list[asyncio.Task[None]] = []
 
     # --- what is offered ------------------------------------------------------------------------
@@ -129,7 +129,7 @@ class MavlinkArbiter:
             return ()
         return offered(self._connections[resource].domain)
 
-    def _taken(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+    def _behaviors_of(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """A payload may be held by what its vehicle does."""
         return self.catalogue(ResourceId(resource.partition("/")[0]))
 
@@ -156,32 +156,39 @@ class MavlinkArbiter:
 
     async def connect(self) -> None:
         """Listen to all vehicles; returns when all were heard, or soon."""
-        from m2pem_plugin_mavlink.helm import Helm  # noqa: PLC0415  # it needs pymavlink
+        from m2pem_plugin_mavlink.vehicle_controller import VehicleController  # noqa: PLC0415  # it needs pymavlink
 
         lost_after_s = {resource: self.limits(resource).lost_after_s for resource in self._settings}
-        self._station = self._make_station(
+        self._vehicle_connections = self._make_vehicle_connections(
             self._connections, self._settings, self._context, lost_after_s
         )
-        vehicles = await self._station.open()
+        vehicles = await self._vehicle_connections.open()
         create = asyncio.get_running_loop().create_task
         fences: dict[int, Fence] = {}
         for resource, vehicle in vehicles.items():
-            watch = self._station.watch(vehicle)
+            watch = self._vehicle_connections.watch(vehicle)
             watch.open()
-            self._watches.append(watch)
+            self._takeover_monitors.append(watch)
             limits = self.limits(resource)
-            self._helms[resource] = Helm(vehicle, watch, self._ledger, limits, self._context.logger)
+            self._controllers[resource] = VehicleController(
+                vehicle, watch, self._tracker, limits, self._context.logger
+            )
             area = self._connections[resource].fence
             if area is not None:
                 self._fences[resource] = fences.setdefault(id(area), Fence(area))
-            self._publish_changes(self._helms[resource])
-            self._tasks.append(create(self._attend(resource)))
-        heard = await asyncio.gather(*(helm.knows(HEARD_WITHIN_S) for helm in self._helms.values()))
+            self._publish_mode_changes(self._controllers[resource])
+            self._tasks.append(create(self._monitor_vehicle(resource)))
+        known = await asyncio.gather(
+            *(
+                controller.wait_until_known(HEARD_WITHIN_S)
+                for controller in self._controllers.values()
+            )
+        )
         for vehicle in vehicles.values():  # who is commanded first may be told to follow another
-            self._states.put(vehicle.state())
+            self._states.put(vehicle.telemetry())
         self._tasks += [create(self._check(vehicle)) for vehicle in vehicles.values()]
-        for resource, is_heard in zip(vehicles, heard, strict=True):
-            if not is_heard:
+        for resource, is_known in zip(vehicles, known, strict=True):
+            if not is_known:
                 self._context.logger.warning("%s: where it is was not heard yet", resource)
 
     async def close(self) -> None:
@@ -190,36 +197,36 @@ class MavlinkArbiter:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._tasks = []
-        for helm in self._helms.values():
-            await helm.close()
-        for watch in self._watches:
+        for controller in self._controllers.values():
+            await controller.close()
+        for watch in self._takeover_monitors:
             await watch.close()
-        self._watches = []
-        station, self._station = self._station, None
-        if station is not None:
-            await station.close()
+        self._takeover_monitors = []
+        vehicle_connections, self._vehicle_connections = self._vehicle_connections, None
+        if vehicle_connections is not None:
+            await vehicle_connections.close()
         self._states.close()
-        self._ledger.close()
+        self._tracker.close()
 
     # --- behaviors ------------------------------------------------------------------------------
 
     async def start(self, request: BehaviorRequest) -> None:
         """Start a behavior; see `BehaviorRequest`."""
-        asked = request.id in self._asked
-        self._asked.discard(request.id)
+        queried = request.id in self._queried
+        self._queried.discard(request.id)
         try:
-            if self._ledger.admit(request, lambda: self._native_ref(request), self._refusal):
+            if self._tracker.admit(request, lambda: self._native_ref(request), self._refusal):
                 resource, behavior = _vehicles(request)[0], self._pending[request.id]
-                self._helms[resource].take(request.id, behavior, look_first=asked)
+                self._controllers[resource].start(request.id, behavior, look_first=queried)
         finally:
             self._pending.pop(request.id, None)
 
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
         """Stop the vehicle that does it."""
-        if self._ledger.may_cancel(behavior, epoch):
-            for resource, helm in self._helms.items():
-                if self._ledger.holder(resource) == behavior:
-                    helm.cancel(behavior)
+        if self._tracker.may_cancel(behavior, epoch):
+            for resource, controller in self._controllers.items():
+                if self._tracker.holder(resource) == behavior:
+                    controller.cancel(behavior)
 
     async def adjust(
         self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
@@ -228,42 +235,42 @@ class MavlinkArbiter:
         speed_m_s = parameters.get("speed")
         if not isinstance(speed_m_s, int | float) or speed_m_s <= 0:
             return
-        if self._ledger.may_adjust(behavior, epoch):
-            for resource, helm in self._helms.items():
-                if self._ledger.holder(resource) == behavior:
-                    helm.adjust(behavior, float(speed_m_s))
+        if self._tracker.may_adjust(behavior, epoch):
+            for resource, controller in self._controllers.items():
+                if self._tracker.holder(resource) == behavior:
+                    controller.adjust(behavior, float(speed_m_s))
 
     async def hold(self, resource: ResourceId) -> None:
         """Have a vehicle stand still at once."""
-        if resource in self._helms:
-            self._helms[resource].hold()
+        if resource in self._controllers:
+            self._controllers[resource].hold()
 
     async def resume(self, resource: ResourceId) -> None:
         """Have a vehicle go on."""
-        if resource in self._helms:
-            self._helms[resource].resume()
+        if resource in self._controllers:
+            self._controllers[resource].resume()
 
     async def reclaim(self, resource: ResourceId) -> str:
         """A vehicle that was lost is heard again: have it stop, unless it flies a failsafe."""
-        return await self._helms[resource].reclaim() if resource in self._helms else ""
+        return await self._controllers[resource].reclaim() if resource in self._controllers else ""
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """What is known; after a restart, what the vehicle itself shows. Nothing is sent to it but
         questions."""
-        known = self._ledger.last(behavior)
+        known = self._tracker.last(behavior)
         if known.state is not BehaviorState.UNKNOWN:
             return known
         kept = read_native_ref(native_ref) if native_ref else None
-        if kept is None or kept.resource not in self._helms:
-            self._asked.add(behavior)
+        if kept is None or kept.resource not in self._controllers:
+            self._queried.add(behavior)
             return known
-        return await self._look(behavior, kept, native_ref or "")
+        return await self._reattach(behavior, kept, native_ref or "")
 
     # --- streams --------------------------------------------------------------------------------
 
     def reports(self) -> AsyncIterator[BehaviorReport]:
         """Reports as they come, for one reader, until `close`."""
-        return self._ledger.reports()
+        return self._tracker.reports()
 
     def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
         """States as they come, for one reader, until `close`; a slow one misses old states."""
@@ -283,7 +290,7 @@ class MavlinkArbiter:
         allowed = self._connections[resource].behaviors
         if allowed is not None and request.behavior not in allowed:
             return f"the fleet does not allow {resource} the behavior '{request.behavior}'"
-        if resource not in self._helms:
+        if resource not in self._controllers:
             return "the arbiter is not connected"
         kept = Kept(resource, request.behavior, request.parameters, {})
         try:
@@ -295,30 +302,30 @@ class MavlinkArbiter:
 
     def _make(self, kept: Kept) -> "Behavior":
         from m2pem_plugin_mavlink.behaviors import BEHAVIORS  # noqa: PLC0415
-        from m2pem_plugin_mavlink.behaviors.behavior import Job  # noqa: PLC0415
+        from m2pem_plugin_mavlink.behaviors.behavior import BehaviorContext  # noqa: PLC0415
 
-        helm, clock = self._helms[kept.resource], self._context.clock
-        job = Job(
-            helm.vehicle,
+        controller, clock = self._controllers[kept.resource], self._context.clock
+        context = BehaviorContext(
+            controller.vehicle,
             kept.parameters,
             self._context.bus,
             self._context.origin,
             lambda: clock.now_us() / 1e6,
             self._fences.get(kept.resource),
-            helm.cruise_m_s,
+            controller.cruise_m_s,
             self._settings[kept.resource].actuators,
         )
-        return BEHAVIORS[kept.behavior](job)
+        return BEHAVIORS[kept.behavior](context)
 
     def _native_ref(self, request: BehaviorRequest) -> str:
         from m2pem_plugin_mavlink.beginning import before  # noqa: PLC0415
 
-        memory = self._pending[request.id].memory()
+        memory = self._pending[request.id].checkpoint()
         resource = _vehicles(request)[0]
-        was = before(self._helms[resource].vehicle, self._context.clock.now_us() / 1e6)
+        was = before(self._controllers[resource].vehicle, self._context.clock.now_us() / 1e6)
         return native_ref(Kept(resource, request.behavior, request.parameters, memory, was))
 
-    async def _look(self, id_: BehaviorId, kept: Kept, reference: str) -> BehaviorReport:
+    async def _reattach(self, id_: BehaviorId, kept: Kept, reference: str) -> BehaviorReport:
         from m2pem_plugin_mavlink.beginning import has_not_begun  # noqa: PLC0415
         from m2pem_plugin_mavlink.behaviors import BEHAVIORS  # noqa: PLC0415
         from m2pem_plugin_mavlink.behaviors.behavior import (  # noqa: PLC0415
@@ -326,47 +333,47 @@ class MavlinkArbiter:
         )
         from m2pem_plugin_mavlink.protocol.transaction import ExchangeError  # noqa: PLC0415
 
-        helm = self._helms[kept.resource]
-        vehicle = helm.vehicle
+        controller = self._controllers[kept.resource]
+        vehicle = controller.vehicle
         unknown = BehaviorReport(id_, 0, BehaviorState.UNKNOWN, native_ref=reference)
         if kept.behavior not in BEHAVIORS:
             return replace(unknown, reason=f"there is no behavior '{kept.behavior}' any more")
-        if not await helm.knows(HEARD_WITHIN_S):
-            helm.leave()
+        if not await controller.wait_until_known(HEARD_WITHIN_S):
+            controller.mark_commanded()
             return replace(unknown, reason=f"where {kept.resource} is was not heard")
         try:
             behavior = self._make(kept)
-            behavior.recall(kept.memory)
-            state = await behavior.recognised()
+            behavior.restore(kept.memory)
+            state = await behavior.reattach()
         except (BehaviorFailedError, ExchangeError) as error:
             return replace(unknown, reason=str(error))
         if state is BehaviorState.RUNNING:
-            self._ledger.adopt(id_, [kept.resource], reference)
-            helm.adopt(id_, behavior)
-            return self._ledger.last(id_)
+            self._tracker.adopt(id_, [kept.resource], reference)
+            controller.adopt(id_, behavior)
+            return self._tracker.last(id_)
         if state is BehaviorState.SUCCEEDED:
             return replace(unknown, number=3, state=state)
         if has_not_begun(behavior, kept.before, self._context.clock.now_us() / 1e6):
-            self._asked.add(id_)
+            self._queried.add(id_)
             reason = f"{kept.resource} is as it was before, and has not begun it"
             return replace(unknown, reason=reason, not_begun=True)
-        mode = vehicle.state().mode or "an unknown mode"
+        mode = vehicle.telemetry().mode or "an unknown mode"
         return replace(unknown, reason=f"{kept.resource} is in {mode}, and does not do it")
 
     async def _check(self, vehicle: "Vehicle") -> None:
         """Tell where the fleet and the vehicle disagree about failsafes, once it is heard."""
         await vehicle.until(lambda: vehicle.identity is not None)
-        if self._station is not None and self._connections[vehicle.resource].failsafe:
-            for finding in await self._station.findings(vehicle):
+        if self._vehicle_connections is not None and self._connections[vehicle.resource].failsafe:
+            for finding in await self._vehicle_connections.findings(vehicle):
                 self._context.logger.warning("%s", finding)
 
-    async def _attend(self, resource: ResourceId) -> None:
+    async def _monitor_vehicle(self, resource: ResourceId) -> None:
         """Tell how a vehicle is, and notice when it falls silent."""
-        helm, clock = self._helms[resource], self._context.clock
-        vehicle = helm.vehicle
+        controller, clock = self._controllers[resource], self._context.clock
+        vehicle = controller.vehicle
         bound_s = self.limits(resource).lost_after_s
         began_us = looked_us = clock.now_us()
-        told, link, was_late = -1, LinkState.CONNECTED, False
+        published, link, was_late = -1, LinkState.CONNECTED, False
         while True:
             now_us = clock.now_us()
             # After a pause of our own, what the vehicle said meanwhile is still to be read.
@@ -375,28 +382,30 @@ class MavlinkArbiter:
             silent_s = vehicle.silent_s
             if silent_s is None:
                 silent_s = (now_us - began_us) / 1e6
-            if silent_s >= bound_s and not late and self._ledger.holder(resource) is not None:
-                helm.drop()
-                self._ledger.lose(resource, f"not heard for {silent_s:.1f} s")
-            if vehicle.heard.changes != told or vehicle.link_state != link:
-                told, link = vehicle.heard.changes, vehicle.link_state
-                self._states.put(replace(vehicle.state(), behavior=helm.behavior))
+            if silent_s >= bound_s and not late and self._tracker.holder(resource) is not None:
+                controller.release()
+                self._tracker.lose(resource, f"not heard for {silent_s:.1f} s")
+            if vehicle.state.changes != published or vehicle.link_state != link:
+                published, link = vehicle.state.changes, vehicle.link_state
+                self._states.put(replace(vehicle.telemetry(), behavior=controller.behavior))
             left_s = bound_s - silent_s
             await clock.sleep(min(TELEMETRY_EVERY_S, left_s) if left_s > 0 else TELEMETRY_EVERY_S)
 
-    def _publish_changes(self, helm: "Helm") -> None:
+    def _publish_mode_changes(self, controller: "VehicleController") -> None:
         """Publish changes of mode, and arming, at once: they may end a run, and what operators then
         read of the vehicle is its last state."""
-        heard = helm.vehicle.heard
-        shown = heard.custom_mode, heard.armed
+        state = controller.vehicle.state
+        shown = state.custom_mode, state.armed
 
         def look() -> None:
             nonlocal shown
-            if (heard.custom_mode, heard.armed) != shown:
-                shown = heard.custom_mode, heard.armed
-                self._states.put(replace(helm.vehicle.state(), behavior=helm.behavior))
+            if (state.custom_mode, state.armed) != shown:
+                shown = state.custom_mode, state.armed
+                self._states.put(
+                    replace(controller.vehicle.telemetry(), behavior=controller.behavior)
+                )
 
-        helm.vehicle.watch(look)
+        controller.vehicle.watch(look)
 
 
 def _vehicles(request: BehaviorRequest) -> list[ResourceId]:

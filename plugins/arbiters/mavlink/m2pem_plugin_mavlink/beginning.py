@@ -5,8 +5,8 @@ the state into which m2pem brings it before the start: in the behavior's mode an
 mode, disarmed motors or another place may be what a person has intended: an operator is asked.
 """
 
+from m2pem_plugin_mavlink.behaviors.arrival import accepts_mode, distance_to_m, is_still
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior
-from m2pem_plugin_mavlink.behaviors.looking import accepts, away_m, stands
 from m2pem_plugin_mavlink.native_ref import Before
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
@@ -19,14 +19,14 @@ SAME_PLACE_M = 3.0
 
 def before(vehicle: Vehicle, now_s: float) -> Before | None:
     """How a vehicle is now; None if something of it was not received yet."""
-    heard = vehicle.heard
-    position, height_m = heard.position, heard.altitude_above_home_m
-    if heard.armed is None or heard.landed is None or heard.custom_mode is None:
+    state = vehicle.state
+    position, height_m = state.position, state.altitude_above_home_m
+    if state.armed is None or state.landed is None or state.custom_mode is None:
         return None
     if position is None or height_m is None:
         return None
     place = (position.latitude_deg, position.longitude_deg)
-    return Before(now_s, heard.armed, heard.landed, heard.custom_mode, *place, height_m)
+    return Before(now_s, state.armed, state.landed, state.custom_mode, *place, height_m)
 
 
 def has_not_begun(behavior: Behavior, was: Before | None, now_s: float) -> bool:
@@ -34,15 +34,15 @@ def has_not_begun(behavior: Behavior, was: Before | None, now_s: float) -> bool:
     work, leaves nothing to see."""
     vehicle = behavior.vehicle
     now = before(vehicle, now_s)
-    if was is None or now is None or not behavior.steers:
+    if was is None or now is None or not behavior.moves_vehicle:
         return False
     as_it_was = (now.armed, now.custom_mode) == (was.armed, was.custom_mode)
-    is_ready = now.armed >= was.armed and accepts(behavior, vehicle.heard.mode)
+    is_ready = now.armed >= was.armed and accepts_mode(behavior, vehicle.state.mode)
     return (
         0.0 <= now_s - was.at_s <= SOON_S
         and (as_it_was or is_ready)
         and now.landed == was.landed
-        and stands(vehicle)
-        and away_m(vehicle, (was.latitude_deg, was.longitude_deg)) <= SAME_PLACE_M
+        and is_still(vehicle)
+        and distance_to_m(vehicle, (was.latitude_deg, was.longitude_deg)) <= SAME_PLACE_M
         and abs(now.altitude_m - was.altitude_m) <= SAME_PLACE_M
     )

@@ -7,8 +7,8 @@ from typing import Any
 import click
 
 
-class Later(click.Command):
-    """Stands for a command of another module in the list of commands."""
+class LazyCommand(click.Command):
+    """A command that imports its module when it is invoked."""
 
     def __init__(self, name: str, module: str, summary: str) -> None:
         super().__init__(name, help=summary)
@@ -21,14 +21,14 @@ class Later(click.Command):
         parent: click.Context | None = None,
         **extra: Any,
     ) -> click.Context:
-        """That of the command itself, which then is what is invoked."""
+        """Return the context of the imported command, which is then invoked."""
         command: click.Command = getattr(import_module(self._module), str(self.name))
         return command.make_context(info_name, args, parent, **extra)
 
 
 def add_to(commands: MutableMapping[str, click.Command]) -> None:
     """Add `sitl` and `sim mavlink`; the group `sim` may have commands of other plugins, too."""
-    commands["sitl"] = Later(
+    commands["sitl"] = LazyCommand(
         "sitl",
         "m2pem_plugin_mavlink.sitl.command_line",
         "Start the real autopilots of a fleet, as software in the loop.",
@@ -38,9 +38,9 @@ def add_to(commands: MutableMapping[str, click.Command]) -> None:
         group = click.Group("sim", help="Simulate vehicles that speak as real ones do.")
         commands["sim"] = group
     group.add_command(
-        Later(
+        LazyCommand(
             "mavlink",
-            "m2pem_plugin_mavlink.sim.command_line",
+            "m2pem_plugin_mavlink.simulator.command_line",
             "Simulate MAVLink vehicles over UDP.",
         )
     )

@@ -43,11 +43,11 @@ def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[Resource
         for resource, connection in connections.items()
         if "/" not in resource
     }
-    heard: dict[tuple[str, int, int], ResourceId] = {}
+    state: dict[tuple[str, int, int], ResourceId] = {}
     for resource, settings in read.items():
         for url in settings.urls:
             key = (url, settings.system_id, settings.component_id)
-            if (other := heard.setdefault(key, resource)) != resource:
+            if (other := state.setdefault(key, resource)) != resource:
                 raise _error(
                     resource, "system_id", f"{other} is system {settings.system_id} of {url}, too"
                 )

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from m2pem_plugin_mavlink.sim.autopilot import Autopilot
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.autopilot import Autopilot
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 GCS = "gcs"
@@ -17,13 +17,13 @@ MODES = {
 
 
 class Bench:
-    """One vehicle and a ground station. `heard`: all that it said to `GCS`."""
+    """One vehicle and a ground station. `state`: all that it said to `GCS`."""
 
     def __init__(self, kind: Kind = Kind.COPTER, **options: Any) -> None:
         self.kind = kind
         spec = VehicleSpec(kind, **{"estimator_s": 6.0, **options})
         self.autopilot = Autopilot(spec, step_s=0.05)
-        self.heard: list[Any] = []
+        self.received: list[Any] = []
         self.autopilot.meet(GCS)
         self.guided, self.auto, self.rtl = MODES[kind]
 
@@ -68,12 +68,12 @@ class Bench:
 
     def texts(self) -> list[str]:
         """All that it said to people."""
-        return [m.text for m in self.heard if m.get_type() == "STATUSTEXT"]
+        return [m.text for m in self.received if m.get_type() == "STATUSTEXT"]
 
     def report(self, id_: int) -> Any:
         """A message asked for."""
         assert self.command(dialect.MAV_CMD_REQUEST_MESSAGE, id_) == 0
-        return next(m for m in reversed(self.heard) if m.get_msgId() == id_)
+        return next(m for m in reversed(self.received) if m.get_msgId() == id_)
 
     def offset(self, north_m: float, east_m: float) -> tuple[float, float]:
         """Latitude and longitude of a place so far from home."""
@@ -126,7 +126,7 @@ class Bench:
                 continue
             frame = message.pack(dialect.MAVLink(None, self.autopilot.spec.system, component))
             said += dialect.MAVLink(None).parse_buffer(frame)
-        self.heard += said
+        self.received += said
         return said
 
 

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-from m2pem_plugin_mavlink.behaviors.fingerprint import is_navigation
+from m2pem_plugin_mavlink.behaviors.mission import is_navigation
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
 

@@ -8,15 +8,14 @@ import asyncio
 import logging
 import math
 
-from m2pem_plugin_mavlink.behaviors.behavior import Job
-from m2pem_plugin_mavlink.foreign import TakeoverWatch
+from m2pem_plugin_mavlink.behaviors.behavior import BehaviorContext
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError, RefusedError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place, Readiness
-from m2pem_plugin_mavlink.vehicle.heard import Heard
 from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind
-from m2pem_plugin_mavlink.vehicle.ours import Ours
-from m2pem_plugin_mavlink.vehicle.waiters import Waiters
+from m2pem_plugin_mavlink.vehicle.state import AutopilotState, CommandedState
+from m2pem_plugin_mavlink.vehicle.takeover_monitor import TakeoverMonitor
+from m2pem_plugin_mavlink.vehicle.vehicle import ConditionWaiters
 from mavlink_body import HOME, SPEED_M_S, Body
 
 from m2pem.api import (
@@ -68,7 +67,7 @@ class DoubleDriver:
 
     def _enter(self, mode: FlightMode) -> None:
         self.body.mode = mode
-        self.vehicle.ours.custom_mode = MODES.index(mode)
+        self.vehicle.commanded.custom_mode = MODES.index(mode)
         self.vehicle.hear()
 
     async def set_mode(self, mode: FlightMode) -> None:
@@ -82,7 +81,7 @@ class DoubleDriver:
 
     async def disarm(self) -> None:
         await self._tell("disarm")
-        self.vehicle.ours.disarming = True
+        self.vehicle.commanded.disarming = True
         self.body.armed = False
 
     async def take_off(self, altitude_m: float) -> None:
@@ -125,7 +124,7 @@ class DoubleDriver:
 
     async def upload(self, items) -> None:
         await self._tell("upload", len(items))
-        self.body.mission = self.vehicle.ours.mission = tuple(items)
+        self.body.mission = self.vehicle.commanded.mission = tuple(items)
         self.body.reached = None
 
     async def downloaded(self):
@@ -190,58 +189,58 @@ class DoubleVehicle:
         kind = Kind.COPTER if body.domain == "air" else Kind.ROVER
         self._is = Identity(body.firmware, kind)
         self.link = DoubleLink(clock)
-        self.heard, self.ours = Heard(), Ours()
+        self.state, self.commanded = AutopilotState(), CommandedState()
         self.driver = DoubleDriver(self)
         self._clock = clock
-        self._waiters = Waiters(clock)
+        self._waiters = ConditionWaiters(clock)
         self._watchers = []
         if body.heard_by_us:
             self.hear()
 
     def hear(self) -> None:
-        body, heard = self.body, self.heard
+        body, state = self.body, self.state
         if not body.heard_by_us:
             return
         latitude, longitude = LocalFrame(HOME).to_latlon((body.east, body.north))
-        heard.position = GeoPosition(latitude, longitude, HOME_ALTITUDE_M + body.up)
-        heard.home = GeoPosition(*HOME, HOME_ALTITUDE_M)
-        heard.altitude_above_home_m = heard.altitude_above_terrain_m = body.up
-        heard.velocity_enu_m_s, heard.yaw_rad = body.velocity, body.yaw
+        state.position = GeoPosition(latitude, longitude, HOME_ALTITUDE_M + body.up)
+        state.home = GeoPosition(*HOME, HOME_ALTITUDE_M)
+        state.altitude_above_home_m = state.altitude_above_terrain_m = body.up
+        state.velocity_enu_m_s, state.yaw_rad = body.velocity, body.yaw
         mode = body.mode
         if body.firmware is Firmware.PX4 and mode is FlightMode.GUIDED:
             mode = FlightMode.HOLD
-        heard.mode, heard.custom_mode = mode, MODES.index(mode)
-        heard.armed, heard.landed = body.armed, body.landed
-        heard.boots, heard.clock_s = body.boots, self.link.now_s()
-        heard.at_s = heard.heartbeat_s = self.link.now_s()
-        heard.changes += 1
+        state.mode, state.custom_mode = mode, MODES.index(mode)
+        state.armed, state.landed = body.armed, body.landed
+        state.boots, state.clock_s = body.boots, self.link.now_s()
+        state.at_s = state.heartbeat_s = self.link.now_s()
+        state.changes += 1
         self._waiters.look()
         for watcher in tuple(self._watchers):
             watcher()
 
     @property
     def identity(self) -> Identity | None:
-        return None if self.heard.at_s is None else self._is
+        return None if self.state.at_s is None else self._is
 
     @property
     def silent_s(self) -> float | None:
-        return None if self.heard.at_s is None else self.link.now_s() - self.heard.at_s
+        return None if self.state.at_s is None else self.link.now_s() - self.state.at_s
 
     @property
     def link_state(self) -> LinkState:
         return LinkState.CONNECTED if self.body.heard_by_us else LinkState.LOST
 
-    def state(self) -> VehicleState:
-        heard = self.heard
+    def telemetry(self) -> VehicleState:
+        state = self.state
         return VehicleState(
             self.resource,
             self._clock.now_us(),
-            heard.position,
-            heard.altitude_above_home_m,
-            heard.velocity_enu_m_s,
-            yaw_rad=heard.yaw_rad,
-            mode=heard.mode.upper(),
-            armed=heard.armed,
+            state.position,
+            state.altitude_above_home_m,
+            state.velocity_enu_m_s,
+            yaw_rad=state.yaw_rad,
+            mode=state.mode.upper(),
+            armed=state.armed,
             link=self.link_state,
         )
 
@@ -250,7 +249,7 @@ class DoubleVehicle:
         return lambda: self._watchers.remove(watcher)
 
     async def identified(self, within_s: float) -> bool:
-        return await self.until(lambda: self.heard.at_s is not None, within_s)
+        return await self.until(lambda: self.state.at_s is not None, within_s)
 
     async def until(self, true, within_s: float | None = None) -> bool:
         return await self._waiters.wait(true, within_s)
@@ -280,7 +279,7 @@ class DoubleStation:
         return self.vehicles
 
     def watch(self, vehicle):
-        return TakeoverWatch(vehicle)
+        return TakeoverMonitor(vehicle)
 
     async def findings(self, vehicle):
         await vehicle.sleep(1.0)
@@ -322,8 +321,8 @@ def connections(bodies: dict[ResourceId, Body], **more) -> dict[ResourceId, Conn
     }
 
 
-def job(vehicle: DoubleVehicle, bus=None, **parameters) -> Job:
-    return Job(vehicle, parameters, bus or NoBus(), (*HOME, 488.0), vehicle.link.now_s)
+def job(vehicle: DoubleVehicle, bus=None, **parameters) -> BehaviorContext:
+    return BehaviorContext(vehicle, parameters, bus or NoBus(), (*HOME, 488.0), vehicle.link.now_s)
 
 
 def at(east: float, north: float) -> tuple[float, float]:

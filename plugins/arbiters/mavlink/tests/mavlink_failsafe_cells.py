@@ -5,7 +5,7 @@ Parameters are those of ArduPilot 4.7 and of PX4 main of August 2026.
 
 from collections.abc import Callable, Mapping
 
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_failsafes import FAR_NORTH, NORTH, Failsafe, Phase, Play, Vehicle
 from mavlink_station import SECOND, Station
 from pymavlink.dialects.v20 import ardupilotmega as dialect

@@ -19,17 +19,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
-from m2pem_plugin_mavlink.sim.specification import Kind
-from m2pem_plugin_mavlink.sitl.frames import FRAMES
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from m2pem_plugin_mavlink.sitl.launch import (
     Launch,
     Start,
     ardupilot_launch,
     px4_launch,
     px4_port,
+    running,
 )
-from m2pem_plugin_mavlink.sitl.processes import running
-from m2pem_plugin_mavlink.sitl.programs import ardupilot_program, find_px4
+from m2pem_plugin_mavlink.sitl.programs import FRAMES, ardupilot_program, find_px4
 from mavlink_sitl import free_port
 from mavlink_station import Station
 from mavlink_wires import UdpWire

@@ -226,8 +226,8 @@ class Answers(Silent):
 
     def __init__(self, *answers: Sequence[Message]) -> None:
         self.answers = list(answers)
-        self.heard: list[Any] = []
+        self.received: list[Any] = []
 
     def hear(self, message: Message, now_s: float) -> Sequence[Message]:
-        self.heard.append(message)
+        self.received.append(message)
         return self.answers.pop(0) if self.answers else ()

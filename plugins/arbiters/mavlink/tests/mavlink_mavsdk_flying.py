@@ -6,8 +6,8 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import aclosing, asynccontextmanager
 from typing import Any
 
-from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from mavlink_mavsdk_world import free_port
 from mavsdk import logging as mavsdk_log
 from mavsdk.asyncio import Configuration, Mavsdk

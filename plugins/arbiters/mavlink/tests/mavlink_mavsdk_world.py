@@ -9,8 +9,8 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+from m2pem_plugin_mavlink.mavsdk_driver.ground_station import open_mavsdk_link
 from m2pem_plugin_mavlink.mavsdk_driver.link import MavsdkLink
-from m2pem_plugin_mavlink.mavsdk_driver.opening import open_mavsdk_link
 from m2pem_plugin_mavlink.protocol.messages import Address
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -37,7 +37,7 @@ def free_port() -> int:
 
 
 class Scripted(asyncio.DatagramProtocol):
-    """Sends a heartbeat as a copter with ArduPilot, and answers as `answers` say; `heard` has all
+    """Sends a heartbeat as a copter with ArduPilot, and answers as `answers` say; `state` has all
     that came."""
 
     def __init__(self, port: int, system: int = 1) -> None:
@@ -45,7 +45,7 @@ class Scripted(asyncio.DatagramProtocol):
         self.mav = dialect.MAVLink(self, system, 1)
         self.parser = dialect.MAVLink(None, system, 1)
         self.parser.robust_parsing = True
-        self.heard: list[Any] = []
+        self.received: list[Any] = []
         self.answers: dict[str, Callable[[Any], None]] = {"COMMAND_LONG": self.accept}
         self.news = asyncio.Event()
 
@@ -60,7 +60,7 @@ class Scripted(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, _: Any) -> None:
         for message in self.parser.parse_buffer(data) or ():
-            self.heard.append(message)
+            self.received.append(message)
             self.news.set()
             answer = self.answers.get(message.get_type())
             if answer is not None:
@@ -76,7 +76,7 @@ class Scripted(asyncio.DatagramProtocol):
     async def hears(self, true: Callable[[Any], bool]) -> Any:
         async with asyncio.timeout(WITHIN_S):
             while True:
-                for message in self.heard:
+                for message in self.received:
                     if true(message):
                         return message
                 self.news.clear()

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from m2pem_plugin_mavlink.sitl.fleet import Vehicle, launches, read_vehicles
-from m2pem_plugin_mavlink.sitl.processes import running
+from m2pem_plugin_mavlink.sitl.launch import running
 from m2pem_plugin_mavlink.sitl.readiness import connected, ready
 from mavlink_tracks import At, Sample, Tap, Uploaded, east_north, logged_missions
 

@@ -37,11 +37,11 @@ class Commanded(Silent):
     def __init__(self, does: Callable[[Any, "Commanded"], Sequence[Message]]) -> None:
         self.does = does
         self.effects: list[Any] = []
-        self.heard: list[Any] = []
+        self.received: list[Any] = []
 
     def hear(self, message: Message, now_s: float) -> Sequence[Message]:
         assert message.TYPE.name in COMMANDS
-        self.heard.append(message)
+        self.received.append(message)
         return self.does(message, self)
 
 

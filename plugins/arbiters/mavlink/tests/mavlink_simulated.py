@@ -6,9 +6,9 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
-from m2pem_plugin_mavlink.sim.geometry import Location
-from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.geometry import Location
+from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 
 from m2pem.api import Connection, LocalFrame, ResourceId, offset
 from m2pem.executive.clock import SystemClock

@@ -9,10 +9,8 @@ import socket
 import subprocess
 from pathlib import Path
 
-from m2pem_plugin_mavlink.sitl.frames import FRAMES
-from m2pem_plugin_mavlink.sitl.launch import Launch, Start, ardupilot_launch, px4_launch
-from m2pem_plugin_mavlink.sitl.processes import running
-from m2pem_plugin_mavlink.sitl.programs import ardupilot_program, find_px4
+from m2pem_plugin_mavlink.sitl.launch import Launch, Start, ardupilot_launch, px4_launch, running
+from m2pem_plugin_mavlink.sitl.programs import FRAMES, ardupilot_program, find_px4
 
 __all__ = [
     "HOME",

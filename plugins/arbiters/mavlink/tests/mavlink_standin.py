@@ -10,9 +10,9 @@ import os
 import sys
 from pathlib import Path
 
-from m2pem_plugin_mavlink.sim.geometry import Location
-from m2pem_plugin_mavlink.sim.simulator import Simulator
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.geometry import Location
+from m2pem_plugin_mavlink.simulator.simulator import Simulator
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 
 KINDS = {"quad": Kind.COPTER, "rover": Kind.ROVER, "motorboat": Kind.BOAT}
 

@@ -9,7 +9,7 @@ import struct
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_recording import ARDUPILOT_MODES, OWN, Recording
 from mavlink_wires import SimulatedWire, Wire
 from pymavlink import mavutil

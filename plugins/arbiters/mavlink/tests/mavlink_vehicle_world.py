@@ -264,7 +264,7 @@ class Playing:
         link.switch_on()
         assert await vehicle.identified(5.0)
         assert await vehicle.until(
-            lambda: not link.says or vehicle.heard.home is not None or vehicle.heard.changes > 40,
+            lambda: not link.says or vehicle.state.home is not None or vehicle.state.changes > 40,
             20.0,
         )
         return self.pair

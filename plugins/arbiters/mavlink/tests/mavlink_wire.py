@@ -61,7 +61,7 @@ class FarEnd(asyncio.Protocol):
     def __init__(self, system: int = 1, component: int = 1) -> None:
         self.mav = dialect.MAVLink(self, srcSystem=system, srcComponent=component)
         self.mav.robust_parsing = True
-        self.heard: list[Any] = []
+        self.received: list[Any] = []
         self.transport: Any = None
         self.to: Any = None
 
@@ -84,13 +84,13 @@ class FarEnd(asyncio.Protocol):
 
     def names(self) -> list[str]:
         """Of what was heard, but for heartbeats."""
-        return [each.get_type() for each in self.heard if each.get_type() != "HEARTBEAT"]
+        return [each.get_type() for each in self.received if each.get_type() != "HEARTBEAT"]
 
     def beats(self) -> list[tuple[int, int]]:
         """Who has said that he is there."""
         return [
             (each.get_srcSystem(), each.get_srcComponent())
-            for each in self.heard
+            for each in self.received
             if each.get_type() == "HEARTBEAT"
         ]
 
@@ -98,7 +98,7 @@ class FarEnd(asyncio.Protocol):
         self.transport = transport
 
     def data_received(self, data: bytes) -> None:
-        self.heard += self.mav.parse_buffer(data) or ()
+        self.received += self.mav.parse_buffer(data) or ()
 
     def datagram_received(self, data: bytes, address: Any) -> None:
         self.to = address

@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from m2pem_plugin_mavlink.sim.autopilot import Autopilot
-from m2pem_plugin_mavlink.sim.battery import EMPTY_V, FULL_V
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.autopilot import Autopilot
+from m2pem_plugin_mavlink.simulator.sensors import EMPTY_V, FULL_V
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 SetParameter = Callable[[str, float], None]
@@ -68,7 +68,7 @@ class SimulatedWire:
 
     def satellites(self, there: bool, set_parameter: SetParameter) -> None:
         """As `sim.faults` does it."""
-        self.autopilot.troubles.gps_lost = not there
+        self.autopilot.injected_faults.gps_lost = not there
 
 
 class UdpWire:

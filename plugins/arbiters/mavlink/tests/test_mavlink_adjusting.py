@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_double import Body, at
 from mavlink_play import V, play
 from mavlink_simulated import at as place

@@ -47,7 +47,7 @@ def commands(link: ScriptedLink) -> list[int]:
 
 async def in_the_air(link: ScriptedLink, vehicle: Vehicle) -> None:
     fly(link)
-    await vehicle.until(lambda: vehicle.heard.landed is False and bool(vehicle.heard.armed), 5.0)
+    await vehicle.until(lambda: vehicle.state.landed is False and bool(vehicle.state.armed), 5.0)
 
 
 def test_arming_waits_for_a_position_then_sets_guided_then_arms(virtual: Run) -> None:
@@ -61,7 +61,7 @@ def test_arming_waits_for_a_position_then_sets_guided_then_arms(virtual: Run) ->
             link.says["EKF_STATUS_REPORT"] = {"flags": READY_FLAGS}
             await arming
             assert commands(link) == [SET_MODE, ARM]
-            assert (link.custom_mode, vehicle.heard.armed) == (GUIDED, True)
+            assert (link.custom_mode, vehicle.state.armed) == (GUIDED, True)
             await vehicle.driver.arm()
             assert commands(link) == [SET_MODE, ARM]
 
@@ -99,9 +99,9 @@ def test_a_check_that_fails_in_a_mode_that_cannot_be_armed_is_no_obstacle(virtua
 
         link.custom_mode, link.says["SYS_STATUS"], link.obey[SET_MODE] = BRAKE, used, obey
         async with Playing((link, vehicle)):
-            assert vehicle.state().ready is False
+            assert vehicle.telemetry().ready is False
             await vehicle.driver.arm()
-            assert (link.custom_mode, vehicle.heard.armed) == (GUIDED, True)
+            assert (link.custom_mode, vehicle.state.armed) == (GUIDED, True)
 
     virtual(main)
 
@@ -129,8 +129,8 @@ def test_guided_is_repeated_until_the_heartbeat_shows_it(virtual: Run) -> None:
 
             link.obey[SET_MODE] = obey
             await vehicle.driver.set_mode(FlightMode.GUIDED)
-            assert (len(tries), vehicle.heard.custom_mode) == (4, GUIDED)
-            assert vehicle.ours.custom_mode == GUIDED
+            assert (len(tries), vehicle.state.custom_mode) == (4, GUIDED)
+            assert vehicle.commanded.custom_mode == GUIDED
 
     virtual(main)
 
@@ -155,7 +155,7 @@ def test_a_mode_that_comes_without_an_acknowledgement_is_a_success(virtual: Run)
 
             link.obey[SET_MODE] = obey
             await vehicle.driver.set_mode(FlightMode.GUIDED)
-            assert vehicle.heard.mode is FlightMode.GUIDED
+            assert vehicle.state.mode is FlightMode.GUIDED
 
     virtual(main)
 
@@ -166,7 +166,7 @@ def test_a_mode_that_stays_refused_is_refused_and_not_ours(virtual: Run) -> None
             link.obey[SET_MODE] = lambda _: FAILED
             with pytest.raises(RefusedError):
                 await vehicle.driver.set_mode(FlightMode.MISSION)
-            assert (vehicle.ours.custom_mode, vehicle.ours.changing) == (None, 0)
+            assert (vehicle.commanded.custom_mode, vehicle.commanded.changing) == (None, 0)
 
     virtual(main)
 
@@ -197,7 +197,7 @@ def test_arming_is_tried_again_and_the_heartbeat_is_believed(virtual: Run) -> No
 
             link.obey[ARM] = obey
             await vehicle.driver.arm()
-            assert vehicle.heard.armed is True
+            assert vehicle.state.armed is True
 
     virtual(main)
 
@@ -321,7 +321,7 @@ def test_a_copter_brakes_and_where_that_is_refused_loiters(virtual: Run) -> None
             assert link.custom_mode == BRAKE
             accept = link.obey[SET_MODE]
             link.custom_mode = GUIDED
-            await vehicle.until(lambda: vehicle.heard.custom_mode == GUIDED)
+            await vehicle.until(lambda: vehicle.state.custom_mode == GUIDED)
             link.obey[SET_MODE] = lambda each: FAILED if each.param2 == BRAKE else accept(each)
             await vehicle.driver.stop()
             assert link.custom_mode == LOITER
@@ -352,7 +352,7 @@ def test_velocities_go_out_in_guided_and_do_not_fight_for_it(virtual: Run) -> No
             assert (setpoint.vx, setpoint.vy, setpoint.vz) == (3.0, 1.0, -0.5)
             assert (setpoint.type_mask, setpoint.coordinate_frame) == (0xDC7, 1)
             link.custom_mode = LOITER
-            await vehicle.until(lambda: vehicle.heard.custom_mode == LOITER)
+            await vehicle.until(lambda: vehicle.state.custom_mode == LOITER)
             with pytest.raises(ExchangeError, match="it is in mode LOITER now"):
                 await vehicle.driver.move((3.0, 1.0, -0.5))
             assert link.custom_mode == LOITER
@@ -367,7 +367,7 @@ def test_a_return_is_rtl_and_a_disarming_is_noted_as_ours(virtual: Run) -> None:
             await vehicle.driver.return_home()
             assert link.custom_mode == RTL
             await vehicle.driver.disarm()
-            assert (link.armed, vehicle.ours.disarming) == (False, True)
+            assert (link.armed, vehicle.commanded.disarming) == (False, True)
 
     virtual(main)
 
@@ -379,7 +379,7 @@ def test_a_disarming_in_flight_is_refused_once(virtual: Run) -> None:
             link.obey[ARM] = lambda _: FAILED
             with pytest.raises(RefusedError):
                 await vehicle.driver.disarm()
-            assert (commands(link), vehicle.ours.disarming) == ([ARM], False)
+            assert (commands(link), vehicle.commanded.disarming) == ([ARM], False)
 
     virtual(main)
 
@@ -410,7 +410,7 @@ def test_a_second_mission_is_begun_by_leaving_auto_first(virtual: Run) -> None:
         async with Playing((link, vehicle)):
             await in_the_air(link, vehicle)
             link.custom_mode = AUTO
-            assert await vehicle.until(lambda: vehicle.heard.custom_mode == AUTO, 3.0)
+            assert await vehicle.until(lambda: vehicle.state.custom_mode == AUTO, 3.0)
             await vehicle.driver.start_mission()
             modes = [int(each.param2) for each in link.of("COMMAND_LONG", SET_MODE)]
             assert modes == [GUIDED, AUTO]
@@ -441,10 +441,10 @@ def test_home_is_not_counted_among_the_items(virtual: Run) -> None:
             driver = vehicle.driver
             assert (driver.current_item, driver.reached_item) == (None, None)
             link.says["MISSION_CURRENT"] = {"seq": 0, "total": 3}
-            await vehicle.until(lambda: vehicle.heard.mission_sequence == 0, 3.0)
+            await vehicle.until(lambda: vehicle.state.mission_sequence == 0, 3.0)
             assert driver.current_item is None
             link.says["MISSION_CURRENT"] = {"seq": 3, "total": 3}
-            await vehicle.until(lambda: vehicle.heard.mission_sequence == 3, 3.0)
+            await vehicle.until(lambda: vehicle.state.mission_sequence == 3, 3.0)
             assert driver.current_item == 2
 
     virtual(main)

@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 from itertools import count, pairwise
 
 import pytest
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_ground import Ground
 from mavlink_simulated import AMPLE_S, at, fly
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -98,8 +98,8 @@ def test_a_copter_follows_a_rover() -> None:
         async with asyncio.timeout(40):
             while near < 50:
                 await hear()
-                away_m = math.dist(bench.level(1), bench.level(2))
-                near = near + 1 if abs(away_m - 6.0) < 4.0 else 0
+                distance_to_m = math.dist(bench.level(1), bench.level(2))
+                near = near + 1 if abs(distance_to_m - 6.0) < 4.0 else 0
         assert bench.states_of("r1.b3")[-1] is BehaviorState.RUNNING
         end = await bench.ended("r1.b3", AMPLE_S)
         assert "v2 has not been heard" in end.reason
@@ -110,7 +110,7 @@ def test_a_copter_follows_a_rover() -> None:
 def test_an_actuator_is_worked() -> None:
     async def main(bench) -> None:
         await bench.do("r1.b1", "deploy", actuator="servo 9", value=1700.0)
-        kinds = [event.kind for event in bench.truth().autopilot.chronicle.events]
+        kinds = [event.kind for event in bench.truth().autopilot.log.events]
         assert "servo" in kinds
 
     fly(main, COPTER)
@@ -146,7 +146,7 @@ class Track:
 
     def nearest_m(self, place: tuple[float, float]) -> float:
         """How near it came; between two looks it went straight, however late the second was."""
-        return min(away_m(place, *ends) for ends in pairwise(self.places))
+        return min(distance_to_m(place, *ends) for ends in pairwise(self.places))
 
     def speeds_m_s(self) -> list[float]:
         """Its mean speed between two looks, by its own time."""
@@ -158,7 +158,7 @@ class Track:
         ]
 
 
-def away_m(
+def distance_to_m(
     place: tuple[float, float], begin: tuple[float, float], end: tuple[float, float]
 ) -> float:
     """How far a place is from a straight line."""

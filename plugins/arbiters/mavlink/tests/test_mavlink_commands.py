@@ -5,7 +5,7 @@ CODE = """
 import sys
 from m2pem.cli.entry import run_command_line
 assert run_command_line(["sim", "--help"]) == 0
-heavy = ("asyncio", "pymavlink", "m2pem_plugin_mavlink.sim")
+heavy = ("asyncio", "pymavlink", "m2pem_plugin_mavlink.simulator")
 print(*(name for name in heavy if name in sys.modules))
 """
 

@@ -8,8 +8,8 @@ import pytest
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
 from m2pem_plugin_mavlink.link.routed_link import open_link
 from m2pem_plugin_mavlink.protocol.messages import Address
-from m2pem_plugin_mavlink.sim.simulator import Simulator
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.simulator import Simulator
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from mavlink_simulated import at, connections, specs
 
@@ -213,7 +213,7 @@ async def take_off(truth, number: int) -> None:
     vehicle.open()
     assert await vehicle.identified(20.0)
     await vehicle.driver.take_off(10.0)
-    assert await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0.0) > 9.5, 60.0)
+    assert await vehicle.until(lambda: (vehicle.state.altitude_above_home_m or 0.0) > 9.5, 60.0)
     if truth.autopilot.spec.kind is Kind.PLANE:
         await vehicle.driver.stop()  # it took off by a mission, which would still go on
     await vehicle.close()

@@ -5,8 +5,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, ClassVar
 
 import pytest
-from m2pem_plugin_mavlink.link.exchange import Exchange
-from m2pem_plugin_mavlink.link.vehicle_link import Listener
+from m2pem_plugin_mavlink.link.vehicle_link import Exchange, Listener
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
 from m2pem_plugin_mavlink.protocol.transaction import Transaction

@@ -1,5 +1,5 @@
 import pytest
-from m2pem_plugin_mavlink.failsafe import findings, parameters_of_interest
+from m2pem_plugin_mavlink.vehicle.failsafe import findings, parameters_of_interest
 from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind
 
 from m2pem.api import ResourceId

@@ -95,12 +95,12 @@ async def test_all_that_we_are_is_said_and_numbered_apart() -> None:
     vehicle.beat()
     await until(links[0].heard_systems)
     await clock.turn(2.0)
-    await until(lambda: len(vehicle.heard) == 4)
+    await until(lambda: len(vehicle.received) == 4)
     assert vehicle.beats() == [(255, 190), OTHER] * 2
-    assert [each.get_seq() for each in vehicle.heard] == [0, 0, 1, 1]
+    assert [each.get_seq() for each in vehicle.received] == [0, 0, 1, 1]
     await links[1].close()
     await clock.turn(1.0)
-    await until(lambda: len(vehicle.heard) == 5)
+    await until(lambda: len(vehicle.received) == 5)
     assert vehicle.beats()[-1] == (255, 190)
     await links[0].close()
     await vehicle.close()

@@ -25,8 +25,8 @@ class Ear:
     """An inbound side that wants heartbeats of whoever it lets in."""
 
     def __init__(self, refused: int = 0, listener: Listener | None = None) -> None:
-        self.heard: list[tuple[Message, Address]] = []
-        listeners = tuple(filter(None, (listener, lambda *heard: self.heard.append(heard))))
+        self.received: list[tuple[Message, Address]] = []
+        listeners = tuple(filter(None, (listener, lambda *heard: self.received.append(heard))))
         wanted = {HEARTBEAT.id: Wanted(HEARTBEAT, listeners)}
 
         def meet(sender: Sender) -> bool:
@@ -71,7 +71,7 @@ def test_what_is_wanted_is_decoded_and_handed_over_with_its_sender(feed: Feed) -
     feed(ear, beat(0, mode=4))
     feed(ear, attitude(1))
     feed(ear, beat(2, Address(3, 154)))
-    assert [(m.custom_mode, sender) for m, sender in ear.heard] == [(4, VEHICLE), (1, (3, 154))]
+    assert [(m.custom_mode, sender) for m, sender in ear.received] == [(4, VEHICLE), (1, (3, 154))]
     assert ear.sender().sent == 2
 
 
@@ -79,7 +79,7 @@ def test_what_is_wanted_is_decoded_and_handed_over_with_its_sender(feed: Feed) -
 def test_frames_of_others_in_the_same_bytes_are_told_apart(feed: Feed) -> None:
     ear = Ear()
     feed(ear, b"".join(beat(0, Address(system, 1)) for system in range(1, 9)))
-    assert [sender.system for _, sender in ear.heard] == [*range(1, 9)]
+    assert [sender.system for _, sender in ear.received] == [*range(1, 9)]
 
 
 @both
@@ -98,7 +98,7 @@ def test_a_wanted_frame_with_a_wrong_checksum_is_nothing(feed: Feed) -> None:
     feed(ear, beat(0))
     feed(ear, broken(beat(1)))
     feed(ear, beat(2))
-    assert len(ear.heard) == 2
+    assert len(ear.received) == 2
     assert ear.sender().lost == 1
 
 
@@ -128,7 +128,7 @@ def test_who_is_refused_is_not_heard(feed: Feed) -> None:
     ear = Ear(refused=3)
     for sequence in range(3):
         feed(ear, beat(sequence))
-    assert (ear.heard, ear.inbound.senders) == ([], {})
+    assert (ear.received, ear.inbound.senders) == ([], {})
 
 
 @both
@@ -137,7 +137,7 @@ def test_a_sender_of_whom_nothing_is_wanted_is_counted(feed: Feed) -> None:
     feed(ear, beat(0))
     ear.sender().wanted = NOTHING
     feed(ear, beat(1))
-    assert (len(ear.heard), ear.sender().sent) == (1, 2)
+    assert (len(ear.received), ear.sender().sent) == (1, 2)
 
 
 @both
@@ -150,7 +150,7 @@ def test_a_listener_that_fails_hinders_no_other(
     ear = Ear(listener=fails)
     with caplog.at_level(logging.ERROR):
         feed(ear, beat(0) + beat(1))
-    assert len(ear.heard) == 2
+    assert len(ear.received) == 2
     assert "a listener to HEARTBEAT" in caplog.text
 
 
@@ -160,7 +160,7 @@ def test_frames_in_a_datagram_with_junk_must_be_right() -> None:
     as_datagram(ear, b"\1\2" + broken(attitude(1)) + attitude(2) + beat(3) + b"\xfd")
     assert ear.sender().sent == 4
     assert ear.sender().lost == 1
-    assert len(ear.heard) == 2
+    assert len(ear.received) == 2
     assert ear.inbound.junk_bytes == 3 + len(attitude(1))
 
 
@@ -168,7 +168,7 @@ def test_a_stream_may_come_byte_by_byte() -> None:
     ear = Ear()
     for byte in b"boot banner\n" + beat(0) + attitude(1) + beat(2):
         as_stream(ear, bytes([byte]))
-    assert (len(ear.heard), ear.sender().sent, ear.sender().lost) == (2, 3, 0)
+    assert (len(ear.received), ear.sender().sent, ear.sender().lost) == (2, 3, 0)
     assert ear.inbound.junk_bytes == len("boot banner\n")
 
 
@@ -176,16 +176,16 @@ def test_what_only_looks_like_a_long_frame_does_not_hold_others_up_for_ever() ->
     ear = Ear()
     ear.inbound.stream(b"\xfd\xff\0", 0.0)
     ear.inbound.stream(beat(0), 0.1)
-    assert ear.heard == []
+    assert ear.received == []
     ear.inbound.stream(beat(1), 0.2 + UNFINISHED_S)
-    assert len(ear.heard) == 2
+    assert len(ear.received) == 2
 
 
 def test_a_slow_frame_is_not_given_up_when_its_end_comes() -> None:
     ear = Ear()
     ear.inbound.stream(beat(0)[:9], 0.0)
     ear.inbound.stream(beat(0)[9:], 5.0)
-    assert len(ear.heard) == 1
+    assert len(ear.received) == 1
 
 
 def test_nothing_grows_with_what_comes() -> None:

@@ -1,5 +1,5 @@
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
-from m2pem_plugin_mavlink.vehicle.landing import landing, landing_begins, without_landing
+from m2pem_plugin_mavlink.vehicle.fixed_wing import landing, landing_begins, without_landing
 
 DO_LAND_START, WAYPOINT, LAND = 189, 16, 21
 

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_simulated import at, fly
 
 from m2pem.api import Area, Point, Route

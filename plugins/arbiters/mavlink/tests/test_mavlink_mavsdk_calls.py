@@ -4,11 +4,11 @@ import asyncio
 import threading
 
 import pytest
-from m2pem_plugin_mavlink.mavsdk_driver.calls import Calls
+from m2pem_plugin_mavlink.mavsdk_driver.link import PendingCalls
 
 
 async def test_a_call_gives_its_result_or_raises():
-    calls = Calls()
+    calls = PendingCalls()
 
     async def works():
         return 7
@@ -23,7 +23,7 @@ async def test_a_call_gives_its_result_or_raises():
 
 
 async def test_a_call_whose_caller_is_gone_is_still_waited_for():
-    calls, go, back = Calls(), threading.Event(), []
+    calls, go, back = PendingCalls(), threading.Event(), []
 
     async def blocks():
         await asyncio.get_running_loop().run_in_executor(None, go.wait, 10)
@@ -46,7 +46,7 @@ async def test_a_call_whose_caller_is_gone_is_still_waited_for():
 
 
 async def test_what_a_forgotten_call_raises_disturbs_nobody(caplog):
-    calls = Calls()
+    calls = PendingCalls()
 
     async def fails():
         await asyncio.sleep(0)

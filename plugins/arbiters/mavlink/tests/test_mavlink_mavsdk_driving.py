@@ -4,8 +4,8 @@ import asyncio
 import math
 
 import pytest
-from m2pem_plugin_mavlink.sim.geometry import Location
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.geometry import Location
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from mavlink_mavsdk_flying import first, flying, really
 from mavsdk.autopilot import Autopilot
 from mavsdk.plugins.action import ActionError

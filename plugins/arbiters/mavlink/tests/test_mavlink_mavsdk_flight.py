@@ -4,8 +4,8 @@ import asyncio
 import math
 
 import pytest
-from m2pem_plugin_mavlink.sim.geometry import Location
-from m2pem_plugin_mavlink.sim.specification import VehicleSpec
+from m2pem_plugin_mavlink.simulator.geometry import Location
+from m2pem_plugin_mavlink.simulator.specification import VehicleSpec
 from mavlink_mavsdk_flying import first, flying, really
 from mavsdk.autopilot import Autopilot
 from mavsdk.plugins.action import ActionError
@@ -27,7 +27,7 @@ async def mode_told(flown, mode):
     await first(flown.telemetry.subscribe_flight_mode(), lambda each: each is mode)
 
 
-def away_m(flown):
+def distance_to_m(flown):
     north_m = (flown.real.location.latitude_deg - HOME.latitude_deg) * 111_195
     east_m = flown.real.location.longitude_deg - HOME.longitude_deg
     return north_m, east_m * 111_195 * math.cos(math.radians(HOME.latitude_deg))
@@ -172,13 +172,13 @@ def _near(flown, latitude_deg, longitude_deg, up_m):
 async def test_it_holds(copter):
     await copter.up(10.0)
     await copter.action.goto_location(HOME.latitude_deg + 0.01, HOME.longitude_deg, 500.0, 0.0)
-    await really(lambda: away_m(copter)[0] > 5.0)
+    await really(lambda: distance_to_m(copter)[0] > 5.0)
     await copter.action.hold()
     await mode_told(copter, FlightMode.HOLD)
     assert copter.real.mode == "BRAKE"
-    before = away_m(copter)[0]
+    before = distance_to_m(copter)[0]
     await really(lambda: not copter.real.autopilot.body.moving)
-    assert away_m(copter)[0] - before < 30.0
+    assert distance_to_m(copter)[0] - before < 30.0
 
 
 async def test_its_speed_can_be_set(copter):
@@ -192,11 +192,11 @@ async def test_its_speed_can_be_set(copter):
 async def test_it_returns_lands_and_disarms(copter):
     await copter.up(10.0)
     await copter.action.goto_location(HOME.latitude_deg + 0.0002, HOME.longitude_deg, 498.0, 0.0)
-    await really(lambda: away_m(copter)[0] > 15.0)
+    await really(lambda: distance_to_m(copter)[0] > 15.0)
     await copter.action.return_to_launch()
     await mode_told(copter, FlightMode.RETURN_TO_LAUNCH)
     await really(lambda: not copter.real.armed, 40.0)
-    assert math.hypot(*away_m(copter)) < 1.0
+    assert math.hypot(*distance_to_m(copter)) < 1.0
     assert abs(copter.real.up_m) < 0.3
 
 
@@ -225,28 +225,30 @@ async def test_offboard_flies_by_velocity_until_it_is_stopped(copter):
     await copter.offboard.start()
     assert await copter.offboard.is_active()
     assert copter.real.mode == "GUIDED"
-    await really(lambda: away_m(copter)[1] > 10.0)
+    await really(lambda: distance_to_m(copter)[1] > 10.0)
     await copter.offboard.stop()
     await really(lambda: copter.real.mode == "BRAKE")
-    stopped = away_m(copter)[1]
+    stopped = distance_to_m(copter)[1]
     await really(lambda: not copter.real.autopilot.body.moving)
-    assert away_m(copter)[1] - stopped < 5.0
+    assert distance_to_m(copter)[1] - stopped < 5.0
 
 
 async def test_offboard_goes_to_a_place_in_its_own_frame(copter):
     await copter.up(10.0)
     await copter.offboard.set_position_ned(PositionNedYaw(15.0, -8.0, -14.0, 0.0))
     await copter.offboard.start()
-    await really(lambda: math.dist((*away_m(copter), copter.real.up_m), (15.0, -8.0, 14.0)) < 1.0)
+    await really(
+        lambda: math.dist((*distance_to_m(copter), copter.real.up_m), (15.0, -8.0, 14.0)) < 1.0
+    )
 
 
 async def test_a_velocity_that_is_not_repeated_runs_out(copter):
     await copter.up(10.0)
     await copter.offboard.set_velocity_ned(VelocityNedYaw(0.0, 2.0, 0.0, 90.0))
     await copter.offboard.start()
-    await really(lambda: away_m(copter)[1] > 5.0)
+    await really(lambda: distance_to_m(copter)[1] > 5.0)
     copter.offboard.destroy()  # it repeats its setpoint no more, and changes nothing else
-    at = away_m(copter)[1]
+    at = distance_to_m(copter)[1]
     await really(lambda: not copter.real.autopilot.body.moving)
     assert copter.real.mode == "GUIDED"
-    assert away_m(copter)[1] - at < 10.0
+    assert distance_to_m(copter)[1] - at < 10.0

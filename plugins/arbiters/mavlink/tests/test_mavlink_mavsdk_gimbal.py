@@ -3,9 +3,9 @@
 import math
 
 import pytest
-from m2pem_plugin_mavlink.sim.geometry import Location
-from m2pem_plugin_mavlink.sim.gimbal.gimbal import Gimbal
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.geometry import Location
+from m2pem_plugin_mavlink.simulator.gimbal import Gimbal
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from mavlink_mavsdk_flying import first, flying, really
 from mavsdk.plugins.gimbal import ControlMode, GimbalMode, SendMode
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -34,7 +34,7 @@ async def gimbal_of(flown):
 
 def points(flown):
     """Pitch and yaw to the bow, in degrees, as it really is."""
-    (gimbal,) = (each for each in flown.real.autopilot.parts if isinstance(each, Gimbal))
+    (gimbal,) = (each for each in flown.real.autopilot.components if isinstance(each, Gimbal))
     pointing = gimbal.pointing
     return math.degrees(pointing.pitch_rad), math.degrees(pointing.yaw_rad)
 

@@ -66,7 +66,7 @@ async def test_what_is_sent_arrives_in_its_order_and_from_us(world):
     for north in range(20):
         link.send(target.make(target_system=1, target_component=1, vx=float(north)))
     await vehicle.hears(lambda each: getattr(each, "vx", None) == 19.0)
-    sent = [each for each in vehicle.heard if each.get_type() == target.name]
+    sent = [each for each in vehicle.received if each.get_type() == target.name]
     assert [each.vx for each in sent] == [float(north) for north in range(20)]
     assert {(each.get_srcSystem(), each.get_srcComponent()) for each in sent} == {tuple(GROUND)}
 
@@ -79,7 +79,7 @@ async def test_before_the_vehicle_is_heard_nothing_is_sent_or_performed():
             await link.perform(Ask())
         async with scripted(port) as vehicle:
             await vehicle.hears(lambda each: each.get_type() == "HEARTBEAT")
-            assert not any(each.get_type() == "PING" for each in vehicle.heard)
+            assert not any(each.get_type() == "PING" for each in vehicle.received)
 
 
 class Ask(Transaction[int]):
@@ -121,14 +121,14 @@ async def test_a_command_is_given_once_and_its_refusal_told(world):
     with pytest.raises(RefusedError, match="refused"):
         await link.perform(Ask())
     await asyncio.sleep(0.7)  # after 0.5 s MAVSDK itself would ask again
-    assert len([each for each in vehicle.heard if getattr(each, "command", None) == 400]) == 1
+    assert len([each for each in vehicle.received if getattr(each, "command", None) == 400]) == 1
 
 
 async def test_commands_with_one_number_and_different_fields_all_arrive(world):
     link, vehicle = world
     for message_id in (24, 30, 33):
         await link.perform(Ask(511, param1=float(message_id)))
-    asked = [each.param1 for each in vehicle.heard if getattr(each, "command", None) == 511]
+    asked = [each.param1 for each in vehicle.received if getattr(each, "command", None) == 511]
     assert asked == [24.0, 30.0, 33.0]
 
 

@@ -4,8 +4,8 @@ import asyncio
 from contextlib import aclosing
 
 import pytest
-from m2pem_plugin_mavlink.sim.geometry import Location
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.geometry import Location
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from mavlink_mavsdk_flying import first, flying, really
 from mavsdk.plugins.mission_raw import MissionItem, MissionRawError
 from mavsdk.plugins.telemetry import FlightMode
@@ -132,7 +132,7 @@ async def test_a_mission_is_flown_from_the_ground_home_again(copter):
     currents = [current for current, total in progress if total == len(SURVEY) and current > 0]
     assert currents == sorted(currents)
     assert {2, 3, 4} <= set(currents)
-    events = copter.real.autopilot.chronicle.events
+    events = copter.real.autopilot.log.events
     reached = [int(each.detail) for each in events if each.kind == "reached"]
     assert reached == [1, 2, 3, 4]
 

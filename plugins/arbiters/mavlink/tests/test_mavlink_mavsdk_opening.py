@@ -4,7 +4,7 @@ import asyncio
 import socket
 
 import pytest
-from m2pem_plugin_mavlink.mavsdk_driver.opening import open_mavsdk_link
+from m2pem_plugin_mavlink.mavsdk_driver.ground_station import open_mavsdk_link
 from m2pem_plugin_mavlink.protocol.messages import Address, message_type
 from mavlink_mavsdk_world import (
     GROUND,

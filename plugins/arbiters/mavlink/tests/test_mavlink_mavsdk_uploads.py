@@ -9,8 +9,8 @@ from m2pem_plugin_mavlink.microservices.mission_download import DownloadMission
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType
 from m2pem_plugin_mavlink.microservices.mission_upload import UploadMission
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
-from m2pem_plugin_mavlink.sim.simulator import Simulator
-from m2pem_plugin_mavlink.sim.specification import VehicleSpec
+from m2pem_plugin_mavlink.simulator.simulator import Simulator
+from m2pem_plugin_mavlink.simulator.specification import VehicleSpec
 from mavlink_mavsdk_world import ONE, free_port, linked, until
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 

@@ -19,9 +19,8 @@ from m2pem_plugin_mavlink.microservices.camera import (
     take_images,
     zoom,
 )
-from m2pem_plugin_mavlink.microservices.patience import PATIENCE
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError
+from m2pem_plugin_mavlink.protocol.transaction import PATIENCE, NoAnswerError
 from mavlink_lossy import VEHICLE, Played, Silent, play_table, run
 from mavlink_peers import Commanded, ack
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -88,7 +87,7 @@ def test_several_images_are_asked_for_only_once_as_they_would_be_taken_again() -
 def test_what_is_sent_to_cameras(command: Any, id_: int, params: tuple[float, ...]) -> None:
     camera = Commanded(lambda heard, _: (ack(heard.command),))
     assert run(command, camera).error is None
-    (heard,) = camera.heard
+    (heard,) = camera.received
     assert heard.command == id_
     assert tuple(heard)[: len(params)] == params
 

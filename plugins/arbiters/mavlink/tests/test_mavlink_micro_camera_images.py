@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from m2pem_plugin_mavlink.microservices.camera_images import KEPT, CapturedImages, ReadImage
-from m2pem_plugin_mavlink.microservices.patience import PATIENCE
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
+from m2pem_plugin_mavlink.protocol.transaction import PATIENCE
 from mavlink_lossy import VEHICLE, Played, over_the_wire, play_table
 from mavlink_peers import Commanded, ack
 

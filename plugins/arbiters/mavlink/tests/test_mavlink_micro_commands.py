@@ -13,9 +13,9 @@ from m2pem_plugin_mavlink.microservices.commands import (
     CommandPlace,
     Request,
 )
-from m2pem_plugin_mavlink.microservices.patience import PATIENCE
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
+    PATIENCE,
     ExchangeError,
     NoAnswerError,
     RefusedError,
@@ -65,7 +65,7 @@ def test_a_place_is_sent_in_whole_numbers() -> None:
     vehicle = Answers([ack(dialect.MAV_CMD_DO_REPOSITION)])
     reposition = Command(VEHICLE, dialect.MAV_CMD_DO_REPOSITION, (-1, 1), place=place)
     assert run(reposition, vehicle).error is None
-    (heard,) = vehicle.heard
+    (heard,) = vehicle.received
     assert heard.TYPE.name == "COMMAND_INT"
     assert (heard.x, heard.y, heard.frame) == (473977420, -85455941, dialect.MAV_FRAME_GLOBAL_INT)
     assert (heard.param1, heard.param2) == (-1.0, 1.0)
@@ -205,19 +205,19 @@ def test_the_other_form_is_tried_once_if_the_vehicle_wants_it() -> None:
     only_int = [ack(TAKEOFF, dialect.MAV_RESULT_COMMAND_INT_ONLY)]
     vehicle = Answers(only_int, [ack(TAKEOFF)])
     assert run(Command(VEHICLE, TAKEOFF, (0, 0, 0, 0, 5, 6, 7)), vehicle).error is None
-    assert [each.TYPE.name for each in vehicle.heard] == ["COMMAND_LONG", "COMMAND_INT"]
-    assert (vehicle.heard[1].x, vehicle.heard[1].y, vehicle.heard[1].z) == (5, 6, 7.0)
+    assert [each.TYPE.name for each in vehicle.received] == ["COMMAND_LONG", "COMMAND_INT"]
+    assert (vehicle.received[1].x, vehicle.received[1].y, vehicle.received[1].z) == (5, 6, 7.0)
 
     only_long = [ack(TAKEOFF, dialect.MAV_RESULT_COMMAND_LONG_ONLY)]
     vehicle = Answers(only_long, [ack(TAKEOFF)])
     place = CommandPlace(47.0, 8.0, 30.0)
     assert run(Command(VEHICLE, TAKEOFF, place=place), vehicle).error is None
-    assert [each.TYPE.name for each in vehicle.heard] == ["COMMAND_INT", "COMMAND_LONG"]
-    assert (vehicle.heard[1].param5, vehicle.heard[1].param6) == (47.0, 8.0)
+    assert [each.TYPE.name for each in vehicle.received] == ["COMMAND_INT", "COMMAND_LONG"]
+    assert (vehicle.received[1].param5, vehicle.received[1].param6) == (47.0, 8.0)
 
     vehicle = Answers(only_int, only_long)
     assert isinstance(run(Command(VEHICLE, TAKEOFF), vehicle).error, RefusedError)
-    assert len(vehicle.heard) == 2
+    assert len(vehicle.received) == 2
 
     params = (0, 0, 0, 0, math.nan, 0, 0)  # which COMMAND_INT cannot say
     played = run(Command(VEHICLE, TAKEOFF, params), Answers(only_int))

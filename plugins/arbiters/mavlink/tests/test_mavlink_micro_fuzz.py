@@ -5,14 +5,17 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
-from m2pem_plugin_mavlink.microservices.autopilot import ReadAutopilotVersion
 from m2pem_plugin_mavlink.microservices.camera import FindCamera, ReadCaptureStatus, ReadStorage
 from m2pem_plugin_mavlink.microservices.camera_images import ReadImage
 from m2pem_plugin_mavlink.microservices.commands import Command
 from m2pem_plugin_mavlink.microservices.gimbal import FindGimbal
 from m2pem_plugin_mavlink.microservices.gimbal_status import WANTED, GimbalStatus
 from m2pem_plugin_mavlink.microservices.home import GroundPlace, ReadHome, SetOrigin
-from m2pem_plugin_mavlink.microservices.intervals import ReadMessageInterval, SetMessageInterval
+from m2pem_plugin_mavlink.microservices.message_requests import (
+    ReadAutopilotVersion,
+    ReadMessageInterval,
+    SetMessageInterval,
+)
 from m2pem_plugin_mavlink.microservices.mission_download import DownloadMission
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.microservices.mission_upload import UploadMission
@@ -21,9 +24,12 @@ from m2pem_plugin_mavlink.microservices.missions import (
     ReadMissionItem,
     SetCurrentItem,
 )
-from m2pem_plugin_mavlink.microservices.parameter_list import ReadParameters
-from m2pem_plugin_mavlink.microservices.parameter_values import ParameterEncoding
-from m2pem_plugin_mavlink.microservices.parameters import ReadParameter, SetParameter
+from m2pem_plugin_mavlink.microservices.parameters import (
+    ParameterEncoding,
+    ReadParameter,
+    ReadParameters,
+    SetParameter,
+)
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type, types_by_id
 from m2pem_plugin_mavlink.protocol.transaction import Transaction
 from mavlink_lossy import VEHICLE, Silent, run

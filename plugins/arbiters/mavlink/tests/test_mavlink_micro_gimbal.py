@@ -17,9 +17,8 @@ from m2pem_plugin_mavlink.microservices.gimbal import (
     stop,
     take_control,
 )
-from m2pem_plugin_mavlink.microservices.patience import PATIENCE
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError
+from m2pem_plugin_mavlink.protocol.transaction import PATIENCE, NoAnswerError
 from mavlink_lossy import GROUND, VEHICLE, Played, play_table, run
 from mavlink_peers import Commanded, ack
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -66,7 +65,7 @@ def test_a_gimbal_points_once_or_it_fails_clearly_whatever_the_link_does() -> No
 def test_angles_are_sent_in_degrees_and_rates_left_alone() -> None:
     vehicle = Commanded(manages)
     run(point(VEHICLE, Aim(-math.pi / 4, 1.5 * math.pi), 2), vehicle)
-    sent = vehicle.heard[0]
+    sent = vehicle.received[0]
     assert (sent.param1, sent.param2) == pytest.approx((-45.0, -90.0))
     assert math.isnan(sent.param3)
     assert math.isnan(sent.param4)
@@ -85,7 +84,7 @@ def test_control_is_taken_and_given_back() -> None:
     vehicle = Commanded(manages)
     assert run(take_control(VEHICLE, GROUND), vehicle).error is None
     assert run(release(VEHICLE), vehicle).error is None
-    taken, released = vehicle.heard
+    taken, released = vehicle.received
     assert (taken.param1, taken.param2, taken.param3, taken.param4) == (255, 190, -1, -1)
     assert (released.param1, released.param2, released.param3) == (-3, -3, -1)
 
@@ -101,7 +100,7 @@ def test_no_gimbal_points_nowhere(angle_rad: float) -> None:
 def test_a_gimbal_is_stopped_by_a_rate_of_nothing() -> None:
     gimbal = Commanded(lambda heard, _: (ack(heard.command),))
     assert run(stop(VEHICLE, YawFrame.NORTH, 3), gimbal).error is None
-    (heard,) = gimbal.heard
+    (heard,) = gimbal.received
     assert heard.command == dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
     assert math.isnan(heard.param1)
     assert math.isnan(heard.param2)

@@ -12,9 +12,8 @@ from m2pem_plugin_mavlink.microservices.home import (
     SetOrigin,
     set_home,
 )
-from m2pem_plugin_mavlink.microservices.patience import PATIENCE
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError
+from m2pem_plugin_mavlink.protocol.transaction import PATIENCE, ExchangeError, NoAnswerError
 from mavlink_lossy import VEHICLE, Played, Silent, play_table, run
 from mavlink_peers import Commanded, ack
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -43,7 +42,7 @@ def test_home_is_set_to_a_place_or_to_where_the_vehicle_is() -> None:
     vehicle = Commanded(lambda command, _: (ack(command.command),))
     assert run(set_home(VEHICLE, PLACE), vehicle).error is None
     assert run(set_home(VEHICLE, None), vehicle).error is None
-    there, here = vehicle.heard
+    there, here = vehicle.received
     assert (there.TYPE.name, there.x, there.y, there.z) == (
         "COMMAND_INT",
         AT["latitude"],

@@ -5,16 +5,15 @@ from typing import Any
 
 import pytest
 from m2pem_plugin_mavlink.microservices.commands import REASON_S
-from m2pem_plugin_mavlink.microservices.intervals import (
+from m2pem_plugin_mavlink.microservices.message_requests import (
     SLOWER_TRIES,
     ReadMessageInterval,
     RequestMessage,
     SetMessageInterval,
     as_it_is,
 )
-from m2pem_plugin_mavlink.microservices.patience import PATIENCE
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError, RefusedError
+from m2pem_plugin_mavlink.protocol.transaction import PATIENCE, NoAnswerError, RefusedError
 from mavlink_lossy import VEHICLE, Answers, Played, Silent, play_table, run
 from mavlink_peers import Commanded, ack
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -60,7 +59,7 @@ def test_a_rate_that_is_denied_is_tried_slower() -> None:
     vehicle = Commanded(streams)
     played = run(SetMessageInterval(VEHICLE, ATTITUDE, 0.004), vehicle)
     assert played.result == 0.032
-    assert [each.param2 for each in vehicle.heard] == [4000, 8000, 16000, 32000]
+    assert [each.param2 for each in vehicle.received] == [4000, 8000, 16000, 32000]
 
 
 def test_what_is_denied_at_any_rate_is_refused() -> None:
@@ -68,14 +67,14 @@ def test_what_is_denied_at_any_rate_is_refused() -> None:
     played = run(SetMessageInterval(VEHICLE, 33, 0.1), vehicle)
     assert isinstance(played.error, RefusedError)
     assert played.error.reason.startswith("SET_MESSAGE_INTERVAL of GLOBAL_POSITION_INT: denied")
-    assert len(vehicle.heard) == 1 + SLOWER_TRIES
+    assert len(vehicle.received) == 1 + SLOWER_TRIES
 
 
 @pytest.mark.parametrize("interval_s", [0.0, -1.0])
 def test_default_and_never_are_said_as_they_are(interval_s: float) -> None:
     vehicle = Commanded(streams)
     assert run(SetMessageInterval(VEHICLE, ATTITUDE, interval_s), vehicle).result == interval_s
-    assert vehicle.heard[0].param2 == interval_s
+    assert vehicle.received[0].param2 == interval_s
 
 
 @pytest.mark.parametrize(("interval_us", "interval_s"), [(250_000, 0.25), (-1, -1.0), (0, 0.0)])

@@ -209,7 +209,7 @@ def test_items_may_be_asked_for_in_any_order() -> None:
     answers = [[request(n)] for n in (4, 2, 0, 1, 3)]
     vehicle = Answers(*answers, [mission_ack(dialect.MAV_MISSION_ACCEPTED)])
     assert run(UploadMission(VEHICLE, ITEMS), vehicle).error is None
-    assert [each.seq for each in vehicle.heard[1:]] == [4, 2, 0, 1, 3]
+    assert [each.seq for each in vehicle.received[1:]] == [4, 2, 0, 1, 3]
 
 
 def test_an_item_that_is_asked_for_over_and_over_is_an_end() -> None:

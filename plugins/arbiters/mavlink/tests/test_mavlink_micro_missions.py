@@ -11,9 +11,8 @@ from m2pem_plugin_mavlink.microservices.missions import (
     ReadMissionItem,
     SetCurrentItem,
 )
-from m2pem_plugin_mavlink.microservices.patience import PATIENCE
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError, RefusedError
+from m2pem_plugin_mavlink.protocol.transaction import PATIENCE, NoAnswerError, RefusedError
 from mavlink_lossy import VEHICLE, Answers, Played, Silent, play_table, run
 from mavlink_peers import Commanded, Stored, ack, mission_ack
 from pymavlink.dialects.v20 import ardupilotmega as dialect

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from m2pem_plugin_mavlink.microservices.parameter_list import (
+from m2pem_plugin_mavlink.microservices.parameters import (
     BASE_S,
     GAP_PATIENCE,
     LIST_PATIENCE,

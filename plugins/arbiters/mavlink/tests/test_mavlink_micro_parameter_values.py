@@ -1,7 +1,7 @@
 """Values of parameters as they travel."""
 
 import pytest
-from m2pem_plugin_mavlink.microservices.parameter_values import (
+from m2pem_plugin_mavlink.microservices.parameters import (
     Parameter,
     ParameterEncoding,
     carried,

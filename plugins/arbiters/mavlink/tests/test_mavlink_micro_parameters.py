@@ -4,11 +4,18 @@ import math
 from collections.abc import Sequence
 
 import pytest
-from m2pem_plugin_mavlink.microservices.parameter_values import ParameterEncoding
-from m2pem_plugin_mavlink.microservices.parameters import ReadParameter, SetParameter
-from m2pem_plugin_mavlink.microservices.patience import PATIENCE
+from m2pem_plugin_mavlink.microservices.parameters import (
+    ParameterEncoding,
+    ReadParameter,
+    SetParameter,
+)
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
+from m2pem_plugin_mavlink.protocol.transaction import (
+    PATIENCE,
+    ExchangeError,
+    NoAnswerError,
+    RefusedError,
+)
 from mavlink_lossy import VEHICLE, Answers, Played, Silent, play_table, run
 from mavlink_peers import Parameters
 from pymavlink.dialects.v20 import ardupilotmega as dialect

@@ -7,20 +7,25 @@ from dataclasses import replace
 
 import pytest
 from m2pem_plugin_mavlink.link.routed_link import RoutedLink, open_link
-from m2pem_plugin_mavlink.microservices.autopilot import ReadAutopilotVersion
 from m2pem_plugin_mavlink.microservices.commands import Command
 from m2pem_plugin_mavlink.microservices.home import ReadHome
-from m2pem_plugin_mavlink.microservices.intervals import SetMessageInterval
+from m2pem_plugin_mavlink.microservices.message_requests import (
+    ReadAutopilotVersion,
+    SetMessageInterval,
+)
 from m2pem_plugin_mavlink.microservices.mission_download import DownloadMission
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType
 from m2pem_plugin_mavlink.microservices.mission_upload import UploadMission
 from m2pem_plugin_mavlink.microservices.missions import ClearMission, SetCurrentItem
-from m2pem_plugin_mavlink.microservices.parameter_list import ReadParameters
-from m2pem_plugin_mavlink.microservices.parameters import ReadParameter, SetParameter
+from m2pem_plugin_mavlink.microservices.parameters import (
+    ReadParameter,
+    ReadParameters,
+    SetParameter,
+)
 from m2pem_plugin_mavlink.protocol.messages import Address, message_type
 from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError, RefusedError
-from m2pem_plugin_mavlink.sim.simulator import Simulator
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.simulator import Simulator
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.executive.clock import SystemClock

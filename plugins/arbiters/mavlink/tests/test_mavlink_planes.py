@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_simulated import AMPLE_S, at, fly
 
 from m2pem.api import Area, BehaviorState, Point, Route
@@ -194,7 +194,7 @@ def test_without_a_landing_stored_it_says_what_it_needs() -> None:
 
 def test_it_lands_by_the_landing_it_had_stored_before_it_flew_something_else() -> None:
     async def main(bench) -> None:
-        vehicle = bench.arbiter._helms["v1"].vehicle
+        vehicle = bench.arbiter._controllers["v1"].vehicle
         assert await vehicle.identified(AMPLE_S)
         await vehicle.driver.upload([stored(WAYPOINT, 0, 900, 50), *LANDING])
         await bench.do("r1.b1", "takeoff", altitude=60.0)

@@ -2,8 +2,8 @@
 
 import pytest
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
-from m2pem_plugin_mavlink.behaviors import looking
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.behaviors import arrival as looking
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_simulated import Bench, at, connections, fly
 
 from m2pem.api import BehaviorState, Point

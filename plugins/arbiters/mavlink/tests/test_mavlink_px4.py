@@ -35,7 +35,7 @@ async def in_the_air(link: ScriptedLink, vehicle: Vehicle) -> None:
     fly(link)
     link.custom_mode = AUTO_LOITER
     await vehicle.until(
-        lambda: vehicle.heard.landed is False and vehicle.heard.custom_mode == AUTO_LOITER, 5.0
+        lambda: vehicle.state.landed is False and vehicle.state.custom_mode == AUTO_LOITER, 5.0
     )
 
 
@@ -53,7 +53,7 @@ def test_modes_are_commanded_by_main_and_sub_mode(virtual: Run) -> None:
             await vehicle.driver.set_mode(FlightMode.MISSION)
             (command,) = link.of("COMMAND_LONG", SET_MODE)
             assert (command.param1, command.param2, command.param3) == (1.0, 4.0, 4.0)
-            assert vehicle.driver.mode_name(vehicle.heard.custom_mode or 0) == "AUTO.MISSION"
+            assert vehicle.driver.mode_name(vehicle.state.custom_mode or 0) == "AUTO.MISSION"
 
     virtual(main)
 
@@ -68,7 +68,7 @@ def test_a_mission_that_was_just_uploaded_is_tried_again_while_it_is_denied(virt
 
             link.obey[SET_MODE] = obey
             await vehicle.driver.set_mode(FlightMode.MISSION)
-            assert vehicle.heard.custom_mode == AUTO_MISSION
+            assert vehicle.state.custom_mode == AUTO_MISSION
 
     virtual(main)
 
@@ -135,7 +135,7 @@ def test_it_orbits_by_command_where_it_can(virtual: Run) -> None:
             assert await vehicle.driver.orbit(Place(47.4, 8.55, 20.0), 30.0, 4.0) is True
             (orbit,) = link.of("COMMAND_INT", ORBIT)
             assert (orbit.param1, orbit.param2, orbit.z) == (30.0, 4.0, 508.0)
-            assert vehicle.heard.mode is FlightMode.ORBIT
+            assert vehicle.state.mode is FlightMode.ORBIT
             link.obey[ORBIT] = lambda _: dialect.MAV_RESULT_UNSUPPORTED
             assert await vehicle.driver.orbit(Place(47.4, 8.55, 20.0), 30.0, 4.0) is False
 
@@ -155,7 +155,7 @@ def test_offboard_has_setpoints_before_and_during_its_entry(virtual: Run) -> Non
 
             link.obey[SET_MODE] = obey
             await vehicle.driver.move((1.0, 2.0, 0.0))
-            assert vehicle.heard.custom_mode == OFFBOARD
+            assert vehicle.state.custom_mode == OFFBOARD
             assert before[0] >= 5
             assert before[1] - before[0] >= 4
             sent = len(link.of("SET_POSITION_TARGET_LOCAL_NED"))
@@ -187,7 +187,7 @@ def test_velocities_do_not_fight_for_offboard(virtual: Run) -> None:
             await in_the_air(link, vehicle)
             await vehicle.driver.move((1.0, 2.0, 0.0))
             link.custom_mode = POSCTL
-            await vehicle.until(lambda: vehicle.heard.custom_mode == POSCTL)
+            await vehicle.until(lambda: vehicle.state.custom_mode == POSCTL)
             with pytest.raises(ExchangeError, match="it is in mode POSCTL now"):
                 await vehicle.driver.move((1.0, 2.0, 0.0))
             await vehicle.driver.stop()

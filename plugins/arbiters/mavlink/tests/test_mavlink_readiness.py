@@ -1,14 +1,14 @@
 from dataclasses import replace
 
 import pytest
-from m2pem_plugin_mavlink.vehicle.heard import Heard
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
 from m2pem_plugin_mavlink.vehicle.readiness import readiness
+from m2pem_plugin_mavlink.vehicle.state import AutopilotState
 
 from m2pem.api import GeoPosition
 
 ARDUPILOT, PX4 = Firmware.ARDUPILOT, Firmware.PX4
-READY = Heard(
+READY = AutopilotState(
     heartbeat_s=10.0,
     boot_s=0.0,
     armed=False,
@@ -20,8 +20,8 @@ READY = Heard(
 )
 
 
-def reasons(firmware: Firmware, heard: Heard, *texts: str) -> tuple[str, ...]:
-    answer = readiness(firmware, heard, texts, 12.0)
+def reasons(firmware: Firmware, state: AutopilotState, *texts: str) -> tuple[str, ...]:
+    answer = readiness(firmware, state, texts, 12.0)
     assert answer.ready is not bool(answer.reasons)
     return answer.reasons
 
@@ -71,7 +71,7 @@ def test_prearm_texts_are_the_reasons_of_a_check_that_fails() -> None:
 def test_gps_battery_and_link_are_reasons() -> None:
     assert reasons(ARDUPILOT, replace(READY, gps_fix=1)) == ("GPS: no 3D fix",)
     assert reasons(PX4, replace(READY, battery_fraction=0.12)) == ("battery at 12 %",)
-    assert reasons(PX4, Heard()) == ("link: no heartbeat yet",)
+    assert reasons(PX4, AutopilotState()) == ("link: no heartbeat yet",)
 
 
 def test_an_armed_vehicle_is_ready() -> None:

@@ -3,8 +3,7 @@
 import logging
 
 import pytest
-from m2pem_plugin_mavlink.link.peer import Peer
-from m2pem_plugin_mavlink.link.route import FORGOTTEN_S, MOST_RIVALS, TAKEOVER_S, Route
+from m2pem_plugin_mavlink.link.route import FORGOTTEN_S, MOST_RIVALS, TAKEOVER_S, Peer, Route
 from m2pem_plugin_mavlink.protocol.frames import encode
 from m2pem_plugin_mavlink.protocol.inbound import Sender
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
@@ -22,11 +21,11 @@ class World:
         self.route = Route(5, parse_url("udpin://127.0.0.1:14550"))
         self.route.autopilots.add(1)
         self.now_s = 0.0
-        self.heard: list[int] = []
+        self.received: list[int] = []
         self.route.listen([0], self._listen)
 
     def _listen(self, message: Message, _: Address) -> None:
-        self.heard.append(message.custom_mode)
+        self.received.append(message.custom_mode)
 
     def peer(self, name: str) -> Peer:
         def meet(peer: Peer, sender: Sender) -> bool:
@@ -76,7 +75,7 @@ def test_another_peer_with_the_same_id_is_not_believed_and_told_of_once(
                 world.beat(liar, mode=2)
             world.route.judge(world.now_s)
     assert world.reached() == "first"
-    assert set(world.heard) == {1}
+    assert set(world.received) == {1}
     assert len(caplog.records) == 1
     assert "second says to be component 1 of system 5, as first does" in caplog.text
 
@@ -93,10 +92,10 @@ def test_a_rival_is_believed_when_the_first_has_long_been_silent() -> None:
     world.now_s += 0.1
     world.route.judge(world.now_s)
     assert world.reached() == "new"
-    world.heard.clear()
+    world.received.clear()
     world.beat(new, mode=8)
     world.beat(old, mode=9)
-    assert world.heard == [8]
+    assert world.received == [8]
 
 
 def test_places_may_change_again_and_again() -> None:
@@ -109,7 +108,7 @@ def test_places_may_change_again_and_again() -> None:
             world.now_s += 1.0
             world.route.judge(world.now_s)
         assert world.reached() == speaking.name
-        assert world.heard[-1] == turn
+        assert world.received[-1] == turn
 
 
 def test_who_is_heard_first_after_a_silence_is_believed_at_once() -> None:
@@ -117,7 +116,7 @@ def test_who_is_heard_first_after_a_silence_is_believed_at_once() -> None:
     world.beat(world.peer("old"))
     world.now_s = TAKEOVER_S + 0.1
     world.beat(world.peer("new"), mode=7)
-    assert (world.reached(), world.heard[-1]) == ("new", 7)
+    assert (world.reached(), world.received[-1]) == ("new", 7)
 
 
 def test_a_rival_that_is_silent_too_is_not_believed() -> None:

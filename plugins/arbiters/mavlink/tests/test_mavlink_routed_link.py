@@ -74,7 +74,7 @@ def send(link: RoutedLink) -> None:
 
 
 def commands(end: FarEnd) -> list[int]:
-    return [each.command for each in end.heard if each.get_type() == "COMMAND_LONG"]
+    return [each.command for each in end.received if each.get_type() == "COMMAND_LONG"]
 
 
 async def streamed(clock: HandClock, link: RoutedLink, end: FarEnd, keep: int, of: int) -> None:

@@ -1,4 +1,4 @@
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -38,7 +38,7 @@ def test_the_prearm_bit_goes_when_the_mode_needs_a_position() -> None:
 def test_arming_twice_is_accepted_twice_and_done_once() -> None:
     bench = Bench().ready()
     assert bench.command(ARM, 1) == 0
-    assert bench.autopilot.chronicle.counts["armed"] == 1
+    assert bench.autopilot.log.counts["armed"] == 1
 
 
 def test_a_copter_in_the_air_is_disarmed_by_force_only() -> None:

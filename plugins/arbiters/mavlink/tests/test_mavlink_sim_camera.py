@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 import pytest
-from m2pem_plugin_mavlink.sim.camera import Camera
+from m2pem_plugin_mavlink.simulator.camera import Camera
 from mavlink_bench import Bench
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -33,12 +33,12 @@ def result(bench: Bench, command: int, *params: float) -> int:
 
 
 def camera(bench: Bench) -> Camera:
-    (found,) = [each for each in bench.autopilot.parts if isinstance(each, Camera)]
+    (found,) = [each for each in bench.autopilot.components if isinstance(each, Camera)]
     return found
 
 
 def pictures(bench: Bench) -> list[Any]:
-    return [each for each in bench.heard if each.get_msgId() == CAPTURED]
+    return [each for each in bench.received if each.get_msgId() == CAPTURED]
 
 
 def asked(bench: Bench, id_: int) -> Any:
@@ -47,7 +47,7 @@ def asked(bench: Bench, id_: int) -> Any:
 
 def test_it_has_a_heartbeat_of_its_own(bench: Bench) -> None:
     bench.run(5)
-    beats = [each for each in bench.heard if each.get_msgId() == 0]
+    beats = [each for each in bench.received if each.get_msgId() == 0]
     cameras = [each for each in beats if each.get_srcComponent() == CAMERA]
     assert {each.type for each in cameras} == {dialect.MAV_TYPE_CAMERA}
     assert 4 <= len(cameras) <= 6
@@ -162,10 +162,10 @@ def test_a_picture_that_it_cannot_take_it_tells_of(bench: Bench) -> None:
 
 
 def test_a_full_camera_takes_and_records_nothing_more(bench: Bench) -> None:
-    bench.autopilot.troubles.camera_full = True
+    bench.autopilot.injected_faults.camera_full = True
     assert result(bench, 2000, 0, 0, 1) == dialect.MAV_RESULT_FAILED
     assert result(bench, 2500) == dialect.MAV_RESULT_FAILED
     assert asked(bench, 261).available_capacity == 0
     assert "Camera: storage full" in bench.texts()
-    bench.autopilot.troubles.camera_full = False
+    bench.autopilot.injected_faults.camera_full = False
     assert result(bench, 2000, 0, 0, 1) == 0

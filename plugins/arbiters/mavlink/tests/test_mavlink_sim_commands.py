@@ -2,7 +2,7 @@ import math
 import random
 
 import pytest
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import GCS, Bench
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -29,9 +29,9 @@ def test_a_confirmed_repetition_is_answered_but_not_done_again() -> None:
     bench = Bench()
     for confirmation in (0, 1, 2):
         assert bench.command(183, 9, 1500, confirmation=confirmation) == 0
-    assert bench.autopilot.chronicle.counts["servo"] == 1
+    assert bench.autopilot.log.counts["servo"] == 1
     assert bench.command(183, 9, 1500) == 0
-    assert bench.autopilot.chronicle.counts["servo"] == 2
+    assert bench.autopilot.log.counts["servo"] == 2
 
 
 def test_a_refused_command_is_tried_again_when_it_is_repeated() -> None:
@@ -72,11 +72,11 @@ def test_a_reboot_is_silence_and_a_new_start_with_the_plan_and_parameters_kept()
     bench.autopilot.parameters["RTL_ALT"] = 3000
     assert bench.command(246, 1) == 0
     bench.run(0.1)
-    bench.heard.clear()
+    bench.received.clear()
     bench.run(1.5)
-    assert bench.heard == []
+    assert bench.received == []
     bench.run(2)
-    assert bench.heard
+    assert bench.received
     assert not bench.autopilot.estimator.ready
     assert bench.autopilot.parameters["RTL_ALT"] == 3000
     assert bench.autopilot.since_boot_s < 3

@@ -1,7 +1,7 @@
 """Failsafes of simulated vehicles."""
 
 import pytest
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench, item
 from mavlink_px4_bench import Px4Bench
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -119,7 +119,7 @@ def test_with_a_low_battery_it_is_not_armed() -> None:
 
 def test_without_satellites_a_copter_lands_and_is_not_ready_again() -> None:
     bench = Bench().airborne(10)
-    bench.autopilot.troubles.gps_lost = True
+    bench.autopilot.injected_faults.gps_lost = True
     bench.run(2)
     assert mode(bench) == "LAND"
     assert "EKF Failsafe: changed to LAND Mode" in bench.texts()
@@ -129,13 +129,13 @@ def test_without_satellites_a_copter_lands_and_is_not_ready_again() -> None:
     bench.run_until(lambda: not bench.autopilot.arming.armed)
     assert bench.command(176, 1, 4) == 0
     assert bench.command(400, 1) == 4
-    bench.autopilot.troubles.gps_lost = False
+    bench.autopilot.injected_faults.gps_lost = False
     assert bench.command(400, 1) == 0
 
 
 def test_without_satellites_a_rover_holds() -> None:
     bench = Bench(Kind.ROVER).ready()
-    bench.autopilot.troubles.gps_lost = True
+    bench.autopilot.injected_faults.gps_lost = True
     bench.run(2)
     assert mode(bench) == "HOLD"
 
@@ -198,7 +198,7 @@ def test_px4_holds_no_longer_once_another_mode_is_commanded() -> None:
 
 def test_px4_without_a_position_descends() -> None:
     bench = Px4Bench().airborne(10)
-    bench.autopilot.troubles.gps_lost = True
+    bench.autopilot.injected_faults.gps_lost = True
     bench.run(2)
     assert bench.mode == "AUTO.DESCEND"
     assert not bench.report(230).flags & dialect.ESTIMATOR_POS_HORIZ_ABS

@@ -2,10 +2,10 @@
 
 import pytest
 from click.testing import CliRunner
-from m2pem_plugin_mavlink.sim.command_line import mavlink
-from m2pem_plugin_mavlink.sim.faults import FaultError, parse
-from m2pem_plugin_mavlink.sim.simulator import Simulator
-from m2pem_plugin_mavlink.sim.specification import VehicleSpec
+from m2pem_plugin_mavlink.simulator.command_line import mavlink
+from m2pem_plugin_mavlink.simulator.faults import FaultError, parse
+from m2pem_plugin_mavlink.simulator.simulator import Simulator
+from m2pem_plugin_mavlink.simulator.specification import VehicleSpec
 from test_mavlink_sim_faults import World
 
 
@@ -62,7 +62,7 @@ def test_the_others_do_what_they_say() -> None:
     assert happening("battery 12.5 %").autopilot.battery.percent == 12
     assert not happening("lose gps").autopilot.estimator.ready
     assert happening("refuse command 400").command(400, 1) == 4
-    assert happening("camera full").autopilot.troubles.camera_full
+    assert happening("camera full").autopilot.injected_faults.camera_full
     world = happening('refuse arming "Gyros: not today"')
     world.command(176, 1, 4)
     assert world.command(400, 1) == 4

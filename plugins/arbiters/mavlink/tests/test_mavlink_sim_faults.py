@@ -3,14 +3,13 @@
 from random import Random
 
 import pytest
-from m2pem_plugin_mavlink.sim.autopilot import Autopilot
-from m2pem_plugin_mavlink.sim.command import Result
-from m2pem_plugin_mavlink.sim.faults import Direction, Faults, LinkFaults, every, share
-from m2pem_plugin_mavlink.sim.faults.frames import frames_in, message_id
-from m2pem_plugin_mavlink.sim.faults.link import FaultyWire
-from m2pem_plugin_mavlink.sim.missions.plan import MISSION, Item
-from m2pem_plugin_mavlink.sim.server import VehiclePort
-from m2pem_plugin_mavlink.sim.specification import VehicleSpec
+from m2pem_plugin_mavlink.simulator.autopilot import Autopilot
+from m2pem_plugin_mavlink.simulator.faults import Direction, Faults, LinkFaults, every, share
+from m2pem_plugin_mavlink.simulator.faults.link import FaultyWire, frames_in, message_id
+from m2pem_plugin_mavlink.simulator.messages import Result
+from m2pem_plugin_mavlink.simulator.missions.plan import MISSION, Item
+from m2pem_plugin_mavlink.simulator.server import VehiclePort
+from m2pem_plugin_mavlink.simulator.specification import VehicleSpec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 PEER = ("127.0.0.1", 1)

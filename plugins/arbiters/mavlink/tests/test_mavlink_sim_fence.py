@@ -1,7 +1,7 @@
 """The fence of a simulated vehicle."""
 
 import pytest
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench, item
 from mavlink_px4_bench import GROUND_M, NAN, REPOSITION, Px4Bench
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -41,7 +41,7 @@ def test_leaving_an_inclusion_polygon_is_told_and_ends_in_rtl() -> None:
     fly(bench, 8, 0, 4)
     assert bench.autopilot.modes.mode.name == "RTL"
     assert "Polygon fence breached" in bench.texts()
-    (told, *_) = [m for m in bench.heard if m.get_msgId() == STATUS and m.breach_status]
+    (told, *_) = [m for m in bench.received if m.get_msgId() == STATUS and m.breach_status]
     assert (told.breach_count, told.breach_type) == (1, dialect.FENCE_BREACH_BOUNDARY)
     assert told.breach_time > 0
     bench.run_until(lambda: not bench.autopilot.arming.armed)

@@ -1,6 +1,6 @@
 import pymap3d
 import pytest
-from m2pem_plugin_mavlink.sim.geometry import LocalFrame, Location, Point
+from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Location, Point
 
 PLACES = [(47.397742, 8.545594), (-33.9, 151.2), (0.0, 179.9999), (69.6, -18.9)]
 

@@ -3,8 +3,8 @@
 import math
 
 import pytest
-from m2pem_plugin_mavlink.sim.gimbal.gimbal import Gimbal
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.gimbal import Gimbal
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench
 from mavlink_px4_bench import Px4Bench
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -39,10 +39,10 @@ def test_the_autopilot_tells_of_the_manager_and_of_the_device() -> None:
 def test_its_attitude_is_told_only_when_it_is_asked_for() -> None:
     bench = Bench()
     bench.run(10)
-    assert not [each for each in bench.heard if each.get_msgId() == ATTITUDE]
+    assert not [each for each in bench.received if each.get_msgId() == ATTITUDE]
     assert bench.command(511, ATTITUDE, 200_000) == 0
     bench.run(2)
-    assert len([each for each in bench.heard if each.get_msgId() == ATTITUDE]) >= 9
+    assert len([each for each in bench.received if each.get_msgId() == ATTITUDE]) >= 9
 
 
 def test_it_turns_no_faster_than_it_can() -> None:
@@ -79,7 +79,7 @@ def test_yaw_follows_the_vehicle_unless_it_is_locked(flags: int, from_north: flo
     bench.run(6)
     heading = math.degrees(bench.autopilot.body.yaw_rad)
     assert heading == pytest.approx(40, abs=2)
-    gimbal = bench.autopilot.part(Gimbal)
+    gimbal = bench.autopilot.component(Gimbal)
     assert math.degrees(gimbal.pointing.yaw_rad) + heading == pytest.approx(from_north, abs=2)
     assert angles(bench)[1] == pytest.approx(20, abs=2)
     assert bool(bench.report(ATTITUDE).flags & LOCK) == bool(flags)

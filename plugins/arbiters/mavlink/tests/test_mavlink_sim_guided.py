@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -34,7 +34,7 @@ def test_a_takeoff_that_is_repeated_in_the_air_fails() -> None:
     assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 4
     bench.run(10)
     assert bench.command(22, 0, 0, 0, 0, 0, 0, 10) == 4
-    assert bench.autopilot.chronicle.counts["takeoff"] == 1
+    assert bench.autopilot.log.counts["takeoff"] == 1
     assert abs(bench.autopilot.body.up_m - 10) < 0.5
 
 
@@ -66,7 +66,7 @@ def test_reposition_works_in_guided_or_when_it_may_change_the_mode() -> None:
     assert bench.autopilot.modes.mode.name == "GUIDED"
     bench.run(15)
     assert bench.autopilot.body.north_m == pytest.approx(40, abs=0.3)
-    assert bench.autopilot.chronicle.counts["motion"] == 1
+    assert bench.autopilot.log.counts["motion"] == 1
 
 
 def test_reposition_needs_a_place_on_earth() -> None:
@@ -80,7 +80,7 @@ def test_the_same_place_again_is_no_new_motion() -> None:
     bench = Bench().airborne()
     for _ in range(3):
         assert bench.command_int(192, -1, 1, at=(*bench.offset(40, 0), 20)) == 0
-    assert bench.autopilot.chronicle.counts["motion"] == 1
+    assert bench.autopilot.log.counts["motion"] == 1
 
 
 def test_a_velocity_is_forgotten_after_three_seconds() -> None:
@@ -98,7 +98,7 @@ def test_a_velocity_that_is_renewed_goes_on() -> None:
         bench.tell(velocity(0, -4))
         bench.run(1)
     assert bench.autopilot.body.east_mps == pytest.approx(-4)
-    assert bench.autopilot.chronicle.counts["motion"] == 1
+    assert bench.autopilot.log.counts["motion"] == 1
 
 
 def test_a_velocity_in_the_bodys_frame_turns_with_it() -> None:
@@ -227,7 +227,7 @@ def test_a_rover_drives_to_a_place_behind_it_and_stands() -> None:
     body = bench.autopilot.body
     assert math.hypot(body.north_m + 20, body.east_m - 15) < 2.5
     assert not body.moving
-    assert [m.seq for m in bench.heard if m.get_type() == "MISSION_ITEM_REACHED"] == [0]
+    assert [m.seq for m in bench.received if m.get_type() == "MISSION_ITEM_REACHED"] == [0]
 
 
 def test_a_rover_backs_off_with_a_negative_speed() -> None:

@@ -4,9 +4,9 @@ import asyncio
 from collections.abc import Callable, Iterator
 
 import pytest
-from m2pem_plugin_mavlink.sim.geometry import LocalFrame, Point
-from m2pem_plugin_mavlink.sim.simulator import Simulator
-from m2pem_plugin_mavlink.sim.specification import ZURICH, Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Point
+from m2pem_plugin_mavlink.simulator.simulator import Simulator
+from m2pem_plugin_mavlink.simulator.specification import ZURICH, Kind, VehicleSpec
 from mavlink_bench import item
 from mavlink_ground import Ground
 

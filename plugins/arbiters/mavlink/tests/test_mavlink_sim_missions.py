@@ -1,5 +1,5 @@
 import pytest
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench, item
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -15,7 +15,7 @@ def progress(bench: Bench) -> tuple[int, int, int]:
 
 
 def reached(bench: Bench) -> list[int]:
-    return [m.seq for m in bench.heard if m.get_type() == "MISSION_ITEM_REACHED"]
+    return [m.seq for m in bench.received if m.get_type() == "MISSION_ITEM_REACHED"]
 
 
 def reached_at_last(bench: Bench) -> list[int]:
@@ -39,8 +39,8 @@ def test_a_copter_takes_off_flies_its_mission_and_comes_home() -> None:
     assert reached_at_last(bench) == [1, 2, 3, 4]
     assert not bench.autopilot.arming.armed
     assert bench.autopilot.position.distance_m(bench.autopilot.home.point) < 1
-    assert bench.autopilot.chronicle.counts["takeoff"] == 1
-    assert bench.autopilot.chronicle.counts["mission"] == 1
+    assert bench.autopilot.log.counts["takeoff"] == 1
+    assert bench.autopilot.log.counts["mission"] == 1
     assert progress(bench) == (0, 5, 1)
 
 
@@ -97,7 +97,7 @@ def test_actions_are_reported_but_servos_and_behind_the_last_item_one_is_begun()
     bench = Bench().airborne()
     bench.upload(marked(bench))
     assert bench.command(START) == 0
-    bench.heard.clear()
+    bench.received.clear()
     bench.run_until(lambda: bench.autopilot.mission.complete)
     assert reached_at_last(bench) == [1, 3, 5]
     assert bench.texts() == [
@@ -114,12 +114,12 @@ def test_actions_are_reported_but_servos_and_behind_the_last_item_one_is_begun()
 def test_an_action_that_is_set_is_answered_by_the_next_item_of_navigation() -> None:
     bench = Bench().airborne()
     bench.upload(marked(bench))
-    bench.heard.clear()
+    bench.received.clear()
     assert bench.command(SET_CURRENT, 1) == 0
     bench.tell(dialect.MAVLink_mission_set_current_message(1, 1, 3))
-    assert [m.seq for m in bench.heard if m.get_type() == "MISSION_CURRENT"] == [2, 3]
+    assert [m.seq for m in bench.received if m.get_type() == "MISSION_CURRENT"] == [2, 3]
     assert progress(bench) == (5, 2, 0)
-    bench.heard.clear()
+    bench.received.clear()
     bench.command(START)
     bench.run_until(lambda: bench.autopilot.mission.complete)
     assert reached_at_last(bench) == [3, 5]
@@ -191,7 +191,7 @@ def test_left_and_entered_again_it_goes_on_where_it_was() -> None:
     bench.command(MODE, 1, 3)
     bench.run_until(lambda: len(reached(bench)) == 3)
     assert reached_at_last(bench) == [1, 2, 3]
-    assert bench.autopilot.chronicle.counts["mission"] == 1
+    assert bench.autopilot.log.counts["mission"] == 1
 
 
 def test_in_a_new_plan_it_goes_on_at_the_same_number_or_if_there_is_none_at_the_beginning() -> None:
@@ -220,7 +220,7 @@ def test_set_up_so_it_begins_again() -> None:
     bench.command(MODE, 1, 3)
     bench.run_until(lambda: len(reached(bench)) == 3)
     assert reached_at_last(bench) == [1, 1, 2]
-    assert bench.autopilot.chronicle.counts["mission"] == 2
+    assert bench.autopilot.log.counts["mission"] == 2
 
 
 def test_the_current_item_can_be_set_before_and_on_the_way() -> None:
@@ -268,7 +268,7 @@ def test_actions_are_done_on_the_way() -> None:
         item(4, 16, bench.offset(40, 0), 20.0),
     )
     assert bench.autopilot.payload.servos_us == {9: 1700}
-    kinds = [event.kind for event in bench.autopilot.chronicle.events]
+    kinds = [event.kind for event in bench.autopilot.log.events]
     assert kinds.index("servo") > kinds.index("reached")
     assert bench.autopilot.modes.speed_mps == 2.0
 

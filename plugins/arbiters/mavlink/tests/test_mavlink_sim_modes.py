@@ -18,7 +18,7 @@ def test_guided_is_refused_until_the_attitude_is_known() -> None:
     bench.run(10)
     assert bench.command(MODE, 1, 4) == 0
     bench.run(1)
-    assert bench.heard[-1].custom_mode == 4
+    assert bench.received[-1].custom_mode == 4
 
 
 def test_armed_it_enters_no_mode_that_needs_a_position_it_has_not() -> None:
@@ -65,4 +65,4 @@ def test_land_comes_down_where_it_is() -> None:
     assert bench.command(dialect.MAV_CMD_NAV_LAND) == 0
     bench.run_until(lambda: not bench.autopilot.arming.armed)
     assert bench.autopilot.body.on_ground
-    assert bench.autopilot.chronicle.counts["landed"] == 1
+    assert bench.autopilot.log.counts["landed"] == 1

@@ -1,19 +1,19 @@
 import math
 
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 
 def values(bench: Bench) -> list[object]:
-    return [m for m in bench.heard if m.get_type() == "PARAM_VALUE"]
+    return [m for m in bench.received if m.get_type() == "PARAM_VALUE"]
 
 
 def test_a_list_has_each_parameter_once() -> None:
     bench = Bench()
     bench.tell(dialect.MAVLink_param_request_list_message(1, 1))
     bench.run(2)
-    told = [m for m in bench.heard if m.get_type() == "PARAM_VALUE"]
+    told = [m for m in bench.received if m.get_type() == "PARAM_VALUE"]
     assert [m.param_index for m in told] == list(range(len(bench.autopilot.parameters)))
     assert {m.param_count for m in told} == {len(told)}
 

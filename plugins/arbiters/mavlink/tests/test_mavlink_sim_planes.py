@@ -1,6 +1,6 @@
 import pytest
-from m2pem_plugin_mavlink.sim.geometry import Point
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.geometry import Point
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench, item
 
 
@@ -19,7 +19,7 @@ def test_in_takeoff_mode_a_plane_climbs_to_its_height_and_circles() -> None:
     assert body.up_m == pytest.approx(50, abs=3)
     assert body.ground_speed_mps == pytest.approx(22, abs=0.5)
     assert abs(body.roll_rad) > 0.2
-    assert bench.autopilot.chronicle.counts["takeoff"] == 1
+    assert bench.autopilot.log.counts["takeoff"] == 1
 
 
 def test_in_guided_a_plane_circles_the_place_it_was_sent_to() -> None:

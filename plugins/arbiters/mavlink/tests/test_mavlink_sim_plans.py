@@ -50,14 +50,14 @@ def test_a_download_gives_back_what_was_uploaded_behind_the_own_home() -> None:
 def test_a_lost_item_is_asked_for_each_second_and_the_upload_cancelled_after_eight() -> None:
     bench = Bench()
     bench.tell(count(4))
-    bench.heard.clear()
+    bench.received.clear()
     bench.run(8.5)
-    requests = [m for m in bench.heard if m.get_type() == "MISSION_REQUEST"]
+    requests = [m for m in bench.received if m.get_type() == "MISSION_REQUEST"]
     assert len(requests) in (7, 8)
     assert {m.seq for m in requests} == {0}
     assert "Mission upload timeout" in bench.texts()
-    assert bench.heard[-1].get_type() in ("MISSION_ACK", "HEARTBEAT")
-    assert [m.type for m in bench.heard if m.get_type() == "MISSION_ACK"] == [15]
+    assert bench.received[-1].get_type() in ("MISSION_ACK", "HEARTBEAT")
+    assert [m.type for m in bench.received if m.get_type() == "MISSION_ACK"] == [15]
 
 
 def test_a_second_uploader_is_denied_and_the_first_goes_on() -> None:
@@ -169,6 +169,6 @@ def test_the_uploader_may_give_up() -> None:
     bench = Bench()
     bench.tell(count(4))
     bench.tell(dialect.MAVLink_mission_ack_message(1, 1, 15))
-    bench.heard.clear()
+    bench.received.clear()
     bench.run(9)
-    assert "MISSION_REQUEST" not in types(bench.heard)
+    assert "MISSION_REQUEST" not in types(bench.received)

@@ -1,8 +1,8 @@
 """A simulated PX4 by itself: readiness, arming, modes, and going to places."""
 
 import pytest
-from m2pem_plugin_mavlink.sim.autopilot import Autopilot
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.autopilot import Autopilot
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from mavlink_px4_bench import (
     ACCEPTED,
     ARM,
@@ -22,7 +22,7 @@ ORBIT = dialect.MAV_CMD_DO_ORBIT
 
 
 def heard(bench: Px4Bench, id_: int) -> list:
-    return [each for each in bench.heard if each.get_msgId() == id_]
+    return [each for each in bench.received if each.get_msgId() == id_]
 
 
 def test_its_heartbeat_is_that_of_px4() -> None:
@@ -82,7 +82,7 @@ def test_it_takes_off_to_a_height_above_the_sea_and_then_holds() -> None:
     bench.run_until(lambda: bench.mode == "AUTO.LOITER")
     bench.run(5)
     assert bench.autopilot.body.up_m == pytest.approx(12, abs=0.3)
-    assert bench.autopilot.chronicle.counts["takeoff"] == 1
+    assert bench.autopilot.log.counts["takeoff"] == 1
 
 
 def test_without_a_height_it_takes_off_to_the_one_that_is_set() -> None:
@@ -176,14 +176,16 @@ def test_it_orbits_a_place() -> None:
     bench.run(40)
     assert bench.mode == "POSCTL.ORBIT"
     assert heard(bench, 0)[-1].custom_mode == 3 << 16 | 1 << 24
-    away_m = bench.autopilot.position.distance_m(bench.autopilot.frame.to_point(_place(place)))
-    assert away_m == pytest.approx(15, abs=1.5)
+    distance_to_m = bench.autopilot.position.distance_m(
+        bench.autopilot.frame.to_point(_place(place))
+    )
+    assert distance_to_m == pytest.approx(15, abs=1.5)
     assert heard(bench, 360)[-1].radius == 15
     assert bench.autopilot.body.ground_speed_mps == pytest.approx(4, abs=0.5)
 
 
 def _place(place: tuple[float, float, float]):
-    from m2pem_plugin_mavlink.sim.geometry import Location
+    from m2pem_plugin_mavlink.simulator.geometry import Location
 
     return Location(*place)
 

@@ -8,8 +8,8 @@ from contextlib import aclosing, suppress
 from typing import Any
 
 import pytest
-from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
-from m2pem_plugin_mavlink.sim.specification import ZURICH, VehicleSpec
+from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
+from m2pem_plugin_mavlink.simulator.specification import ZURICH, VehicleSpec
 from mavsdk import logging as mavsdk_log
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import pytest
-from m2pem_plugin_mavlink.sim.faults import Direction, every
-from m2pem_plugin_mavlink.sim.simulator import Simulator
-from m2pem_plugin_mavlink.sim.specification import ZURICH, VehicleSpec
+from m2pem_plugin_mavlink.simulator.faults import Direction, every
+from m2pem_plugin_mavlink.simulator.simulator import Simulator
+from m2pem_plugin_mavlink.simulator.specification import ZURICH, VehicleSpec
 from mavlink_bench import item
 from mavlink_ground import Ground
 
@@ -115,4 +115,4 @@ async def test_frames_that_are_spoiled_double_or_swapped_do_no_harm(ground: Grou
             ground.link.mav.command_long_send(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
 
     sim = await at(ground, scene, PX4)
-    assert sim[1].autopilot.chronicle.counts["armed"] == 1
+    assert sim[1].autopilot.log.counts["armed"] == 1

@@ -27,9 +27,9 @@ def uploaded(wait_s: float = 3.0) -> Px4Bench:
 def test_it_asks_for_items_as_int_and_has_no_home_item() -> None:
     bench = Px4Bench()
     bench.run(10)
-    bench.heard.clear()
+    bench.received.clear()
     bench.upload(plan(bench))
-    requests = [each for each in bench.heard if each.get_type().startswith("MISSION_REQUEST")]
+    requests = [each for each in bench.received if each.get_type().startswith("MISSION_REQUEST")]
     assert {each.get_type() for each in requests} == {"MISSION_REQUEST_INT"}
     assert [each.seq for each in requests] == [0, 1, 2]
     answers = bench.tell(dialect.MAVLink_mission_request_int_message(1, 1, 0))
@@ -67,12 +67,12 @@ def test_it_arms_flies_to_the_end_and_holds_there() -> None:
     assert bench.autopilot.arming.armed
     bench.run_until(lambda: bench.mode == "AUTO.LOITER")
     bench.run(5)
-    reached = [each.seq for each in bench.heard if each.get_type() == "MISSION_ITEM_REACHED"]
+    reached = [each.seq for each in bench.received if each.get_type() == "MISSION_ITEM_REACHED"]
     assert reached == [0, 1, 2]
     assert bench.autopilot.position == pytest.approx((30, 30, 10), abs=2)
     current = bench.report(42)
     assert (current.total, current.mission_state) == (3, dialect.MISSION_STATE_COMPLETE)
-    assert bench.autopilot.chronicle.counts["mission"] == 1
+    assert bench.autopilot.log.counts["mission"] == 1
 
 
 def test_armed_in_the_mode_it_begins() -> None:
@@ -88,10 +88,10 @@ def test_it_begins_at_the_item_that_was_set() -> None:
     bench.run(3)
     bench.tell(dialect.MAVLink_mission_set_current_message(1, 1, 2))
     assert bench.enter(AUTO, MISSION) == ACCEPTED
-    bench.heard.clear()
+    bench.received.clear()
     bench.run_until(lambda: bench.mode == "AUTO.LOITER")
     bench.run(1)
-    reached = [each.seq for each in bench.heard if each.get_type() == "MISSION_ITEM_REACHED"]
+    reached = [each.seq for each in bench.received if each.get_type() == "MISSION_ITEM_REACHED"]
     assert reached == [2]
 
 

@@ -28,7 +28,7 @@ def test_it_flies_as_fast_as_setpoints_say_for_as_long_as_they_come() -> None:
     stream(bench, 10, 3.0, 1.0)
     assert bench.autopilot.body.north_mps == pytest.approx(3, abs=0.1)
     assert bench.autopilot.body.east_mps == pytest.approx(1, abs=0.1)
-    assert bench.autopilot.chronicle.counts["motion"] == 1
+    assert bench.autopilot.log.counts["motion"] == 1
 
 
 @pytest.mark.parametrize(("action", "mode"), [(0, "AUTO.RTL"), (3, "AUTO.RTL"), (5, "AUTO.LOITER")])

@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -11,7 +11,7 @@ def test_a_long_text_comes_in_chunks() -> None:
     text = "".join(chr(97 + n % 26) for n in range(120))
     bench.autopilot.say(text)
     bench.run(0.1)
-    chunks = [m for m in bench.heard if m.get_type() == "STATUSTEXT"]
+    chunks = [m for m in bench.received if m.get_type() == "STATUSTEXT"]
     assert [m.chunk_seq for m in chunks] == [0, 1, 2]
     assert len({m.id for m in chunks}) == 1
     assert chunks[0].id != 0
@@ -23,7 +23,7 @@ def test_a_text_ends_with_a_chunk_that_is_not_full(length: int) -> None:
     bench = Bench()
     bench.autopilot.say("x" * length)
     bench.run(0.1)
-    chunks = [m for m in bench.heard if m.get_type() == "STATUSTEXT"]
+    chunks = [m for m in bench.received if m.get_type() == "STATUSTEXT"]
     assert sum(len(m.text) for m in chunks) == length
     assert len(chunks[-1].text) < 50
     assert (chunks[0].id == 0) == (length < 50)
@@ -52,7 +52,7 @@ def test_before_the_estimator_is_ready_no_position_is_told() -> None:
     assert bench.report(24).fix_type >= 3
     for missing in (32, 242, 259):  # acknowledged all the same
         assert bench.command(512, missing) == 0
-        assert missing not in {m.get_msgId() for m in bench.heard}
+        assert missing not in {m.get_msgId() for m in bench.received}
     assert bench.command(512, 150) == 4
 
 
@@ -108,14 +108,14 @@ def test_the_battery_drains_in_motion() -> None:
 def test_it_says_who_it_is() -> None:
     bench = Bench(Kind.BOAT, system=1)
     bench.run(1.5)
-    heartbeat = next(m for m in bench.heard if m.get_type() == "HEARTBEAT")
+    heartbeat = next(m for m in bench.received if m.get_type() == "HEARTBEAT")
     assert (heartbeat.type, heartbeat.autopilot) == (11, 3)
     assert (bench.report(245).vtol_state, bench.report(245).landed_state) == (0, 0)
     assert bench.command(511, 136, 1e6) == 0
     bench.run(2)
-    assert "TERRAIN_REPORT" not in {m.get_type() for m in bench.heard}
+    assert "TERRAIN_REPORT" not in {m.get_type() for m in bench.received}
     assert bench.command(520) == 0
-    version = next(m for m in bench.heard if m.get_type() == "AUTOPILOT_VERSION")
+    version = next(m for m in bench.received if m.get_type() == "AUTOPILOT_VERSION")
     assert version.flight_sw_version >> 16 == 4 << 8 | 7
     assert version.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
 

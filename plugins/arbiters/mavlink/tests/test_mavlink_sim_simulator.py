@@ -3,10 +3,9 @@ import socket
 from collections.abc import AsyncIterator, Callable
 
 import pytest
-from m2pem_plugin_mavlink.sim.server import Address
-from m2pem_plugin_mavlink.sim.simulator import Simulator
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
-from m2pem_plugin_mavlink.sim.wire import Wire
+from m2pem_plugin_mavlink.simulator.server import Address, Wire
+from m2pem_plugin_mavlink.simulator.simulator import Simulator
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 
@@ -14,7 +13,7 @@ class Listener(asyncio.DatagramProtocol):
     """Parses what comes, each vehicle for itself."""
 
     def __init__(self) -> None:
-        self.heard: list[object] = []
+        self.received: list[object] = []
         self.parsers: dict[Address, object] = {}
         self.came = asyncio.Event()
 
@@ -23,7 +22,7 @@ class Listener(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, addr: Address) -> None:
         parser = self.parsers.setdefault(addr, dialect.MAVLink(None))
-        self.heard += parser.parse_buffer(data) or []  # type: ignore[attr-defined]
+        self.received += parser.parse_buffer(data) or []  # type: ignore[attr-defined]
         self.came.set()
 
     async def until(self, condition: Callable[[], bool]) -> None:
@@ -35,7 +34,7 @@ class Listener(asyncio.DatagramProtocol):
     def beats(self, system: int) -> int:
         return sum(
             m.get_srcSystem() == system and m.get_type() == "HEARTBEAT"  # type: ignore[attr-defined]
-            for m in self.heard
+            for m in self.received
         )
 
 
@@ -64,7 +63,7 @@ async def test_sequence_numbers_are_each_vehicles_own_and_have_no_gaps(listener:
     specs = [VehicleSpec(system=1), VehicleSpec(system=2)]
     async with Simulator(specs, speed=20, to=address(listener)):
         await listener.until(lambda: listener.beats(1) >= 5 and listener.beats(2) >= 5)
-    numbers = [m.get_seq() for m in listener.heard if m.get_srcSystem() == 2]  # type: ignore[attr-defined]
+    numbers = [m.get_seq() for m in listener.received if m.get_srcSystem() == 2]  # type: ignore[attr-defined]
     assert numbers == list(range(len(numbers)))
 
 

@@ -1,4 +1,4 @@
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -6,13 +6,13 @@ SET, GET, REQUEST = 511, 510, 512
 
 
 def heard(bench: Bench, id_: int) -> int:
-    return sum(m.get_msgId() == id_ for m in bench.heard)
+    return sum(m.get_msgId() == id_ for m in bench.received)
 
 
 def test_nothing_but_the_heartbeat_is_sent_unasked() -> None:
     bench = Bench()
     bench.run(30)
-    kinds = {m.get_type() for m in bench.heard}
+    kinds = {m.get_type() for m in bench.received}
     assert kinds == {"HEARTBEAT", "TIMESYNC", "HOME_POSITION", "GPS_GLOBAL_ORIGIN"}
     assert heard(bench, 0) in (30, 31)
 
@@ -23,7 +23,7 @@ def test_a_message_comes_as_often_as_asked_for() -> None:
     bench.run(20)
     assert 99 <= heard(bench, 33) <= 102
     assert bench.command(SET, 33, -1) == 0
-    bench.heard.clear()
+    bench.received.clear()
     bench.run(5)
     assert heard(bench, 33) == 0
 
@@ -50,7 +50,7 @@ def test_an_interval_can_be_asked_for() -> None:
     bench.command(SET, 1, 500_000)
     bench.command(GET, 1)
     bench.command(GET, 30)
-    told = [(m.message_id, m.interval_us) for m in bench.heard if m.get_msgId() == 244]
+    told = [(m.message_id, m.interval_us) for m in bench.received if m.get_msgId() == 244]
     assert told == [(1, 500_000), (30, -1)]
 
 
@@ -68,7 +68,7 @@ def test_the_old_request_asks_for_a_group() -> None:
     bench.run(10)
     assert 38 <= heard(bench, 33) <= 42
     bench.tell(dialect.MAVLink_request_data_stream_message(1, 1, 0, 0, 0))
-    bench.heard.clear()
+    bench.received.clear()
     bench.run(5)
     assert heard(bench, 33) == 0
 

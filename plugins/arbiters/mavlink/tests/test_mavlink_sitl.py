@@ -92,7 +92,7 @@ class _RealAutopilot(ArbiterContract):
             return
         await vehicle.driver.take_off(self.height_m)
         high = await vehicle.until(
-            lambda: (vehicle.heard.altitude_above_home_m or 0.0) > self.height_m - 2,
+            lambda: (vehicle.state.altitude_above_home_m or 0.0) > self.height_m - 2,
             READY_WITHIN_S,
         )
         assert high, vehicle.recent_texts(60.0)

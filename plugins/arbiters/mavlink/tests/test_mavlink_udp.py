@@ -59,8 +59,8 @@ async def test_a_vehicle_is_heard_and_answered_where_it_is() -> None:
         await until(lambda: modes == [3])
         link.send(arm())
         await until(lambda: vehicle.names() == ["COMMAND_LONG"])
-        assert vehicle.heard[-1].get_srcSystem() == 255
-        assert vehicle.heard[-1].param1 == 1.0
+        assert vehicle.received[-1].get_srcSystem() == 255
+        assert vehicle.received[-1].param1 == 1.0
         await vehicle.close()
 
 
@@ -73,9 +73,9 @@ async def test_nothing_is_sent_to_a_vehicle_that_was_not_heard() -> None:
         first.send(arm(1))
         second.send(arm(2))
         await until(vehicle.names)
-        assert [each.target_system for each in vehicle.heard if each.get_type() != "HEARTBEAT"] == [
-            2
-        ]
+        assert [
+            each.target_system for each in vehicle.received if each.get_type() != "HEARTBEAT"
+        ] == [2]
         await vehicle.close()
 
 
@@ -92,7 +92,7 @@ async def test_each_of_many_vehicles_gets_its_own_and_only_its_own() -> None:
             link.send(arm(link.address.system))
         await until(lambda: all(each.names() for each in vehicles))
         for vehicle in vehicles:
-            (command,) = [each for each in vehicle.heard if each.get_type() == "COMMAND_LONG"]
+            (command,) = [each for each in vehicle.received if each.get_type() == "COMMAND_LONG"]
             assert command.target_system == vehicle.mav.srcSystem
             await vehicle.close()
 
@@ -136,7 +136,7 @@ async def test_every_peer_hears_us_once_a_second_of_the_clock() -> None:
         await clock.turn(5.0)
         await until(lambda: len(vehicle.beats()) == 5)
         assert set(vehicle.beats()) == {GROUND_STATION}
-        assert [each.get_seq() for each in vehicle.heard] == [0, 1, 2, 3, 4]
+        assert [each.get_seq() for each in vehicle.received] == [0, 1, 2, 3, 4]
         await vehicle.close()
 
 
@@ -150,7 +150,7 @@ async def test_what_says_to_come_from_us_is_not_heard() -> None:
         await until(lambda: modes)
         await clock.turn(1.0)
         await until(vehicle.beats)
-        assert echo.heard == []
+        assert echo.received == []
         assert link.heard_systems() == {1}
         await echo.close()
         await vehicle.close()

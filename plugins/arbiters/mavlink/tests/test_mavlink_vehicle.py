@@ -38,7 +38,7 @@ def test_a_vehicle_is_known_by_its_heartbeat_and_nothing_is_sent_before(virtual:
         link, vehicle = copter(clock)
         vehicle.open()
         assert not await vehicle.identified(2.0)
-        assert (link.sent, vehicle.state().link) == ([], LinkState.LOST)
+        assert (link.sent, vehicle.telemetry().link) == ([], LinkState.LOST)
         with pytest.raises(NoAnswerError, match="uav1 was not heard yet"):
             _ = vehicle.driver
         link.switch_on()
@@ -113,13 +113,13 @@ def test_its_state_is_what_it_says(virtual: Run) -> None:
         async with Playing(copter(clock)) as (link, vehicle):
             fly(link)
             link.custom_mode = 4
-            await vehicle.until(lambda: not vehicle.heard.landed and bool(vehicle.heard.armed), 5.0)
-            state = vehicle.state()
+            await vehicle.until(lambda: not vehicle.state.landed and bool(vehicle.state.armed), 5.0)
+            state = vehicle.telemetry()
             assert state.position == GeoPosition(47.397742, 8.545594, 498.0)
             assert state.altitude_above_home_m == 10.0
             assert (state.mode, state.armed, state.ready) == ("GUIDED", True, True)
             assert (state.battery_fraction, state.link) == (0.9, LinkState.CONNECTED)
-            assert vehicle.heard.mode is FlightMode.GUIDED
+            assert vehicle.state.mode is FlightMode.GUIDED
 
     virtual(main)
 
@@ -129,7 +129,7 @@ def test_it_says_why_it_is_not_ready(virtual: Run) -> None:
         link, vehicle = copter(clock)
         link.says["EKF_STATUS_REPORT"] = {"flags": 0xA7}
         async with Playing((link, vehicle)):
-            (reason,) = vehicle.state().not_ready_reasons
+            (reason,) = vehicle.telemetry().not_ready_reasons
             assert reason.startswith("EKF: no position yet")
 
     virtual(main)
@@ -154,9 +154,9 @@ def test_silence_degrades_and_loses_the_link_and_wakes_who_waits_for_it(virtual:
 def test_a_link_that_loses_much_is_degraded(virtual: Run) -> None:
     async def main(clock: Clock) -> None:
         async with Playing(copter(clock)) as (link, vehicle):
-            assert vehicle.state().link is LinkState.CONNECTED
+            assert vehicle.telemetry().link is LinkState.CONNECTED
             link.loss = 0.4
-            assert vehicle.state().link is LinkState.DEGRADED
+            assert vehicle.telemetry().link is LinkState.DEGRADED
 
     virtual(main)
 
@@ -176,7 +176,7 @@ def test_a_condition_that_raises_raises_where_it_is_waited_for(virtual: Run) -> 
         async with Playing(copter(clock)) as (link, vehicle):
 
             def condition() -> bool:
-                if vehicle.heard.custom_mode == 9:
+                if vehicle.state.custom_mode == 9:
                     raise ValueError("nine")
                 return False
 
@@ -199,7 +199,7 @@ def test_messages_are_asked_for_once_and_again_after_a_boot(virtual: Run) -> Non
             for fields in link.says.values():
                 if "time_boot_ms" in fields:
                     fields["time_boot_ms"] = 1000
-            assert await vehicle.until(lambda: vehicle.heard.boots == 2, 30.0)
+            assert await vehicle.until(lambda: vehicle.state.boots == 2, 30.0)
             await vehicle.sleep(5.0)
             assert set(link.intervals) == set(first)
 
@@ -227,7 +227,7 @@ def test_what_is_refused_is_not_asked_for_again_and_what_is_not_answered_is(virt
             tried = times[refused]  # slower and slower, and then no more
             await vehicle.sleep(60.0)
             assert (times[refused], times[lost]) == (tried, 8)
-            assert vehicle.heard.home is not None
+            assert vehicle.state.home is not None
 
     virtual(main)
 
@@ -249,7 +249,7 @@ def test_a_home_that_is_not_streamed_is_asked_for_until_it_is_told(virtual: Run)
 
         link.obey[dialect.MAV_CMD_REQUEST_MESSAGE] = tell
         async with Playing((link, vehicle)):
-            assert await vehicle.until(lambda: vehicle.heard.home is not None, 30.0)
+            assert await vehicle.until(lambda: vehicle.state.home is not None, 30.0)
             await vehicle.sleep(30.0)
             assert [each.param1 for each in asked] == [refused] * 3
 

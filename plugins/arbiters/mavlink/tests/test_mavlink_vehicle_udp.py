@@ -5,15 +5,15 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 import pytest
-from m2pem_plugin_mavlink import failsafe
-from m2pem_plugin_mavlink.foreign import Cause, TakeoverWatch
 from m2pem_plugin_mavlink.link.routed_link import open_link
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.protocol.transaction import RefusedError
-from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.vehicle import failsafe
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.takeover_monitor import Cause, TakeoverMonitor
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -49,56 +49,56 @@ async def flying(
 
 async def test_a_copter_waits_for_its_estimator_takes_off_goes_and_returns() -> None:
     async with flying() as (truth, vehicle):
-        assert vehicle.state().ready is False
+        assert vehicle.telemetry().ready is False
         driver = vehicle.driver
         await driver.take_off(10.0)
         assert (truth.armed, truth.takeoffs) == (True, 1)
         assert await vehicle.until(
-            lambda: (vehicle.heard.altitude_above_home_m or 0) > 9.0, AMPLE_S
+            lambda: (vehicle.state.altitude_above_home_m or 0) > 9.0, AMPLE_S
         )
-        assert vehicle.heard.landed is False
+        assert vehicle.state.landed is False
         await driver.go_to(Place(47.3982, 8.545594, 20.0), 8.0)
         there = 47.3982 - 2e-6
-        arrived = lambda: vehicle.heard.position.latitude_deg > there  # noqa: E731
+        arrived = lambda: vehicle.state.position.latitude_deg > there  # noqa: E731
         assert await vehicle.until(arrived, AMPLE_S)
         assert truth.location.latitude_deg == pytest.approx(47.3982, abs=1e-5)
         await driver.return_home()
-        assert await vehicle.until(lambda: vehicle.heard.armed is False, AMPLE_S)
-        assert await vehicle.until(lambda: vehicle.heard.landed is True, AMPLE_S)
+        assert await vehicle.until(lambda: vehicle.state.armed is False, AMPLE_S)
+        assert await vehicle.until(lambda: vehicle.state.landed is True, AMPLE_S)
 
 
 async def test_a_takeoff_that_was_stopped_on_the_ground_can_be_begun_again() -> None:
     async with flying() as (truth, vehicle):
         await vehicle.driver.take_off(6.0)
         await vehicle.driver.stop()
-        assert await vehicle.until(lambda: vehicle.heard.armed is False, AMPLE_S)
+        assert await vehicle.until(lambda: vehicle.state.armed is False, AMPLE_S)
         assert truth.mode == "BRAKE"
         await vehicle.driver.take_off(6.0)
         assert await vehicle.until(
-            lambda: (vehicle.heard.altitude_above_home_m or 0) > 5.0, AMPLE_S
+            lambda: (vehicle.state.altitude_above_home_m or 0) > 5.0, AMPLE_S
         )
 
 
 async def test_a_copter_stands_soon_after_a_stop() -> None:
     async with flying() as (truth, vehicle):
         await vehicle.driver.take_off(10.0)
-        await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0) > 9.0, AMPLE_S)
+        await vehicle.until(lambda: (vehicle.state.altitude_above_home_m or 0) > 9.0, AMPLE_S)
         await vehicle.driver.go_to(Place(47.41, 8.545594, 10.0), 8.0)
-        assert await vehicle.until(lambda: 7.0 < vehicle.heard.speed_m_s < 20.0, AMPLE_S)
+        assert await vehicle.until(lambda: 7.0 < vehicle.state.speed_m_s < 20.0, AMPLE_S)
         await vehicle.driver.stop()
         assert truth.mode == "BRAKE"
-        assert await vehicle.until(lambda: vehicle.heard.speed_m_s < 0.2, AMPLE_S)
+        assert await vehicle.until(lambda: vehicle.state.speed_m_s < 0.2, AMPLE_S)
 
 
 async def test_velocities_move_it_while_they_are_repeated() -> None:
     async with flying() as (_, vehicle):
         await vehicle.driver.take_off(10.0)
-        await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0) > 9.0, AMPLE_S)
+        await vehicle.until(lambda: (vehicle.state.altitude_above_home_m or 0) > 9.0, AMPLE_S)
         async with asyncio.timeout(AMPLE_S / SPEED):
-            while vehicle.heard.velocity_enu_m_s[:2] != pytest.approx((3.0, 0.0), abs=0.3):
+            while vehicle.state.velocity_enu_m_s[:2] != pytest.approx((3.0, 0.0), abs=0.3):
                 await vehicle.driver.move((0.0, 3.0, 0.0))
                 await vehicle.sleep(0.5)
-        assert await vehicle.until(lambda: vehicle.heard.speed_m_s < 0.2, AMPLE_S)
+        assert await vehicle.until(lambda: vehicle.state.speed_m_s < 0.2, AMPLE_S)
 
 
 async def test_a_rover_is_armed_drives_holds_and_does_not_take_off() -> None:
@@ -107,21 +107,21 @@ async def test_a_rover_is_armed_drives_holds_and_does_not_take_off() -> None:
             await vehicle.driver.take_off(10.0)
         await vehicle.driver.go_to(Place(47.3982, 8.545594))
         assert truth.mode == "GUIDED"
-        assert await vehicle.until(lambda: 1.0 < vehicle.heard.speed_m_s < 20.0, AMPLE_S)
+        assert await vehicle.until(lambda: 1.0 < vehicle.state.speed_m_s < 20.0, AMPLE_S)
         await vehicle.driver.stop()
         assert truth.mode == "HOLD"
-        assert await vehicle.until(lambda: vehicle.heard.speed_m_s < 0.2, AMPLE_S)
-        assert vehicle.heard.landed is True
+        assert await vehicle.until(lambda: vehicle.state.speed_m_s < 0.2, AMPLE_S)
+        assert vehicle.state.landed is True
 
 
 async def test_another_ground_station_is_noticed() -> None:
     async with flying() as (truth, vehicle):
-        watch = TakeoverWatch(vehicle, OWN.system)
+        watch = TakeoverMonitor(vehicle, OWN.system)
         watch.open()
         await vehicle.driver.take_off(10.0)
-        await vehicle.until(lambda: (vehicle.heard.altitude_above_home_m or 0) > 9.0, AMPLE_S)
+        await vehicle.until(lambda: (vehicle.state.altitude_above_home_m or 0) > 9.0, AMPLE_S)
         flying_modes = {FlightMode.GUIDED}
-        assert watch.taken_over(flying_modes) is None
+        assert watch.takeover(flying_modes) is None
         host, port = truth.address
         url = f"udpout://{host}:{port}"
         link = await open_link(Address(1, 1), [url], SystemClock(SPEED), Address(254, 190))
@@ -129,8 +129,8 @@ async def test_another_ground_station_is_noticed() -> None:
         other.open()
         assert await other.identified(AMPLE_S)
         await other.driver.set_mode(FlightMode.LAND)
-        assert await vehicle.until(lambda: watch.taken_over(flying_modes) is not None, AMPLE_S)
-        takeover = watch.taken_over(flying_modes)
+        assert await vehicle.until(lambda: watch.takeover(flying_modes) is not None, AMPLE_S)
+        takeover = watch.takeover(flying_modes)
         assert takeover is not None
         assert takeover.cause is Cause.STATION
         assert "from GUIDED to LAND" in takeover.reason
@@ -187,14 +187,14 @@ async def test_another_mission_by_another_ground_station_is_noticed(
     replaced: tuple[MissionItem, ...], words: str
 ) -> None:
     async with flying() as (truth, vehicle):
-        watch = TakeoverWatch(vehicle, OWN.system)
+        watch = TakeoverMonitor(vehicle, OWN.system)
         watch.open()
         await vehicle.driver.upload(ROUTE)
         await vehicle.driver.start_mission()
         assert await vehicle.until(lambda: vehicle.driver.current_item == 1, AMPLE_S)
         mission_modes = {FlightMode.MISSION}
         await vehicle.sleep(3.0)
-        assert watch.taken_over(mission_modes) is None
+        assert watch.takeover(mission_modes) is None
         host, port = truth.address
         url = f"udpout://{host}:{port}"
         link = await open_link(Address(1, 1), [url], SystemClock(SPEED), Address(254, 190))
@@ -202,8 +202,8 @@ async def test_another_mission_by_another_ground_station_is_noticed(
         other.open()
         assert await other.identified(AMPLE_S)
         await other.driver.upload(replaced)
-        assert await vehicle.until(lambda: watch.taken_over(mission_modes) is not None, AMPLE_S)
-        takeover = watch.taken_over(mission_modes)
+        assert await vehicle.until(lambda: watch.takeover(mission_modes) is not None, AMPLE_S)
+        takeover = watch.takeover(mission_modes)
         assert takeover is not None
         assert words in takeover.reason or "begun to replace the mission" in takeover.reason
         await other.close()
@@ -234,12 +234,12 @@ async def test_a_refusal_says_why() -> None:
 
 async def test_a_cut_link_is_lost_and_found_again() -> None:
     async with flying() as (truth, vehicle):
-        await vehicle.until(lambda: vehicle.heard.home is not None, AMPLE_S)
+        await vehicle.until(lambda: vehicle.state.home is not None, AMPLE_S)
         outward, truth.port.outward = truth.port.outward, _Nowhere()  # type: ignore[assignment]
         assert await vehicle.until(lambda: vehicle.link_state is LinkState.LOST, AMPLE_S)
         truth.port.outward = outward
         assert await vehicle.until(lambda: vehicle.link_state is LinkState.CONNECTED, AMPLE_S)
-        assert vehicle.heard.boots == 1
+        assert vehicle.state.boots == 1
 
 
 class _Nowhere:

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
-from m2pem_plugin_mavlink.sim.camera import Camera
-from m2pem_plugin_mavlink.sim.gimbal.gimbal import Gimbal
-from m2pem_plugin_mavlink.sim.simulator import SimulatedVehicle, Simulator
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.camera import Camera
+from m2pem_plugin_mavlink.simulator.gimbal import Gimbal
+from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from m2pem_plugin_ptz.drivers.driver import Seat
 from m2pem_plugin_ptz.drivers.mavlink import MavlinkDriver
-from m2pem_plugin_ptz.gimbal import Reach
+from m2pem_plugin_ptz.head import PositionSetpoint
 from m2pem_plugin_ptz.settings import DriverName, Settings
 
 from m2pem.api import ArbiterContext, Connection, ResourceId, VehicleState
@@ -25,7 +25,7 @@ from m2pem.telemetry.bus import Bus
 SPEED = 10.0
 AMPLE_S = 40.0
 VEHICLE, CAMERA = ResourceId("v1"), ResourceId("v1/ptz")
-REACH = Reach(zoom_max=11.0, rate_rad_s=2.0)
+REACH = PositionSetpoint(zoom_max=11.0, rate_rad_s=2.0)
 
 
 async def until(true: Callable[[], bool]) -> None:
@@ -47,12 +47,12 @@ class World:
 
     @property
     def gimbal(self) -> Gimbal:
-        (found,) = (each for each in self.real.autopilot.parts if isinstance(each, Gimbal))
+        (found,) = (each for each in self.real.autopilot.components if isinstance(each, Gimbal))
         return found
 
     @property
     def camera(self) -> Camera:
-        (found,) = (each for each in self.real.autopilot.parts if isinstance(each, Camera))
+        (found,) = (each for each in self.real.autopilot.components if isinstance(each, Camera))
         return found
 
     @property

@@ -3,7 +3,7 @@
 import asyncio
 
 import pytest
-from m2pem_plugin_mavlink.sim.command import Result
+from m2pem_plugin_mavlink.simulator.messages import Result
 from m2pem_plugin_ptz.drivers.driver import CameraError
 from ptz_mavlink_world import until, world
 
@@ -96,12 +96,12 @@ async def test_a_picture_that_never_comes_is_an_error() -> None:
 async def test_a_full_storage_is_an_error_that_says_so() -> None:
     async with world() as it:
         await it.ready("take_picture")
-        it.real.autopilot.troubles.camera_full = True
+        it.real.autopilot.injected_faults.camera_full = True
         with pytest.raises(CameraError, match="storage full"):
             await it.driver.take_picture()
         with pytest.raises(CameraError, match="storage full"):
             await it.driver.start_recording()
-        it.real.autopilot.troubles.camera_full = False
+        it.real.autopilot.injected_faults.camera_full = False
         await it.driver.take_picture()
 
 

@@ -6,9 +6,9 @@ import threading
 from typing import ClassVar
 
 import pytest
-from m2pem_plugin_mavlink.sim.gimbal.gimbal import Gimbal
-from m2pem_plugin_mavlink.sim.simulator import Simulator
-from m2pem_plugin_mavlink.sim.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.gimbal import Gimbal
+from m2pem_plugin_mavlink.simulator.simulator import Simulator
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from m2pem_plugin_ptz.arbiter import PtzArbiter
 
 from m2pem.api import Connection, GeoPosition, ResourceId, VehicleState
@@ -79,7 +79,7 @@ class _Gimbals(ArbiterContract):
     def motions(self, simulator):
         found = {}
         for camera, number in NUMBERS.items():
-            parts = simulator[number].autopilot.parts
+            parts = simulator[number].autopilot.components
             (gimbal,) = (each for each in parts if isinstance(each, Gimbal))
             found[camera] = CountedMotions(gimbal)
         return found

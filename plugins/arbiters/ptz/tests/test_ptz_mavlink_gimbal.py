@@ -6,9 +6,9 @@ import socket
 
 import pytest
 from m2pem_plugin_mavlink import Address, open_link
-from m2pem_plugin_mavlink.sim.command import Result
-from m2pem_plugin_mavlink.sim.gimbal.gimbal import Controller
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.gimbal import Controller
+from m2pem_plugin_mavlink.simulator.messages import Result
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from ptz_mavlink_world import AMPLE_S, REACH, SPEED, until, world
 
 from m2pem.executive.clock import SystemClock

@@ -9,7 +9,7 @@ from typing import Any
 
 import mavsdk
 import pytest
-from m2pem_plugin_mavlink.sim.specification import Kind
+from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavsdk.asyncio import Configuration, Mavsdk
 from mavsdk.asyncio.plugins.camera import CameraAsync
 from mavsdk.asyncio.plugins.gimbal import GimbalAsync

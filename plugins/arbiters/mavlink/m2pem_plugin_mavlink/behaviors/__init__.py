@@ -2,30 +2,32 @@
 
 from collections.abc import Callable, Mapping
 
-from m2pem_plugin_mavlink.behaviors.backing import Reverse
-from m2pem_plugin_mavlink.behaviors.behavior import Behavior, Job
+from m2pem_plugin_mavlink.behaviors.area_observe import ObserveFromAbove, ObserveFromTheEdge
+from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorContext
 from m2pem_plugin_mavlink.behaviors.deploy import Deploy
-from m2pem_plugin_mavlink.behaviors.flight import (
+from m2pem_plugin_mavlink.behaviors.follow import Follow
+from m2pem_plugin_mavlink.behaviors.goto import DriveStop, Goto, Hold
+from m2pem_plugin_mavlink.behaviors.mission import Routing, RunOnboardMission, Survey
+from m2pem_plugin_mavlink.behaviors.orbit import Orbit
+from m2pem_plugin_mavlink.behaviors.reverse import Reverse
+from m2pem_plugin_mavlink.behaviors.takeoff_landing import (
     ChangeAltitude,
     Land,
     ReturnToLaunch,
     SetSpeed,
     Takeoff,
 )
-from m2pem_plugin_mavlink.behaviors.following import Follow
-from m2pem_plugin_mavlink.behaviors.going import DriveStop, Goto, Hold
-from m2pem_plugin_mavlink.behaviors.observe import ObserveFromAbove, ObserveFromTheEdge
-from m2pem_plugin_mavlink.behaviors.onboard import RunOnboardMission
-from m2pem_plugin_mavlink.behaviors.orbit import Orbit
-from m2pem_plugin_mavlink.behaviors.routing import Routing
-from m2pem_plugin_mavlink.behaviors.survey import Survey
 
 
-def _observe(job: Job) -> Behavior:
-    return ObserveFromAbove(job) if job.vehicle.domain == "air" else ObserveFromTheEdge(job)
+def _observe(context: BehaviorContext) -> Behavior:
+    return (
+        ObserveFromAbove(context)
+        if context.vehicle.domain == "air"
+        else ObserveFromTheEdge(context)
+    )
 
 
-BEHAVIORS: Mapping[str, Callable[[Job], Behavior]] = {
+BEHAVIORS: Mapping[str, Callable[[BehaviorContext], Behavior]] = {
     "single_vehicle_routing": Routing,
     "goto": Goto,
     "hold": Hold,

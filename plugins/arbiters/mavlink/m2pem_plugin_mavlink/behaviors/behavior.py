@@ -9,7 +9,7 @@ from m2pem.api import BehaviorState, Fence, FleetBus, ResolvedValue
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
-Memory: TypeAlias = Mapping[str, float | str | list[float] | None]
+CheckpointState: TypeAlias = Mapping[str, float | str | list[float] | None]
 """What a behavior must know to be recognised after a restart, beside its parameters; goes into a
 text of JSON."""
 
@@ -31,7 +31,7 @@ class BehaviorFailedError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class BehaviorContext:
     """What is to be done, by whom, and where: the fleet's bus (positions of other vehicles) and the
     origin of its ENU frame (latitude and longitude in degrees, altitude in metres).
 
@@ -62,13 +62,13 @@ class Behavior(ABC):
 
     name: ClassVar[str]
     modes: frozenset[FlightMode]
-    steers: ClassVar[bool] = True
-    still_s: ClassVar[float | None] = None
+    moves_vehicle: ClassVar[bool] = True
+    max_still_s: ClassVar[float | None] = None
     """For how long its vehicle may stand still before it has failed, in s; None: for ever."""
 
-    def __init__(self, job: Job) -> None:
-        self.job = job
-        self.vehicle = job.vehicle
+    def __init__(self, context: BehaviorContext) -> None:
+        self.context = context
+        self.vehicle = context.vehicle
 
     def refusal(self) -> str:
         """Why it cannot be done; "" if it can. Nothing has been sent yet."""
@@ -94,7 +94,7 @@ class Behavior(ABC):
         """The vehicle is being held."""
 
     @abstractmethod
-    async def go_on(self) -> None:
+    async def resume(self) -> None:
         """Have the vehicle go on after it was held."""
 
     def adjust(self, speed_m_s: float) -> bool:
@@ -102,20 +102,20 @@ class Behavior(ABC):
         is told by the helm, and again by what is sent after a hold."""
         return False
 
-    async def steps(self) -> None:  # noqa: B027  # most have none
+    async def run_in_background(self) -> None:  # noqa: B027  # most have none
         """What must be done over and over while it goes on and is not held."""
 
-    async def leave(self) -> None:  # noqa: B027  # most leave nothing behind
+    async def clean_up(self) -> None:  # noqa: B027  # most leave nothing behind
         """Undo what must not outlive it; another behavior takes over without a stop."""
 
     @abstractmethod
-    async def recognised(self) -> BehaviorState:
+    async def reattach(self) -> BehaviorState:
         """After a restart, by looking at the vehicle and asking it nothing but what it has: RUNNING
         (it does just this), SUCCEEDED (it has done it) or UNKNOWN."""
 
-    def memory(self) -> Memory:
+    def checkpoint(self) -> CheckpointState:
         """What `recall` needs after a restart, beside parameters that are no routes or areas."""
         return {}
 
-    def recall(self, memory: Memory) -> None:  # noqa: B027  # most need nothing
+    def restore(self, checkpoint: CheckpointState) -> None:  # noqa: B027  # most need nothing
         """Before `recognised`: what `memory` said when it began."""

@@ -5,7 +5,7 @@ import math
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import BehaviorState
-from m2pem_plugin_mavlink.behaviors.behavior import ANY_MODE, Behavior, Job
+from m2pem_plugin_mavlink.behaviors.behavior import ANY_MODE, Behavior, BehaviorContext
 from m2pem_plugin_mavlink.behaviors.wishes import Wishes
 
 KINDS = "'servo N', 'relay N', 'actuator N', 'gripper' or 'gripper N'"
@@ -19,13 +19,13 @@ class Deploy(Behavior):
 
     name = "deploy"
     modes = ANY_MODE
-    steers = False
+    moves_vehicle = False
 
-    def __init__(self, job: Job) -> None:
-        super().__init__(job)
-        wishes = Wishes(job)
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        wishes = Wishes(context)
         self._called = wishes.text("actuator")
-        meant = job.actuators.get(self._called, self._called)
+        meant = context.actuators.get(self._called, self._called)
         words = meant.replace(":", " ").lower().split()
         self._kind, self._number = _read(words)
         self._value = wishes.number("value")
@@ -33,7 +33,7 @@ class Deploy(Behavior):
     def refusal(self) -> str:
         """There must be such an actuator, and it must take the value."""
         if not self._kind:
-            names = ", ".join(self.job.actuators)
+            names = ", ".join(self.context.actuators)
             known = f"{names}; or " if names else ""
             return f"parameter 'actuator': there is no '{self._called}': write {known}{KINDS}"
         if self._kind == "servo" and self._value is None:
@@ -63,7 +63,7 @@ class Deploy(Behavior):
             values[self._number - 1] = 1.0 if self._value is None else self._value
             await driver.command(dialect.MAV_CMD_DO_SET_ACTUATOR, *values, 0.0)
 
-    async def go_on(self) -> None:
+    async def resume(self) -> None:
         """Command it again."""
         await self.begin()
 
@@ -71,7 +71,7 @@ class Deploy(Behavior):
         """As soon as the autopilot has accepted."""
         return True
 
-    async def recognised(self) -> BehaviorState:
+    async def reattach(self) -> BehaviorState:
         """No autopilot tells how its actuators are set."""
         return BehaviorState.UNKNOWN
 

@@ -4,15 +4,19 @@ import math
 from collections.abc import Sequence
 
 from m2pem.api import BehaviorState, LocalFrame
-from m2pem_plugin_mavlink.behaviors.behavior import BehaviorFailedError, Job, Memory
-from m2pem_plugin_mavlink.behaviors.looking import (
-    away_m,
-    near_the_circle_m,
-    reach_m,
-    unless_airborne,
-    where,
+from m2pem_plugin_mavlink.behaviors.arrival import (
+    arrival_radius_m,
+    circle_tolerance_m,
+    distance_to_m,
+    position_of,
+    takeoff_required,
 )
-from m2pem_plugin_mavlink.behaviors.mission_flight import MissionFlight, waypoint
+from m2pem_plugin_mavlink.behaviors.behavior import (
+    BehaviorContext,
+    BehaviorFailedError,
+    CheckpointState,
+)
+from m2pem_plugin_mavlink.behaviors.mission import MissionFlight, waypoint
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 
@@ -30,8 +34,8 @@ class Orbit(MissionFlight):
     name = "orbit"
     modes = frozenset({FlightMode.MISSION, FlightMode.ORBIT})
 
-    def __init__(self, job: Job) -> None:
-        super().__init__(job)
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
         self._center: Place | None = None
         self._radius_m = self.wishes.number("radius") or RADIUS_M
         self._seconds = self.wishes.number("duration")
@@ -42,7 +46,7 @@ class Orbit(MissionFlight):
         self._turned_rad = 0.0
         self._bearing_rad: float | None = None
         self._done = False
-        if self.vehicle.heard.circle_m is not None:
+        if self.vehicle.state.loiter_radius_m is not None:
             self.modes |= {FlightMode.GUIDED}  # a plane is sent to a place with a radius
 
     ends = True
@@ -85,7 +89,7 @@ class Orbit(MissionFlight):
         return max(8, min(36, math.ceil(math.tau * self._radius_m / 12.0)))
 
     def _begins_at(self, frame: LocalFrame) -> float:
-        here = where(self.vehicle)
+        here = position_of(self.vehicle)
         if here is None:
             return math.pi / 2
         east, north = frame.to_local(here)
@@ -100,7 +104,7 @@ class Orbit(MissionFlight):
     def refusal(self) -> str:
         """As for a route; no turn at all needs no room."""
         if self._turns == 0 or self._seconds == 0:
-            return unless_airborne(self.vehicle)
+            return takeoff_required(self.vehicle)
         return super().refusal()
 
     async def begin(self) -> None:
@@ -114,14 +118,14 @@ class Orbit(MissionFlight):
         if not self._by_command:
             await super().begin()
 
-    async def go_on(self) -> None:
+    async def resume(self) -> None:
         """What was turned already counts."""
         if self._by_command or self._done:
             await self.begin()
         else:
-            await super().go_on()
+            await super().resume()
 
-    async def steps(self) -> None:
+    async def run_in_background(self) -> None:
         """Stop at the end; begin each lap anew until then."""
         if self._done:
             return
@@ -136,23 +140,23 @@ class Orbit(MissionFlight):
             await self.vehicle.sleep(LOOK_EVERY_S)
             on_it = self._look()
             if on_it and left_s is None and self._seconds is not None:
-                left_s = self.job.now_s() + self._seconds
-            if left_s is not None and self.job.now_s() >= left_s:
+                left_s = self.context.now_s() + self._seconds
+            if left_s is not None and self.context.now_s() >= left_s:
                 return
             if self._turns is not None and self._turned_rad >= math.tau * self._turns:
                 return
             if not self._by_command and self.at_the_end():
-                self._standing.forget()
+                self._stillness.forget()
                 await self.vehicle.driver.start_mission(0)
 
     def _look(self) -> bool:
         """Add to what was turned; whether it is on the circle."""
         center = (self.center.latitude_deg, self.center.longitude_deg)
-        here = where(self.vehicle)
-        near_m, away = near_the_circle_m(self._radius_m), away_m(self.vehicle, center)
+        here = position_of(self.vehicle)
+        near_m, away = circle_tolerance_m(self._radius_m), distance_to_m(self.vehicle, center)
         # A plane that cannot turn as tightly as it is asked to goes round as it can.
-        wide_m = max(self._radius_m, self.vehicle.heard.circle_m or 0.0)
-        farthest_m = max(self._radius_m + near_m, reach_m(self.vehicle, 0.0, wide_m))
+        wide_m = max(self._radius_m, self.vehicle.state.loiter_radius_m or 0.0)
+        farthest_m = max(self._radius_m + near_m, arrival_radius_m(self.vehicle, 0.0, wide_m))
         if here is None or not self._radius_m - near_m <= away <= farthest_m:
             self._bearing_rad = None
             return False
@@ -171,33 +175,33 @@ class Orbit(MissionFlight):
 
     # --- after a restart ------------------------------------------------------------------------
 
-    async def recognised(self) -> BehaviorState:
+    async def reattach(self) -> BehaviorState:
         """By its mode and its distance from the centre, or by its mission."""
-        plane = self.vehicle.heard.circle_m is not None
-        by_place = plane and self.vehicle.heard.mode is FlightMode.GUIDED
-        if by_place or self.vehicle.heard.mode is FlightMode.ORBIT:
+        plane = self.vehicle.state.loiter_radius_m is not None
+        by_place = plane and self.vehicle.state.mode is FlightMode.GUIDED
+        if by_place or self.vehicle.state.mode is FlightMode.ORBIT:
             self._by_command = True
             near = self._look() or self._bearing_rad is not None
             return BehaviorState.RUNNING if near else BehaviorState.UNKNOWN
-        return await super().recognised()
+        return await super().reattach()
 
-    def memory(self) -> Memory:
+    def checkpoint(self) -> CheckpointState:
         """As for a route, and the circle."""
         center = self.center
         return {
-            **super().memory(),
+            **super().checkpoint(),
             "center": [center.latitude_deg, center.longitude_deg, center.altitude_m or 0.0],
             "frame": center.altitude_frame,
             "radius": self._radius_m,
             "loop": float(self.loop),
         }
 
-    def recall(self, memory: Memory) -> None:
+    def restore(self, checkpoint: CheckpointState) -> None:
         """The same."""
-        super().recall(memory)
-        center, radius = memory.get("center"), memory.get("radius")
+        super().restore(checkpoint)
+        center, radius = checkpoint.get("center"), checkpoint.get("radius")
         if not isinstance(center, list) or not isinstance(radius, int | float):
             raise BehaviorFailedError("where it circles is not known any more")
-        self._center = Place(center[0], center[1], center[2], str(memory.get("frame")))
+        self._center = Place(center[0], center[1], center[2], str(checkpoint.get("frame")))
         self._radius_m = float(radius)
-        self.loop = bool(memory.get("loop"))
+        self.loop = bool(checkpoint.get("loop"))

@@ -1,7 +1,7 @@
 """A request's parameters, as behaviors ask for them."""
 
 from m2pem.api import Area, LatLon, Point, ResourceId, Route, VehiclePosition, VehicleState
-from m2pem_plugin_mavlink.behaviors.behavior import BehaviorFailedError, Job
+from m2pem_plugin_mavlink.behaviors.behavior import BehaviorContext, BehaviorFailedError
 from m2pem_plugin_mavlink.vehicle.driver import Place
 
 RELATIVE, AMSL, TERRAIN = "relative", "amsl", "terrain"
@@ -15,11 +15,11 @@ class Wishes:
     """What was asked for; what the vehicle's domain has no use for is left out. `adjusted_m_s`: the
     speed that it was told on its way; None: none."""
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, context: BehaviorContext) -> None:
         self.adjusted_m_s: float | None = None
-        self._job = job
-        self._values = job.parameters
-        self.has_height = job.vehicle.domain in _WITH_HEIGHT
+        self._job = context
+        self._values = context.parameters
+        self.has_height = context.vehicle.domain in _WITH_HEIGHT
 
     def number(self, name: str) -> float | None:
         """A number in SI, None if not given."""
@@ -85,7 +85,7 @@ class Wishes:
             return altitude_m, frame
         if not self.has_height:
             return 0.0, RELATIVE
-        present_m = self._job.vehicle.heard.altitude_above_home_m
+        present_m = self._job.vehicle.state.altitude_above_home_m
         if present_m is None:
             raise BehaviorFailedError("its height is not known yet: say the altitude to move at")
         return present_m, RELATIVE
@@ -138,7 +138,7 @@ class Wishes:
         return state.position.latitude_deg, state.position.longitude_deg
 
 
-def state_of(job: Job, vehicle: str) -> VehicleState | None:
+def state_of(context: BehaviorContext, vehicle: str) -> VehicleState | None:
     """What another vehicle of the fleet said last."""
-    state = job.bus.latest(ResourceId(vehicle))
+    state = context.bus.latest(ResourceId(vehicle))
     return state if isinstance(state, VehicleState) else None

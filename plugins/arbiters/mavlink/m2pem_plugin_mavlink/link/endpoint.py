@@ -4,8 +4,7 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterable, Set
 
-from m2pem_plugin_mavlink.link.peer import Peer
-from m2pem_plugin_mavlink.link.route import Route
+from m2pem_plugin_mavlink.link.route import Peer, Route
 from m2pem_plugin_mavlink.protocol.inbound import Sender
 from m2pem_plugin_mavlink.protocol.url import Url
 

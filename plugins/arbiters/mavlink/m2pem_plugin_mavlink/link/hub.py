@@ -15,8 +15,7 @@ from weakref import WeakKeyDictionary
 from m2pem.api import Clock
 from m2pem.errors import PluginError
 from m2pem_plugin_mavlink.link.endpoint import Endpoint
-from m2pem_plugin_mavlink.link.peer import Peer
-from m2pem_plugin_mavlink.link.route import Route
+from m2pem_plugin_mavlink.link.route import Peer, Route
 from m2pem_plugin_mavlink.link.streams import SerialEndpoint, TcpInEndpoint, TcpOutEndpoint
 from m2pem_plugin_mavlink.link.udp import UdpEndpoint
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type

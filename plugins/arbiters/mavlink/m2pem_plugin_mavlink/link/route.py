@@ -1,20 +1,54 @@
-"""A vehicle as it is heard over one endpoint: at which peer, and what of it is wanted.
+"""Where a vehicle is reached on one endpoint: `Peer` is an address, `Route` the choice among them.
 
-System ids are only claimed: a second autopilot with the same one, or a program that lies, would
-make messages go astray. So whoever is heard first as a component of a system keeps it, until it has
-been silent for `TAKEOVER_S` or its connection is gone.
+System ids are only claims: a second autopilot with the same id, or a program that lies, would
+misdirect messages. The first sender that speaks as a component of a system keeps that component
+until it has been silent for `TAKEOVER_S` or its connection is gone.
 """
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import partial
+from typing import TypeAlias
 
-from m2pem_plugin_mavlink.link.peer import Peer
-from m2pem_plugin_mavlink.link.turns import Turns
-from m2pem_plugin_mavlink.protocol.inbound import NOTHING, Listener, Sender, Wanted
-from m2pem_plugin_mavlink.protocol.messages import types_by_id
+from m2pem_plugin_mavlink.link.vehicle_link import KeyedLock
+from m2pem_plugin_mavlink.protocol.frames import encode
+from m2pem_plugin_mavlink.protocol.inbound import NOTHING, Inbound, Listener, Sender, Wanted
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, types_by_id
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
 from m2pem_plugin_mavlink.protocol.url import Url
+
+Meet: TypeAlias = Callable[["Peer", Sender], bool]
+"""Is told of a new sender at a peer; False: it is not to be heard."""
+
+
+class Peer:
+    """A peer of an endpoint: a UDP address, a TCP connection, or what is at the end of a serial
+    line. `name` is for people; `write` sends bytes at once, or drops them; `heard_s`: when anything
+    came from it; `open`: it has not gone away."""
+
+    __slots__ = ("_sequences", "heard_s", "inbound", "name", "open", "write")
+
+    def __init__(
+        self, name: str, write: Callable[[bytes], None], meet: Meet, heard_s: float
+    ) -> None:
+        self.name = name
+        self.write = write
+        self.heard_s = heard_s
+        self.open = True
+        self.inbound = Inbound(partial(meet, self))
+        self._sequences: dict[Address, int] = {}
+
+    def send(self, message: Message, source: Address) -> None:
+        """Send a message as `source`, whose frames to each peer are numbered by themselves.
+
+        Raises:
+            struct.error: a field's value does not fit its type.
+        """
+        sequence = self._sequences.get(source, 0)
+        self.write(encode(message, sequence, source))
+        self._sequences[source] = (sequence + 1) & 255
+
 
 _logger = logging.getLogger(__name__)
 
@@ -53,7 +87,7 @@ class Route:
         self.url = url
         self.users = 0
         self.autopilots: set[int] = set()
-        self.turns = Turns()
+        self.locks = KeyedLock()
         self._wanted: dict[int, Wanted] = {}
         self._seats: dict[int, _Seat] = {}
 

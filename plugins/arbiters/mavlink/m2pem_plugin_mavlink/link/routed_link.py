@@ -7,10 +7,9 @@ from typing import TypeVar
 
 from m2pem.api import Clock
 from m2pem.errors import PluginError
-from m2pem_plugin_mavlink.link.exchange import Exchange
 from m2pem_plugin_mavlink.link.hub import Hub, shared_hub
 from m2pem_plugin_mavlink.link.route import Route
-from m2pem_plugin_mavlink.link.vehicle_link import Listener
+from m2pem_plugin_mavlink.link.vehicle_link import Exchange, Listener
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, Transaction
@@ -109,7 +108,7 @@ class RoutedLink:
     async def perform(self, transaction: Transaction[T]) -> T:
         """See `VehicleLink.perform`. Cancelling it ends the exchange: nothing more is sent."""
         transaction.source = self.source
-        async with self._routes[0].turns.turn((self.source, transaction.key)):
+        async with self._routes[0].locks.locked((self.source, transaction.key)):
             if self._closed:
                 raise ExchangeError("the link was closed")
             exchange = Exchange(transaction, self, self._clock)

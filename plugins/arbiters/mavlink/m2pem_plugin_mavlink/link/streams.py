@@ -8,7 +8,7 @@ from typing import Any
 
 from m2pem.errors import PluginError
 from m2pem_plugin_mavlink.link.endpoint import Endpoint, logger
-from m2pem_plugin_mavlink.link.peer import Peer
+from m2pem_plugin_mavlink.link.route import Peer
 from m2pem_plugin_mavlink.link.udp import why_not
 from m2pem_plugin_mavlink.protocol.url import SerialUrl, SocketUrl
 

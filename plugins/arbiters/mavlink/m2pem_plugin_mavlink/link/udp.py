@@ -11,7 +11,7 @@ from typing import Any
 
 from m2pem.errors import PluginError
 from m2pem_plugin_mavlink.link.endpoint import Endpoint, logger
-from m2pem_plugin_mavlink.link.peer import Peer
+from m2pem_plugin_mavlink.link.route import Peer
 from m2pem_plugin_mavlink.protocol.url import SocketUrl, Way
 
 RECEIVE_BUFFER_BYTES = 8 * 2**20

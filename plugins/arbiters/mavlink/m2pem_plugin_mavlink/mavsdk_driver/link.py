@@ -4,21 +4,126 @@ import asyncio
 import contextlib
 import logging
 from collections import deque
-from collections.abc import Awaitable, Callable, Coroutine, Iterable
+from collections.abc import Awaitable, Callable, Coroutine, Iterable, Sequence
 from typing import Any, TypeVar
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from m2pem.api import Clock
-from m2pem_plugin_mavlink.link.exchange import Exchange
-from m2pem_plugin_mavlink.link.turns import Turns
-from m2pem_plugin_mavlink.link.vehicle_link import Listener
+from m2pem_plugin_mavlink.link.vehicle_link import Exchange, KeyedLock, Listener
 from m2pem_plugin_mavlink.mavsdk_driver import json_fields, library
-from m2pem_plugin_mavlink.mavsdk_driver.calls import Calls
-from m2pem_plugin_mavlink.mavsdk_driver.missions import cancel_upload, carried
+from m2pem_plugin_mavlink.microservices.mission_items import (
+    MissionItem,
+    MissionType,
+    is_temporary,
+    item_message,
+    mission_result_words,
+)
+from m2pem_plugin_mavlink.microservices.mission_upload import UploadMission
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, types_by_id
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
-from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, Transaction
+from m2pem_plugin_mavlink.protocol.transaction import (
+    ExchangeError,
+    NoAnswerError,
+    RefusedError,
+    Transaction,
+)
 
 T = TypeVar("T")
+
+
+class PendingCalls:
+    """A call is made in a thread and cannot be stopped: who waits for it may be cancelled, and then
+    it goes on. What it works with must not go away before it has come back."""
+
+    def __init__(self) -> None:
+        self._tasks: set[asyncio.Task[Any]] = set()
+
+    @property
+    def pending(self) -> bool:
+        """Whether any is on its way."""
+        return bool(self._tasks)
+
+    async def make(self, call: Coroutine[Any, Any, T]) -> T:
+        """Make a call; what it raises is raised."""
+        task = asyncio.get_running_loop().create_task(call)
+        self._tasks.add(task)
+        task.add_done_callback(self._done)
+        return await asyncio.shield(task)
+
+    def _done(self, task: "asyncio.Task[Any]") -> None:
+        self._tasks.discard(task)
+        if not task.cancelled():
+            task.exception()  # so that nobody says that nobody has asked
+
+    async def finish(self) -> None:
+        """Wait until all have come back; each does so soon, as MAVSDK waits for no vehicle long."""
+        while self._tasks:
+            await asyncio.wait(self._tasks)
+
+
+_RESULTS: dict[str, int] = {
+    "ERROR": dialect.MAV_MISSION_ERROR,
+    "BUSY": dialect.MAV_MISSION_ERROR,
+    "UNSUPPORTED": dialect.MAV_MISSION_UNSUPPORTED,
+    "TOO_MANY_MISSION_ITEMS": dialect.MAV_MISSION_NO_SPACE,
+    "INVALID_ARGUMENT": dialect.MAV_MISSION_INVALID,
+    "INVALID_SEQUENCE": dialect.MAV_MISSION_INVALID_SEQUENCE,
+    "DENIED": dialect.MAV_MISSION_DENIED,
+    "TRANSFER_CANCELLED": dialect.MAV_MISSION_OPERATION_CANCELLED,
+}
+"""What its results mean, by their names: MAV_MISSION_RESULT."""
+
+
+async def carried(link: "MavsdkLink", transaction: Transaction[Any]) -> bool:
+    """Have MAVSDK upload a mission; False: it is another exchange."""
+    if not isinstance(transaction, UploadMission) or not transaction.items:
+        return False
+    if transaction.mission_type is not MissionType.MISSION:
+        return False
+    transaction.begin(link.now_s())  # it fails if there is an item that cannot be sent
+    if not transaction.done:
+        try:
+            await link.calls.make(_upload(link, transaction.items))
+        except asyncio.CancelledError:
+            await cancel_upload(link)
+            raise
+        except library.failure() as error:
+            transaction.fail(_meant(error))
+        else:
+            transaction.succeed(None)
+    return True
+
+
+async def cancel_upload(link: "MavsdkLink") -> None:
+    """End the upload that goes on, if there is one."""
+    with contextlib.suppress(library.failure()):  # there is none
+        await link.calls.make(link.missions.cancel_mission_upload())
+
+
+async def _upload(link: "MavsdkLink", items: Sequence[MissionItem]) -> None:
+    """To the end: its progress is told in callbacks, for which somebody must be there."""
+    make = library.plugin("mission_raw").MissionPlan
+    plan = make([_item(item, sequence, link.address) for sequence, item in enumerate(items)])
+    async for _ in link.missions.upload_mission_with_progress(plan):
+        pass
+
+
+def _item(item: MissionItem, sequence: int, target: Address) -> Any:
+    fields: Any = item_message(item, sequence, target, MissionType.MISSION)
+    names = "seq frame command current autocontinue param1 param2 param3 param4 x y z mission_type"
+    make = library.plugin("mission_raw").MissionItem
+    return make(**{name: getattr(fields, name) for name in names.split()})
+
+
+def _meant(error: Exception) -> ExchangeError:
+    name = error.result.name if hasattr(error, "result") else ""
+    if name not in _RESULTS:  # a time-out, or trouble of its own
+        return NoAnswerError(f"upload of the mission: MAVSDK: {library.reason(error)}")
+    result = _RESULTS[name]
+    reason = f"mission refused: {mission_result_words(result)}"
+    return RefusedError(reason, result, temporary=is_temporary(result))
+
 
 US_PER_S = 1_000_000
 _logger = logging.getLogger(__name__)
@@ -40,7 +145,7 @@ class MavsdkLink:
         self, address: Address, clock: Clock, leave: Callable[[], Awaitable[None]]
     ) -> None:
         self.address = address
-        self.calls = Calls()
+        self.calls = PendingCalls()
         self.missions: Any = None
         self._direct: Any = None
         self._clock = clock
@@ -51,7 +156,7 @@ class MavsdkLink:
         self._unsent: deque[Message] = deque(maxlen=UNSENT)
         self._sender: asyncio.Task[None] | None = None
         self._exchanges: set[Exchange] = set()
-        self._turns = Turns()
+        self._locks = KeyedLock()
 
     # --- life -----------------------------------------------------------------------------------
 
@@ -124,7 +229,7 @@ class MavsdkLink:
 
     async def perform(self, transaction: Transaction[T]) -> T:
         """See `VehicleLink.perform`."""
-        async with self._turns.turn(transaction.key):
+        async with self._locks.locked(transaction.key):
             if self._closed:
                 raise ExchangeError("the link was closed")
             if not self.attached:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.microservices.commands import Command
-from m2pem_plugin_mavlink.microservices.intervals import RequestMessage
+from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
 
 MS_PER_S = 1000.0

@@ -3,7 +3,7 @@ services/camera.html, "Still Image Capture")."""
 
 from dataclasses import dataclass
 
-from m2pem_plugin_mavlink.microservices.intervals import RequestMessage
+from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 
 WANTED = frozenset({message_type("CAMERA_IMAGE_CAPTURED").id})

@@ -1,9 +1,4 @@
-"""Commands and their acknowledgements (mavlink.io, "Command Protocol", services/command.html).
-
-An acknowledgement names the command and not the request: a late one of an earlier request for the
-same command cannot be told from the answer. Whoever must be sure looks at what the vehicle says
-anyway (HEARTBEAT for a mode or for being armed).
-"""
+"""Commands and their acknowledgements (mavlink.io, "Command Protocol", services/command.html)."""
 
 import math
 from abc import abstractmethod
@@ -13,16 +8,52 @@ from typing import TypeVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.microservices.patience import PATIENCE, Patience
-from m2pem_plugin_mavlink.microservices.refusals import command_name, result_words, with_reason
-from m2pem_plugin_mavlink.microservices.texts import StatusTexts
+from m2pem_plugin_mavlink.microservices.texts import StatusTexts, Text
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
+    PATIENCE,
     ExchangeError,
     NoAnswerError,
     RefusedError,
+    RetryPolicy,
     Transaction,
 )
+
+_WORDS: dict[int, str] = {
+    dialect.MAV_RESULT_TEMPORARILY_REJECTED: "not possible now",
+    dialect.MAV_RESULT_DENIED: "denied, as it stands or with these values",
+    dialect.MAV_RESULT_UNSUPPORTED: "not supported",
+    dialect.MAV_RESULT_FAILED: "failed",
+    6: "cancelled",  # MAV_RESULT_CANCELLED, which the dialect does not have
+    dialect.MAV_RESULT_COMMAND_LONG_ONLY: "taken as COMMAND_LONG only",
+    dialect.MAV_RESULT_COMMAND_INT_ONLY: "taken as COMMAND_INT only",
+}
+MOST_TEXTS = 3
+
+
+def result_words(result: int) -> str:
+    """What a MAV_RESULT other than "accepted" means."""
+    return _WORDS.get(result, f"refused with result {result}")
+
+
+def command_name(command: int) -> str:
+    """A MAV_CMD as people call it: "COMPONENT_ARM_DISARM"."""
+    known = dialect.enums["MAV_CMD"].get(command)
+    return str(known.name).removeprefix("MAV_CMD_") if known else f"command {command}"
+
+
+def message_name(id_: int) -> str:
+    """A message as people call it: "GLOBAL_POSITION_INT"."""
+    known = dialect.mavlink_map.get(id_)
+    return str(known.msgname) if known else f"message {id_}"
+
+
+def with_reason(what: str, texts: Sequence[Text]) -> str:
+    """What was refused, and what the vehicle said of it: "ARM: failed (PreArm: no position)"."""
+    said = dict.fromkeys(each.text for each in texts if each.text)
+    reasons = "; ".join(list(said)[-MOST_TEXTS:])
+    return f"{what} ({reasons})" if reasons else what
+
 
 T = TypeVar("T")
 
@@ -85,13 +116,13 @@ class CommandExchange(Transaction[T]):
         *,
         place: CommandPlace | None = None,
         once: bool = False,
-        patience: Patience = PATIENCE,
+        retry_policy: RetryPolicy = PATIENCE,
         progress: Callable[[int | None], None] | None = None,
     ) -> None:
         super().__init__(("command", target, command))
         self.target, self.command = target, command
         self.name = command_name(command)
-        self.patience = Patience(1, patience.bound_s) if once else patience
+        self.retry_policy = RetryPolicy(1, retry_policy.bound_s) if once else retry_policy
         self._params = tuple(float(each) for each in params) + (0.0,) * (7 - len(params))
         self._place = place
         self._as_int = place is not None
@@ -131,7 +162,7 @@ class CommandExchange(Transaction[T]):
             self.fail(RefusedError(reason, refused.result, temporary=refused.temporary))
         elif self._in_progress:  # asking again might begin it again
             self.fail(NoAnswerError(f"{self.name}: was begun, but not heard of again"))
-        elif self._asked < self.patience.tries:
+        elif self._asked < self.retry_policy.tries:
             self._ask(now_s)
         else:
             self.fail(NoAnswerError(self._silence()))
@@ -182,7 +213,7 @@ class CommandExchange(Transaction[T]):
     def _ask(self, now_s: float) -> None:
         self.outbox.append(self._message(self._asked))
         self._asked += 1
-        self.deadline_s = now_s + self.patience.answer_s
+        self.deadline_s = now_s + self.retry_policy.answer_s
 
     def _message(self, confirmation: int) -> Message:
         system, component = self.target
@@ -222,7 +253,7 @@ class CommandExchange(Transaction[T]):
 
     def _silence(self) -> str:
         often = "once" if self._asked == 1 else f"{self._asked} times"
-        return f"{self.name}: no answer, though sent {often} in {self.patience.bound_s:g} s"
+        return f"{self.name}: no answer, though sent {often} in {self.retry_policy.bound_s:g} s"
 
 
 class Command(CommandExchange[Message]):
@@ -250,9 +281,9 @@ class Request(CommandExchange[T]):
         answer: int,
         read: Callable[[Message], T | None],
         *,
-        patience: Patience = PATIENCE,
+        retry_policy: RetryPolicy = PATIENCE,
     ) -> None:
-        super().__init__(target, command, params, patience=patience)
+        super().__init__(target, command, params, retry_policy=retry_policy)
         self.wants = frozenset({_ACK, _TEXT, answer})
         self._answer, self._read = answer, read
         self._accepted_s: float | None = None

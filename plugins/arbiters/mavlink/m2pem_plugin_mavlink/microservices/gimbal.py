@@ -12,7 +12,7 @@ from enum import Enum
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.microservices.commands import Command
-from m2pem_plugin_mavlink.microservices.intervals import RequestMessage
+from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 
 ALL = 0

@@ -6,10 +6,14 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.microservices.commands import Command, CommandPlace
-from m2pem_plugin_mavlink.microservices.intervals import RequestMessage
-from m2pem_plugin_mavlink.microservices.patience import PATIENCE
+from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, Transaction
+from m2pem_plugin_mavlink.protocol.transaction import (
+    PATIENCE,
+    ExchangeError,
+    NoAnswerError,
+    Transaction,
+)
 
 _DEG_TO_1E7 = 1e7
 _MM_PER_M = 1000.0

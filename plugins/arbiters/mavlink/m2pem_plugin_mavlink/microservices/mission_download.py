@@ -3,29 +3,27 @@ services/mission.html, "Download a Mission from the Vehicle"): one item after th
 for until it comes."""
 
 from m2pem_plugin_mavlink.microservices.mission_items import (
+    ACCEPTED,
+    CANCELLED,
     ITEM_FLOAT,
     ITEM_INT,
     MissionItem,
     MissionType,
-    item_of,
-)
-from m2pem_plugin_mavlink.microservices.mission_results import (
-    ACCEPTED,
-    CANCELLED,
     is_temporary,
+    item_of,
     mission_result_words,
 )
-from m2pem_plugin_mavlink.microservices.patience import Patience
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
     ExchangeError,
     NoAnswerError,
     RefusedError,
+    RetryPolicy,
     Transaction,
 )
 
-COUNT_PATIENCE = Patience(tries=5, answer_s=1.5)
-ITEM_PATIENCE = Patience(tries=8, answer_s=0.75)
+COUNT_PATIENCE = RetryPolicy(tries=5, answer_s=1.5)
+ITEM_PATIENCE = RetryPolicy(tries=8, answer_s=0.75)
 """mavlink.io has 0.25 s and five times, which is too short for most radios."""
 
 PASSES = 3

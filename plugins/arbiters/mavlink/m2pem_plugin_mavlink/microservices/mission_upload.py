@@ -10,26 +10,28 @@ if it fails, what the vehicle has must be looked at before it is used.
 from collections.abc import Sequence
 from math import inf
 
-from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType, item_message
-from m2pem_plugin_mavlink.microservices.mission_results import (
+from m2pem_plugin_mavlink.microservices.commands import command_name
+from m2pem_plugin_mavlink.microservices.mission_items import (
     ACCEPTED,
     CANCELLED,
     OUT_OF_SEQUENCE,
+    MissionItem,
+    MissionType,
     is_of_one_item,
     is_temporary,
+    item_message,
     mission_result_words,
 )
-from m2pem_plugin_mavlink.microservices.patience import Patience
-from m2pem_plugin_mavlink.microservices.refusals import command_name
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
     ExchangeError,
     NoAnswerError,
     RefusedError,
+    RetryPolicy,
     Transaction,
 )
 
-COUNT_PATIENCE = Patience(tries=5, answer_s=1.5)
+COUNT_PATIENCE = RetryPolicy(tries=5, answer_s=1.5)
 """For the first request; mavlink.io: 1.5 s, five times."""
 
 SILENCE_S = 5.0

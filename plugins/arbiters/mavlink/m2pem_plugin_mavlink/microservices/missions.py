@@ -6,23 +6,26 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from m2pem_plugin_mavlink.microservices.commands import CommandExchange
 from m2pem_plugin_mavlink.microservices.mission_download import item_request
 from m2pem_plugin_mavlink.microservices.mission_items import (
+    ACCEPTED,
+    CANCELLED,
     ITEM_FLOAT,
     ITEM_INT,
     MissionItem,
     MissionType,
-    item_of,
-)
-from m2pem_plugin_mavlink.microservices.mission_results import (
-    ACCEPTED,
-    CANCELLED,
     is_temporary,
+    item_of,
     mission_result_words,
 )
-from m2pem_plugin_mavlink.microservices.patience import PATIENCE, Patience
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError, RefusedError, Transaction
+from m2pem_plugin_mavlink.protocol.transaction import (
+    PATIENCE,
+    NoAnswerError,
+    RefusedError,
+    RetryPolicy,
+    Transaction,
+)
 
-CLEAR_PATIENCE = Patience(tries=5, answer_s=1.5)
+CLEAR_PATIENCE = RetryPolicy(tries=5, answer_s=1.5)
 
 _CLEAR = message_type("MISSION_CLEAR_ALL")
 _ACK = message_type("MISSION_ACK")
@@ -82,9 +85,11 @@ class SetCurrentItem(CommandExchange[None]):
 
     wants = CommandExchange.wants | {_CURRENT.id}
 
-    def __init__(self, target: Address, sequence: int, *, patience: Patience = PATIENCE) -> None:
+    def __init__(
+        self, target: Address, sequence: int, *, retry_policy: RetryPolicy = PATIENCE
+    ) -> None:
         command = dialect.MAV_CMD_DO_SET_MISSION_CURRENT
-        super().__init__(target, command, (sequence,), patience=patience)
+        super().__init__(target, command, (sequence,), retry_policy=retry_policy)
         self.name = f"current item {sequence}"
         self._sequence = sequence
         self._by_message = False
@@ -113,7 +118,7 @@ class SetCurrentItem(CommandExchange[None]):
         """Ask again, or give up."""
         if not self._by_message:
             super().expire(now_s)
-        elif self._tries < self.patience.tries:
+        elif self._tries < self.retry_policy.tries:
             self._send(now_s)
         else:
             shown = "it does not show it, though asked"
@@ -128,7 +133,7 @@ class SetCurrentItem(CommandExchange[None]):
                 target_component=self.target.component,
             )
         )
-        self.deadline_s = now_s + self.patience.answer_s
+        self.deadline_s = now_s + self.retry_policy.answer_s
 
 
 class ReadMissionItem(Transaction[MissionItem]):
@@ -146,10 +151,10 @@ class ReadMissionItem(Transaction[MissionItem]):
         sequence: int,
         mission_type: MissionType = MissionType.MISSION,
         *,
-        patience: Patience = PATIENCE,
+        retry_policy: RetryPolicy = PATIENCE,
     ) -> None:
         super().__init__(("mission", target))
-        self.target, self.mission_type, self.patience = target, mission_type, patience
+        self.target, self.mission_type, self.retry_policy = target, mission_type, retry_policy
         self._sequence = sequence
         self._tries = 0
 
@@ -157,7 +162,7 @@ class ReadMissionItem(Transaction[MissionItem]):
         """Ask."""
         self._tries += 1
         self.outbox.append(item_request(self.target, self._sequence, self.mission_type))
-        self.deadline_s = now_s + self.patience.answer_s
+        self.deadline_s = now_s + self.retry_policy.answer_s
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
         """The item, or a refusal."""
@@ -173,7 +178,7 @@ class ReadMissionItem(Transaction[MissionItem]):
 
     def expire(self, now_s: float) -> None:
         """Ask again, or give up."""
-        if self._tries < self.patience.tries:
+        if self._tries < self.retry_policy.tries:
             self.begin(now_s)
         else:
             asked = f"no answer, though asked {self._tries} times"

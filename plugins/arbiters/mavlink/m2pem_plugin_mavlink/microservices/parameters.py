@@ -1,24 +1,125 @@
-"""Reading and setting single parameters (mavlink.io, "Parameter Protocol",
-services/parameter.html)."""
+"""Parameters: their encoding, reading and setting single ones, and reading all of them (mavlink.io,
+"Parameter Protocol", services/parameter.html).
+"""
+
+import math
+import struct
+from dataclasses import dataclass
+from enum import Enum
+from itertools import islice
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.microservices.parameter_values import (
-    Parameter,
-    ParameterEncoding,
-    carried,
-    encoded_name,
-    parameter_of,
-    same_value,
-)
-from m2pem_plugin_mavlink.microservices.patience import PATIENCE, Patience
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
+    PATIENCE,
     ExchangeError,
     NoAnswerError,
     RefusedError,
+    RetryPolicy,
     Transaction,
 )
+
+NAME_BYTES = 16
+
+_REAL32: int = dialect.MAV_PARAM_TYPE_REAL32
+_WHOLE: dict[int, tuple[str, str]] = {  # how it is laid out in four bytes; its name
+    dialect.MAV_PARAM_TYPE_UINT8: ("<B3x", "uint8"),
+    dialect.MAV_PARAM_TYPE_INT8: ("<b3x", "int8"),
+    dialect.MAV_PARAM_TYPE_UINT16: ("<H2x", "uint16"),
+    dialect.MAV_PARAM_TYPE_INT16: ("<h2x", "int16"),
+    dialect.MAV_PARAM_TYPE_UINT32: ("<I", "uint32"),
+    dialect.MAV_PARAM_TYPE_INT32: ("<i", "int32"),
+}
+_FLOAT = struct.Struct("<f")
+
+
+class ParameterEncoding(Enum):
+    """How whole numbers are carried."""
+
+    C_CAST = "c_cast"
+    BYTEWISE = "bytewise"
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter as its vehicle has it. `type`: a MAV_PARAM_TYPE; `value` is an int where that is
+    a whole number; `index` of `count`: None and 0 where it was sent without being listed."""
+
+    name: str
+    value: float
+    type: int
+    index: int | None = None
+    count: int = 0
+
+
+def encoded_name(name: str) -> bytes:
+    """A name as it travels.
+
+    Raises:
+        ValueError: no parameter can have it.
+    """
+    encoded = name.encode("ascii", "replace")
+    if not name or len(encoded) > NAME_BYTES or not name.isascii() or not name.isprintable():
+        raise ValueError(f"'{name}' is no name of a parameter: 1 to {NAME_BYTES} ASCII characters")
+    return encoded
+
+
+def parameter_of(message: Message, encoding: ParameterEncoding) -> Parameter:
+    """What a PARAM_VALUE says."""
+    value: float = message.param_value
+    whole = _WHOLE.get(message.param_type)
+    if whole is not None and encoding is ParameterEncoding.BYTEWISE:
+        value = struct.unpack(whole[0], _FLOAT.pack(value))[0]
+    elif whole is not None and math.isfinite(value):
+        value = round(value)
+    listed = message.param_index < message.param_count
+    return Parameter(
+        name=message.param_id.decode("ascii", "replace"),
+        value=value,
+        type=message.param_type,
+        index=message.param_index if listed else None,
+        count=message.param_count if listed else 0,
+    )
+
+
+def carried(value: float, type_: int, encoding: ParameterEncoding) -> float:
+    """The float that carries a value of a MAV_PARAM_TYPE in PARAM_SET.
+
+    Raises:
+        ValueError: the type has no such value, or it cannot be carried.
+    """
+    if not math.isfinite(value):
+        raise ValueError(f"{value} is not a finite number")
+    if type_ not in _WHOLE:
+        try:
+            return float(_FLOAT.unpack(_FLOAT.pack(value))[0])
+        except OverflowError:
+            raise ValueError(f"{value:g} is too large for a float") from None
+    layout, name = _WHOLE[type_]
+    if value != int(value):
+        raise ValueError(f"{value:g} is not a whole number, and the parameter is one ({name})")
+    try:
+        raw = struct.pack(layout, int(value))
+    except struct.error:
+        raise ValueError(f"{value:g} is outside of {name}") from None
+    if encoding is ParameterEncoding.C_CAST:
+        result = float(_FLOAT.unpack(_FLOAT.pack(value))[0])
+        if result != value:
+            raise ValueError(f"{value:.0f} has more digits than this autopilot can be sent")
+        return result
+    result = float(_FLOAT.unpack(raw)[0])
+    if _FLOAT.pack(result) != raw:  # the bytes of a NaN that Python does not keep
+        raise ValueError(f"{value:.0f} cannot be sent")
+    return result
+
+
+def same_value(kept: Parameter, value: float) -> bool:
+    """Whether a parameter has a value, but for what floats of 32 bits lose."""
+    if kept.type == _REAL32 or kept.type not in _WHOLE:
+        return math.isclose(kept.value, value, rel_tol=1e-6, abs_tol=1e-9)
+    return kept.value == value
+
 
 BY_NAME = -1
 """The index in requests that name a parameter."""
@@ -51,10 +152,15 @@ class ReadParameter(Transaction[Parameter]):
         name: str,
         encoding: ParameterEncoding = ParameterEncoding.C_CAST,
         *,
-        patience: Patience = PATIENCE,
+        retry_policy: RetryPolicy = PATIENCE,
     ) -> None:
         super().__init__(("parameter", target, name))
-        self.target, self.name, self.encoding, self.patience = target, name, encoding, patience
+        self.target, self.name, self.encoding, self.retry_policy = (
+            target,
+            name,
+            encoding,
+            retry_policy,
+        )
         self._encoded = b""
         self._tries = 0
 
@@ -80,7 +186,7 @@ class ReadParameter(Transaction[Parameter]):
 
     def expire(self, now_s: float) -> None:
         """Ask again, or give up."""
-        if self._tries < self.patience.tries:
+        if self._tries < self.retry_policy.tries:
             self._ask(now_s)
         else:
             silence = "no answer: perhaps it has no such parameter"
@@ -93,7 +199,7 @@ class ReadParameter(Transaction[Parameter]):
     def _ask(self, now_s: float) -> None:
         self._tries += 1
         self.outbox.append(read_request(self.target, self._encoded, BY_NAME))
-        self.deadline_s = now_s + self.patience.answer_s
+        self.deadline_s = now_s + self.retry_policy.answer_s
 
 
 class SetParameter(ReadParameter):
@@ -111,9 +217,9 @@ class SetParameter(ReadParameter):
         value: float,
         encoding: ParameterEncoding = ParameterEncoding.C_CAST,
         *,
-        patience: Patience = PATIENCE,
+        retry_policy: RetryPolicy = PATIENCE,
     ) -> None:
-        super().__init__(target, name, encoding, patience=patience)
+        super().__init__(target, name, encoding, retry_policy=retry_policy)
         self.value = value
         self._kept: Parameter | None = None
         self._answered = False
@@ -132,7 +238,7 @@ class SetParameter(ReadParameter):
     def expire(self, now_s: float) -> None:
         """Set it again, or give up."""
         kept = self._kept
-        if kept is None or self._tries < self.patience.tries:
+        if kept is None or self._tries < self.retry_policy.tries:
             super().expire(now_s)
         elif self._answered:
             reason = f"parameter {self.name}: it keeps {kept.value:g} and does not take"
@@ -161,7 +267,7 @@ class SetParameter(ReadParameter):
                 param_type=self._kept.type,
             )
         )
-        self.deadline_s = now_s + self.patience.answer_s
+        self.deadline_s = now_s + self.retry_policy.answer_s
 
 
 def read_request(target: Address, name: bytes, index: int) -> Message:
@@ -173,3 +279,101 @@ def read_request(target: Address, name: bytes, index: int) -> Message:
         param_id=name,
     )
     return message
+
+
+LIST_PATIENCE = RetryPolicy(tries=5, answer_s=1.5)
+"""For the first one, and between one and the next; then the missing ones are asked for."""
+
+GAP_PATIENCE = RetryPolicy(tries=6, answer_s=1.0)
+GAPS_AT_ONCE = 20
+BASE_S = 60.0
+PER_PARAMETER_S = 0.5
+MOST = 10_000
+"""What says that it has more is not believed; autopilots have some 1,500."""
+
+_LIST = message_type("PARAM_REQUEST_LIST")
+
+
+class ReadParameters(Transaction[dict[str, Parameter]]):
+    """All parameters of a component, by name.
+
+    Fails with `NoAnswerError`, or `ExchangeError` for a count that cannot be; at the latest after
+    `BASE_S` and `PER_PARAMETER_S` for each parameter.
+    """
+
+    wants = frozenset({_VALUE.id})
+
+    def __init__(
+        self, target: Address, encoding: ParameterEncoding = ParameterEncoding.C_CAST
+    ) -> None:
+        super().__init__(("parameters", target))
+        self.target, self.encoding = target, encoding
+        self._ends_s = self._began_s = 0.0
+        self._tries = 0
+        self._count = 0
+        self._had: dict[int, Parameter] = {}
+        self._asked: set[int] = set()
+
+    def begin(self, now_s: float) -> None:
+        """Ask for all."""
+        self._began_s = now_s
+        self._ends_s = now_s + BASE_S
+        self._ask(now_s)
+
+    def receive(self, message: Message, sender: Address, now_s: float) -> None:
+        """A parameter. One that is not of the list, but was read or set, comes without an index."""
+        if self.done or sender != self.target:
+            return
+        parameter = parameter_of(message, self.encoding)
+        if parameter.index is None:
+            return
+        if parameter.count > MOST:
+            self._give_up(ExchangeError, f"{parameter.count} of them cannot be")
+            return
+        if parameter.count != self._count:  # some parameters bring others with them
+            self._count = parameter.count
+            self._ends_s = self._began_s + BASE_S + PER_PARAMETER_S * self._count
+            self._had = {n: each for n, each in self._had.items() if n < self._count}
+        self._had[parameter.index] = parameter
+        if len(self._had) == self._count:
+            self.succeed({each.name: self._had[n] for n, each in sorted(self._had.items())})
+        elif not self._asked:
+            self.deadline_s = min(now_s + LIST_PATIENCE.answer_s, self._ends_s)
+        elif parameter.index in self._asked:
+            self._asked.remove(parameter.index)
+            self._tries = 0
+            if not self._asked:
+                self._ask_missing(now_s)
+
+    def expire(self, now_s: float) -> None:
+        """Ask for what is missing, or give up."""
+        if now_s >= self._ends_s:
+            self._give_up(NoAnswerError, "not done in time")
+        elif not self._count and self._tries < LIST_PATIENCE.tries:
+            self._ask(now_s)
+        elif not self._count:
+            self._give_up(NoAnswerError, f"no answer, though asked {self._tries} times")
+        elif not self._asked or self._tries < GAP_PATIENCE.tries:
+            if not self._asked:
+                self._tries = 0
+            self._ask_missing(now_s)
+        else:
+            self._give_up(NoAnswerError, "the others do not come")
+
+    def _ask(self, now_s: float) -> None:
+        self._tries += 1
+        system, component = self.target
+        self.outbox.append(_LIST.make(target_system=system, target_component=component))
+        self.deadline_s = min(now_s + LIST_PATIENCE.answer_s, self._ends_s)
+
+    def _ask_missing(self, now_s: float) -> None:
+        self._tries += 1
+        missing = (index for index in range(self._count) if index not in self._had)
+        self._asked = set(islice(missing, GAPS_AT_ONCE))
+        for index in sorted(self._asked):
+            self.outbox.append(read_request(self.target, b"", index))
+        self.deadline_s = min(now_s + GAP_PATIENCE.answer_s, self._ends_s)
+
+    def _give_up(self, error: type[ExchangeError], reason: str) -> None:
+        had = f" ({len(self._had)} of {self._count} came)" if self._count else ""
+        self.fail(error(f"reading the parameters: {reason}{had}"))

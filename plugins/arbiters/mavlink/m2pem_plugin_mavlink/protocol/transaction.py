@@ -7,6 +7,7 @@ from its vehicle, and `expire` when `deadline_s` has passed; after each of them 
 
 from abc import ABC, abstractmethod
 from collections.abc import Hashable
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
@@ -95,3 +96,21 @@ class Transaction(ABC, Generic[T]):
         if self._error is not None:
             raise self._error
         return self._result  # type: ignore[return-value]  # `succeed` has set it
+
+
+@dataclass(frozen=True, slots=True)
+class RetryPolicy:
+    """It is asked `tries` times, and each time waited `answer_s` seconds."""
+
+    tries: int
+    answer_s: float
+
+    @property
+    def bound_s(self) -> float:
+        """After so much silence it is over."""
+        return self.tries * self.answer_s
+
+
+PATIENCE = RetryPolicy(tries=5, answer_s=1.0)
+"""For questions with one answer. mavlink.io, "Command Protocol", leaves times to the sender; ground
+stations wait 0.5 to 1.5 s, three to five times. Links by satellite or mesh answer after 4 s."""

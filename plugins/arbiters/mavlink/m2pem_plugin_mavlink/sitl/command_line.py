@@ -13,8 +13,7 @@ import click
 from m2pem import load_fleet
 from m2pem.errors import M2pemError, PluginError
 from m2pem_plugin_mavlink.sitl.fleet import ARBITER, Vehicle, launches, read_vehicles
-from m2pem_plugin_mavlink.sitl.launch import Launch
-from m2pem_plugin_mavlink.sitl.processes import Program, first_to_end, running
+from m2pem_plugin_mavlink.sitl.launch import Launch, Program, first_to_end, running
 from m2pem_plugin_mavlink.sitl.readiness import connected, ready
 
 _FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)

@@ -112,9 +112,9 @@ def _reasons(vehicle: Vehicle) -> str:
         return "no heartbeat yet"
     if vehicle.link_state is LinkState.LOST:
         return f"silent for {vehicle.silent_s or 0.0:.0f} s"
-    if vehicle.heard.mode is FlightMode.RETURN:
+    if vehicle.state.mode is FlightMode.RETURN:
         # A plane counts its ground station as lost from the start, and waits in RTL, in which it
         # cannot be armed. The executive's takeoff leaves that mode.
-        return ", ".join(unlocated(vehicle.identity.firmware, vehicle.heard, vehicle.link.now_s()))
+        return ", ".join(unlocated(vehicle.identity.firmware, vehicle.state, vehicle.link.now_s()))
     readiness = vehicle.driver.readiness()
     return "" if readiness.ready else ", ".join(readiness.reasons)

@@ -10,10 +10,9 @@ from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.protocol.transaction import RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot, cannot, not_now
-from m2pem_plugin_mavlink.vehicle.circling import WINGED
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.fixed_wing import NO_LANDING, WINGED, landing, landing_begins
 from m2pem_plugin_mavlink.vehicle.identity import Kind
-from m2pem_plugin_mavlink.vehicle.landing import NO_LANDING, landing, landing_begins
 
 STOP_WITHIN_S = 3.0
 """The mode in which it stops is commanded for so long before another one is tried."""
@@ -109,7 +108,7 @@ class ArdupilotDriver(Autopilot):
         await self.start_mission()
 
     def _here(self, altitude_m: float) -> Place:
-        position = self.heard.position
+        position = self.state.position
         if position is None:
             raise not_now("its position is not known")
         return Place(position.latitude_deg, position.longitude_deg, altitude_m)
@@ -138,7 +137,7 @@ class ArdupilotDriver(Autopilot):
     async def stop(self) -> None:
         """BRAKE, HOLD or LOITER, whatever stops this kind of vehicle best; one that is not armed
         stands already."""
-        if self.heard.armed is False:
+        if self.state.armed is False:
             return
         *better, last = _STOP_MODES[self.kind]
         for name in better:
@@ -157,7 +156,7 @@ class ArdupilotDriver(Autopilot):
         await self._arm_to_drive()
         await self.set_mode(FlightMode.GUIDED)
         # Unless it is told, a plane circles as far from there as from the place before.
-        await self._reposition(place, self.heard.circle_m or 0.0)
+        await self._reposition(place, self.state.loiter_radius_m or 0.0)
         if speed_m_s is not None:
             await self.set_speed(speed_m_s)
         if place.heading_rad is not None and self.kind is Kind.COPTER:
@@ -187,9 +186,9 @@ class ArdupilotDriver(Autopilot):
             return dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, 0.0
         if place.altitude_m is not None:
             return _FRAMES[place.altitude_frame], place.altitude_m
-        if self.heard.position is None:
+        if self.state.position is None:
             raise not_now("its height is not known")
-        return dialect.MAV_FRAME_GLOBAL, self.heard.position.altitude_m
+        return dialect.MAV_FRAME_GLOBAL, self.state.position.altitude_m
 
     async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
         """Only planes can be told to circle a place; the CIRCLE of copters and rovers has no
@@ -209,9 +208,9 @@ class ArdupilotDriver(Autopilot):
         if self.kind in WINGED:
             raise cannot(f"a {self.kind} takes no velocities")
         guided = self.modes.number("GUIDED")
-        if self.heard.custom_mode != guided:
-            if self._left_by_somebody(guided) and not self.ours.changing:
-                raise not_now(f"it is in mode {self.modes.name(self.heard.custom_mode or 0)} now")
+        if self.state.custom_mode != guided:
+            if self._left_by_somebody(guided) and not self.commanded.changing:
+                raise not_now(f"it is in mode {self.modes.name(self.state.custom_mode or 0)} now")
             await self._arm_to_drive()
             await self.set_mode(FlightMode.GUIDED)
         self._send_velocity(velocity_ned_m_s)
@@ -220,7 +219,7 @@ class ArdupilotDriver(Autopilot):
 
     def _as_stored(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
         """Item 0 is home, which the vehicle replaces by its own."""
-        home = self.heard.home
+        home = self.state.home
         place = (
             (home.latitude_deg, home.longitude_deg, home.altitude_m) if home else (0.0, 0.0, 0.0)
         )
@@ -244,8 +243,8 @@ class ArdupilotDriver(Autopilot):
         """
         if self.kind not in WINGED:
             await self.arm()
-        self.heard.reached_sequence = None
-        if self.heard.mode is FlightMode.MISSION:
+        self.state.reached_sequence = None
+        if self.state.mode is FlightMode.MISSION:
             await self.set_mode(FlightMode.GUIDED)
         await exchanges.set_current(self.link, first + self.home_items)
         await self.set_mode(FlightMode.MISSION)

@@ -4,11 +4,12 @@ import contextlib
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import LatLon
+from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType
 from m2pem_plugin_mavlink.protocol.messages import message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
@@ -17,9 +18,7 @@ from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Readiness
 from m2pem_plugin_mavlink.vehicle.identity import Identity, Kind
 from m2pem_plugin_mavlink.vehicle.modes import modes_of
 from m2pem_plugin_mavlink.vehicle.readiness import TEXTS_WITHIN_S, readiness, unlocated
-
-if TYPE_CHECKING:
-    from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+from m2pem_plugin_mavlink.vehicle.state import AutopilotState, CommandedState
 
 LOCATED_WITHIN_S = 90.0
 """An ArduPilot has a position some 41 s after it was switched on."""
@@ -69,21 +68,34 @@ def not_now(reason: str) -> RefusedError:
     return RefusedError(reason, _LATER, temporary=True)
 
 
+class DrivenVehicle(Protocol):
+    """What a driver needs of its vehicle."""
+
+    link: VehicleLink
+    state: AutopilotState
+    commanded: CommandedState
+
+    async def until(self, true: Callable[[], bool], within_s: float | None = None) -> bool: ...
+    async def sleep(self, seconds: float) -> None: ...
+    def recent_texts(self, within_s: float = 5.0) -> tuple[str, ...]: ...
+    def warn(self, text: str) -> None: ...
+
+
 class Autopilot(ABC):
     """Implements `Driver`, but for what each make of autopilot has its own way of."""
 
     home_items: int
     """How many items of a stored mission stand before the first real one."""
 
-    def __init__(self, vehicle: "Vehicle", identity: Identity) -> None:
+    def __init__(self, vehicle: DrivenVehicle, identity: Identity) -> None:
         self.vehicle = vehicle
         self.identity = identity
         self.kind: Kind = identity.kind
         self.name: str = identity.firmware
         self.modes = modes_of(identity)
         self.link = vehicle.link
-        self.heard = vehicle.heard
-        self.ours = vehicle.ours
+        self.state = vehicle.state
+        self.commanded = vehicle.commanded
 
     # --- what it says ---------------------------------------------------------------------------
 
@@ -98,17 +110,17 @@ class Autopilot(ABC):
     def readiness(self) -> Readiness:
         """Whether it may be armed now."""
         texts = self.vehicle.recent_texts(TEXTS_WITHIN_S)
-        return readiness(self.identity.firmware, self.heard, texts, self.link.now_s())
+        return readiness(self.identity.firmware, self.state, texts, self.link.now_s())
 
     @property
     def current_item(self) -> int | None:
         """The item that the vehicle moves to, numbered as in `upload`."""
-        return self._item(self.heard.mission_sequence)
+        return self._item(self.state.mission_sequence)
 
     @property
     def reached_item(self) -> int | None:
         """The item reached last since the mission was started."""
-        return self._item(self.heard.reached_sequence)
+        return self._item(self.state.reached_sequence)
 
     def _item(self, sequence: int | None) -> int | None:
         if sequence is None or sequence < self.home_items:
@@ -118,7 +130,7 @@ class Autopilot(ABC):
     @property
     def in_the_air(self) -> bool:
         """Whether it flies."""
-        return bool(self.heard.armed) and self.heard.landed is False
+        return bool(self.state.armed) and self.state.landed is False
 
     # --- modes ----------------------------------------------------------------------------------
 
@@ -139,7 +151,7 @@ class Autopilot(ABC):
         await self._enter(
             custom_mode,
             lambda: self._command_mode(custom_mode),
-            lambda: self.heard.custom_mode == custom_mode,
+            lambda: self.state.custom_mode == custom_mode,
             within_s,
         )
 
@@ -156,17 +168,17 @@ class Autopilot(ABC):
         must_accept: bool = False,
     ) -> None:
         """Give a command that changes the mode, and note that the change is ours."""
-        before = self.ours.custom_mode
-        self.ours.custom_mode = custom_mode
-        self.ours.changing += 1
+        before = self.commanded.custom_mode
+        self.commanded.custom_mode = custom_mode
+        self.commanded.changing += 1
         name = f"mode {self.modes.name(custom_mode)}"
         try:
             await self._repeat(command, shows, within_s, name, must_accept=must_accept)
         except RefusedError:
-            self.ours.custom_mode = before
+            self.commanded.custom_mode = before
             raise
         finally:
-            self.ours.changing -= 1
+            self.commanded.changing -= 1
 
     async def _repeat(
         self,
@@ -210,7 +222,7 @@ class Autopilot(ABC):
         Raises:
             ExchangeError: it is not ready (and why), or refuses.
         """
-        if self.heard.armed:
+        if self.state.armed:
             return
         await self._locate()
         # What its other checks say may be of the mode that it is in: some cannot be armed.
@@ -244,7 +256,7 @@ class Autopilot(ABC):
             self.vehicle.warn("is ready")
 
     def _is_located(self) -> bool:
-        return not unlocated(self.identity.firmware, self.heard, self.link.now_s())
+        return not unlocated(self.identity.firmware, self.state, self.link.now_s())
 
     def _not_ready(self) -> RefusedError:
         return not_now("not ready: " + "; ".join(self.readiness().reasons))
@@ -261,28 +273,28 @@ class Autopilot(ABC):
     async def _arm(self) -> None:
         await self._repeat(
             lambda: exchanges.command(self.link, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0),
-            lambda: self.heard.armed is True,
+            lambda: self.state.armed is True,
             ARM_WITHIN_S,
             "arming",
         )
-        self.ours.disarming = False
+        self.commanded.disarming = False
 
     async def disarm(self) -> None:
         """Disarm; refused in flight."""
-        if self.heard.armed is False:
+        if self.state.armed is False:
             return
-        self.ours.disarming = True
+        self.commanded.disarming = True
         try:
             await exchanges.command(self.link, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
         except RefusedError:
-            self.ours.disarming = False
+            self.commanded.disarming = False
             raise
-        if not await self.vehicle.until(lambda: self.heard.armed is False, 2 * SHOWS_WITHIN_S):
+        if not await self.vehicle.until(lambda: self.state.armed is False, 2 * SHOWS_WITHIN_S):
             raise NoAnswerError("disarming was accepted, but does not come")
 
     async def _arm_to_drive(self) -> None:
         """What drives is armed when it is to move; what flies takes off first."""
-        if self.heard.armed:
+        if self.state.armed:
             return
         if self.kind in (Kind.COPTER, Kind.PLANE, Kind.VTOL):
             raise not_now("it stands on the ground, not armed: it must take off first")
@@ -306,34 +318,34 @@ class Autopilot(ABC):
 
     def _left_by_somebody(self, custom_mode: int) -> bool:
         """Whether it was brought into a mode from here and is in another one now."""
-        return self.ours.custom_mode == custom_mode and self.heard.custom_mode != custom_mode
+        return self.commanded.custom_mode == custom_mode and self.state.custom_mode != custom_mode
 
     # --- missions -------------------------------------------------------------------------------
 
     async def upload(self, items: Sequence[MissionItem]) -> None:
         """Store a mission of items that begin with the first real one; none: clear it."""
-        self.ours.mission = None
-        self.ours.exchanging += 1
+        self.commanded.mission = None
+        self.commanded.exchanging += 1
         try:
             if items:
                 await exchanges.upload(self.link, self._as_stored(tuple(items)))
             else:
                 await exchanges.clear(self.link)
         finally:
-            self.ours.exchanging -= 1
-        self.ours.mission = tuple(items)
-        self.heard.reached_sequence = None
+            self.commanded.exchanging -= 1
+        self.commanded.mission = tuple(items)
+        self.state.reached_sequence = None
 
     def _as_stored(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
         return items
 
     async def downloaded(self) -> tuple[MissionItem, ...]:
         """The mission that the vehicle has, as `upload` takes it."""
-        self.ours.exchanging += 1
+        self.commanded.exchanging += 1
         try:
             return (await exchanges.download(self.link))[self.home_items :]
         finally:
-            self.ours.exchanging -= 1
+            self.commanded.exchanging -= 1
 
     async def rally_points(self) -> Sequence[LatLon]:
         """Where it may land instead of at home when it returns."""
@@ -347,14 +359,14 @@ class Autopilot(ABC):
         Raises:
             ExchangeError: it is not.
         """
-        self.heard.mission_state = None  # what was said before may be of the mission before
-        begun = lambda: self.heard.mission_state in _BEGUN  # noqa: E731
+        self.state.mission_state = None  # what was said before may be of the mission before
+        begun = lambda: self.state.mission_state in _BEGUN  # noqa: E731
         if not await self.vehicle.until(begun, BEGINS_WITHIN_S):
-            state = self.heard.mission_state
+            state = self.state.mission_state
             if state is not None:
                 raise NoAnswerError(
                     f"its mission does not begin: {_MISSION_STATES.get(state, state)} for "
-                    f"{BEGINS_WITHIN_S:g} s in {self.modes.name(self.heard.custom_mode or 0)}"
+                    f"{BEGINS_WITHIN_S:g} s in {self.modes.name(self.state.custom_mode or 0)}"
                 )
 
     # --- speed ----------------------------------------------------------------------------------

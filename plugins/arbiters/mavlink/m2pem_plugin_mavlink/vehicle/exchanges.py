@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
 from m2pem_plugin_mavlink.microservices.commands import Command, CommandPlace
-from m2pem_plugin_mavlink.microservices.intervals import RequestMessage, SetMessageInterval
+from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage, SetMessageInterval
 from m2pem_plugin_mavlink.microservices.mission_download import DownloadMission
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType
 from m2pem_plugin_mavlink.microservices.mission_upload import UploadMission
@@ -16,10 +16,9 @@ from m2pem_plugin_mavlink.microservices.missions import (
     ReadMissionItem,
     SetCurrentItem,
 )
-from m2pem_plugin_mavlink.microservices.parameter_values import ParameterEncoding
-from m2pem_plugin_mavlink.microservices.parameters import ReadParameter
-from m2pem_plugin_mavlink.microservices.patience import Patience
+from m2pem_plugin_mavlink.microservices.parameters import ParameterEncoding, ReadParameter
 from m2pem_plugin_mavlink.protocol.messages import Message
+from m2pem_plugin_mavlink.protocol.transaction import RetryPolicy
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
 
 _ENCODINGS = {
@@ -28,7 +27,7 @@ _ENCODINGS = {
 }
 
 
-_SHORT = Patience(tries=2, answer_s=1.0)
+_SHORT = RetryPolicy(tries=2, answer_s=1.0)
 _IGNORES_POSITION = 0b111
 """POSITION_TARGET_TYPEMASK."""
 
@@ -58,7 +57,9 @@ async def request_message(link: VehicleLink, name: str) -> None:
 async def position_target(link: VehicleLink) -> tuple[float, float, float]:
     """Where an autopilot is on its way to: latitude and longitude in degrees, metres above mean sea
     level (POSITION_TARGET_GLOBAL_INT in MAV_FRAME_GLOBAL). One without a target does not answer."""
-    request = RequestMessage(link.address, "POSITION_TARGET_GLOBAL_INT", _target, patience=_SHORT)
+    request = RequestMessage(
+        link.address, "POSITION_TARGET_GLOBAL_INT", _target, retry_policy=_SHORT
+    )
     return await link.perform(request)
 
 

@@ -52,7 +52,7 @@ class Px4Driver(Autopilot):
         """Arm where needed, and climb to so much above home."""
         if self.kind in ON_THE_GROUND:
             raise cannot(f"a {self.kind} does not take off")
-        position = self.heard.position
+        position = self.state.position
         if self.in_the_air and position is not None:
             await self.go_to(Place(position.latitude_deg, position.longitude_deg, altitude_m))
             return
@@ -65,7 +65,7 @@ class Px4Driver(Autopilot):
             lambda: exchanges.command(
                 self.link, dialect.MAV_CMD_NAV_TAKEOFF, nan, nan, nan, nan, nan, nan, amsl_m
             ),
-            lambda: self.heard.custom_mode == takeoff or self.in_the_air,
+            lambda: self.state.custom_mode == takeoff or self.in_the_air,
             must_accept=True,
         )
 
@@ -84,7 +84,7 @@ class Px4Driver(Autopilot):
     async def stop(self) -> None:
         """AUTO.LOITER, in which it brakes at once; one that is not armed stands already. As that is
         also the mode in which it goes to places, it is then told to go nowhere."""
-        if self.heard.armed is not False:
+        if self.state.armed is not False:
             await self.set_mode(FlightMode.HOLD)
             change = float(dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
             nowhere = (math.nan,) * 4
@@ -142,7 +142,7 @@ class Px4Driver(Autopilot):
     async def _by_command(self, name: str, command: Callable[[], Awaitable[None]]) -> None:
         number = self.modes.number(name)
         await self._enter(
-            number, command, lambda: self.heard.custom_mode == number, must_accept=True
+            number, command, lambda: self.state.custom_mode == number, must_accept=True
         )
 
     def _place_amsl(self, place: Place) -> float:
@@ -156,17 +156,17 @@ class Px4Driver(Autopilot):
             return altitude_m
         if frame == "terrain":
             raise cannot("PX4 goes to no height above terrain")
-        if self.heard.home is None:
+        if self.state.home is None:
             raise not_now("its home is not known, and so no height above it")
-        return self.heard.home.altitude_m + altitude_m
+        return self.state.home.altitude_m + altitude_m
 
     async def move(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
         """One velocity setpoint. It does not take the vehicle back from somebody who has left
         OFFBOARD."""
         offboard = self.modes.number("OFFBOARD")
-        if self.heard.custom_mode != offboard:
-            if self._left_by_somebody(offboard) and not self.ours.changing:
-                raise not_now(f"it is in mode {self.modes.name(self.heard.custom_mode or 0)} now")
+        if self.state.custom_mode != offboard:
+            if self._left_by_somebody(offboard) and not self.commanded.changing:
+                raise not_now(f"it is in mode {self.modes.name(self.state.custom_mode or 0)} now")
             await self._arm_to_drive()
             await self._enter_offboard(offboard, velocity_ned_m_s)
         self._send_velocity(velocity_ned_m_s)
@@ -192,7 +192,7 @@ class Px4Driver(Autopilot):
     async def start_mission(self, first: int = 0) -> None:
         """Fly the stored mission from an item on, arming where needed."""
         await self.arm()
-        self.heard.reached_sequence = None
+        self.state.reached_sequence = None
         await exchanges.set_current(self.link, first)
         await self.set_mode(FlightMode.MISSION)
         await self._mission_begins()

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Iterator
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.vehicle.driver import Readiness
-from m2pem_plugin_mavlink.vehicle.heard import Heard
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
+from m2pem_plugin_mavlink.vehicle.state import AutopilotState
 
 LOW_BATTERY = 0.15
 """Below this share a vehicle does not set out."""
@@ -27,47 +27,49 @@ _REFUSALS = {
 }
 
 
-def readiness(firmware: Firmware, heard: Heard, texts: Iterable[str], now_s: float) -> Readiness:
+def readiness(
+    firmware: Firmware, state: AutopilotState, texts: Iterable[str], now_s: float
+) -> Readiness:
     """Whether it may be armed now; `texts`: what it said in the last `TEXTS_WITHIN_S`, newest last.
 
     A vehicle that is armed already is ready.
     """
-    if heard.armed:
+    if state.armed:
         return Readiness(True)
-    if heard.heartbeat_s is None:
+    if state.heartbeat_s is None:
         return Readiness(False, ("link: no heartbeat yet",))
-    reasons = (*unlocated(firmware, heard, now_s), *_reasons(firmware, heard, texts))
+    reasons = (*unlocated(firmware, state, now_s), *_reasons(firmware, state, texts))
     return Readiness(not reasons, reasons)
 
 
-def unlocated(firmware: Firmware, heard: Heard, now_s: float) -> tuple[str, ...]:
+def unlocated(firmware: Firmware, state: AutopilotState, now_s: float) -> tuple[str, ...]:
     """Why it does not know where it is; none: it does. Unlike the rest that does not depend on the
     mode that it is in."""
-    gps = heard.gps_fix is not None and heard.gps_fix < _FIX_3D
-    return (*(("GPS: no 3D fix",) if gps else ()), *_position_reasons(firmware, heard, now_s))
+    gps = state.gps_fix is not None and state.gps_fix < _FIX_3D
+    return (*(("GPS: no 3D fix",) if gps else ()), *_position_reasons(firmware, state, now_s))
 
 
-def _reasons(firmware: Firmware, heard: Heard, texts: Iterable[str]) -> Iterator[str]:
-    if heard.prearm_passed is False:
+def _reasons(firmware: Firmware, state: AutopilotState, texts: Iterable[str]) -> Iterator[str]:
+    if state.prearm_passed is False:
         said = list(dict.fromkeys(_refusals(firmware, texts)))
         yield from (f"prearm: {text}" for text in said)
         if not said:
             yield "prearm: a check fails, the vehicle does not say which"
-    if heard.battery_fraction is not None and heard.battery_fraction < LOW_BATTERY:
-        yield f"battery at {heard.battery_fraction:.0%}".replace("%", " %")
+    if state.battery_fraction is not None and state.battery_fraction < LOW_BATTERY:
+        yield f"battery at {state.battery_fraction:.0%}".replace("%", " %")
 
 
-def _position_reasons(firmware: Firmware, heard: Heard, now_s: float) -> Iterator[str]:
+def _position_reasons(firmware: Firmware, state: AutopilotState, now_s: float) -> Iterator[str]:
     """A PX4 that sends no ESTIMATOR_STATUS is believed on its pre-arm bit. PX4 sets
     ESTIMATOR_CONST_POS_MODE whenever it is at rest; on ArduPilot the bit means: no position."""
-    waited_s = 0.0 if heard.boot_s is None else now_s - heard.boot_s
-    flags = heard.estimator_flags
+    waited_s = 0.0 if state.boot_s is None else now_s - state.boot_s
+    flags = state.estimator_flags
     if flags is None:
-        if firmware is Firmware.ARDUPILOT or heard.prearm_passed is None:
+        if firmware is Firmware.ARDUPILOT or state.prearm_passed is None:
             yield f"EKF: nothing heard of it yet, {waited_s:.0f} s"
     elif not flags & _HAS_POSITION or (flags & _NO_POSITION and firmware is Firmware.ARDUPILOT):
         yield f"EKF: no position yet, {waited_s:.0f} s"
-    if firmware is Firmware.PX4 and heard.home is None:
+    if firmware is Firmware.PX4 and state.home is None:
         yield f"home: not set yet, {waited_s:.0f} s"
 
 

@@ -30,7 +30,7 @@ _OWN = {
 
 
 def telemetry_streams(firmware: Firmware) -> Mapping[int, float]:
-    """Ids of the messages that `Heard` is made of, and their intervals in seconds."""
+    """Ids of the messages that `AutopilotState` is made of, and their intervals in seconds."""
     named = {**_COMMON, **_OWN[firmware]}
     return MappingProxyType({message_type(name).id: each for name, each in named.items()})
 

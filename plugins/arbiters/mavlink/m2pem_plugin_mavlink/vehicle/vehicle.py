@@ -1,4 +1,4 @@
-"""One vehicle as behaviors see it."""
+"""One vehicle: its state, its driver, and waiting for what it reports."""
 
 import asyncio
 import logging
@@ -13,17 +13,69 @@ from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
 from m2pem_plugin_mavlink.microservices.texts import StatusTexts, Text
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
-from m2pem_plugin_mavlink.vehicle import circling, exchanges
+from m2pem_plugin_mavlink.vehicle import exchanges
+from m2pem_plugin_mavlink.vehicle import fixed_wing as circling
+from m2pem_plugin_mavlink.vehicle.ardupilot import ArdupilotDriver
 from m2pem_plugin_mavlink.vehicle.driver import Driver
-from m2pem_plugin_mavlink.vehicle.drivers import driver_of
-from m2pem_plugin_mavlink.vehicle.heard import Heard
-from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Identity, identity
-from m2pem_plugin_mavlink.vehicle.intake import Intake
+from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Firmware, Identity, identity
 from m2pem_plugin_mavlink.vehicle.modes import modes_of
-from m2pem_plugin_mavlink.vehicle.ours import Ours
+from m2pem_plugin_mavlink.vehicle.px4 import Px4Driver
+from m2pem_plugin_mavlink.vehicle.state import (
+    DEGRADED_SHARE,
+    AutopilotState,
+    CommandedState,
+    link_state,
+    vehicle_state,
+)
 from m2pem_plugin_mavlink.vehicle.streams import Streams, telemetry_streams
-from m2pem_plugin_mavlink.vehicle.telemetry import DEGRADED_SHARE, link_state, vehicle_state
-from m2pem_plugin_mavlink.vehicle.waiters import Waiters
+from m2pem_plugin_mavlink.vehicle.telemetry_decoder import TelemetryDecoder
+
+
+class ConditionWaiters:
+    """Who waits until something is true. `look` is to be called whenever something may be."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._waiting: dict[asyncio.Future[bool], Callable[[], bool]] = {}
+
+    def look(self) -> None:
+        """Wake those whose condition holds, or raises."""
+        for future, true in tuple(self._waiting.items()):
+            if future.done():
+                continue
+            try:
+                if true():
+                    future.set_result(True)
+            except Exception as error:
+                future.set_exception(error)
+
+    async def wait(self, true: Callable[[], bool], within_s: float | None = None) -> bool:
+        """Wait until `true()`, which may raise; False: it was not within so many seconds."""
+        if true():
+            return True
+        loop = asyncio.get_running_loop()
+        future: asyncio.Future[bool] = loop.create_future()
+        self._waiting[future] = true
+        alarm = None if within_s is None else loop.create_task(self._alarm(within_s, future))
+        try:
+            return await future or true()
+        finally:
+            del self._waiting[future]
+            if alarm is not None:
+                alarm.cancel()
+
+    async def _alarm(self, within_s: float, future: "asyncio.Future[bool]") -> None:
+        await self._clock.sleep(within_s)
+        if not future.done():
+            future.set_result(False)
+
+
+def driver_of(vehicle: "Vehicle", identity: Identity) -> Driver:
+    """The driver for a vehicle."""
+    if identity.firmware is Firmware.PX4:
+        return Px4Driver(vehicle, identity)
+    return ArdupilotDriver(vehicle, identity)
+
 
 _HEARTBEAT = message_type("HEARTBEAT").id
 _STATUSTEXT = message_type("STATUSTEXT").id
@@ -40,14 +92,12 @@ RADII_EVERY_S = 10.0
 HOME_EVERY_S = 5.0
 """A home position that is not sent by itself is asked for so often, until it is there."""
 
-__all__ = ["Heard", "Vehicle"]
-
 
 class Vehicle:
     """A vehicle of the fleet behind its link, between `open` and `close`.
 
     Nothing is sent before its heartbeat has told what it is; then it is asked for the messages that
-    `heard` is made of, and again when they stop coming. All times are of the arbiter's clock.
+    `state` is made of, and again when they stop coming. All times are of the arbiter's clock.
     """
 
     def __init__(
@@ -63,8 +113,8 @@ class Vehicle:
         self.resource = resource
         self.domain = domain
         self.link = link
-        self.heard = Heard()
-        self.ours = Ours()
+        self.state = AutopilotState()
+        self.commanded = CommandedState()
         self.texts = StatusTexts(self._warn_of)
         self._warned_s: dict[str, float] = {}
         self.identity: Identity | None = None
@@ -72,9 +122,9 @@ class Vehicle:
         self._clock = clock
         self._logger = logger or logging.getLogger(__name__)
         self._driver: Driver | None = None
-        self._intake: Intake | None = None
+        self._decoder: TelemetryDecoder | None = None
         self._streams: Streams | None = None
-        self._waiters = Waiters(clock)
+        self._waiters = ConditionWaiters(clock)
         self._watchers: list[Callable[[], None]] = []
         self._deafen: list[Callable[[], None]] = []
         self._tasks: set[asyncio.Task[None]] = set()
@@ -123,7 +173,7 @@ class Vehicle:
     @property
     def silent_s(self) -> float | None:
         """Since when nothing was heard of it; None: nothing ever was."""
-        return None if self.heard.at_s is None else self.link.now_s() - self.heard.at_s
+        return None if self.state.at_s is None else self.link.now_s() - self.state.at_s
 
     @property
     def link_state(self) -> LinkState:
@@ -131,15 +181,15 @@ class Vehicle:
         quality = self.link.quality()
         return link_state(self.silent_s, self.lost_after_s, quality.loss if quality else 0.0)
 
-    def state(self) -> VehicleState:
+    def telemetry(self) -> VehicleState:
         """Its telemetry now."""
-        heard, driver = self.heard, self._driver
-        known = driver is not None and heard.custom_mode is not None
+        state, driver = self.state, self._driver
+        known = driver is not None and state.custom_mode is not None
         return vehicle_state(
             self.resource,
             self._clock.now_us(),
-            heard,
-            driver.mode_name(heard.custom_mode or 0) if driver is not None and known else "",
+            state,
+            driver.mode_name(state.custom_mode or 0) if driver is not None and known else "",
             driver.readiness() if driver is not None else None,
             self.link_state,
         )
@@ -194,12 +244,12 @@ class Vehicle:
             )
         self._driver = driver_of(self, found)
         self._streams = Streams(telemetry_streams(found.firmware))
-        self._intake = Intake(self.heard, modes_of(found), flies=flies)
+        self._decoder = TelemetryDecoder(self.state, modes_of(found), flies=flies)
         if circling.circles(found):
-            circling.suppose(self.heard, found)
+            circling.suppose(self.state, found)
             self._go(self._ask_for_radii(found))
         self._hear(message, sender)
-        self._deafen.append(self.link.listen(self._intake.wants, self._hear))
+        self._deafen.append(self.link.listen(self._decoder.wants, self._hear))
 
     def _tell_of_stranger(self, autopilot: int, type_: int) -> None:
         if not self._stranger:
@@ -210,11 +260,11 @@ class Vehicle:
             )  # fmt: skip
 
     def _hear(self, message: Message, sender: Address) -> None:
-        if sender != self.link.address or self._intake is None or self._streams is None:
+        if sender != self.link.address or self._decoder is None or self._streams is None:
             return
-        self._intake.take(message, self.link.now_s())
-        if self.heard.boots != self._boots:
-            self._boots = self.heard.boots
+        self._decoder.take(message, self.link.now_s())
+        if self.state.boots != self._boots:
+            self._boots = self.state.boots
             self._streams.forget()
         if message.TYPE.id == _HEARTBEAT:
             self._ask_for_streams()
@@ -252,8 +302,8 @@ class Vehicle:
         while True:
             silent_s = self.silent_s
             if silent_s is None or silent_s >= self.lost_after_s:
-                before_s = self.heard.at_s
-                await self.until(lambda before_s=before_s: self.heard.at_s != before_s)  # type: ignore[misc]
+                before_s = self.state.at_s
+                await self.until(lambda before_s=before_s: self.state.at_s != before_s)  # type: ignore[misc]
                 continue
             bounds_s = (DEGRADED_SHARE * self.lost_after_s, self.lost_after_s)
             ahead_s = min(bound - silent_s for bound in bounds_s if bound > silent_s)
@@ -267,14 +317,14 @@ class Vehicle:
         assert self._streams is not None
         if self._asking:
             return
-        due = self._streams.due(self.heard.messages_s, self.link.now_s())
+        due = self._streams.due(self.state.messages_s, self.link.now_s())
         now_s = self.link.now_s()
         if due:
             self._asking = True
             self._go(self._ask(self._streams, due))
         elif (
             _HOME in self._streams.refused
-            and self.heard.home is None
+            and self.state.home is None
             and now_s - self._home_asked_s >= HOME_EVERY_S
         ):
             self._home_asked_s, self._asking = now_s, True
@@ -308,7 +358,7 @@ class Vehicle:
     async def _ask_for_radii(self, found: Identity) -> None:
         while True:
             try:
-                await circling.ask(self.heard, found, self.link)
+                await circling.ask(self.state, found, self.link)
             except ExchangeError as error:
                 self._logger.debug("%s: does not tell how it circles: %s", self.resource, error)
                 await self._clock.sleep(RADII_EVERY_S)

@@ -1,0 +1,187 @@
+"""Whether a vehicle is there, stands, or is on its way: by what it says of itself."""
+
+import math
+
+from m2pem.api import LatLon, LocalFrame, distance_m
+from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorContext
+from m2pem_plugin_mavlink.behaviors.wishes import AMSL, RELATIVE
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.exchanges import position_target
+from m2pem_plugin_mavlink.vehicle.state import AutopilotState
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+STANDS_BELOW_M_S = 0.3
+"""Positions of a vehicle that stands drift; a gust moves one that hovers."""
+
+HEIGHT_TOLERANCE_M = 1.0
+CIRCLING_HEIGHT_TOLERANCE_M = 5.0
+"""What circles climbs and sinks on its circle, in every gust."""
+
+NEAR_THE_CIRCLE = 0.25
+"""Of its radius; and so many metres at least:"""
+
+NEAR_THE_CIRCLE_M = 5.0
+
+LOOKS_FOR_S = 4.0
+"""After a restart: a vehicle that is on its way has turned and moves by then."""
+
+SAME_TARGET_M = 2.0
+
+_TOWARDS = math.cos(math.radians(60.0))
+
+
+class StillnessTimer:
+    """For how long a vehicle has stood, as far as anybody has looked."""
+
+    def __init__(self, context: BehaviorContext) -> None:
+        self._job = context
+        self._since_s: float | None = None
+
+    def seconds(self, circled: LatLon | None = None, radius_m: float | None = None) -> float:
+        """Up to now; 0 while it moves. `circled`, `radius_m`: as for `stays`."""
+        now_s = self._job.now_s()
+        if not stays_at(self._job.vehicle, circled, radius_m):
+            self._since_s = None
+            return 0.0
+        if self._since_s is None:
+            self._since_s = now_s
+        return now_s - self._since_s
+
+    def forget(self) -> None:
+        """Count anew."""
+        self._since_s = None
+
+
+def is_still(vehicle: Vehicle) -> bool:
+    """Whether it hardly moves."""
+    return vehicle.state.speed_m_s < STANDS_BELOW_M_S
+
+
+def stays_at(vehicle: Vehicle, at: LatLon | None, radius_m: float | None = None) -> bool:
+    """Whether it hardly moves; what cannot stand still in the air stays at a place when it is on
+    its circle around it, or within. `radius_m`: of that circle, None: the one that it has been set
+    to."""
+    if is_still(vehicle):
+        return True
+    if at is None or not cannot_stop(vehicle):
+        return False
+    return distance_to_m(vehicle, at) <= arrival_radius_m(vehicle, 0.0, radius_m)
+
+
+def cannot_stop(vehicle: Vehicle) -> bool:
+    """Whether it is in the air and cannot stand still there."""
+    return vehicle.state.loiter_radius_m is not None and vehicle.state.landed is not True
+
+
+def circle_tolerance_m(radius_m: float) -> float:
+    """How far off a circle still counts as on it."""
+    return max(NEAR_THE_CIRCLE_M, NEAR_THE_CIRCLE * radius_m)
+
+
+def arrival_radius_m(vehicle: Vehicle, tolerance_m: float, radius_m: float | None = None) -> float:
+    """How near to a place a vehicle is there: within a tolerance, or what circles on its circle."""
+    radius = vehicle.state.loiter_radius_m if radius_m is None else radius_m
+    if radius is None or not cannot_stop(vehicle):
+        return tolerance_m
+    return radius + max(tolerance_m, circle_tolerance_m(radius))
+
+
+def height_tolerance_m(vehicle: Vehicle, tolerance_m: float) -> float:
+    """The same of heights."""
+    return max(tolerance_m, CIRCLING_HEIGHT_TOLERANCE_M) if cannot_stop(vehicle) else tolerance_m
+
+
+def position_of(vehicle: Vehicle) -> LatLon | None:
+    """Its latitude and longitude."""
+    position = vehicle.state.position
+    return (position.latitude_deg, position.longitude_deg) if position is not None else None
+
+
+def distance_to_m(vehicle: Vehicle, place: LatLon) -> float:
+    """How far it is from a place, over ground; infinite while that is not known."""
+    here = position_of(vehicle)
+    return distance_m(place, here) if here is not None else math.inf
+
+
+def height_m(state: AutopilotState, frame: str) -> float | None:
+    """Its height in a frame of altitudes."""
+    if frame == RELATIVE:
+        return state.altitude_above_home_m
+    if frame == AMSL:
+        return state.position.altitude_m if state.position is not None else None
+    return state.altitude_above_terrain_m
+
+
+def height_error_m(vehicle: Vehicle, place: Place) -> float:
+    """How far it is from a place in height; 0 where no height was asked for, or none is known."""
+    if place.altitude_m is None:
+        return 0.0
+    height = height_m(vehicle.state, place.altitude_frame)
+    return abs(height - place.altitude_m) if height is not None else 0.0
+
+
+def on_the_ground(vehicle: Vehicle) -> bool:
+    """Whether it is an aircraft that has not taken off."""
+    return vehicle.domain == "air" and vehicle.state.landed is True
+
+
+def takeoff_required(vehicle: Vehicle) -> str:
+    """Why a motion cannot begin yet; "" if it can."""
+    if on_the_ground(vehicle):
+        return f"{vehicle.resource} stands on the ground: let it take off first (takeoff)"
+    return ""
+
+
+def accepted_modes(behavior: Behavior) -> frozenset[FlightMode]:
+    """The modes in which a behavior goes on. PX4 goes to a place in the mode in which it holds."""
+    modes = behavior.modes
+    if FlightMode.GUIDED in modes and "px4" in behavior.vehicle.driver.name.lower():
+        return modes | {FlightMode.HOLD}
+    return modes
+
+
+def accepts_mode(behavior: Behavior, mode: FlightMode) -> bool:
+    """Whether a vehicle in a mode may be doing what the behavior has told it."""
+    return mode in accepted_modes(behavior)
+
+
+async def moves_towards(vehicle: Vehicle, place: Place) -> bool:
+    """Whether it moves towards a place, or names that as its target; waits a little for the former
+    to be seen."""
+
+    def towards() -> bool:
+        return _towards(vehicle, place)
+
+    return (
+        towards() or await _has_target(vehicle, place) or await vehicle.until(towards, LOOKS_FOR_S)
+    )
+
+
+def _towards(vehicle: Vehicle, place: Place) -> bool:
+    here, velocity = position_of(vehicle), vehicle.state.velocity_enu_m_s
+    if here is None or velocity is None or vehicle.state.speed_m_s < STANDS_BELOW_M_S:
+        return False
+    east, north = LocalFrame(here).to_local((place.latitude_deg, place.longitude_deg))
+    height = height_m(vehicle.state, place.altitude_frame)
+    up = 0.0
+    if place.altitude_m is not None and height is not None:
+        up = place.altitude_m - height
+    ahead = math.hypot(east, north, up)
+    along = (east * velocity[0] + north * velocity[1] + up * velocity[2]) if ahead else 0.0
+    return along > _TOWARDS * ahead * vehicle.state.speed_m_s
+
+
+async def _has_target(vehicle: Vehicle, place: Place) -> bool:
+    """By what its autopilot says when it is asked: a plane may fly away from its target for a while
+    until it has turned. Heights in its answer are above the sea."""
+    try:
+        target = await position_target(vehicle.link)
+    except ExchangeError:
+        return False  # it has no target, or does not say
+    if distance_m((place.latitude_deg, place.longitude_deg), target[:2]) > SAME_TARGET_M:
+        return False
+    height, here = height_m(vehicle.state, place.altitude_frame), vehicle.state.position
+    if place.altitude_m is None or height is None or here is None:
+        return True
+    return abs(target[2] - here.altitude_m - (place.altitude_m - height)) < HEIGHT_TOLERANCE_M

@@ -1,0 +1,228 @@
+"""Going to a place, and standing."""
+
+import math
+from dataclasses import replace
+from typing import ClassVar
+
+from m2pem.api import BehaviorState, LatLon, distance_m
+from m2pem_plugin_mavlink.behaviors.arrival import (
+    HEIGHT_TOLERANCE_M,
+    StillnessTimer,
+    accepts_mode,
+    arrival_radius_m,
+    cannot_stop,
+    distance_to_m,
+    height_error_m,
+    height_tolerance_m,
+    moves_towards,
+    on_the_ground,
+    position_of,
+    stays_at,
+    takeoff_required,
+)
+from m2pem_plugin_mavlink.behaviors.behavior import (
+    MOVES_WITHIN_S,
+    Behavior,
+    BehaviorContext,
+    BehaviorFailedError,
+    CheckpointState,
+)
+from m2pem_plugin_mavlink.behaviors.wishes import Wishes
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+
+TOLERANCES_M = {"air": 2.0, "ground": 2.5, "surface": 5.0, "subsurface": 3.0}
+"""How near is there, if nobody says; what autopilots take for a waypoint's radius."""
+
+NEAREST_M = 0.5
+"""Nearer than this a satellite receiver cannot tell."""
+
+SETTLED_S = 10.0
+"""Who stands for so long near its target considers itself arrived."""
+
+SETTLED_WITHIN_M = 10.0
+TURNED_RAD = math.radians(10.0)
+TURN_S = 10.0
+"""A vehicle at its target has turned by then."""
+
+MOVED_M = 1.0
+"""A target that has moved by so much is told to the vehicle again."""
+
+REPEAT_S = 0.5
+
+
+class Goto(Behavior):
+    """Go to a place, or to where another vehicle is, as long as it takes."""
+
+    name = "goto"
+    modes = frozenset({FlightMode.GUIDED})
+    max_still_s: ClassVar[float | None] = MOVES_WITHIN_S
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        self.wishes = Wishes(context)
+        self._place: Place | None = None
+        self._stillness = StillnessTimer(context)
+        tolerance = self.wishes.number("tolerance")
+        self._said = tolerance is not None
+        usual_m = TOLERANCES_M.get(self.vehicle.domain, 2.5)
+        self._tolerance_m = usual_m if tolerance is None else max(tolerance, NEAREST_M)
+
+    def target(self) -> Place:
+        """Where to go now."""
+        return replace(self.wishes.target(), heading_rad=self.wishes.number("heading"))
+
+    def refusal(self) -> str:
+        """What flies must be in the air, and the way within the fence."""
+        if reason := takeoff_required(self.vehicle):
+            return reason
+        return "" if self.wishes.target_is_unheard else self._breach(self.target())
+
+    def _breach(self, place: Place) -> str:
+        if self.context.fence is None:
+            return ""
+        way = [(place.latitude_deg, place.longitude_deg)]
+        return self.context.fence.breach(way, position_of(self.vehicle), lambda _: "the target")
+
+    async def begin(self) -> None:
+        """Send it there."""
+        self._stillness.forget()
+        if self.wishes.target_is_unheard:
+            await self.wishes.hear_target()
+            if reason := self._breach(self.target()):
+                raise BehaviorFailedError(reason)
+        self._place = self.target()
+        await self.vehicle.driver.go_to(self._place, self.wishes.speed_m_s)
+
+    async def resume(self) -> None:
+        """Send it there again."""
+        await self.begin()
+
+    def adjust(self, speed_m_s: float) -> bool:
+        """It can."""
+        self.wishes.adjusted_m_s = speed_m_s
+        return True
+
+    async def run_in_background(self) -> None:
+        """Go after a target that moves."""
+        while self.wishes.target_vehicle is not None:
+            await self.vehicle.sleep(REPEAT_S)
+            new, old = self.target(), self._place
+            at = (new.latitude_deg, new.longitude_deg)
+            if old is None or _apart_m(new, old) > MOVED_M:
+                if self.context.fence is not None and self.context.fence.outside_m(at) > 0:
+                    await self.vehicle.driver.stop()
+                    raise BehaviorFailedError(
+                        f"{self.wishes.target_vehicle} has left the fleet's fence"
+                    )
+                self._place = new
+                await self.vehicle.driver.go_to(new, self.wishes.speed_m_s)
+
+    def finished(self) -> bool:
+        """Within the tolerance and turned; or it stands, as near as its autopilot goes. What cannot
+        stand still is there when it circles the place.
+
+        Raises:
+            BehaviorFailedError: it stands outside of a tolerance that was asked for.
+        """
+        place = self._place or self.target()
+        away = distance_to_m(self.vehicle, (place.latitude_deg, place.longitude_deg))
+        height_m = height_tolerance_m(self.vehicle, max(self._tolerance_m, HEIGHT_TOLERANCE_M))
+        high = height_error_m(self.vehicle, place) <= height_m
+        if away <= arrival_radius_m(self.vehicle, self._tolerance_m) and high:
+            return self._turned(place)
+        if self._stillness.seconds() < SETTLED_S or away > SETTLED_WITHIN_M or not high:
+            return False
+        if self._said:
+            raise BehaviorFailedError(
+                f"it stands {away:.1f} m from its target, and tolerance is {self._tolerance_m:g} m:"
+                " its autopilot takes that for there"
+            )
+        return True
+
+    def _turned(self, place: Place) -> bool:
+        yaw = self.vehicle.state.yaw_rad
+        if place.heading_rad is None or self.vehicle.domain != "air" or yaw is None:
+            return True
+        if cannot_stop(self.vehicle):
+            return True
+        off = math.remainder(math.pi / 2 - place.heading_rad - yaw, math.tau)
+        return abs(off) <= TURNED_RAD or self._stillness.seconds() >= TURN_S
+
+    async def reattach(self) -> BehaviorState:
+        """By its place, and whether it moves towards the target."""
+        self._place = place = self.target()
+        if not accepts_mode(self, self.vehicle.state.mode):
+            return BehaviorState.UNKNOWN
+        if self.finished():
+            return BehaviorState.SUCCEEDED
+        if await moves_towards(self.vehicle, place):
+            return BehaviorState.RUNNING
+        return BehaviorState.SUCCEEDED if self.finished() else BehaviorState.UNKNOWN
+
+
+def _apart_m(a: Place, b: Place) -> float:
+    return distance_m((a.latitude_deg, a.longitude_deg), (b.latitude_deg, b.longitude_deg))
+
+
+class Hold(Behavior):
+    """Stand for a time, or until it stands; what cannot, circles where it was."""
+
+    name = "hold"
+    modes = frozenset({FlightMode.HOLD})
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        self._left_s = Wishes(context).number("duration") or 0.0
+        self._since_s: float | None = None
+        self._at: LatLon | None = None
+
+    async def begin(self) -> None:
+        """Stop it; what is not armed stands."""
+        self._at = position_of(self.vehicle)
+        if on_the_ground(self.vehicle) or self.vehicle.state.armed is False:
+            self.modes = frozenset(FlightMode)  # it stands already, in whatever mode
+        else:
+            await self.vehicle.driver.stop()
+        self._since_s = self.context.now_s()
+
+    def paused(self) -> None:
+        """A pause does not count in the duration."""
+        if self._since_s is not None:
+            self._left_s -= self.context.now_s() - self._since_s
+            self._since_s = None
+
+    async def resume(self) -> None:
+        """For as long as is left."""
+        await self.begin()
+
+    def finished(self) -> bool:
+        """Standing, and the time is over."""
+        now_s = self.context.now_s()
+        over = self._since_s is not None and now_s - self._since_s >= self._left_s
+        return over and stays_at(self.vehicle, self._at)
+
+    async def reattach(self) -> BehaviorState:
+        """By its mode."""
+        if self.vehicle.state.armed and not accepts_mode(self, self.vehicle.state.mode):
+            return BehaviorState.UNKNOWN
+        self._at = position_of(self.vehicle)
+        self._since_s = self.context.now_s()
+        if self.vehicle.state.armed is False:
+            self.modes = frozenset(FlightMode)
+        return BehaviorState.SUCCEEDED if self.finished() else BehaviorState.RUNNING
+
+    def checkpoint(self) -> CheckpointState:
+        """When it ends."""
+        return {"until_s": self.context.now_s() + self._left_s}
+
+    def restore(self, checkpoint: CheckpointState) -> None:
+        """How long is left."""
+        until_s = checkpoint.get("until_s")
+        if isinstance(until_s, int | float):
+            self._left_s = max(0.0, until_s - self.context.now_s())
+
+
+class DriveStop(Hold):
+    """Stop."""
+
+    name = "drive_stop"

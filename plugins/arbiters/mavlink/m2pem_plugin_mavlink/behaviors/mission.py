@@ -1,0 +1,373 @@
+"""Behaviors that fly or drive a stored mission: routes, surveys, missions that are on board."""
+
+import math
+import zlib
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import BehaviorState, LatLon, LocalFrame, lawn_mower, longest_edge_yaw
+from m2pem_plugin_mavlink.behaviors.arrival import (
+    StillnessTimer,
+    arrival_radius_m,
+    distance_to_m,
+    position_of,
+    takeoff_required,
+)
+from m2pem_plugin_mavlink.behaviors.behavior import (
+    MOVES_WITHIN_S,
+    Behavior,
+    BehaviorContext,
+    BehaviorFailedError,
+    CheckpointState,
+)
+from m2pem_plugin_mavlink.behaviors.goto import TOLERANCES_M
+from m2pem_plugin_mavlink.behaviors.wishes import AMSL, RELATIVE, TERRAIN, Wishes
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode
+from m2pem_plugin_mavlink.vehicle.fixed_wing import without_landing
+
+_LAST_NAVIGATION_COMMAND: int = dialect.MAV_CMD_NAV_LAST
+_SAME_FRAMES = {5: 0, 6: 3, 11: 10}
+"""The frames with integer coordinates, by those without; autopilots send back either."""
+
+_HEIGHT_STEP_M = 0.02
+"""Autopilots keep altitudes in centimetres, or as short floats."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fingerprint:
+    """Of the items that have a place: how many there are, where, and how high in all."""
+
+    count: int
+    places: int
+    height_m: float
+
+    def fits(self, other: "Fingerprint") -> bool:
+        """Whether they are of the same mission, but for what storing it changes."""
+        off_m = abs(self.height_m - other.height_m)
+        same = (self.count, self.places) == (other.count, other.places)
+        return same and off_m <= _HEIGHT_STEP_M * max(1, self.count) + 1e-6 * abs(self.height_m)
+
+
+def fingerprint(items: Sequence[MissionItem]) -> Fingerprint:
+    """The fingerprint of a mission."""
+    placed = [item for item in items if is_navigation(item)]
+    lines = "\n".join(
+        f"{item.command} {_SAME_FRAMES.get(item.frame, item.frame)}"
+        f" {round(item.latitude_deg * 1e7)} {round(item.longitude_deg * 1e7)}"
+        for item in placed
+    )
+    return Fingerprint(
+        len(placed),
+        zlib.crc32(lines.encode()),
+        sum(item.altitude_m for item in placed),
+    )
+
+
+def is_navigation(item: MissionItem) -> bool:
+    """Whether the vehicle moves for it, and says that it was reached."""
+    return item.command <= _LAST_NAVIGATION_COMMAND
+
+
+FRAMES = {
+    RELATIVE: dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    AMSL: dialect.MAV_FRAME_GLOBAL,
+    TERRAIN: dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+}
+GROUND_SPEED = 1.0
+AS_IT_IS = -1.0
+
+STANDS_AT_END_S = 2.0
+"""The message that the last item was reached comes once, and may be lost."""
+
+
+def waypoint(place: LatLon, altitude_m: float, frame: str) -> MissionItem:
+    """Go there, and on."""
+    nan = float("nan")
+    return MissionItem(
+        dialect.MAV_CMD_NAV_WAYPOINT, FRAMES[frame], (0.0, 0.0, 0.0, nan), *place, altitude_m
+    )
+
+
+def circle_for_ever(last: MissionItem) -> MissionItem:
+    """Stay at the place of another item, for what cannot stand still there: an ArduPlane would go
+    home at the end of its mission, and go on into a landing that stands behind it."""
+    return replace(last, command=dialect.MAV_CMD_NAV_LOITER_UNLIM)
+
+
+def speed_item(speed_m_s: float) -> MissionItem:
+    """From here on, so fast over ground."""
+    params = (GROUND_SPEED, speed_m_s, AS_IT_IS, 0.0)
+    return MissionItem(dialect.MAV_CMD_DO_CHANGE_SPEED, dialect.MAV_FRAME_MISSION, params)
+
+
+class MissionFlight(Behavior):
+    """Uploads a way and has it flown; `loop`: over and over. A subclass says the `items`."""
+
+    modes = frozenset({FlightMode.MISSION})
+    max_still_s = MOVES_WITHIN_S
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        self.wishes = Wishes(context)
+        self.loop = False
+        self._items: tuple[MissionItem, ...] | None = None
+        self._kept: Fingerprint | None = None
+        self._end: tuple[int, LatLon] | None = None
+        self._stillness = StillnessTimer(context)
+
+    @abstractmethod
+    def way(self) -> Sequence[MissionItem]:
+        """The waypoints.
+
+        Raises:
+            BehaviorFailedError: there can be none; the reason says why.
+        """
+
+    def named(self, index: int) -> str:
+        """What people call a waypoint."""
+        return f"waypoint {index + 1}"
+
+    @property
+    def items(self) -> tuple[MissionItem, ...]:
+        """What is uploaded: the speed, if one was asked for, then the waypoints; for a plane also
+        a circle at the last of them."""
+        if self._items is None:
+            way = tuple(self.way())
+            speed = self.wishes.speed_m_s
+            items = way if speed is None else (speed_item(speed), *way)
+            last = items[-1]
+            self._end = (len(items) - 1, (last.latitude_deg, last.longitude_deg))
+            circles = self.vehicle.state.loiter_radius_m is not None
+            self._items = (*items, circle_for_ever(last)) if circles else items
+            self._kept = fingerprint(self._items)
+        return self._items
+
+    def refusal(self) -> str:
+        """What flies must be in the air, and the way within the fence; a loop's way back, too."""
+        if reason := takeoff_required(self.vehicle):
+            return reason
+        speeds = 0 if self.wishes.speed_m_s is None else 1
+        items = self.items
+        if self.context.fence is None or self._end is None:
+            return ""
+        way = [(item.latitude_deg, item.longitude_deg) for item in items[speeds : self._end[0] + 1]]
+        start = position_of(self.vehicle)
+        if reason := self.context.fence.breach(way, start, self.named):
+            return reason
+        if not self.loop:
+            return ""
+        last = len(way) - 1
+        return self.context.fence.breach(
+            [way[-1], way[0]], None, lambda index: self.named(0 if index else last)
+        )
+
+    async def begin(self) -> None:
+        """Upload the items and start the mission."""
+        self._stillness.forget()
+        await self.vehicle.driver.upload(self.items)
+        await self.vehicle.driver.start_mission(0)
+
+    async def resume(self) -> None:
+        """From the item that it was moving to."""
+        self._stillness.forget()
+        last = self._end[0] if self._end else 0
+        current = self.vehicle.driver.current_item or 0
+        await self.vehicle.driver.start_mission(min(current, last))
+        if (speed := self.wishes.speed_m_s) is not None:
+            await self.vehicle.driver.set_speed(speed)
+
+    def adjust(self, speed_m_s: float) -> bool:
+        """It can; what was uploaded stays as it is."""
+        self.wishes.adjusted_m_s = speed_m_s
+        return True
+
+    async def run_in_background(self) -> None:
+        """Begin again at the end of a loop."""
+        while self.loop:
+            await self.vehicle.until(self.at_the_end)
+            self._stillness.forget()
+            await self.vehicle.driver.start_mission(0)
+            if self.wishes.adjusted_m_s is not None:  # the mission begins with the speed before
+                await self.vehicle.driver.set_speed(self.wishes.adjusted_m_s)
+            await self.vehicle.until(lambda: not self.at_the_end())
+
+    def at_the_end(self) -> bool:
+        """Whether the last waypoint was reached, by the vehicle's word or its place."""
+        if self._end is None:
+            return False
+        last, place = self._end
+        driver = self.vehicle.driver
+        reached, current = driver.reached_item, driver.current_item
+        if reached is not None and reached >= last:
+            return True
+        if current is None or current < last:
+            return False
+        near_m = 2 * TOLERANCES_M.get(self.vehicle.domain, 2.5)
+        if distance_to_m(self.vehicle, place) > arrival_radius_m(self.vehicle, near_m):
+            return False
+        over = self.vehicle.state.mode is FlightMode.HOLD  # PX4 holds at the end of a mission
+        return over or self._stillness.seconds(place) >= STANDS_AT_END_S
+
+    def finished(self) -> bool:
+        """At the last waypoint; a loop never is."""
+        return not self.loop and self.at_the_end()
+
+    async def reattach(self) -> BehaviorState:
+        """By the mission that it has stored, its mode, its item and its place."""
+        if self._kept is None or self._end is None:
+            return BehaviorState.UNKNOWN
+        stored = await self.vehicle.driver.downloaded()
+        if not fingerprint(without_landing(stored)).fits(self._kept):
+            return BehaviorState.UNKNOWN
+        if self.finished() or await self._stands_at_the_end():
+            return BehaviorState.SUCCEEDED
+        flies = self.vehicle.state.mode is FlightMode.MISSION and self.vehicle.state.armed
+        return BehaviorState.RUNNING if flies else BehaviorState.UNKNOWN
+
+    async def _stands_at_the_end(self) -> bool:
+        current = self.vehicle.driver.current_item
+        if self.loop or self._end is None or current is None or current < self._end[0]:
+            return False
+        return await self.vehicle.until(self.at_the_end, STANDS_AT_END_S + 0.5)
+
+    def checkpoint(self) -> CheckpointState:
+        """The mission's fingerprint, its last item and where that is."""
+        if not self.items or self._kept is None or self._end is None:
+            raise BehaviorFailedError("there is no way to move")
+        last, place = self._end
+        kept = self._kept
+        return {
+            "mission": [float(kept.count), float(kept.places), round(kept.height_m, 3)],
+            "end": [float(last), *place],
+        }
+
+    def restore(self, checkpoint: CheckpointState) -> None:
+        """The same."""
+        mission, end = checkpoint.get("mission"), checkpoint.get("end")
+        if isinstance(mission, list) and isinstance(end, list):
+            self._kept = Fingerprint(int(mission[0]), int(mission[1]), mission[2])
+            self._end = (int(end[0]), (end[1], end[2]))
+
+
+class Routing(MissionFlight):
+    """Fly or drive a route from its first waypoint to its last, or over and over."""
+
+    name = "single_vehicle_routing"
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        self.loop = self.wishes.flag("loop")
+
+    def way(self) -> Sequence[MissionItem]:
+        """The waypoints of the route."""
+        route = self.wishes.route
+        if route is None or not route.waypoints:
+            raise BehaviorFailedError("parameter 'route': it has no waypoints")
+        return [
+            waypoint((latitude, longitude), *self.wishes.altitude_to_fly(own, route.altitude_frame))
+            for latitude, longitude, own in route.waypoints
+        ]
+
+    def named(self, index: int) -> str:
+        """By its number, from 1."""
+        return f"waypoint {index + 1} of the route"
+
+
+SPACING_M = 20.0
+
+
+class Survey(MissionFlight):
+    """The passes of a lawn-mower, begun at the nearer of their two ends."""
+
+    name = "area_survey"
+
+    def way(self) -> Sequence[MissionItem]:
+        """The ends of the passes."""
+        area = self.wishes.area
+        if area is None:
+            raise BehaviorFailedError("parameter 'area': there is none")
+        frame = LocalFrame(area.rings[0][0][:2])
+        rings = [[frame.to_local(corner[:2]) for corner in ring] for ring in area.rings]
+        heading = self.wishes.number("heading")
+        yaw = longest_edge_yaw(rings[0]) if heading is None else math.pi / 2 - heading
+        try:
+            points = lawn_mower(
+                rings,
+                self.wishes.number("spacing") or SPACING_M,
+                yaw,
+                self.wishes.number("overshoot") or 0.0,
+            )
+        except ValueError as error:
+            raise BehaviorFailedError(f"parameter 'spacing': {error}") from None
+        places = [frame.to_latlon(point) for point in points]
+        if distance_to_m(self.vehicle, places[-1]) < distance_to_m(self.vehicle, places[0]):
+            places.reverse()
+        height = self.wishes.altitude_to_fly(area.rings[0][0][2], area.altitude_frame)
+        return [waypoint(place, *height) for place in places]
+
+    def named(self, index: int) -> str:
+        """By the number of its pass, from 1."""
+        return f"{'end' if index % 2 else 'begin'} of pass {index // 2 + 1} of the survey"
+
+
+class RunOnboardMission(Behavior):
+    """Carry it out from an item on; done when its last waypoint was reached, or it has landed."""
+
+    name = "run_onboard_mission"
+    modes = frozenset({FlightMode.MISSION})
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        self._first = int(Wishes(context).number("first") or 0)
+        self._last: int | None = None
+        self._flew = False
+
+    async def begin(self) -> None:
+        """Look at what is stored, and start it."""
+        items = await self.vehicle.driver.downloaded()
+        if not items:
+            raise BehaviorFailedError("it has no mission stored")
+        if self._first >= len(items):
+            raise BehaviorFailedError(
+                f"parameter 'first': there is no item {self._first}; its mission has {len(items)}"
+            )
+        self._see(items)
+        await self.vehicle.driver.start_mission(self._first)
+
+    async def resume(self) -> None:
+        """From the item that it was moving to."""
+        await self.vehicle.driver.start_mission(self.vehicle.driver.current_item or self._first)
+
+    def finished(self) -> bool:
+        """At the last waypoint, or down and disarmed after having flown."""
+        state = self.vehicle.state
+        self._flew = self._flew or state.landed is False
+        reached = self.vehicle.driver.reached_item
+        if self._last is not None and reached is not None and reached >= self._last:
+            return True
+        return self._flew and state.landed is True and state.armed is False
+
+    def _see(self, items: tuple[MissionItem, ...]) -> None:
+        moves = [index for index, item in enumerate(items) if is_navigation(item)]
+        if not moves:
+            raise BehaviorFailedError("the mission that it has stored has no waypoint")
+        self._last = moves[-1]
+        if self.context.fence is not None:
+            placed = [items[i] for i in moves if items[i].latitude_deg or items[i].longitude_deg]
+            way = [(item.latitude_deg, item.longitude_deg) for item in placed]
+            if reason := self.context.fence.breach(way):
+                raise BehaviorFailedError(reason)
+
+    async def reattach(self) -> BehaviorState:
+        """By its mode."""
+        if self.vehicle.state.mode is not FlightMode.MISSION or not self.vehicle.state.armed:
+            return BehaviorState.UNKNOWN
+        items = await self.vehicle.driver.downloaded()
+        if not items:
+            return BehaviorState.UNKNOWN
+        self._see(items)
+        return BehaviorState.SUCCEEDED if self.finished() else BehaviorState.RUNNING

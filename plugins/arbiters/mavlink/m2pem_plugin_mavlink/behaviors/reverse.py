@@ -1,0 +1,126 @@
+"""Backwards."""
+
+import math
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import BehaviorState, LatLon, offset
+from m2pem_plugin_mavlink.behaviors.arrival import distance_to_m, is_still, position_of
+from m2pem_plugin_mavlink.behaviors.behavior import (
+    MOVES_WITHIN_S,
+    Behavior,
+    BehaviorContext,
+    BehaviorFailedError,
+    CheckpointState,
+)
+from m2pem_plugin_mavlink.behaviors.wishes import Wishes
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+
+SPEED_M_S = 1.0
+BEYOND_M = 5.0
+"""Autopilots stop some way before the place that they were told: it lies so far beyond."""
+
+STOPPING_S = 0.25
+LOOK_EVERY_S = 0.1
+
+
+class Reverse(Behavior):
+    """Drive backwards over a distance, then stand: by DO_SET_REVERSE, and a place behind."""
+
+    name = "reverse"
+    modes = frozenset({FlightMode.GUIDED, FlightMode.HOLD})
+    max_still_s = MOVES_WITHIN_S
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        wishes = Wishes(context)
+        distance = wishes.number("distance")
+        self._distance_m = 5.0 if distance is None else distance
+        self._speed_m_s = wishes.speed_m_s or SPEED_M_S
+        self._from = position_of(self.vehicle)
+        self._yaw_rad = self.vehicle.state.yaw_rad
+        self._done = False
+
+    def refusal(self) -> str:
+        """It must know where it is and points, and not back out of the fence."""
+        if self._from is None or self._yaw_rad is None:
+            return "where it is, and where its bow points, is not known yet"
+        if self.context.fence is None:
+            return ""
+        way = [self._behind(self._from, self._yaw_rad, self._distance_m)]
+        return self.context.fence.breach(way, self._from, lambda _: "the place behind it")
+
+    def adjust(self, speed_m_s: float) -> bool:
+        """It can."""
+        self._speed_m_s = speed_m_s
+        return True
+
+    async def begin(self) -> None:
+        """Set it to drive backwards, to a place somewhat beyond the distance."""
+        if self._from is None or self._yaw_rad is None:
+            raise BehaviorFailedError("where it is, and where its bow points, is not known")
+        if self._distance_m == 0:
+            self._done = True
+            return
+        driver = self.vehicle.driver
+        await driver.set_mode(FlightMode.GUIDED)  # a change of mode makes it drive forwards again
+        await driver.arm()
+        await driver.command(dialect.MAV_CMD_DO_SET_REVERSE, 1.0)
+        beyond = self._behind(self._from, self._yaw_rad, self._distance_m + BEYOND_M)
+        await driver.go_to(Place(*beyond), self._speed_m_s)
+
+    async def resume(self) -> None:
+        """To the same place as before."""
+        if not self._done:
+            await self.begin()
+
+    async def run_in_background(self) -> None:
+        """Stop it after the distance."""
+        if self._done:
+            return
+        while not self._covered():
+            await self.vehicle.sleep(LOOK_EVERY_S)
+        await self.vehicle.driver.stop()
+        self._done = True
+
+    def finished(self) -> bool:
+        """It was stopped after the distance, and stands."""
+        return self._done and is_still(self.vehicle)
+
+    async def clean_up(self) -> None:
+        """Set it to drive forwards again."""
+        await self.vehicle.driver.command(dialect.MAV_CMD_DO_SET_REVERSE, 0.0)
+
+    def _covered(self) -> bool:
+        if self._from is None:
+            return False
+        speed = self.vehicle.state.speed_m_s
+        rolls_on = STOPPING_S * speed if math.isfinite(speed) else 0.0
+        driven = distance_to_m(self.vehicle, self._from)
+        return math.isfinite(driven) and driven + rolls_on >= self._distance_m
+
+    @staticmethod
+    def _behind(place: LatLon, yaw_rad: float, distance_m: float) -> LatLon:
+        return offset(place, -distance_m * math.cos(yaw_rad), -distance_m * math.sin(yaw_rad))
+
+    async def reattach(self) -> BehaviorState:
+        """By how far it is from where it began."""
+        mode = self.vehicle.state.mode
+        if self._from is None or mode not in self.modes:
+            return BehaviorState.UNKNOWN
+        if self._covered():
+            self._done = mode is FlightMode.HOLD
+            over = self._done and is_still(self.vehicle)
+            return BehaviorState.SUCCEEDED if over else BehaviorState.RUNNING
+        moves = mode is FlightMode.GUIDED and not is_still(self.vehicle)
+        return BehaviorState.RUNNING if moves else BehaviorState.UNKNOWN
+
+    def checkpoint(self) -> CheckpointState:
+        """Where it began, and where its bow pointed."""
+        return {"from": list(self._from or ()), "yaw": self._yaw_rad}
+
+    def restore(self, checkpoint: CheckpointState) -> None:
+        """The same."""
+        began, yaw = checkpoint.get("from"), checkpoint.get("yaw")
+        if isinstance(began, list) and len(began) == 2 and isinstance(yaw, int | float):
+            self._from, self._yaw_rad = (began[0], began[1]), float(yaw)

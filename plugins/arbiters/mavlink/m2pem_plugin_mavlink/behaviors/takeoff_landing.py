@@ -1,0 +1,357 @@
+"""Up, down and home."""
+
+import contextlib
+import math
+from collections.abc import Sequence
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import BehaviorState, LatLon
+from m2pem_plugin_mavlink.behaviors.arrival import (
+    StillnessTimer,
+    accepts_mode,
+    arrival_radius_m,
+    distance_to_m,
+    height_m,
+    height_tolerance_m,
+    is_still,
+    moves_towards,
+    on_the_ground,
+    position_of,
+    takeoff_required,
+)
+from m2pem_plugin_mavlink.behaviors.behavior import (
+    ANY_MODE,
+    MOVES_WITHIN_S,
+    Behavior,
+    BehaviorContext,
+    BehaviorFailedError,
+)
+from m2pem_plugin_mavlink.behaviors.goto import TOLERANCES_M
+from m2pem_plugin_mavlink.behaviors.wishes import AMSL, Wishes
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedError
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_begins
+from m2pem_plugin_mavlink.vehicle.readiness import TEXTS_WITHIN_S
+
+_RETURNS = frozenset({FlightMode.RETURN})
+TAKEOFFS = (dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_VTOL_TAKEOFF)
+LEAST_TAKEOFF_M = 0.5
+LEVEL_M_S = 0.5
+"""Climbing or sinking by less is hovering."""
+
+DISARMS_WITHIN_S = 10.0
+"""An autopilot disarms by itself so soon after landing; one that doesn't is told to."""
+
+LANDS_WITHIN_M = 15.0
+"""An aircraft that returns lands so near to its home, or to a rally point."""
+
+HOVERS_AT_HOME_S = 30.0
+"""An aircraft that is set up not to land at home hovers there; before landing it waits a little."""
+
+
+class ChangeAltitude(Behavior):
+    """Climb or sink to a height, over where it is."""
+
+    name = "change_altitude"
+    modes = frozenset({FlightMode.GUIDED})
+    max_still_s = MOVES_WITHIN_S
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        wishes = Wishes(context)
+        altitude, self._frame = wishes.altitude()
+        self._altitude_m = altitude or 0.0
+
+    def refusal(self) -> str:
+        """It must fly, and know where."""
+        if reason := takeoff_required(self.vehicle):
+            return reason
+        return "" if position_of(self.vehicle) else "its position is not known yet"
+
+    async def begin(self) -> None:
+        """Send it to the height, over where it is."""
+        here = position_of(self.vehicle)
+        if here is None:
+            raise BehaviorFailedError("its position is not known")
+        await self.vehicle.driver.go_to(Place(*here, self._altitude_m, self._frame))
+
+    async def resume(self) -> None:
+        """The same, over where it is by now."""
+        await self.begin()
+
+    def finished(self) -> bool:
+        """At the height, and neither climbing nor sinking."""
+        height = height_m(self.vehicle.state, self._frame)
+        if height is None:
+            raise BehaviorFailedError(f"its height above {self._frame} is not known")
+        near_m = min(1.0, max(0.3, 0.1 * abs(self._altitude_m)))
+        near_m = height_tolerance_m(self.vehicle, near_m)
+        return abs(height - self._altitude_m) <= near_m and self._is_level()
+
+    def _is_level(self) -> bool:
+        velocity = self.vehicle.state.velocity_enu_m_s
+        return velocity is None or abs(velocity[2]) < LEVEL_M_S
+
+    async def reattach(self) -> BehaviorState:
+        """By its height, and whether it climbs or sinks towards the one asked for."""
+        if not accepts_mode(self, self.vehicle.state.mode):
+            return BehaviorState.UNKNOWN
+        here = position_of(self.vehicle)
+        if self.finished():
+            return BehaviorState.SUCCEEDED
+        if here and await moves_towards(self.vehicle, Place(*here, self._altitude_m, self._frame)):
+            return BehaviorState.RUNNING
+        return BehaviorState.SUCCEEDED if self.finished() else BehaviorState.UNKNOWN
+
+
+class Takeoff(ChangeAltitude):
+    """Take off and climb; one that flies already only climbs. Planes take off by a mission."""
+
+    name = "takeoff"
+    modes = frozenset({FlightMode.GUIDED, FlightMode.TAKEOFF})
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        if self.vehicle.state.loiter_radius_m is not None:
+            self.modes |= {FlightMode.MISSION}
+
+    def refusal(self) -> str:
+        """The height must be above its home."""
+        altitude_m = self._above_home_m()
+        if altitude_m is None:
+            return "the height of its home is not known yet: say a relative altitude"
+        if altitude_m < LEAST_TAKEOFF_M:
+            return (
+                f"parameter 'altitude': {self._altitude_m:g} m {self._frame} is {altitude_m:g} m "
+                f"above its home; at least {LEAST_TAKEOFF_M:g} m are needed"
+            )
+        return ""
+
+    async def begin(self) -> None:
+        """Arm it and have it take off; one that flies only climbs."""
+        altitude_m = self._above_home_m()
+        if self.vehicle.state.landed is False and self.vehicle.state.armed:
+            await super().begin()
+        elif altitude_m is not None:
+            await self.vehicle.driver.take_off(altitude_m)
+
+    def finished(self) -> bool:
+        """Up there, and no longer climbing."""
+        if self.vehicle.state.landed is True:
+            return False
+        height = self.vehicle.state.altitude_above_home_m
+        wished = self._above_home_m()
+        if height is None or wished is None:
+            return False
+        near_m = height_tolerance_m(self.vehicle, min(1.0, max(0.3, 0.1 * wished)))
+        return height >= wished - near_m and self._is_level()
+
+    def _above_home_m(self) -> float | None:
+        state = self.vehicle.state
+        if self._frame != AMSL:
+            return self._altitude_m  # the ground below home is home's height
+        if state.home is not None:
+            return self._altitude_m - state.home.altitude_m
+        if state.position is None or state.altitude_above_home_m is None:
+            return None
+        return self._altitude_m - state.position.altitude_m + state.altitude_above_home_m
+
+    async def reattach(self) -> BehaviorState:
+        """As for a change of altitude; or it is in a mode for takeoffs, or flies a mission that
+        is one."""
+        state = await super().reattach()
+        if state is not BehaviorState.UNKNOWN or not self.vehicle.state.armed:
+            return state
+        mode = self.vehicle.state.mode
+        climbs = mode is FlightMode.TAKEOFF or (
+            mode is FlightMode.MISSION
+            and accepts_mode(self, mode)
+            and await self._has_its_mission()
+        )
+        return BehaviorState.RUNNING if climbs else state
+
+    async def _has_its_mission(self) -> bool:
+        mission, wished = await self.vehicle.driver.downloaded(), self._above_home_m()
+        if not mission or wished is None or mission[0].command not in TAKEOFFS:
+            return False
+        return abs(mission[0].altitude_m - wished) < LEAST_TAKEOFF_M
+
+
+class Land(Behavior):
+    """Land where it is; a plane by the landing of its mission."""
+
+    name = "land"
+    modes = frozenset({FlightMode.LAND})
+    max_still_s = MOVES_WITHIN_S
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        if self.vehicle.state.loiter_radius_m is not None:
+            self.modes |= {FlightMode.MISSION}
+
+    async def begin(self) -> None:
+        """Unless it has landed already."""
+        if not self._down():
+            await self.vehicle.driver.land()
+
+    async def resume(self) -> None:
+        """Land where it is by now."""
+        await self.begin()
+
+    async def run_in_background(self) -> None:
+        """Disarm an aircraft that has landed and does not do that itself."""
+        await disarm_after_landing(self)
+
+    def finished(self) -> bool:
+        """On the ground and disarmed."""
+        return self._down()
+
+    def _down(self) -> bool:
+        return self.vehicle.state.landed is True and self.vehicle.state.armed is False
+
+    async def reattach(self) -> BehaviorState:
+        """By its mode, or because it is down; a mission must have come to its landing."""
+        if self._down():
+            return BehaviorState.SUCCEEDED
+        mode = self.vehicle.state.mode
+        lands = accepts_mode(self, mode)
+        if lands and mode is FlightMode.MISSION:
+            begins = landing_begins(await self.vehicle.driver.downloaded())
+            lands = begins is not None and (self.vehicle.driver.current_item or 0) >= begins
+        return BehaviorState.RUNNING if lands else BehaviorState.UNKNOWN
+
+
+async def disarm_after_landing(behavior: Behavior) -> None:
+    """Wait for a landing, and for the autopilot to disarm; if it does not, disarm."""
+    vehicle = behavior.vehicle
+    await vehicle.until(lambda: vehicle.state.landed is True)
+    if not await vehicle.until(lambda: vehicle.state.armed is False, DISARMS_WITHIN_S):
+        await vehicle.driver.disarm()
+
+
+class ReturnToLaunch(Behavior):
+    """Go home; an aircraft lands there, unless it is set up to hover or circle."""
+
+    name = "return_to_launch"
+    modes = _RETURNS | {FlightMode.LAND}
+    max_still_s = 2 * MOVES_WITHIN_S  # it may wait above its home for a minute (RTL_LOIT_TIME)
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        self._near_m = 2 * TOLERANCES_M.get(self.vehicle.domain, 2.5)
+        self._stillness = StillnessTimer(context)
+        self._rally: Sequence[LatLon] = ()
+
+    def refusal(self) -> str:
+        """What stands on the ground away from home must take off first."""
+        if on_the_ground(self.vehicle) and self._home_m() > self._near_m:
+            return takeoff_required(self.vehicle)
+        return ""
+
+    async def begin(self) -> None:
+        """Unless it is at home already."""
+        self._stillness.forget()
+        if self._is_there_already():
+            self.modes = ANY_MODE
+            return
+        await self.vehicle.driver.return_home()
+
+    async def resume(self) -> None:
+        """The same."""
+        await self.begin()
+
+    async def run_in_background(self) -> None:
+        """As `Land`; before, find out where else than at home it may land."""
+        if self.vehicle.domain == "air" and self.modes is not ANY_MODE:
+            with contextlib.suppress(ExchangeError):  # most have no rally points
+                self._rally = await self.vehicle.driver.rally_points()
+            await disarm_after_landing(self)
+
+    def _off_m(self) -> float:
+        """How far it is from where it should land; 0 where that is not known, or the landing is one
+        of its own (a plane's, which may begin anywhere)."""
+        if self.vehicle.state.loiter_radius_m is not None or position_of(self.vehicle) is None:
+            return 0.0
+        return min(
+            self._home_m(), *(distance_to_m(self.vehicle, each) for each in self._rally), math.inf
+        )
+
+    def _home_m(self) -> float:
+        home = self.vehicle.state.home
+        if home is None:
+            return 0.0
+        return distance_to_m(self.vehicle, (home.latitude_deg, home.longitude_deg))
+
+    def _is_there_already(self) -> bool:
+        state = self.vehicle.state
+        if self.vehicle.domain == "air":
+            return state.landed is True and state.armed is False
+        return state.home is not None and self._home_m() <= self._near_m and is_still(self.vehicle)
+
+    def finished(self) -> bool:
+        """At home: an aircraft down and disarmed (or hovering, or circling, for long), others
+        standing.
+
+        Raises:
+            BehaviorFailedError: an aircraft stands somewhere else.
+        """
+        air = self.vehicle.domain == "air" and self.modes is not ANY_MODE
+        if air:
+            # A LAND far from there is not the end of this return: its battery, or somebody else.
+            lands = self._off_m() <= LANDS_WITHIN_M
+            self.modes = _RETURNS | {FlightMode.LAND} if lands else _RETURNS
+        if self._is_there_already():
+            if air and self._off_m() > LANDS_WITHIN_M:
+                said = "; ".join(self.vehicle.recent_texts(TEXTS_WITHIN_S))
+                reason = f"it stands on the ground, {self._home_m():.0f} m from its home"
+                raise BehaviorFailedError(f"{reason}; it said: {said}" if said else reason)
+            return True
+        home, radius_m = self.vehicle.state.home, self.vehicle.state.home_loiter_radius_m
+        place = (home.latitude_deg, home.longitude_deg) if home is not None else None
+        standing_s = self._stillness.seconds(place, radius_m)
+        if self.vehicle.domain == "air":
+            near_m = arrival_radius_m(self.vehicle, self._near_m, radius_m)
+            at_home = self.vehicle.state.landed is False and self._home_m() <= near_m
+            return at_home and standing_s >= HOVERS_AT_HOME_S
+        return self.vehicle.state.home is None and standing_s >= DISARMS_WITHIN_S
+
+    async def reattach(self) -> BehaviorState:
+        """By its mode, or because it is at home."""
+        if self._is_there_already() and self._home_m() <= self._near_m:
+            return BehaviorState.SUCCEEDED
+        returns = accepts_mode(self, self.vehicle.state.mode)
+        return BehaviorState.RUNNING if returns else BehaviorState.UNKNOWN
+
+
+class SetSpeed(Behavior):
+    """Change the speed of what follows; the arbiter keeps it for the behaviors after this one."""
+
+    name = "set_speed"
+    modes = ANY_MODE
+    moves_vehicle = False
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        self.speed_m_s = Wishes(context).number("speed") or 0.0
+
+    async def begin(self) -> None:
+        """Tell it the speed. A mode in which it goes nowhere may refuse it (BRAKE, HOLD); what
+        follows is told the speed in any case."""
+        try:
+            await self.vehicle.driver.set_speed(self.speed_m_s)
+        except RefusedError as refused:
+            if refused.result != dialect.MAV_RESULT_FAILED:
+                raise
+
+    async def resume(self) -> None:
+        """Tell it again."""
+        await self.begin()
+
+    def finished(self) -> bool:
+        """As soon as the autopilot has accepted."""
+        return True
+
+    async def reattach(self) -> BehaviorState:
+        """No autopilot tells the speed that it was set to."""
+        return BehaviorState.UNKNOWN

@@ -1,1 +1,0 @@
-"""The fence: its shapes (`zones`), and what happens at it (`fence`)."""

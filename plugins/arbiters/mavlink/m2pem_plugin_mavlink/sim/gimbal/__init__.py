@@ -1,1 +1,0 @@
-"""A gimbal: how it moves (`pointing`), and the protocol that moves it (`gimbal`)."""

@@ -1,0 +1,126 @@
+"""Arming and disarming, and what must be well before."""
+
+from collections.abc import Iterator, Mapping
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, CommandHandler, Component
+from m2pem_plugin_mavlink.simulator.messages import Command, Result
+from m2pem_plugin_mavlink.simulator.specification import Kind
+
+FORCE_ARM, FORCE = 2989, 21196
+"""Parameter 2 of MAV_CMD_COMPONENT_ARM_DISARM: do it in spite of everything."""
+COMMANDED = "external command"
+"""A reason to arm or to disarm, as PX4 words it."""
+
+
+class Arming(Component):
+    """Whether motors may turn."""
+
+    def __init__(self, autopilot: AutopilotInterface) -> None:
+        super().__init__(autopilot)
+        self.armed = False
+        self._idle_s = 0.0
+
+    def reasons(self) -> Iterator[str]:
+        """Why it would not arm in its present mode, best first."""
+        mode = self.autopilot.modes.mode
+        if not mode.armable:
+            named = self.autopilot.spec.kind not in (Kind.ROVER, Kind.BOAT)
+            yield f"{mode.name} mode not armable" if named else "Mode not armable"
+        for component in self.autopilot.components:
+            yield from component.refusals()
+
+    def refusals(self) -> Iterator[str]:
+        """What somebody has broken, and what the estimator lacks."""
+        estimator, mode = self.autopilot.estimator, self.autopilot.modes.mode
+        if self.autopilot.injected_faults.arming is not None:
+            yield self.autopilot.injected_faults.arming
+        if not estimator.sensors_well and self.autopilot.firmware.checks_sensors(self.autopilot):
+            yield self.autopilot.firmware.reason_sensors
+        if mode.needs_position and not estimator.ready:
+            firmware = self.autopilot.firmware
+            if estimator.gps_lost and firmware.reason_satellites:
+                yield firmware.reason_satellites
+            else:
+                yield firmware.reason_position if estimator.sensors_well else firmware.reason_home
+
+    @property
+    def healthy(self) -> bool:
+        """Nothing is against arming it (the bit PREARM_CHECK of SYS_STATUS)."""
+        return next(self.reasons(), None) is None
+
+    def arm(self, *, force: bool = False, by: str = COMMANDED) -> bool:
+        """Arm; says why if it will not. To be armed already is well. `by`: the reason."""
+        if self.armed:
+            return True
+        reasons = [] if force else list(self.reasons())
+        if reasons and self.autopilot.firmware.arming_denied:
+            self.autopilot.warn(self.autopilot.firmware.arming_denied)
+        for reason in reasons:
+            self.autopilot.warn(self.autopilot.firmware.arming_text(reason))
+        if reasons:
+            return False
+        self.armed, self._idle_s = True, 0.0
+        self.autopilot.log_event("armed")
+        self.autopilot.home.set_at_arming()
+        self.autopilot.modes.maneuver.begin()
+        self.autopilot.say(self.autopilot.firmware.armed_text.format(by))
+        return True
+
+    def disarm(self, *, force: bool = False, by: str = COMMANDED) -> bool:
+        """Stop the motors; not in flight, unless forced. `by`: the reason."""
+        if not self.armed:
+            return True
+        if not (force or self._may_disarm()):
+            return False
+        self.armed = False
+        self.autopilot.mission.disarmed()
+        self.autopilot.log_event("disarmed")
+        self.autopilot.say(self.autopilot.firmware.disarmed_text.format(by))
+        return True
+
+    def disarm_after_landing(self) -> None:
+        """It is on the ground, and was to land."""
+        if self.armed:
+            self.autopilot.log_event("landed")
+            self.disarm(by="landing")
+
+    def _may_disarm(self) -> bool:
+        return self.autopilot.spec.kind in (Kind.ROVER, Kind.BOAT) or self.autopilot.body.on_ground
+
+    def step(self, dt_s: float) -> None:
+        """What stands on the ground armed is disarmed after a while (DISARM_DELAY)."""
+        autopilot = self.autopilot
+        delay_s = autopilot.tuning.disarm_delay_s
+        flies = autopilot.spec.kind is Kind.COPTER
+        if not (self.armed and flies and autopilot.body.on_ground and delay_s > 0):
+            self._idle_s = 0.0
+            return
+        self._idle_s += dt_s
+        if self._idle_s >= delay_s:
+            self.disarm(by="auto preflight disarming")
+
+    def commands(self) -> Mapping[int, CommandHandler]:
+        """Arm and disarm; ask what is against it."""
+        return {
+            dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._command,
+            dialect.MAV_CMD_RUN_PREARM_CHECKS: self._check,
+        }
+
+    def _command(self, command: Command) -> Result:
+        force = command.param2 in (FORCE, FORCE_ARM)
+        if command.param1 == 1:
+            done = self.arm(force=force)
+        elif command.param1 == 0:
+            done = self.disarm(force=command.param2 == FORCE)
+        else:
+            return Result.UNSUPPORTED
+        return Result.ACCEPTED if done else Result.FAILED
+
+    def _check(self, command: Command) -> Result:
+        if self.armed:
+            return Result.TEMPORARILY_REJECTED
+        for reason in self.reasons():
+            self.autopilot.warn(self.autopilot.firmware.check_text(reason))
+        return Result.ACCEPTED

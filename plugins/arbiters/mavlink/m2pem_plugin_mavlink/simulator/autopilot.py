@@ -1,0 +1,237 @@
+"""What a vehicle carries, whatever its firmware."""
+
+import logging
+from typing import Any, TypeVar
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.simulator.arming import Arming
+from m2pem_plugin_mavlink.simulator.camera import Camera
+from m2pem_plugin_mavlink.simulator.commands import CommandServer, Payload, SystemCommands
+from m2pem_plugin_mavlink.simulator.dynamics import (
+    BodyState,
+    CircleSetpoint,
+    MotionSetpoint,
+    NoThrust,
+    PositionSetpoint,
+    dynamics_of,
+)
+from m2pem_plugin_mavlink.simulator.fence import Fence
+from m2pem_plugin_mavlink.simulator.firmware import Tuning, firmware_of
+from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Point
+from m2pem_plugin_mavlink.simulator.gimbal import Gimbal
+from m2pem_plugin_mavlink.simulator.guided import GuidedSetpoints
+from m2pem_plugin_mavlink.simulator.home import Home
+from m2pem_plugin_mavlink.simulator.identity import Identity
+from m2pem_plugin_mavlink.simulator.interfaces import (
+    Component,
+    EventLog,
+    InjectedFaults,
+    MessageHandler,
+    Parameters,
+)
+from m2pem_plugin_mavlink.simulator.messages import Command, Outgoing, Peer, Result, Sender
+from m2pem_plugin_mavlink.simulator.missions.plan import PlanStore
+from m2pem_plugin_mavlink.simulator.missions.progress import MissionProgress
+from m2pem_plugin_mavlink.simulator.missions.protocol import MissionServer
+from m2pem_plugin_mavlink.simulator.modes import ModeSwitch
+from m2pem_plugin_mavlink.simulator.motion_commands import MotionCommands
+from m2pem_plugin_mavlink.simulator.parameters import ParameterServer
+from m2pem_plugin_mavlink.simulator.reports import Reports, Texts
+from m2pem_plugin_mavlink.simulator.sensors import Battery, Estimator
+from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
+from m2pem_plugin_mavlink.simulator.streams import Streams
+
+
+def equipment_of(spec: VehicleSpec) -> tuple[type[Component], ...]:
+    """Its parts."""
+    gimbal = spec.kind is Kind.COPTER if spec.gimbal is None else spec.gimbal
+    components: list[type[Component]] = [Fence]
+    if gimbal:
+        components.append(Gimbal)
+    if spec.camera:
+        components.append(Camera)
+    return tuple(components)
+
+
+AUTOPILOT_COMPONENT = 1
+REBOOT_S = 2.0
+"""For how long a rebooting autopilot is silent."""
+
+P = TypeVar("P", bound=Component)
+
+logger = logging.getLogger(__name__)
+
+
+class Autopilot:
+    """One vehicle: its body, its firmware and its parts."""
+
+    def __init__(self, spec: VehicleSpec, now_s: float = 0.0, *, step_s: float = 0.02) -> None:
+        self.spec = spec
+        self.firmware = firmware_of(spec)
+        self.now_s = now_s
+        self.step_s = step_s
+        self.frame = LocalFrame(spec.home)
+        self.body = BodyState(yaw_rad=spec.heading_rad)
+        self.dynamics = dynamics_of(spec.kind)
+        self.parameters = Parameters({**self.firmware.parameters(), **spec.parameters})
+        self.plans = PlanStore()
+        self.log = EventLog()
+        self.injected_faults = InjectedFaults()
+        self.outbox: list[Outgoing] = []
+        self.peers: list[Peer] = []
+        self.setpoint: MotionSetpoint = NoThrust()
+        self._silent_until_s = now_s
+        self._boot()
+
+    def _boot(self) -> None:
+        """Make all parts anew; what is in permanent memory (parameters, plans) stays."""
+        self.booted_s = self._silent_until_s
+        self.texts = Texts(self)
+        self.estimator = Estimator(self)
+        self.battery = Battery(self)
+        self.home = Home(self)
+        self.modes = ModeSwitch(self)
+        self.arming = Arming(self)
+        self.guided = GuidedSetpoints(self)
+        self.mission = MissionProgress(self)
+        self.missions = MissionServer(self)
+        self.payload = Payload(self)
+        self.streams = Streams(self)
+        self.components: list[Component] = [
+            self.texts,
+            self.estimator,
+            self.battery,
+            self.home,
+            self.modes,
+            self.arming,
+            self.guided,
+            self.mission,
+            self.missions,
+            self.payload,
+            ParameterServer(self),
+            Identity(self),
+            SystemCommands(self),
+            MotionCommands(self),
+            Reports(self),
+        ]
+        own = (*equipment_of(self.spec), *self.firmware.components())
+        self.components.extend(component(self) for component in own)
+        self._commands = CommandServer(self)
+        self.components += [self._commands, self.streams]
+        self._handlers: dict[tuple[int, str], list[MessageHandler]] = {}
+        for component in self.components:
+            self._commands.handlers.update(component.commands())
+            for id_, maker in component.reports().items():
+                if id_ not in self.firmware.unknown_reports:
+                    self.streams.makers[id_] = maker
+            for name, handler in component.messages().items():
+                self._handlers.setdefault((component.component_id, name), []).append(handler)
+        for peer in self.peers:
+            self.streams.meet(peer)
+        self.modes.start()
+
+    @property
+    def since_boot_s(self) -> float:
+        """Simulated time since it was started."""
+        return self.now_s - self.booted_s
+
+    @property
+    def boot_ms(self) -> int:
+        """The same, as messages have it."""
+        return int(self.since_boot_s * 1000) & 0xFFFFFFFF
+
+    @property
+    def silent(self) -> bool:
+        """It is starting, and neither hears nor speaks."""
+        return self.now_s < self._silent_until_s
+
+    @property
+    def tuning(self) -> Tuning:
+        """How it behaves, as its parameters say now."""
+        return self.firmware.tuning(self.parameters)
+
+    @property
+    def target_point(self) -> Point | None:
+        """Where it is on the way to."""
+        match self.setpoint:
+            case PositionSetpoint(point=point) | CircleSetpoint(center=point):
+                return point
+        return None
+
+    def log_event(self, kind: str, detail: str = "") -> None:
+        """Write into the chronicle."""
+        self.log.log_event(self.now_s, kind, detail)
+
+    @property
+    def position(self) -> Point:
+        """Where it is, from the origin of its frame."""
+        return self.body.point
+
+    def obey(self, command: Command) -> Result:
+        """Do what a command says, whoever sends it."""
+        return self._commands.perform(command)
+
+    def meet(self, peer: Peer) -> None:
+        """There is somebody to talk to. Knowing him already is well."""
+        if peer not in self.peers:
+            self.peers.append(peer)
+            self.streams.meet(peer)
+
+    def component(self, kind: type[P]) -> P:
+        """The part of that type.
+
+        Raises:
+            LookupError: there is none.
+        """
+        for component in self.components:
+            if isinstance(component, kind):
+                return component
+        raise LookupError(kind.__name__)
+
+    def send(self, message: Any, to: Peer | None = None, component: int = 1) -> None:
+        """Put a message into the outbox, for one peer or (None) for all."""
+        self.outbox.append(Outgoing(message, to, component))
+
+    def say(self, text: str, severity: int = dialect.MAV_SEVERITY_INFO) -> None:
+        """Send a STATUSTEXT to all."""
+        self.texts.say(text, severity)
+
+    def warn(self, text: str) -> None:
+        """Say why something is refused or wrong."""
+        self.texts.say(text, dialect.MAV_SEVERITY_CRITICAL)
+
+    def take_outbox(self) -> list[Outgoing]:
+        """What is to be sent; it is yours, and the outbox is empty."""
+        taken, self.outbox = self.outbox, []
+        return taken
+
+    def receive(self, message: Any, sender: Peer, now_s: float) -> None:
+        """A message has come from a peer."""
+        self.meet(sender)
+        if now_s > self.now_s:
+            self.step(now_s)
+        if self.silent or getattr(message, "target_system", 0) not in (0, self.spec.system):
+            return
+        component = getattr(message, "target_component", 0) or AUTOPILOT_COMPONENT
+        origin = Sender(sender, message.get_srcSystem(), message.get_srcComponent())
+        for handler in self._handlers.get((component, message.get_type()), ()):
+            handler(message, origin)
+
+    def step(self, now_s: float) -> None:
+        """Let simulated time pass up to then, in steps that are small enough."""
+        while self.now_s < now_s - 1e-9:
+            dt_s = min(self.step_s, now_s - self.now_s)
+            self.now_s += dt_s
+            if self.silent:
+                continue
+            for component in self.components:
+                component.step(dt_s)
+            self.dynamics.step(self.body, self.setpoint, dt_s)
+
+    def reboot(self) -> None:
+        """Start anew; the vehicle stays where it is."""
+        self.log_event("reboot")
+        self._silent_until_s = self.now_s + REBOOT_S
+        self.setpoint = NoThrust()
+        self._boot()

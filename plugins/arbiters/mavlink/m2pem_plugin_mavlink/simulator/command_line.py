@@ -1,0 +1,253 @@
+"""`m2pem sim mavlink`: simulated vehicles, until Ctrl-C."""
+
+import asyncio
+import difflib
+import math
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from urllib.parse import urlsplit
+
+import click
+
+from m2pem_plugin_mavlink.simulator.faults import FaultError, PlannedFault, parse
+from m2pem_plugin_mavlink.simulator.firmware import FIRMWARES
+from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Location, Point
+from m2pem_plugin_mavlink.simulator.server import Address
+from m2pem_plugin_mavlink.simulator.simulator import Simulator
+from m2pem_plugin_mavlink.simulator.specification import ZURICH, Kind, VehicleSpec
+
+APART_M = 5.0
+"""Vehicles stand in a row, so far from each other."""
+MOST_SYSTEMS = 250
+"""Ground stations have the numbers above."""
+UNITS_S = {"s": 1.0, "ms": 0.001, "min": 60.0, "": 1.0}
+
+
+class UdpAddress(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """A URL such as udp://127.0.0.1:14550."""
+
+    name = "url"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Address:
+        """Host and port."""
+        try:
+            url = urlsplit(str(value))
+            if url.scheme in ("udp", "udpin", "udpout") and url.hostname and url.port:
+                host = "127.0.0.1" if url.hostname == "localhost" else url.hostname
+                return host, url.port
+        except ValueError:
+            pass
+        self.fail(f"{value!r} is not a UDP address such as udp://127.0.0.1:14550", param, ctx)
+
+
+class Place(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """LAT,LON or LAT,LON,ALT."""
+
+    name = "lat,lon,alt"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Location:
+        """WGS-84 in degrees; metres above mean sea level."""
+        if isinstance(value, Location):
+            return value
+        try:
+            latitude, longitude, altitude = (*map(float, str(value).split(",")), 0.0)[:3]
+        except ValueError:
+            self.fail(f"{value!r} is not LAT,LON,ALT, such as 47.39,8.54,488", param, ctx)
+        if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
+            self.fail(f"{value!r} is not on Earth", param, ctx)
+        return Location(latitude, longitude, altitude)
+
+
+class Parameter(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """NAME=VALUE."""
+
+    name = "name=value"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, float]:
+        """The parameter's name and number."""
+        if isinstance(value, tuple):
+            return value
+        name, equals, number = str(value).partition("=")
+        try:
+            if name and equals and math.isfinite(float(number)):
+                return name.strip(), float(number)
+        except ValueError:
+            pass
+        self.fail(f"{value!r} is not NAME=VALUE, such as FS_GCS_ENABLE=1", param, ctx)
+
+
+class Duration(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """Seconds, or with a unit: 6s, 500ms, 1min."""
+
+    name = "duration"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """In seconds."""
+        match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(s|ms|min|)", str(value))
+        if match is None:
+            self.fail(f"{value!r} is not a duration such as 6s", param, ctx)
+        return float(match[1]) * UNITS_S[match[2]]
+
+
+class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """A fault in words, such as 1: cut link at 40 s for 600 s."""
+
+    name = "fault"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> PlannedFault:
+        """When and where it happens."""
+        if isinstance(value, PlannedFault):
+            return value
+        try:
+            return parse(str(value))
+        except FaultError as error:
+            self.fail(str(error), param, ctx)
+
+
+@click.command()
+@click.option("--copters", type=click.IntRange(0), help="[default: 1 if nothing else is asked for]")
+@click.option("--rovers", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--planes", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--boats", type=click.IntRange(0), default=0, show_default=True)
+@click.option(
+    "--speed",
+    type=click.FloatRange(0.1, 100),
+    default=1.0,
+    show_default=True,
+    help="Simulated seconds per second.",
+)
+@click.option(
+    "--to",
+    type=UdpAddress(),
+    default="udp://127.0.0.1:14550",
+    show_default=True,
+    help="The ground station to which all vehicles send.",
+)
+@click.option(
+    "--listen",
+    type=UdpAddress(),
+    help="Wait here to be spoken to instead; each further vehicle has the next port.",
+)
+@click.option(
+    "--home",
+    type=Place(),
+    default=ZURICH,
+    help="Where the first vehicle stands.  [default: Zurich]",
+)
+@click.option(
+    "--ekf",
+    "estimator_s",
+    type=Duration(),
+    default="41s",
+    show_default=True,
+    help="Until vehicles know where they are, in simulated time.",
+)
+@click.option("--first-system", type=click.IntRange(1, MOST_SYSTEMS), default=1, show_default=True)
+@click.option(
+    "--firmware",
+    type=click.Choice(FIRMWARES),
+    default=FIRMWARES[0],
+    show_default=True,
+    help="As which autopilot all vehicles speak.",
+)
+@click.option(
+    "--set",
+    "parameters",
+    type=Parameter(),
+    multiple=True,
+    help="A parameter of all vehicles, such as FS_GCS_ENABLE=1. May be given more than once.",
+)
+@click.option("--camera", is_flag=True, help="All vehicles have a camera (component 100).")
+@click.option("--gimbal", is_flag=True, help="All vehicles have a gimbal, not copters alone.")
+@click.option(
+    "--fault",
+    "faults",
+    type=Fault(),
+    multiple=True,
+    help='What goes wrong, such as "1: cut link at 40 s for 600 s": [VEHICLES:] ACTION '
+    "[at SECONDS s after it was first armed] [for SECONDS s]. May be given more than once.",
+)
+def mavlink(
+    copters: int | None,
+    rovers: int,
+    planes: int,
+    boats: int,
+    speed: float,
+    to: Address,
+    listen: Address | None,
+    home: Location,
+    estimator_s: float,
+    first_system: int,
+    firmware: str,
+    parameters: tuple[tuple[str, float], ...],
+    camera: bool,
+    gimbal: bool,
+    faults: tuple[PlannedFault, ...],
+) -> None:
+    """Simulate MAVLink vehicles over UDP, as ArduPilot or PX4 speaks, until Ctrl-C.
+
+    Example: m2pem sim mavlink --copters 2 --rovers 1 --speed 10
+    """
+    others = [Kind.ROVER] * rovers + [Kind.PLANE] * planes + [Kind.BOAT] * boats
+    if copters is None:
+        copters = 0 if others else 1
+    kinds = [Kind.COPTER] * copters + others
+    if not kinds:
+        raise click.UsageError("no vehicles: say how many, such as --copters 2")
+    if first_system + len(kinds) - 1 > MOST_SYSTEMS:
+        raise click.UsageError(f"system ids go to {MOST_SYSTEMS}: these are too many vehicles")
+    like = VehicleSpec(
+        home=home,
+        estimator_s=estimator_s,
+        firmware=firmware,
+        parameters=dict(parameters),
+        camera=camera,
+        gimbal=True if gimbal else None,
+    )
+    try:
+        specs = list(_specs(kinds, like, first_system))
+        simulator = Simulator(specs, speed=speed, to=None if listen else to, listen=listen)
+        simulator.plan(faults)
+        _check_parameters(simulator, like.parameters)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+    try:
+        asyncio.run(_run(simulator))
+    except OSError as error:
+        raise click.ClickException(f"cannot open a vehicle's UDP socket: {error}") from error
+
+
+def _specs(kinds: list[Kind], like: VehicleSpec, first_system: int) -> Iterator[VehicleSpec]:
+    frame = LocalFrame(like.home)
+    for number, kind in enumerate(kinds):
+        place = frame.to_location(Point(0.0, number * APART_M, 0.0))
+        yield replace(like, kind=kind, system=first_system + number, home=place)
+
+
+def _check_parameters(simulator: Simulator, names: Iterable[str]) -> None:
+    """A name of no vehicle is a mistake; of some of them, not: a rover has less than a copter."""
+    known = {name for vehicle in simulator for name in vehicle.autopilot.firmware.parameters()}
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise ValueError(f"--set {name}: no simulated vehicle has that parameter{hint}")
+
+
+async def _run(simulator: Simulator) -> None:
+    async with simulator as vehicles:
+        for vehicle in vehicles:
+            spec, (host, port) = vehicle.autopilot.spec, vehicle.address
+            click.echo(f"system {spec.system}  {spec.kind:<6}  udp://{host}:{port}")
+        await vehicles.stopped()

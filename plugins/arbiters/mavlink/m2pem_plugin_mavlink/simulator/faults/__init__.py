@@ -1,0 +1,20 @@
+"""Faults on request: bad links, lost satellites, an empty battery, refusals, somebody else's hands.
+
+What happens is the same in every run: chances are drawn from a seed.
+"""
+
+from m2pem_plugin_mavlink.simulator.faults.faults import Direction, Faults
+from m2pem_plugin_mavlink.simulator.faults.grammar import FaultError, PlannedFault, parse
+from m2pem_plugin_mavlink.simulator.faults.link import LinkFaults, Rate, every, share
+
+__all__ = [
+    "Direction",
+    "FaultError",
+    "Faults",
+    "LinkFaults",
+    "PlannedFault",
+    "Rate",
+    "every",
+    "parse",
+    "share",
+]

@@ -1,0 +1,226 @@
+"""Shapes of a fence, made from the items of the plan (MAV_CMD 5001 to 5004)."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Location, Point
+from m2pem_plugin_mavlink.simulator.interfaces import (
+    AutopilotInterface,
+    CommandHandler,
+    Component,
+    FenceRules,
+    ReportMaker,
+)
+from m2pem_plugin_mavlink.simulator.messages import Command, Result
+from m2pem_plugin_mavlink.simulator.missions.plan import FENCE, Item
+from m2pem_plugin_mavlink.simulator.specification import Kind
+
+POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT = 5001, 5002, 5003, 5004
+
+
+@dataclass(frozen=True, slots=True)
+class Polygon:
+    """`keep_in`: it must not be left; else it must not be entered."""
+
+    corners: tuple[Point, ...]
+    keep_in: bool
+
+    def breached(self, point: Point) -> bool:
+        """Whether a point is on the wrong side."""
+        return self.contains(point) != self.keep_in
+
+    def contains(self, point: Point) -> bool:
+        """Whether a point is inside: a ray to the north crosses an odd number of sides."""
+        inside = False
+        last = self.corners[-1]
+        for corner in self.corners:
+            if (corner.east_m > point.east_m) != (last.east_m > point.east_m):
+                component = (point.east_m - corner.east_m) / (last.east_m - corner.east_m)
+                north_m = corner.north_m + component * (last.north_m - corner.north_m)
+                inside ^= point.north_m < north_m
+            last = corner
+        return inside
+
+
+@dataclass(frozen=True, slots=True)
+class CircleSetpoint:
+    """`keep_in`: it must not be left; else it must not be entered."""
+
+    center: Point
+    radius_m: float
+    keep_in: bool
+
+    def breached(self, point: Point) -> bool:
+        """Whether a point is on the wrong side."""
+        return (self.center.distance_m(point) <= self.radius_m) != self.keep_in
+
+
+Zone = Polygon | CircleSetpoint
+
+
+def zones_of(items: Sequence[Item], frame: LocalFrame) -> tuple[Zone, ...]:
+    """The shapes. A polygon that lacks corners (its upload was abandoned) is none."""
+    return tuple(_zones(items, frame))
+
+
+def is_whole(items: Sequence[Item]) -> bool:
+    """Whether every polygon has as many corners as each of them says, three at least."""
+    index = 0
+    while index < len(items):
+        first = items[index]
+        count = 1
+        if first.command in (POLYGON_IN, POLYGON_OUT):
+            count = int(first.param1) if math.isfinite(first.param1) else 0
+            corners = items[index : index + count]
+            said = {(each.command, each.param1) for each in corners}
+            if not len(corners) == count >= 3 or said != {(first.command, first.param1)}:
+                return False
+        index += count
+    return True
+
+
+def _zones(items: Sequence[Item], frame: LocalFrame) -> Iterator[Zone]:
+    index = 0
+    while index < len(items):
+        item = items[index]
+        if item.command in (CIRCLE_IN, CIRCLE_OUT):
+            yield CircleSetpoint(_point(item, frame), item.param1, item.command == CIRCLE_IN)
+        if item.command not in (POLYGON_IN, POLYGON_OUT):
+            index += 1
+            continue
+        count = max(1, int(item.param1)) if math.isfinite(item.param1) else 1
+        corners = items[index : index + count]
+        if len(corners) == count >= 3 and all(each.command == item.command for each in corners):
+            points = tuple(_point(each, frame) for each in corners)
+            yield Polygon(points, item.command == POLYGON_IN)
+        index += count
+
+
+def _point(item: Item, frame: LocalFrame) -> Point:
+    return frame.to_point(
+        Location(item.latitude_deg, item.longitude_deg, frame.origin.altitude_amsl_m)
+    )
+
+
+class Breach(StrEnum):
+    """What was breached, as ArduPilot names it."""
+
+    LOWEST = "Min Alt"
+    HIGHEST = "Max Alt"
+    CIRCLE = "Circle"
+    ZONES = "Polygon"
+
+
+TYPES = {
+    Breach.LOWEST: dialect.FENCE_BREACH_MINALT,
+    Breach.HIGHEST: dialect.FENCE_BREACH_MAXALT,
+    Breach.CIRCLE: dialect.FENCE_BREACH_BOUNDARY,
+    Breach.ZONES: dialect.FENCE_BREACH_BOUNDARY,
+}
+
+
+class Fence(Component):
+    """Watches where the vehicle is. `breach`: what is breached now; `count`: how often."""
+
+    def __init__(self, autopilot: AutopilotInterface) -> None:
+        super().__init__(autopilot)
+        self.breach: Breach | None = None
+        self.count = 0
+        self._breach_ms = 0
+        self._changes = -1
+        self._zones: tuple[Zone, ...] = ()
+
+    @property
+    def rules(self) -> FenceRules:
+        """As the parameters say now."""
+        return self.autopilot.firmware.fence_rules(self.autopilot.parameters)
+
+    @property
+    def zones(self) -> tuple[Zone, ...]:
+        """The uploaded shapes."""
+        plans = self.autopilot.plans
+        if self._changes != plans.changes:
+            self._changes = plans.changes
+            self._zones = zones_of(plans[FENCE], self.autopilot.frame)
+        return self._zones
+
+    def at(self, point: Point, rules: FenceRules) -> Breach | None:
+        """What is breached at a point."""
+        home = self.autopilot.home.point
+        flies = self.autopilot.spec.kind in (Kind.COPTER, Kind.PLANE)
+        up_m = point.up_m - home.up_m
+        if flies and rules.highest_m is not None and up_m > rules.highest_m:
+            return Breach.HIGHEST
+        if rules.radius_m is not None and point.distance_m(home) > rules.radius_m:
+            return Breach.CIRCLE
+        if rules.zones and any(zone.breached(point) for zone in self.zones):
+            return Breach.ZONES
+        in_air = flies and not self.autopilot.body.on_ground
+        if in_air and rules.lowest_m is not None and up_m < rules.lowest_m:
+            return Breach.LOWEST
+        return None
+
+    def step(self, dt_s: float) -> None:
+        """Look where it is; the first moment of a breach counts."""
+        autopilot, rules = self.autopilot, self.rules
+        now = None
+        if rules.enabled and autopilot.arming.armed and autopilot.estimator.ready:
+            now = self.at(autopilot.position, rules)
+        before, self.breach = self.breach, now
+        if now is before:
+            return
+        if now is None:
+            self._send_status()
+            return
+        self.count += 1
+        self._breach_ms = autopilot.boot_ms
+        autopilot.warn(rules.text.format(now))
+        autopilot.log_event("fence", now)
+        self._send_status()
+        if rules.mode is not None:
+            autopilot.modes.switch(rules.mode)
+
+    def forbids(self, point: Point) -> bool:
+        """It does not go beyond the fence."""
+        rules = self.rules
+        return rules.enabled and self.at(point, rules) not in (None, Breach.LOWEST)
+
+    def refusals(self) -> Iterator[str]:
+        """It is not armed beyond the fence."""
+        rules = self.rules
+        if rules.enabled and self.autopilot.estimator.ready:
+            breach = self.at(self.autopilot.position, rules)
+            if breach is not None:
+                yield f"Vehicle breaching {breach} fence"
+
+    def commands(self) -> Mapping[int, CommandHandler]:
+        """DO_FENCE_ENABLE, where a parameter enables the fence."""
+        if "FENCE_ENABLE" not in self.autopilot.parameters:
+            return {}
+        return {dialect.MAV_CMD_DO_FENCE_ENABLE: self._enable}
+
+    def _enable(self, command: Command) -> Result:
+        if command.param1 not in (0, 1):
+            return Result.FAILED
+        self.autopilot.parameters["FENCE_ENABLE"] = command.param1
+        return Result.ACCEPTED
+
+    def reports(self) -> Mapping[int, ReportMaker]:
+        """FENCE_STATUS, while there is a fence."""
+        status = dialect.MAVLINK_MSG_ID_FENCE_STATUS
+        return {status: lambda: self._status() if self.rules.enabled else None}
+
+    def _send_status(self) -> None:
+        if dialect.MAVLINK_MSG_ID_FENCE_STATUS not in self.autopilot.firmware.unknown_reports:
+            self.autopilot.send(self._status())
+
+    def _status(self) -> Any:
+        kind = dialect.FENCE_BREACH_NONE if self.breach is None else TYPES[self.breach]
+        return dialect.MAVLink_fence_status_message(
+            int(self.breach is not None), min(self.count, 0xFFFF), kind, self._breach_ms
+        )

@@ -1,0 +1,119 @@
+"""Modes: which there are, which one it is in, and changing between them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.simulator.dynamics import NoThrust
+from m2pem_plugin_mavlink.simulator.interfaces import (
+    AutopilotInterface,
+    CommandHandler,
+    Component,
+    Maneuver,
+    MessageHandler,
+    Mode,
+)
+from m2pem_plugin_mavlink.simulator.messages import Command, Result, Sender
+
+
+class ModeSwitch(Component):
+    """The mode, and its maneuver.
+
+    `speed_mps`: how fast maneuvers go; `reverse`: a rover drives backwards. Both are as the
+    firmware has it whenever a mode is entered.
+    """
+
+    mode: Mode
+    maneuver: Maneuver
+    reverse = False
+
+    def __init__(self, autopilot: AutopilotInterface) -> None:
+        super().__init__(autopilot)
+        self.by_number = {mode.number: mode for mode in autopilot.firmware.modes()}
+        self._speed_mps: float | None = None
+
+    def start(self) -> None:
+        """Be in the mode that it has after starting."""
+        self._enter(self.by_number[self.autopilot.firmware.first_mode], announce=False)
+
+    @property
+    def speed_mps(self) -> float:
+        """As told since the mode was entered, or as set up."""
+        if self._speed_mps is not None:
+            return self._speed_mps
+        return self.autopilot.tuning.cruise_mps
+
+    def set_speed(self, speed_mps: float | None) -> None:
+        """Go that fast from now on in this mode; None: as set up."""
+        self._speed_mps = speed_mps
+
+    def switch(self, number: int) -> bool:
+        """Enter a mode; says why if it cannot. To be in it already is well."""
+        mode = self.by_number.get(number)
+        if mode is None:
+            self.autopilot.warn(f"No such mode {number}")
+            return False
+        if mode is self.mode:
+            return True
+        maneuver = mode.maneuver(self.autopilot)
+        reason = self._refusal(mode) or maneuver.refusal()
+        if reason is not None:
+            text = self.autopilot.firmware.mode_text(mode, reason)
+            self.autopilot.say(text, dialect.MAV_SEVERITY_WARNING)
+            return False
+        self._enter(mode, maneuver)
+        return True
+
+    def _refusal(self, mode: Mode) -> str | None:
+        estimator = self.autopilot.estimator
+        if not mode.needs_position or estimator.ready:
+            return None
+        # As long as nothing is armed, no harm is done, once it knows its attitude.
+        harmless = estimator.levelled and not self.autopilot.arming.armed
+        return None if harmless else "requires position"
+
+    def _enter(self, mode: Mode, maneuver: Maneuver | None = None, announce: bool = True) -> None:
+        if announce:
+            self.maneuver.end()
+        self.mode = mode
+        self._speed_mps, self.reverse = None, False
+        self.maneuver = maneuver or mode.maneuver(self.autopilot)
+        self.maneuver.begin()
+        if announce:
+            self.autopilot.log_event("mode", mode.name)
+            self.autopilot.firmware.mode_entered(self.autopilot)
+
+    def step(self, dt_s: float) -> None:
+        """Let the maneuver say what to do."""
+        armed = self.autopilot.arming.armed
+        self.autopilot.setpoint = self.maneuver.step(dt_s) if armed else NoThrust()
+
+    def commands(self) -> Mapping[int, CommandHandler]:
+        """DO_SET_MODE."""
+        return {dialect.MAV_CMD_DO_SET_MODE: self._command}
+
+    def messages(self) -> Mapping[str, MessageHandler]:
+        """The old SET_MODE."""
+        return {"SET_MODE": self._message}
+
+    def _command(self, command: Command) -> Result:
+        number = self.autopilot.firmware.mode_number(
+            int(command.param1), int(command.param2), int(command.param3)
+        )
+        return self._asked(number)
+
+    def _message(self, message: Any, sender: Sender) -> None:
+        """ArduPilot acknowledges it as if it were a command (number 11, its message id)."""
+        custom = message.base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        result = self._asked(message.custom_mode if custom else None)
+        ack = dialect.MAVLink_command_ack_message(
+            dialect.MAVLINK_MSG_ID_SET_MODE, result, 0, 0, sender.system, sender.component
+        )
+        self.autopilot.send(ack, sender.peer)
+
+    def _asked(self, number: int | None) -> Result:
+        if number is None:
+            return Result.DENIED
+        switched = self.switch(number)
+        return Result.ACCEPTED if switched else Result.FAILED

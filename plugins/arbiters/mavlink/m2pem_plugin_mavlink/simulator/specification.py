@@ -1,0 +1,48 @@
+"""What a simulated vehicle is: its kind, its number, where it stands and how it is set up."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from m2pem_plugin_mavlink.simulator.geometry import Location
+
+ZURICH = Location(47.397742, 8.545594, 488.0)
+"""A meadow in Zurich."""
+
+
+class Kind(StrEnum):
+    """What moves, and in which way."""
+
+    COPTER = "copter"
+    ROVER = "rover"
+    PLANE = "plane"
+    BOAT = "boat"
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleSpec:
+    """One simulated vehicle.
+
+    `firmware`: a name in `sim.firmware.FIRMWARES`; `estimator_s`: for how long after its start
+    the vehicle does not know where it is, in seconds of simulated time;
+    `parameters`: what differs from the firmware's defaults; `battery_s`: how long a full battery
+    lasts in motion; `gimbal`: it has one (None: if it is a copter); `camera`: it has one, as a
+    component of its own.
+    """
+
+    kind: Kind = Kind.COPTER
+    system: int = 1
+    home: Location = ZURICH
+    heading_deg: float = 0.0
+    firmware: str = "ardupilot"
+    estimator_s: float = 41.0
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    battery_s: float = 1800.0
+    gimbal: bool | None = None
+    camera: bool = False
+
+    @property
+    def heading_rad(self) -> float:
+        """The way it faces at first, from north clockwise."""
+        return math.radians(self.heading_deg)

@@ -1,0 +1,142 @@
+"""Which messages go to whom how often. ArduPilot sends little until it is asked.
+
+Each peer has its own rates, set by SET_MESSAGE_INTERVAL or (old) REQUEST_DATA_STREAM. Rates are in
+simulated time.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.simulator.interfaces import (
+    AutopilotInterface,
+    CommandHandler,
+    Component,
+    MessageHandler,
+    ReportMaker,
+)
+from m2pem_plugin_mavlink.simulator.messages import Command, Peer, Result, Sender
+
+STREAM_GROUPS: Mapping[int, tuple[int, ...]] = {
+    dialect.MAV_DATA_STREAM_RAW_SENSORS: (27, 116, 129, 29),
+    dialect.MAV_DATA_STREAM_EXTENDED_STATUS: (1, 125, 42, 24, 62, 147, 162),
+    dialect.MAV_DATA_STREAM_RC_CHANNELS: (36, 65),
+    dialect.MAV_DATA_STREAM_POSITION: (33, 32),
+    dialect.MAV_DATA_STREAM_EXTRA1: (30,),
+    dialect.MAV_DATA_STREAM_EXTRA2: (74,),
+    dialect.MAV_DATA_STREAM_EXTRA3: (2, 193, 241, 136),
+}
+"""MAV_DATA_STREAM to ids of messages, as ArduPilot groups them."""
+
+
+class Streams(Component):
+    """Sends reports when they are due. `makers`: who makes them, by message id."""
+
+    def __init__(self, autopilot: AutopilotInterface) -> None:
+        super().__init__(autopilot)
+        self.makers: dict[int, ReportMaker] = {}
+        self._due: dict[Peer, dict[int, list[float]]] = {}
+        self._next_s = 0.0
+
+    def meet(self, peer: Peer) -> None:
+        """Somebody new gets the firmware's default streams."""
+        self._due[peer] = {}
+        for id_, interval_s in self.autopilot.firmware.default_streams().items():
+            if id_ in self.makers:
+                self._set(peer, id_, interval_s)
+
+    def interval_s(self, peer: Peer, id_: int) -> float | None:
+        """How often a peer gets a message; None: not at all."""
+        entry = self._due.get(peer, {}).get(id_)
+        return entry[0] if entry else None
+
+    def _set(self, peer: Peer, id_: int, interval_s: float) -> None:
+        self._due[peer][id_] = [interval_s, self.autopilot.now_s]
+        self._next_s = self.autopilot.now_s
+
+    def step(self, dt_s: float) -> None:
+        """Send what is due."""
+        now_s = self.autopilot.now_s
+        if now_s < self._next_s - 1e-9:
+            return
+        next_s = now_s + 1.0
+        made: dict[int, Any] = {}
+        for peer, streams in self._due.items():
+            for id_, entry in streams.items():
+                if entry[1] <= now_s + 1e-9:
+                    if id_ not in made:
+                        made[id_] = self.makers[id_]()
+                    if made[id_] is not None:
+                        self.autopilot.send(made[id_], peer)
+                    entry[1] = max(entry[1] + entry[0], now_s)
+                next_s = min(next_s, entry[1])
+        self._next_s = next_s
+
+    def commands(self) -> Mapping[int, CommandHandler]:
+        """Setting, asking for and getting."""
+        return {
+            dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
+            dialect.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
+            dialect.MAV_CMD_REQUEST_MESSAGE: self._request,
+        }
+
+    def messages(self) -> Mapping[str, MessageHandler]:
+        """The old way to ask."""
+        return {"REQUEST_DATA_STREAM": self._request_stream}
+
+    def _set_interval(self, command: Command) -> Result:
+        id_, interval_us = int(command.param1), command.param2
+        peer = command.sender.peer
+        if id_ in self.autopilot.firmware.silent_reports - self.makers.keys():
+            return Result.ACCEPTED
+        if id_ not in self.makers:
+            return Result.DENIED if self.autopilot.firmware.is_ardupilot else Result.FAILED
+        if interval_us < 0:
+            self._due[peer].pop(id_, None)
+        elif interval_us == 0:
+            self._due[peer].pop(id_, None)
+            default_s = self.autopilot.firmware.default_streams().get(id_)
+            if default_s is not None:
+                self._set(peer, id_, default_s)
+        elif interval_us <= 1e6 / self.autopilot.firmware.loop_hz:
+            self.autopilot.warn("Message interval too short")
+            return Result.DENIED
+        else:
+            self._set(peer, id_, interval_us * 1e-6)
+        return Result.ACCEPTED
+
+    def _get_interval(self, command: Command) -> Result:
+        id_, peer = int(command.param1), command.sender.peer
+        if id_ not in self.makers:
+            return Result.FAILED
+        interval_s = self.interval_s(peer, id_)
+        interval_us = -1 if interval_s is None else round(interval_s * 1e6)
+        self.autopilot.send(dialect.MAVLink_message_interval_message(id_, interval_us), peer)
+        return Result.ACCEPTED
+
+    def _request(self, command: Command) -> Result:
+        """ArduPilot acknowledges it even if there is nothing to send; PX4 denies it."""
+        id_, firmware = int(command.param1), self.autopilot.firmware
+        maker = self.makers.get(id_)
+        message = maker() if maker else None
+        if message is not None:
+            self.autopilot.send(message, command.sender.peer)
+        known = maker is not None or id_ in firmware.silent_reports
+        if not firmware.is_ardupilot:
+            return Result.DENIED if message is None else Result.ACCEPTED
+        return Result.ACCEPTED if known else Result.FAILED
+
+    def _request_stream(self, message: Any, sender: Sender) -> None:
+        group = message.req_stream_id
+        groups = STREAM_GROUPS if group == dialect.MAV_DATA_STREAM_ALL else (group,)
+        rate_hz = message.req_message_rate if message.start_stop else 0
+        fastest_s = 1 / self.autopilot.firmware.loop_hz
+        for each in groups:
+            for id_ in STREAM_GROUPS.get(each, ()):
+                if id_ not in self.makers:
+                    continue
+                if rate_hz:
+                    self._set(sender.peer, id_, max(1 / rate_hz, fastest_s))
+                else:
+                    self._due[sender.peer].pop(id_, None)

@@ -1,0 +1,93 @@
+"""Vehicles that cannot stop in the air: the radius of their loiter, their landing sequence.
+
+Sources: the parameter references of ArduPlane (WP_LOITER_RAD, RTL_RADIUS) and PX4 (NAV_LOITER_RAD,
+RTL_LOITER_RAD).
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError
+from m2pem_plugin_mavlink.vehicle import exchanges
+from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind
+from m2pem_plugin_mavlink.vehicle.state import AutopilotState
+
+WINGED = frozenset({Kind.PLANE, Kind.VTOL})
+"""Kinds that fly on, whatever they are told."""
+
+
+class _Radii(NamedTuple):
+    """Parameters, and what the first one is if nobody has set it, in metres."""
+
+    name: str
+    home_name: str
+    usual_m: float
+
+
+_RADII = {
+    Firmware.ARDUPILOT: _Radii("WP_LOITER_RAD", "RTL_RADIUS", 60.0),
+    Firmware.PX4: _Radii("NAV_LOITER_RAD", "RTL_LOITER_RAD", 80.0),
+}
+
+
+def circles(identity: Identity) -> bool:
+    """Whether a vehicle cannot stand still in the air."""
+    return identity.kind in WINGED
+
+
+def suppose(state: AutopilotState, identity: Identity) -> None:
+    """What its makers have set, until it says more."""
+    state.loiter_radius_m = state.home_loiter_radius_m = _RADII[identity.firmware].usual_m
+
+
+async def ask(state: AutopilotState, identity: Identity, link: VehicleLink) -> None:
+    """Ask it for its radii. A negative one is flown counter-clockwise; 0 at home is as elsewhere.
+
+    Raises:
+        ExchangeError: it does not tell.
+    """
+    radii = _RADII[identity.firmware]
+    elsewhere_m = abs(await exchanges.parameter(link, identity.firmware, radii.name))
+    if elsewhere_m > 0:
+        state.loiter_radius_m = state.home_loiter_radius_m = elsewhere_m
+    try:
+        home_m = abs(await exchanges.parameter(link, identity.firmware, radii.home_name))
+    except NoAnswerError:
+        return  # older ones have no such parameter
+    if home_m > 0:
+        state.home_loiter_radius_m = home_m
+
+
+_START: int = dialect.MAV_CMD_DO_LAND_START
+_LANDS = (dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_NAV_VTOL_LAND)
+
+NO_LANDING = (
+    "a plane lands by the landing in its mission, and it has none stored: store a mission with "
+    "DO_LAND_START, the approach and NAV_LAND"
+)
+
+
+def landing_begins(mission: Sequence[MissionItem]) -> int | None:
+    """The item at which the landing of a mission begins (the first DO_LAND_START, else the first
+    item that lands); None: it has none."""
+    for commands in ((_START,), _LANDS):
+        for index, item in enumerate(mission):
+            if item.command in commands:
+                return index
+    return None
+
+
+def landing(mission: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
+    """The landing of a mission; it goes on to the mission's end."""
+    begins = landing_begins(mission)
+    return () if begins is None else tuple(mission[begins:])
+
+
+def without_landing(mission: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
+    """What a mission has before its landing."""
+    begins = landing_begins(mission)
+    return tuple(mission if begins is None else mission[:begins])

@@ -1,0 +1,302 @@
+"""Somebody else at the vehicle: another ground station, a person at its sticks, its own failsafes.
+
+MAVLink lets anybody command (no arbitration between ground stations). So what the vehicle does is
+compared with what it was asked for here; why it does something else is read from its texts, and is
+else a guess, which the words leave open.
+"""
+
+import asyncio
+import re
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from enum import StrEnum
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
+from m2pem_plugin_mavlink.vehicle import exchanges
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode
+from m2pem_plugin_mavlink.vehicle.identity import Firmware
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+SETTLES_S = 1.5
+"""A change is judged so long after it was seen: the text that explains it may come after it."""
+
+RESTART_SHOWS_WITHIN_S = 12.0
+"""A vehicle that is suddenly disarmed may have restarted, which shows when it tells its clock: its
+streams are asked for again after 5 s of silence."""
+
+TEXTS_BEFORE_S = 3.0
+"""A text that came so long before a change may explain it."""
+
+_FAILSAFE = re.compile(
+    r"failsafe|fail-safe|fence|battery.*(low|critical|emergency)|low battery|EKF variance|"
+    r"glitch|crash|terrain data|dead reckon|vibration|"
+    r"(link|connection|control|signal|position).*lost",
+    re.IGNORECASE,
+)
+_PILOT = re.compile(r"pilot took over|manual control|sticks|RC override|taking over", re.IGNORECASE)
+_STANDS_AFTER = frozenset({FlightMode.LAND, FlightMode.RETURN, FlightMode.MISSION})
+_FOLLOWS = {
+    FlightMode.TAKEOFF: frozenset({FlightMode.HOLD}),
+    FlightMode.RETURN: frozenset({FlightMode.LAND, FlightMode.HOLD}),
+    FlightMode.MISSION: frozenset({FlightMode.HOLD, FlightMode.RETURN, FlightMode.LAND}),
+}
+"""What autopilots go over to by themselves when a mode has done its work."""
+
+_COUNT = message_type("MISSION_COUNT").id
+_ACK = message_type("MISSION_ACK").id
+_REQUESTS = (message_type("MISSION_REQUEST").id, message_type("MISSION_REQUEST_INT").id)
+
+
+class Cause(StrEnum):
+    """Who or what has taken a vehicle over, as far as can be told."""
+
+    FAILSAFE = "failsafe"
+    PILOT = "pilot"
+    STATION = "station"
+    RESTART = "restart"
+
+
+@dataclass(frozen=True, slots=True)
+class Takeover:
+    """A vehicle does what it was not asked for here. `reason`: for people."""
+
+    cause: Cause
+    reason: str
+
+
+class TakeoverMonitor:
+    """Watches a vehicle between `open` and `close`.
+
+    `own`: the system id that this arbiter sends with; None: not known, and then what a vehicle says
+    to another ground station counts only while no exchange of ours goes on.
+    """
+
+    def __init__(self, vehicle: Vehicle, own_system: int | None = None) -> None:
+        self.vehicle = vehicle
+        self.own_system = own_system
+        self._unsubscribe: list[Callable[[], None]] = []
+        self._mode: int | None = None
+        self._mode_s = 0.0
+        self._before: int | None = None
+        self._armed: bool | None = None
+        self._disarmed: tuple[float, FlightMode] | None = None
+        self._boots = vehicle.state.boots
+        self._settled: tuple[int | None, int | None] = (None, None)
+        self._mission: tuple[MissionItem, ...] | None = None
+        self._mission_s = 0.0
+        self._replaced = ""
+        self._checked: int | None = None
+        self._check: asyncio.Task[None] | None = None
+
+    def open(self) -> None:
+        """Watch."""
+        self._unsubscribe.append(self.vehicle.watch(self._update))
+        ids = (_COUNT, _ACK, *_REQUESTS)
+        self._unsubscribe.append(self.vehicle.link.listen(ids, self._receive_from_mission_protocol))
+
+    async def close(self) -> None:
+        """Watch no more."""
+        for end in self._unsubscribe:
+            end()
+        self._unsubscribe.clear()
+        if self._check is not None:
+            self._check.cancel()
+            await asyncio.wait([self._check])
+
+    # --- the answer -----------------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Something new is about to be asked of it: how it is by now is not a takeover."""
+        self._disarmed = None
+        self._boots = self.vehicle.state.boots
+        self._settled = (self.vehicle.state.custom_mode, self.vehicle.commanded.custom_mode)
+
+    def restarted(self) -> Takeover | None:
+        """Whether the autopilot has restarted since `begin`: its clock has gone back, and it
+        is not armed."""
+        state = self.vehicle.state
+        if state.armed is not False or state.boots <= max(self._boots, 1):
+            return None
+        return Takeover(Cause.RESTART, "its autopilot has restarted, and its motors have stopped")
+
+    def takeover(self, modes: Collection[FlightMode]) -> Takeover | None:
+        """Whether somebody else has taken over a vehicle that is to be in one of these modes.
+
+        A change that was just seen is judged `SETTLES_S` later, or once a text explains it. The
+        mode of a vehicle that is not armed is nobody's concern.
+        """
+        return self._disarmed_by(modes) or self._mode_by(modes) or self._mission_by(modes)
+
+    def mode_is_commanded(self, modes: Collection[FlightMode]) -> bool:
+        """Whether the vehicle is in the mode that was asked for here, or in one of these modes that
+        it goes over to by itself."""
+        state, asked_for = self.vehicle.state, self.vehicle.commanded.custom_mode
+        if asked_for is None or state.custom_mode == asked_for:
+            return asked_for is not None or state.mode in modes
+        asked = self.vehicle.driver.flight_mode(asked_for)
+        follows = state.mode in modes and state.mode in _FOLLOWS.get(asked, ())
+        return follows and (asked is not FlightMode.MISSION or self._mission_is_over())
+
+    def _mode_by(self, modes: Collection[FlightMode]) -> Takeover | None:
+        state, commanded = self.vehicle.state, self.vehicle.commanded
+        number = state.custom_mode
+        if number is None or not state.armed or commanded.changing:
+            return None
+        if (number, commanded.custom_mode) == self._settled or self.mode_is_commanded(modes):
+            return None
+        name = self.vehicle.driver.mode_name(number)
+        before = "" if self._before is None else self.vehicle.driver.mode_name(self._before)
+        changed = f"the mode changed from {before} to {name}" if before else f"the mode is {name}"
+        return self._explained(
+            self._mode_s,
+            changed,
+            Takeover(Cause.PILOT, f"a person has taken over: {changed}, not asked for here")
+            if state.mode is FlightMode.MANUAL
+            else Takeover(
+                Cause.STATION,
+                f"another ground station or a switch has taken over: {changed}, not asked for here",
+            ),
+        )
+
+    def _disarmed_by(self, modes: Collection[FlightMode]) -> Takeover | None:
+        if self._disarmed is None or not modes:
+            return None
+        at_s, mode = self._disarmed
+        if self.vehicle.state.landed and mode in _STANDS_AFTER:
+            return None
+        clock_s = self.vehicle.state.clock_s
+        waits = self.vehicle.link.now_s() - at_s < RESTART_SHOWS_WITHIN_S
+        if clock_s is not None and clock_s <= at_s and waits:
+            return None
+        changed = f"it was disarmed in {mode}"
+        return self._explained(
+            at_s,
+            changed,
+            Takeover(Cause.STATION, f"{changed}, not from here: by somebody else or by itself"),
+        )
+
+    def _mission_by(self, modes: Collection[FlightMode]) -> Takeover | None:
+        if FlightMode.MISSION not in modes or not self._replaced:
+            return None
+        return Takeover(Cause.STATION, f"another ground station has {self._replaced}")
+
+    def _explained(self, since_s: float, changed: str, otherwise: Takeover) -> Takeover | None:
+        """What its texts say of a change; without any: `otherwise`, when there was time for one."""
+        now_s = self.vehicle.link.now_s()
+        texts = self.vehicle.recent_texts(now_s - since_s + TEXTS_BEFORE_S)
+        for cause, pattern in ((Cause.FAILSAFE, _FAILSAFE), (Cause.PILOT, _PILOT)):
+            said = [text for text in texts if pattern.search(text)]
+            if cause is Cause.FAILSAFE and not said:
+                said = self._fence_breached(since_s)
+            if said:
+                who = "a failsafe of its own" if cause is Cause.FAILSAFE else "a person"
+                return Takeover(cause, f"{who} has taken over: {changed}: {'; '.join(said)}")
+        return otherwise if now_s - since_s >= SETTLES_S else None
+
+    def _fence_breached(self, since_s: float) -> list[str]:
+        """ArduRover says nothing of a breach but in FENCE_STATUS."""
+        state = self.vehicle.state
+        breached_s = state.fence_breached_s
+        if breached_s is None or breached_s < since_s - TEXTS_BEFORE_S:
+            return []
+        return [f"fence breached ({state.fence_breach or 'it is inside again'})"]
+
+    def _mission_is_over(self) -> bool:
+        mission, driver = self.vehicle.commanded.mission, self.vehicle.driver
+        if not mission:
+            return True
+        last = len(mission) - 1
+        return (driver.reached_item or 0) >= last or (driver.current_item or 0) >= last
+
+    # --- what is seen ---------------------------------------------------------------------------
+
+    def _update(self) -> None:
+        state, commanded, now_s = (
+            self.vehicle.state,
+            self.vehicle.commanded,
+            self.vehicle.link.now_s(),
+        )
+        if state.custom_mode != self._mode:
+            self._before, self._mode, self._mode_s = self._mode, state.custom_mode, now_s
+        if state.armed != self._armed:
+            if self._armed and state.armed is False and not commanded.disarming:
+                self._disarmed = (now_s, state.mode)
+            elif state.armed:
+                self._disarmed = None
+            self._armed = state.armed
+        if commanded.mission is not self._mission:
+            self._mission, self._replaced, self._checked = commanded.mission, "", None
+            self._mission_s = now_s
+        # What it said before it was stored may still come in.
+        settled = now_s - self._mission_s > SETTLES_S
+        if commanded.mission is not None and settled and not commanded.exchanging:
+            self._check_mission(commanded.mission)
+
+    def _check_mission(self, mission: tuple[MissionItem, ...]) -> None:
+        state = self.vehicle.state
+        current_s = state.messages_s.get(dialect.MAVLINK_MSG_ID_MISSION_CURRENT)
+        if current_s is None or current_s != state.at_s:
+            return
+        if state.mission_total is not None and state.mission_total != len(mission):
+            self._replaced = (
+                f"replaced the mission: it has {state.mission_total} items, ours {len(mission)}"
+                if state.mission_total
+                else "cleared the mission"
+            )
+        item = self.vehicle.driver.current_item
+        checking = self._check is not None and not self._check.done()
+        if item is not None and item != self._checked and item < len(mission) and not checking:
+            self._checked = item
+            if self._answers_single_requests:
+                work = self._compare_item(item, mission)
+                self._check = asyncio.get_running_loop().create_task(work)
+
+    @property
+    def _answers_single_requests(self) -> bool:
+        """PX4 gives an item only as part of a download."""
+        identity = self.vehicle.identity
+        return identity is not None and identity.firmware is Firmware.ARDUPILOT
+
+    async def _compare_item(self, item: int, mission: tuple[MissionItem, ...]) -> None:
+        """The item that it now moves to must be the one that was uploaded."""
+        try:
+            found = await exchanges.mission_item(self.vehicle.link, item + 1)
+        except ExchangeError:
+            return  # what is not answered proves nothing
+        if self.vehicle.commanded.mission is mission and not _same(found, mission[item]):
+            self._replaced = f"replaced the mission: its item {item + 1} is not ours"
+
+    def _receive_from_mission_protocol(self, message: Message, sender: Address) -> None:
+        """What it says about missions to somebody else. Links need not carry that."""
+        if sender != self.vehicle.link.address or message.mission_type:
+            return
+        to: int = message.target_system
+        commanded = self.vehicle.commanded
+        if (
+            to in (0, self.own_system)
+            or (self.own_system is None and commanded.exchanging)
+            or commanded.mission is None
+        ):
+            return
+        id_ = message.TYPE.id
+        if id_ in _REQUESTS:
+            self._replaced = f"begun to replace the mission (system {to})"
+        elif id_ == _ACK and message.type == dialect.MAV_MISSION_ACCEPTED:
+            # Also the end of a download; then its count was the same.
+            self._checked = None
+        elif id_ == _COUNT:
+            home = self.vehicle.driver.home_items
+            if message.count != len(commanded.mission) + home:
+                self._replaced = f"replaced the mission: it has {message.count - home} items"
+
+
+def _same(found: MissionItem, commanded: MissionItem) -> bool:
+    """Whether an item is the one that was uploaded. What an item without a place is given back
+    with depends on the autopilot."""
+    if commanded.latitude_deg == 0.0 and commanded.longitude_deg == 0.0:
+        return found.command == commanded.command
+    return found.same_as(commanded)

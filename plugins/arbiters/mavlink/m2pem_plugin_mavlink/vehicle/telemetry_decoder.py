@@ -1,0 +1,220 @@
+"""Decodes the messages of a vehicle into `AutopilotState`, in SI units and east-north-up."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import GeoPosition
+from m2pem_plugin_mavlink.protocol.messages import Message, message_type
+from m2pem_plugin_mavlink.vehicle.modes import Modes
+from m2pem_plugin_mavlink.vehicle.state import AutopilotState
+
+BOOT_TIME_BACK_MS = 10_000
+"""Messages overtake each other by less than this, also in simulated time that passes ten times as
+fast. No autopilot is ready so soon after it was switched on."""
+
+STANDS_BELOW_M, STANDS_BELOW_M_S = 0.5, 0.3
+
+_UNKNOWN_UINT16 = 0xFFFF
+_PREARM = dialect.MAV_SYS_STATUS_PREARM_CHECK
+_ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
+_LANDED = {
+    dialect.MAV_LANDED_STATE_ON_GROUND: True,
+    dialect.MAV_LANDED_STATE_IN_AIR: False,
+    dialect.MAV_LANDED_STATE_TAKEOFF: False,
+    dialect.MAV_LANDED_STATE_LANDING: False,
+}
+_BREACHES = {
+    dialect.FENCE_BREACH_MINALT: "lowest altitude",
+    dialect.FENCE_BREACH_MAXALT: "highest altitude",
+    dialect.FENCE_BREACH_BOUNDARY: "boundary",
+}
+
+
+def enu_yaw(heading_rad: float) -> float:
+    """A heading (from north, clockwise) as a yaw (from east, counter-clockwise), in -pi..pi."""
+    return math.remainder(math.pi / 2 - heading_rad, math.tau)
+
+
+def heading(yaw_rad: float) -> float:
+    """A yaw (from east, counter-clockwise) as a heading (from north, clockwise), in 0..2 pi."""
+    return (math.pi / 2 - yaw_rad) % math.tau
+
+
+class TelemetryDecoder:
+    """`take` is handed each message of the autopilot, in the order of their coming.
+
+    `flies`: whether it leaves the ground; the height above home that one that doesn't flies says
+    is not believed (autopilots of ground vehicles were seen to say the height above the sea).
+    """
+
+    def __init__(self, state: AutopilotState, modes: Modes, *, flies: bool) -> None:
+        self.state = state
+        self.modes = modes
+        self.flies = flies
+        self._boot_ms = 0
+        self._landed_is_said = False
+        if not flies:
+            state.landed = True
+        named: Mapping[str, Callable[[Any], None]] = {
+            "HEARTBEAT": self._heartbeat,
+            "SYS_STATUS": self._sys_status,
+            "GPS_RAW_INT": self._gps,
+            "ATTITUDE": self._attitude,
+            "LOCAL_POSITION_NED": self._local_position,
+            "GLOBAL_POSITION_INT": self._global_position,
+            "MISSION_CURRENT": self._mission_current,
+            "MISSION_ITEM_REACHED": self._mission_item_reached,
+            "EKF_STATUS_REPORT": self._estimator,
+            "ESTIMATOR_STATUS": self._estimator,
+            "BATTERY_STATUS": self._battery,
+            "HOME_POSITION": self._home,
+            "EXTENDED_SYS_STATE": self._extended_sys_state,
+            "TERRAIN_REPORT": self._terrain,
+            "ALTITUDE": self._altitude,
+            "FENCE_STATUS": self._fence,
+        }
+        self._takers = {message_type(name).id: take for name, take in named.items()}
+
+    @property
+    def wants(self) -> frozenset[int]:
+        """Ids of the messages that can be taken in."""
+        return frozenset(self._takers)
+
+    def take(self, message: Message, now_s: float) -> None:
+        """A message of the autopilot has come."""
+        state = self.state
+        id_ = message.TYPE.id
+        if state.boot_s is None:
+            self._booted(now_s)
+        state.at_s = state.messages_s[id_] = now_s
+        self._takers[id_](message)
+        if id_ == dialect.MAVLINK_MSG_ID_HEARTBEAT:
+            state.heartbeat_s = now_s
+        state.changes += 1
+
+    def _booted(self, now_s: float) -> None:
+        """It speaks for the first time, or its clock has gone back."""
+        self.state.forget_the_last_boot()
+        self._landed_is_said = False
+        if not self.flies:
+            self.state.landed = True
+        self.state.boot_s = now_s
+        self.state.boots += 1
+        self._boot_ms = 0
+
+    def _clock(self, message: Any) -> None:
+        boot_ms: int = message.time_boot_ms
+        if boot_ms + BOOT_TIME_BACK_MS < self._boot_ms and self.state.at_s is not None:
+            self._booted(self.state.at_s)
+        self.state.clock_s = self.state.at_s
+        self._boot_ms = max(boot_ms, self._boot_ms)
+
+    def _heartbeat(self, message: Any) -> None:
+        self.state.custom_mode = message.custom_mode
+        self.state.mode = self.modes.purpose(message.custom_mode)
+        self.state.armed = bool(message.base_mode & _ARMED)
+        self._guess_landed()
+
+    def _sys_status(self, message: Any) -> None:
+        state = self.state
+        used = message.onboard_control_sensors_present & message.onboard_control_sensors_enabled
+        healthy = bool(message.onboard_control_sensors_health & _PREARM)
+        state.prearm_passed = healthy if used & _PREARM else None
+        if message.battery_remaining >= 0:
+            state.battery_fraction = min(message.battery_remaining, 100) / 100.0
+
+    def _battery(self, message: Any) -> None:
+        if message.id == 0 and message.battery_remaining >= 0:
+            self.state.battery_fraction = min(message.battery_remaining, 100) / 100.0
+
+    def _gps(self, message: Any) -> None:
+        self.state.gps_fix = message.fix_type
+
+    def _attitude(self, message: Any) -> None:
+        self._clock(message)
+        if all(map(math.isfinite, (message.roll, message.pitch, message.yaw))):
+            state = self.state
+            # NED to ENU turns the axes of the body from forward-right-down to forward-left-up.
+            state.roll_rad, state.pitch_rad = message.roll, -message.pitch
+            state.yaw_rad = enu_yaw(message.yaw)
+
+    def _local_position(self, message: Any) -> None:
+        self._clock(message)
+        north, east, down = message.vx, message.vy, message.vz
+        if all(map(math.isfinite, (north, east, down))):
+            self.state.velocity_enu_m_s = (east, north, -down)
+
+    def _global_position(self, message: Any) -> None:
+        self._clock(message)
+        state = self.state
+        position = _place(message.lat, message.lon, message.alt)
+        if position is None:
+            return
+        state.position = position
+        if self.flies:
+            state.altitude_above_home_m = message.relative_alt / 1000.0
+        elif state.home is not None:
+            state.altitude_above_home_m = position.altitude_m - state.home.altitude_m
+        state.velocity_enu_m_s = (message.vy / 100.0, message.vx / 100.0, -message.vz / 100.0)
+        if state.yaw_rad is None and message.hdg != _UNKNOWN_UINT16:
+            state.yaw_rad = enu_yaw(math.radians(message.hdg / 100.0))
+        self._guess_landed()
+
+    def _mission_current(self, message: Any) -> None:
+        state = self.state
+        state.mission_sequence = message.seq
+        if message.total:  # 0: an autopilot that does not say it
+            state.mission_total = 0 if message.total == _UNKNOWN_UINT16 else message.total
+        state.mission_state = message.mission_state or None
+
+    def _mission_item_reached(self, message: Any) -> None:
+        self.state.reached_sequence = message.seq
+
+    def _estimator(self, message: Any) -> None:
+        self.state.estimator_flags = message.flags
+
+    def _home(self, message: Any) -> None:
+        self.state.home = _place(message.latitude, message.longitude, message.altitude)
+
+    def _extended_sys_state(self, message: Any) -> None:
+        landed = _LANDED.get(message.landed_state)
+        if landed is not None and self.flies:
+            self._landed_is_said = True
+            self.state.landed = landed
+
+    def _terrain(self, message: Any) -> None:
+        if message.loaded and math.isfinite(message.current_height):
+            self.state.altitude_above_terrain_m = message.current_height
+
+    def _altitude(self, message: Any) -> None:
+        if 0.0 <= message.bottom_clearance < math.inf:  # below 0: it does not know
+            self.state.altitude_above_terrain_m = message.bottom_clearance
+
+    def _fence(self, message: Any) -> None:
+        """Whether the vehicle is outside of its fence now (mavlink.io, "FENCE_STATUS")."""
+        state = self.state
+        breached = message.breach_status != 0
+        if breached and not state.fence_breach:
+            state.fence_breached_s = state.at_s
+        state.fence_breach = _BREACHES.get(message.breach_type, "fence") if breached else ""
+
+    def _guess_landed(self) -> None:
+        state = self.state
+        if self._landed_is_said or not self.flies:
+            return
+        if state.armed is False:
+            state.landed = True
+        elif state.altitude_above_home_m is not None:
+            low = state.altitude_above_home_m < STANDS_BELOW_M
+            state.landed = low and state.speed_m_s < STANDS_BELOW_M_S
+
+
+def _place(latitude_e7: int, longitude_e7: int, altitude_mm: int) -> GeoPosition | None:
+    """None for what autopilots say while they know no place, or can be no place."""
+    latitude, longitude = latitude_e7 / 1e7, longitude_e7 / 1e7
+    if (latitude_e7 == 0 and longitude_e7 == 0) or abs(latitude) > 90.0 or abs(longitude) > 180.0:
+        return None
+    return GeoPosition(latitude, longitude, altitude_mm / 1000.0)

@@ -1,0 +1,89 @@
+"""The vehicles of a fleet behind their links."""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+
+from m2pem.api import ArbiterContext, Connection, ResourceId
+from m2pem.errors import PluginError
+from m2pem_plugin_mavlink.link.routed_link import GROUND_STATION, RoutedLink, open_link
+from m2pem_plugin_mavlink.mavsdk_driver.ground_station import open_mavsdk_link
+from m2pem_plugin_mavlink.mavsdk_driver.link import MavsdkLink
+from m2pem_plugin_mavlink.protocol.messages import Address
+from m2pem_plugin_mavlink.settings import Settings
+from m2pem_plugin_mavlink.vehicle.failsafe import check
+from m2pem_plugin_mavlink.vehicle.takeover_monitor import TakeoverMonitor
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+_OPEN: Mapping[str, Callable[..., Awaitable[RoutedLink | MavsdkLink]]] = {
+    "pymavlink": open_link,
+    "mavsdk": open_mavsdk_link,
+}
+
+
+class MavlinkVehicleConnections:
+    """Implements `m2pem_plugin_mavlink.arbiter.Station`; `lost_after_s`: of each vehicle."""
+
+    def __init__(
+        self,
+        connections: Mapping[ResourceId, Connection],
+        settings: Mapping[ResourceId, Settings],
+        context: ArbiterContext,
+        lost_after_s: Mapping[ResourceId, float],
+    ) -> None:
+        self._connections = connections
+        self._settings = settings
+        self._context = context
+        self._lost_after_s = lost_after_s
+        self._links: list[RoutedLink | MavsdkLink] = []
+        self._vehicles: dict[ResourceId, Vehicle] = {}
+
+    async def open(self) -> Mapping[ResourceId, Vehicle]:
+        """Open the endpoints, and listen.
+
+        Raises:
+            PluginError: a URL is wrong, or an endpoint cannot be opened; nothing stays open.
+        """
+        try:
+            for resource, settings in self._settings.items():
+                await self._reach(resource, settings)
+        except BaseException:
+            await self.close()
+            raise
+        return self._vehicles
+
+    async def _reach(self, resource: ResourceId, settings: Settings) -> None:
+        clock = self._context.clock
+        address = Address(settings.system_id, settings.component_id)
+        source = Address(settings.gcs_system_id, GROUND_STATION.component)
+        try:
+            link = await _OPEN[settings.driver](address, settings.urls, clock, source)
+        except PluginError as error:
+            raise PluginError(f"{resource}: connection.url: {error}") from error
+        self._links.append(link)
+        vehicle = Vehicle(
+            resource,
+            self._connections[resource].domain,
+            link,
+            clock,
+            lost_after_s=self._lost_after_s[resource],
+            logger=self._context.logger,
+        )
+        self._vehicles[resource] = vehicle
+        vehicle.open()
+
+    def watch(self, vehicle: Vehicle) -> TakeoverMonitor:
+        """What notices that somebody else steers; not open yet."""
+        return TakeoverMonitor(vehicle, self._settings[vehicle.resource].gcs_system_id)
+
+    async def findings(self, vehicle: Vehicle) -> Sequence[str]:
+        """Where the vehicle's own failsafes are not what the fleet says they are."""
+        word = self._connections[vehicle.resource].failsafe
+        own = self._settings[vehicle.resource].gcs_system_id
+        return [str(finding) for finding in await check(vehicle, word, own)]
+
+    async def close(self) -> None:
+        """Close all that was opened."""
+        for vehicle in self._vehicles.values():
+            await vehicle.close()
+        await asyncio.gather(*(link.close() for link in self._links))
+        self._vehicles, self._links = {}, []

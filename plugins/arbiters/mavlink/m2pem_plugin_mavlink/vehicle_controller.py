@@ -1,0 +1,409 @@
+"""Who steers one vehicle: one behavior at a time, from its beginning to its end.
+
+Whatever is asked of it (a new behavior, a hold, a cancel) takes effect at once: what was being done
+for it before, an exchange in flight too, is given up, and only then something else is sent.
+"""
+
+import asyncio
+import logging
+import math
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, Limits
+from m2pem_plugin_mavlink.behaviors.arrival import (
+    STANDS_BELOW_M_S,
+    StillnessTimer,
+    accepted_modes,
+    on_the_ground,
+)
+from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError
+from m2pem_plugin_mavlink.behaviors.takeoff_landing import Land, ReturnToLaunch, SetSpeed
+from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode
+from m2pem_plugin_mavlink.vehicle.takeover_monitor import TEXTS_BEFORE_S, Cause, TakeoverMonitor
+from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
+
+LOOK_EVERY_S = 0.2
+"""So often is a behavior asked whether it is finished."""
+
+KNOWN_WITHIN_S = 5.0
+STOP_SHARE = 0.8
+"""Of the time in which a cancelled vehicle must be free: a stop that takes longer has failed."""
+
+_FAILSAFES = frozenset({FlightMode.RETURN, FlightMode.LAND})
+"""What autopilots do by themselves when a link is lost, beside standing (BRAKE, HOLD, LOITER)."""
+_HELD = frozenset({FlightMode.HOLD})
+_FAIL_SAFE = frozenset({FlightMode.RETURN, FlightMode.LAND})
+
+
+@dataclass(slots=True)
+class _ActiveBehavior:
+    """A behavior that goes on. `begun`: the vehicle does it; `looked`: it was recognised on a
+    vehicle that had it already, and nothing need be sent. `speed_m_s`: to be told to the vehicle
+    while it goes on; None: nothing is."""
+
+    id: BehaviorId
+    behavior: Behavior
+    begun: bool = False
+    reattached: bool = False
+    cancelled: bool = False
+    speed_m_s: float | None = None
+
+
+class VehicleController:
+    """Steers a vehicle; what becomes of it goes to the ledger."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        takeover_monitor: TakeoverMonitor,
+        tracker: BehaviorTracker,
+        limits: Limits,
+        logger: logging.Logger,
+    ) -> None:
+        self.vehicle = vehicle
+        self.cruise_m_s: float | None = None
+        self._takeover_monitor = takeover_monitor
+        self._tracker = tracker
+        self._limits = limits
+        self._logger = logger
+        self._active: _ActiveBehavior | None = None
+        self._held = False
+        self._was_commanded = False
+        self._work: set[asyncio.Task[None]] = set()
+
+    @property
+    def behavior(self) -> str:
+        """The name of what it does now, or ""."""
+        return self._active.behavior.name if self._active is not None else ""
+
+    async def wait_until_known(self, within_s: float) -> bool:
+        """Wait until it is known what the vehicle is, where it is and whether it flies; False: it
+        was not within so many seconds."""
+        state = self.vehicle.state
+        return await self.vehicle.identified(within_s) and await self.vehicle.until(
+            lambda: state.position is not None and state.landed is not None, within_s
+        )
+
+    # --- what may be asked ----------------------------------------------------------------------
+
+    def start(self, id_: BehaviorId, behavior: Behavior, *, look_first: bool = False) -> None:
+        """Do this from now on, in place of what it does.
+
+        `look_first`: it may have been begun before a restart; then it is not begun again.
+        """
+        before = self._active
+        self._active = active = _ActiveBehavior(id_, behavior)
+        self._held = False
+        self._was_commanded = True
+        self._takeover_monitor.begin()
+        self._replace(lambda: self._run(active, before.behavior if before else None, look_first))
+
+    def adopt(self, id_: BehaviorId, behavior: Behavior) -> None:
+        """The vehicle was found doing it, and is to go on."""
+        self._active = active = _ActiveBehavior(id_, behavior, begun=True, reattached=True)
+        self._held = False
+        self._was_commanded = True
+        self._replace(lambda: self._run(active))
+
+    def cancel(self, id_: BehaviorId) -> None:
+        """Stop, and be free."""
+        active = self._active
+        if active is not None and active.id == id_ and not active.cancelled:
+            active.cancelled = True
+            self._replace(lambda: self._cancel(active))
+
+    def adjust(self, id_: BehaviorId, speed_m_s: float) -> None:
+        """Go on at another speed; who is held does so when it goes on."""
+        active = self._active
+        if active is not None and active.id == id_ and active.behavior.adjust(speed_m_s):
+            active.speed_m_s = speed_m_s
+
+    def hold(self) -> None:
+        """Stand still, and keep the behavior."""
+        active = self._active
+        if active is not None and active.cancelled:
+            return  # it is being stopped already
+        if active is None and self._is_in_failsafe:
+            self._logger.warning(
+                "%s: not held: it returns or lands by itself", self.vehicle.resource
+            )
+            return
+        if active is not None and not self._held:
+            active.behavior.paused()
+        self._held = True
+        self._replace(lambda: self._hold_still(active))
+
+    def resume(self) -> None:
+        """Go on with the behavior."""
+        active, held = self._active, self._held
+        self._held = False
+        if active is not None and held:
+            self._replace(lambda: self._run(active))
+
+    def release(self) -> None:
+        """It cannot be reached: its behavior is nobody's any more."""
+        self._active = None
+        self._held = False
+        for task in self._work:
+            task.cancel()
+
+    async def reclaim(self) -> str:
+        """It is heard again: have it stop what it was given before. Returns "" when it has
+        acknowledged, else why it is not free: RTL or LAND is not interrupted, as a lost link makes
+        autopilots do that by themselves."""
+        self.release()
+        if not await self.wait_until_known(KNOWN_WITHIN_S):
+            return "it is heard again, and does not say yet what it does"
+        state, driver = self.vehicle.state, self.vehicle.driver
+        mode = "" if state.custom_mode is None else driver.mode_name(state.custom_mode)
+        if state.armed and state.mode in _FAILSAFES and not self._stands():
+            return f"it is heard again in {mode}, which is not interrupted: free when it stands"
+        # PX4 goes to a place in the mode in which it also stands.
+        stands = (
+            state.mode is FlightMode.HOLD
+            and state.custom_mode != self.vehicle.commanded.custom_mode
+        )
+        steered = stands or state.mode in _FAILSAFES or state.mode is FlightMode.MANUAL
+        if self._was_commanded and state.armed and not steered:
+            try:
+                await self._stop()
+            except ExchangeError as error:
+                return f"it is heard again in {mode}, and does not stop: {error}"
+        self._was_commanded = False
+        return ""
+
+    def mark_commanded(self) -> None:
+        """It may be doing what it was given before a restart, and could not be asked."""
+        self._was_commanded = True
+
+    def _stands(self) -> bool:
+        """One that flies does not stand, though it may hover for a while."""
+        if self.vehicle.domain == "air":
+            return on_the_ground(self.vehicle)
+        velocity = self.vehicle.state.velocity_enu_m_s
+        return velocity is not None and math.hypot(*velocity) < STANDS_BELOW_M_S
+
+    async def close(self) -> None:
+        """Leave the vehicle as it is."""
+        tasks = list(self._work)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    # --- one thing at a time --------------------------------------------------------------------
+
+    def _replace(self, work: Callable[[], Awaitable[None]]) -> None:
+        before = set(self._work)
+        for task in before:
+            task.cancel()
+        task = asyncio.get_running_loop().create_task(self._after(before, work))
+        self._work.add(task)
+        task.add_done_callback(self._work.discard)
+
+    async def _after(
+        self, before: set[asyncio.Task[None]], work: Callable[[], Awaitable[None]]
+    ) -> None:
+        if before:
+            await asyncio.wait(before)
+        await work()
+
+    # --- what is done ---------------------------------------------------------------------------
+
+    async def _run(
+        self, active: _ActiveBehavior, before: Behavior | None = None, look_first: bool = False
+    ) -> None:
+        try:
+            await self._wait_until_received()
+            if before is not None:
+                await self._clean_up_before(before, active.behavior)
+            if look_first and await active.behavior.reattach() is BehaviorState.RUNNING:
+                active.begun = active.reattached = True
+            await self._begin_or_resume(active)
+            await self._wait_until_finished(active)
+        except BehaviorFailedError as error:
+            await self._fail(active, error.reason, error.code)
+        except _TakenOverError as error:
+            self._end(active, BehaviorState.FAILED, error.code, error.reason)
+        except ExchangeError as error:
+            await self._fail(active, error.reason)
+        except asyncio.CancelledError:
+            raise
+        except Exception as error:  # one vehicle's bug must not hang its mission
+            self._logger.exception("%s: %s", self.vehicle.resource, active.behavior.name)
+            await self._fail(active, f"m2pem is wrong: {type(error).__name__}: {error}")
+        else:
+            if isinstance(active.behavior, SetSpeed):
+                self.cruise_m_s = active.behavior.speed_m_s
+            self._end(active, BehaviorState.SUCCEEDED)
+
+    async def _wait_until_received(self) -> None:
+        """Wait for a vehicle that was not heard yet; one that is never heard is LOST. One that
+        knows no position yet is asked all the same: its driver says why it is not ready."""
+        if not await self.wait_until_known(KNOWN_WITHIN_S):
+            await self.vehicle.until(lambda: self.vehicle.identity is not None)
+
+    async def _clean_up_before(self, before: Behavior, after: Behavior) -> None:
+        """What takes over without steering must not let the old motion go on."""
+        if after.moves_vehicle:
+            await before.clean_up()
+        elif before.moves_vehicle:
+            await self._stop()
+
+    async def _begin_or_resume(self, active: _ActiveBehavior) -> None:
+        if active.reattached:
+            active.reattached = False
+        elif active.begun:
+            await active.behavior.resume()
+        else:
+            await active.behavior.begin()
+            active.begun = True
+        self._tracker.progress(active.id)
+
+    async def _wait_until_finished(self, active: _ActiveBehavior) -> None:
+        create = asyncio.get_running_loop().create_task
+        steps, telling = (
+            create(active.behavior.run_in_background()),
+            create(self._send_speeds(active)),
+        )
+        stillness = StillnessTimer(active.behavior.context)
+        try:
+            # A restart comes first: one that fell from the air looks like one that has landed.
+            while not self._has_restarted() and not active.behavior.finished():
+                if steps.done():
+                    steps.result()
+                self._check_takeover(accepted_modes(active.behavior))
+                self._check_progress(active.behavior, stillness)
+                await self.vehicle.sleep(LOOK_EVERY_S)
+        finally:
+            for task in (steps, telling):
+                task.cancel()
+            await asyncio.gather(steps, telling, return_exceptions=True)
+
+    async def _send_speeds(self, active: _ActiveBehavior) -> None:
+        """Beside the behavior, whose end must not wait for it; of several the newest counts."""
+        while True:
+            speed_m_s, active.speed_m_s = active.speed_m_s, None
+            if speed_m_s is not None:
+                try:
+                    await self.vehicle.driver.set_speed(speed_m_s)
+                except ExchangeError as error:
+                    self._logger.warning("%s keeps its speed: %s", self.vehicle.resource, error)
+            await self.vehicle.sleep(LOOK_EVERY_S)
+
+    def _check_takeover(self, modes: frozenset[FlightMode]) -> None:
+        if takeover := self._takeover_monitor.takeover(modes):
+            code = "TAKEN_OVER"
+            if takeover.cause is Cause.FAILSAFE:
+                code = "BATTERY_LOW" if "batt" in takeover.reason.lower() else "FAILED"
+            raise _TakenOverError(takeover.reason, code)
+
+    def _has_restarted(self) -> bool:
+        """False.
+
+        Raises:
+            _TakenOverError: it has.
+        """
+        if restart := self._takeover_monitor.restarted():
+            raise _TakenOverError(restart.reason, "FAILED")
+        return False
+
+    def _check_progress(self, behavior: Behavior, stillness: StillnessTimer) -> None:
+        bound_s = behavior.max_still_s
+        if bound_s is None or stillness.seconds() < bound_s:
+            return
+        vehicle = self.vehicle
+        mode = vehicle.driver.mode_name(vehicle.state.custom_mode or 0)
+        said = "; ".join(vehicle.recent_texts(bound_s + TEXTS_BEFORE_S))
+        raise BehaviorFailedError(
+            f"it should be on its way, and has not moved for {bound_s:g} s, in {mode}"
+            + (f"; it said: {said}" if said else "")
+        )
+
+    async def _hold_still(self, active: _ActiveBehavior | None) -> None:
+        try:
+            await self._stop()
+            while active is not None and not self._has_restarted():
+                # One that is held before it has left the ground disarms itself after a while.
+                if not on_the_ground(self.vehicle):
+                    self._check_takeover(_HELD)
+                await self.vehicle.sleep(LOOK_EVERY_S)
+        except _TakenOverError as error:
+            if active is not None:
+                self._end(active, BehaviorState.FAILED, error.code, error.reason)
+        except ExchangeError as error:
+            self._logger.error("%s: cannot be held: %s", self.vehicle.resource, error)
+
+    async def _cancel(self, active: _ActiveBehavior) -> None:
+        stop = asyncio.get_running_loop().create_task(self._stop())
+        limit_s = STOP_SHARE * self._limits.cancel_timeout_s
+        late = asyncio.get_running_loop().create_task(self.vehicle.sleep(limit_s))
+        try:
+            await asyncio.wait([stop, late], return_when=asyncio.FIRST_COMPLETED)
+            if not stop.done():
+                reason = f"it did not stop within {limit_s:g} s of the cancel"
+                self._end(active, BehaviorState.FAILED, "TIMEOUT", reason)
+            elif (error := stop.exception()) is not None:
+                self._end(active, BehaviorState.FAILED, "", f"it would not stop: {error}")
+            elif self._is_in_failsafe:
+                reason = "it returns or lands by itself, and was not interrupted"
+                self._end(active, BehaviorState.FAILED, "TAKEN_OVER", reason)
+            else:
+                self._end(active, BehaviorState.CANCELLED)
+        finally:
+            for task in (stop, late):
+                task.cancel()
+            await asyncio.gather(stop, late, return_exceptions=True)
+
+    @property
+    def _is_in_failsafe(self) -> bool:
+        """Whether it returns or lands, and was not asked for that here: a failsafe, or a person.
+        After a restart it is held when its behavior is not recognised."""
+        state, active = self.vehicle.state, self._active
+        if not state.armed or state.mode not in _FAIL_SAFE:
+            return False
+        return not self._takeover_monitor.mode_is_commanded(
+            accepted_modes(active.behavior) if active else ()
+        )
+
+    async def _stop(self) -> None:
+        """Have it stand; a failsafe of its own goes on, whatever ends here."""
+        if not await self.vehicle.identified(0.0):
+            return
+        if self._is_in_failsafe:
+            state = self.vehicle.state
+            mode = self.vehicle.driver.mode_name(state.custom_mode or 0)
+            self._logger.warning(
+                "%s: not stopped: it is in %s, not asked for here", self.vehicle.resource, mode
+            )
+            return
+        await self.vehicle.driver.stop()
+
+    async def _fail(self, active: _ActiveBehavior, reason: str, code: str = "") -> None:
+        """What has failed half-way must not go on, but a return or a landing; a vehicle that stands
+        is left as it is."""
+        state = self.vehicle.state
+        comes_down = isinstance(active.behavior, Land | ReturnToLaunch) and state.mode in _FAIL_SAFE
+        try:
+            if active.behavior.moves_vehicle and state.landed is not True and not comes_down:
+                await self._stop()
+        except ExchangeError as error:
+            self._logger.error("%s: does not stop: %s", self.vehicle.resource, error)
+        self._end(active, BehaviorState.FAILED, code, reason)
+
+    def _end(
+        self, active: _ActiveBehavior, state: BehaviorState, code: str = "", reason: str = ""
+    ) -> None:
+        if self._active is active:
+            self._active = None
+        self._tracker.end(active.id, state, code, reason)
+
+
+class _TakenOverError(Exception):
+    """Somebody else steers: nothing more is sent."""
+
+    def __init__(self, reason: str, code: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.code = code
