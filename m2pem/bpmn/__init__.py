@@ -7,28 +7,22 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
-from m2pem.bpmn import collector
-from m2pem.bpmn.calls import resolve_calls
-from m2pem.bpmn.collaboration import check_collaborations
+from m2pem.bpmn import garbage_collection
+from m2pem.bpmn.activities import resolve_calls
+from m2pem.bpmn.collaboration import check_collaborations, resolve_correlation, resolve_messages
 from m2pem.bpmn.compensation import link_compensation, note_compensation
-from m2pem.bpmn.containers import MAX_DEPTH
-from m2pem.bpmn.correlation import resolve_correlation
-from m2pem.bpmn.data import resolve_data
-from m2pem.bpmn.data_flow import resolve_data_flows
-from m2pem.bpmn.files import Files, Part, open_part
-from m2pem.bpmn.graph import add_unreachable, check_graph
-from m2pem.bpmn.link import link
-from m2pem.bpmn.loop_data import join_default_signals, resolve_loops
-from m2pem.bpmn.merge import merge
-from m2pem.bpmn.messages import resolve_messages
-from m2pem.bpmn.prompts import resolve_prompts
-from m2pem.bpmn.reading import Reading
+from m2pem.bpmn.context import ReadingContext
+from m2pem.bpmn.data import resolve_data, resolve_data_flows
+from m2pem.bpmn.files import Files, Part, find_called, merge, open_part
+from m2pem.bpmn.loops import join_default_signals, resolve_loops
 from m2pem.bpmn.rules.files import DOCTYPE, ENCODING, NOT_BPMN, NOT_XML, TOO_LARGE, UNREADABLE_FILE
 from m2pem.bpmn.rules.registry import check_rules
 from m2pem.bpmn.rules.subprocesses import NO_PROCESS
 from m2pem.bpmn.search_path import SearchPath
-from m2pem.bpmn.size import max_bytes
-from m2pem.bpmn.targets import find_called
+from m2pem.bpmn.sequence_flows import add_unreachable, check_graph, link
+from m2pem.bpmn.subprocesses import MAX_DEPTH
+from m2pem.bpmn.tasks import resolve_prompts
+from m2pem.bpmn.xml import max_bytes
 from m2pem.errors import MissionError
 from m2pem.findings import Severity, has_errors
 from m2pem.mission.library import Library
@@ -80,22 +74,22 @@ def parse_mission(
         MissionError: it is no BPMN 2.0, or has something that m2pem cannot execute; it carries
             every finding, errors and warnings, by file and line.
     """
-    with collector.paused():
+    with garbage_collection.paused():
         return _parse(data, file, library, accepted=accepted)
 
 
-def read_partly(data: bytes, file: str, library: Library | None = None) -> Reading:
+def read_partly(data: bytes, file: str, library: Library | None = None) -> ReadingContext:
     """What can be read of a mission's own file, whatever is wrong with it.
 
     Raises:
         MissionError: it is no BPMN 2.0 at all.
     """
-    with collector.paused():
+    with garbage_collection.paused():
         files = Files(open_part(data, file), library)
         find_called(files)
         for part in [each for each in files.parts if each.is_read]:
             _resolve(part)
-        return files.main.reading
+        return files.main.context
 
 
 def _parse(data: bytes, file: str, library: Library | None, *, accepted: bool) -> Mission:
@@ -104,19 +98,19 @@ def _parse(data: bytes, file: str, library: Library | None, *, accepted: bool) -
     parts = [part for part in files.parts if part.is_read]
     for part in parts:
         _resolve(part)
-    findings = [each for part in files.parts for each in part.reading.report.sorted()]
+    findings = [each for part in files.parts for each in part.context.findings.sorted()]
     if has_errors([*findings, *files.findings]):
         if accepted:
             with suppress(Exception):  # merging relies on what is no error in a mission
                 return merge(files, reached)
         for part in parts:
-            add_unreachable(part.reading)
+            add_unreachable(part.context)
         raise _refusal(file, files)
     return merge(files, reached)
 
 
 def _refusal(file: str, files: Files) -> MissionError:
-    findings = [each for part in files.parts for each in part.reading.report.sorted()]
+    findings = [each for part in files.parts for each in part.context.findings.sorted()]
     findings += files.findings
     count = sum(finding.severity is Severity.ERROR for finding in findings)
     problems = "1 problem" if count == 1 else f"{count} problems"
@@ -125,27 +119,27 @@ def _refusal(file: str, files: Files) -> MissionError:
 
 def _resolve(part: Part) -> None:
     """Look up what is referred to within the file, and check what it is then."""
-    reading = part.reading
-    if not reading.processes:
+    context = part.context
+    if not context.processes:
         root = part.document.root
-        reading.report.error(
+        context.findings.error(
             root,
             root.get("id", ""),
             NO_PROCESS,
             "the file has no process",
             "draw a process with a start event",
         )
-    resolve_data(reading)
-    resolve_loops(reading)
-    resolve_data_flows(reading)
-    resolve_prompts(reading)
-    resolve_calls(reading)
-    note_compensation(reading)
-    link(reading)
-    link_compensation(reading)
-    join_default_signals(reading)
-    resolve_messages(reading)
-    part.correlation = resolve_correlation(reading)
-    check_collaborations(reading)
-    check_graph(reading)
-    check_rules(part.document.root, reading.report, part.data)
+    resolve_data(context)
+    resolve_loops(context)
+    resolve_data_flows(context)
+    resolve_prompts(context)
+    resolve_calls(context)
+    note_compensation(context)
+    link(context)
+    link_compensation(context)
+    join_default_signals(context)
+    resolve_messages(context)
+    part.correlation = resolve_correlation(context)
+    check_collaborations(context)
+    check_graph(context)
+    check_rules(part.document.root, context.findings, part.data)

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN
-from m2pem.bpmn.reading import Drawn, Reading, reference
-from m2pem.bpmn.scan import scan
+from m2pem.bpmn.children import read_children
+from m2pem.bpmn.context import Drawn, ReadingContext, reference
+from m2pem.bpmn.xml import BPMN
 from m2pem.mission.elements import Activity, BoundaryEvent
 from m2pem.mission.events import CompensateEventDefinition
 
@@ -19,11 +19,11 @@ _set = object.__setattr__
 ASSOCIATION = BPMN + "association"
 
 
-def read_association(reading: Reading, element: etree._Element) -> None:
+def read_association(context: ReadingContext, element: etree._Element) -> None:
     """An association; only one of a compensation event has an effect."""
     identifier = element.get("id", "")
-    scan(reading, element, identifier)
-    reading.associations.append(
+    read_children(context, element, identifier)
+    context.associations.append(
         Drawn(
             reference(element.get("sourceRef", "")),
             reference(element.get("targetRef", "")),
@@ -32,46 +32,46 @@ def read_association(reading: Reading, element: etree._Element) -> None:
     )
 
 
-def note_compensation(reading: Reading) -> None:
+def note_compensation(context: ReadingContext) -> None:
     """Note what is for compensation, before anything is linked: it does not begin by itself.
 
     That is what is marked so, and what a compensation event leads to all the same.
     """
-    for _, handler in _pairs(reading):
-        reading.undoing.add(handler)
-    for node in reading.undoing:
-        reading.self_starting.add(node)
+    for _, handler in _pairs(context):
+        context.undoing.add(handler)
+    for node in context.undoing:
+        context.self_starting.add(node)
         _set(node, "for_compensation", True)
 
 
-def link_compensation(reading: Reading) -> None:
+def link_compensation(context: ReadingContext) -> None:
     """Give each activity what undoes it: the first, when several were drawn."""
-    for event, handler in _pairs(reading):
+    for event, handler in _pairs(context):
         activity = getattr(event, "attached_to", None)  # a dangling one has none
         if isinstance(activity, Activity) and activity.compensation is None:
             _set(activity, "compensation", handler)
 
 
-def _pairs(reading: Reading) -> Iterator[tuple[BoundaryEvent, Activity]]:
+def _pairs(context: ReadingContext) -> Iterator[tuple[BoundaryEvent, Activity]]:
     """Compensation events and the activities in the same container that they lead to.
 
     An association without a direction may have been drawn from either end.
     """
-    if not reading.associations:
+    if not context.associations:
         return
-    hosts = dict(reading.attachments)
+    hosts = dict(context.attachments)
     events = {
         event.id: (event, container)
-        for event, container in zip(reading.nodes, reading.containers, strict=True)
+        for event, container in zip(context.nodes, context.containers, strict=True)
         if isinstance(event, BoundaryEvent)
         and any(isinstance(each, CompensateEventDefinition) for each in event.definitions)
     }
     activities = {
         node.id: (node, container)
-        for node, container in zip(reading.nodes, reading.containers, strict=True)
+        for node, container in zip(context.nodes, context.containers, strict=True)
         if isinstance(node, Activity)
     }
-    for drawn in reading.associations:
+    for drawn in context.associations:
         ends = [(drawn.source_ref, drawn.target_ref)]
         if drawn.direction != "One":
             ends.append((drawn.target_ref, drawn.source_ref))

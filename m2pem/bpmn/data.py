@@ -1,57 +1,204 @@
-"""Data objects, references to them and to data stores, and properties: what declares a key."""
+"""Data objects, stores, properties and associations (BPMN 2.0.2, clauses 10.4.1 and 10.4.2)."""
+
+from collections.abc import Iterator
 
 from lxml import etree
 
-from m2pem.bpmn.names import local
-from m2pem.bpmn.reading import DataEnd, Reading, reference
+from m2pem.bpmn.children import Children, read_children
+from m2pem.bpmn.context import (
+    KEY,
+    Association,
+    DataEnd,
+    PendingDataFlow,
+    ReadingContext,
+    association,
+    reference,
+    text_of,
+)
+from m2pem.bpmn.rules.data import BAD_ASSIGNMENT, EMPTY_ASSIGNMENT
 from m2pem.bpmn.rules.references import DANGLING_REFERENCE
-from m2pem.bpmn.scan import scan
-from m2pem.mission.elements import Container, DataObject
+from m2pem.bpmn.xml import BPMN, local
+from m2pem.mission.behavior import Mapping, Mappings
+from m2pem.mission.elements import Activity, Container, DataObject, Event
+from m2pem.mission.expression import parse
 from m2pem.mission.near import did_you_mean
 
 
-def read_data(reading: Reading, element: etree._Element, container: Container) -> None:
+def read_data(context: ReadingContext, element: etree._Element, container: Container) -> None:
     """A dataObject, dataObjectReference, dataStoreReference or property of a container."""
-    identifier = reading.optional_id(element)
-    scan(reading, element, identifier)
+    identifier = context.optional_id(element)
+    read_children(context, element, identifier)
     name = element.get("name", "")
     what = local(element.tag)
     if what in ("dataObject", "property"):
-        declared = DataObject(identifier, name, reading.report.line(element))
+        declared = DataObject(identifier, name, context.findings.line(element))
         if declared.key:
-            reading.declared.append((container, declared))
+            context.declared.append((container, declared))
         if identifier:
-            reading.data.setdefault(identifier, DataEnd(declared.key, [element], declared))
+            context.data.setdefault(identifier, DataEnd(declared.key, [element], declared))
     elif identifier:
         if what == "dataStoreReference":
-            reading.data_stores.add(identifier)
+            context.data_stores.add(identifier)
         target = element.get("dataObjectRef") or element.get("dataStoreRef") or ""
-        reading.data.setdefault(
+        context.data.setdefault(
             identifier, DataEnd(name or identifier, [element], refers_to=reference(target))
         )
 
 
-def resolve_data(reading: Reading) -> None:
+def resolve_data(context: ReadingContext) -> None:
     """Name data objects after their references, and note which ones associations write.
 
     Editors draw and name the *reference*; the data object itself has only an id.
     """
-    for identifier, end in reading.data.items():
-        target = reading.data.get(end.refers_to)
+    for identifier, end in context.data.items():
+        target = context.data.get(end.refers_to)
         if target is None and end.refers_to:
-            reading.report.warning(
+            context.findings.warning(
                 end.carriers[0],
                 identifier,
                 DANGLING_REFERENCE,
                 f"it refers to '{end.refers_to}', which is no data object or data store",
-                did_you_mean(end.refers_to, reading.data, "correct it, or delete it"),
+                did_you_mean(end.refers_to, context.data, "correct it, or delete it"),
             )
         if target is None or target.declared is None:
             continue
         declared = target.declared
         if not declared.name and end.carriers[0].get("name"):
             object.__setattr__(declared, "name", end.key)
-    for association in reading.written:
-        key = reading.data_key(association.target_ref)
+    for written in context.written:
+        key = context.data_key(written.target_ref)
         if key:
-            reading.written_keys.add(key)
+            context.written_keys.add(key)
+
+
+_PARAMETERS = frozenset({"dataInput", "dataOutput", "property"})
+_TAGS = frozenset(
+    BPMN + name
+    for name in (*_PARAMETERS, "ioSpecification", "dataInputAssociation", "dataOutputAssociation")
+)
+_PLACEHOLDER = "__targetRef_placeholder"
+"""The property that Camunda's editor draws data associations to; it is none of the author's."""
+
+
+def read_data_flow(context: ReadingContext, found: Children, node: Activity | Event) -> None:
+    """Keep its data associations until all data objects are known."""
+    if _TAGS.isdisjoint(found.children):
+        return
+    outputs = context.note_outputs(found.of("dataOutputAssociation"))
+    parameters = _parameters(found)
+    if not parameters:
+        return
+    if isinstance(node, Activity):
+        object.__setattr__(node, "own_data", frozenset(parameters.values()))
+    inputs = [association(each) for each in found.of("dataInputAssociation")]
+    context.data_flows.append(PendingDataFlow(node, parameters, inputs, outputs))
+
+
+def _parameters(found: Children) -> dict[str, str]:
+    """Keys of its data inputs, data outputs and properties, by id."""
+    elements: list[etree._Element] = []
+    for specification in found.of("ioSpecification"):
+        elements += specification
+    for name in _PARAMETERS:
+        elements += found.of(name)
+    result: dict[str, str] = {}
+    for element in elements:
+        identifier = element.get("id")
+        name = element.get("name") or identifier or ""
+        if identifier and local(element.tag) in _PARAMETERS and name != _PLACEHOLDER:
+            result[identifier] = name
+    return result
+
+
+def resolve_data_flows(context: ReadingContext) -> None:
+    """Work out what each data association passes."""
+    for pending in context.data_flows:
+        inputs = [mapping for each in pending.inputs for mapping in _into(context, pending, each)]
+        outputs = [
+            mapping for each in pending.outputs for mapping in _out_of(context, pending, each)
+        ]
+        if inputs or outputs:
+            mappings = Mappings(tuple(inputs), tuple(outputs))
+            object.__setattr__(pending.node, "data_flow", mappings)
+
+
+def _into(
+    context: ReadingContext, pending: PendingDataFlow, found: Association
+) -> Iterator[Mapping]:
+    own = pending.parameters.get(found.target_ref, "")
+    outer = [context.data_key(ref) for ref in found.source_refs]
+    yield from _mappings(context, pending, found, outer, own)
+
+
+def _out_of(
+    context: ReadingContext, pending: PendingDataFlow, found: Association
+) -> Iterator[Mapping]:
+    own = [pending.parameters.get(ref, "") for ref in found.source_refs]
+    outer = context.data_key(found.target_ref)
+    yield from _mappings(context, pending, found, own, outer)
+
+
+def _mappings(
+    context: ReadingContext,
+    pending: PendingDataFlow,
+    found: Association,
+    sources: list[str],
+    target: str,
+) -> Iterator[Mapping]:
+    """An association copies its source, or what its transformation or assignments say.
+
+    An end that an editor left out, or drew to a placeholder, passes nothing: the activity sees the
+    data around it anyway. Nor does one whose name no expression can read ("Route prompt").
+    """
+    line = context.findings.line(found.element)
+    identifier = pending.node.id
+    assigned = False
+    for child in found.element:
+        name = local(child.tag)
+        if name == "transformation" and target:
+            assigned = True
+            text, language = text_of(child), child.get("language")
+            expression = context.expression(child, identifier, text, language)
+            if expression is not None:
+                yield Mapping(expression, target, line)
+        elif name == "assignment":
+            assigned = True
+            yield from _assignment(context, pending, child, target)
+    if assigned or not target or not sources or not sources[0]:
+        return
+    if KEY.fullmatch(sources[0]) and KEY.fullmatch(target):
+        yield Mapping(parse(sources[0], "m2pem"), target, line)
+
+
+def _assignment(
+    context: ReadingContext, pending: PendingDataFlow, element: etree._Element, target: str
+) -> Iterator[Mapping]:
+    ends = {local(child.tag): child for child in element}
+    written = text_of(ends["to"]).strip("#${} ") if "to" in ends else ""
+    head, dot, rest = written.partition(".")
+    key = pending.parameters.get(head) or context.data_key(head) or head
+    key = f"{key}{dot}{rest}" or target
+    if "from" in ends and not text_of(ends["from"]):
+        context.findings.warning(
+            ends["from"],
+            pending.node.id,
+            EMPTY_ASSIGNMENT,
+            f"the assignment of '{written}' has an empty 'from'; it assigns nothing",
+            "write what it assigns, or delete it",
+        )
+        return
+    if "from" not in ends or not KEY.fullmatch(key):
+        context.findings.error(
+            element,
+            pending.node.id,
+            BAD_ASSIGNMENT,
+            f"the assignment's 'to', '{written}', is no name of the data"
+            if "from" in ends and written
+            else "the assignment does not say what to write, or where",
+            "write <assignment><from>expression</from><to>name</to></assignment>",
+        )
+        return
+    source = ends["from"]
+    expression = context.value(source, pending.node.id, text_of(source), source.get("language"))
+    if expression is not None:
+        yield Mapping(expression, key, context.findings.line(element))

@@ -1,198 +1,121 @@
-"""Event definitions: what triggers, or results from, an event (BPMN 2.0.2, clause 10.5.5)."""
-
-from collections.abc import Callable, Mapping
-from typing import TypeVar
+"""Elements directly in `definitions`: what events refer to, and collaborations."""
 
 from lxml import etree
 
-from m2pem.bpmn.names import local
-from m2pem.bpmn.reading import MessageUse, Reading, reference, text_of
-from m2pem.bpmn.rewriting import time_remedy
-from m2pem.bpmn.rules.events import MISSING_REFERENCE, NO_CONDITION, TIMER_TIME
-from m2pem.bpmn.rules.references import DANGLING_REFERENCE
-from m2pem.bpmn.scan import Scan, scan
-from m2pem.bpmn.schema import SHAPES
-from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.mission.cycle import cycle
-from m2pem.mission.duration import date_us, duration_us
-from m2pem.mission.events import (
-    CancelEventDefinition,
-    CompensateEventDefinition,
-    ConditionalEventDefinition,
-    Error,
-    ErrorEventDefinition,
-    Escalation,
-    EscalationEventDefinition,
-    EventDefinition,
-    LinkEventDefinition,
-    Message,
-    MessageEventDefinition,
-    RootElement,
-    Signal,
-    SignalEventDefinition,
-    TerminateEventDefinition,
-    TimerEventDefinition,
-    TimerKind,
-)
+from m2pem.bpmn.activities import GLOBAL_TASKS
+from m2pem.bpmn.children import ChildOrder, read_children
+from m2pem.bpmn.collaboration import correlation_key, read_collaboration, read_property
+from m2pem.bpmn.context import DataEnd, ReadingContext
+from m2pem.bpmn.rules.attributes import BAD_VALUE, UNKNOWN_ELEMENT
+from m2pem.bpmn.rules.files import NOT_EXECUTED
+from m2pem.bpmn.schema import ROOT_NAMES, SHAPES
+from m2pem.bpmn.xml import BPMN, M2PEM, a, kind, local
+from m2pem.mission.events import Error, Escalation, Message, Signal
 from m2pem.mission.near import did_you_mean
-from m2pem.mission.values import Value
 
-Root = TypeVar("Root", bound=RootElement)
+PROCESS = BPMN + "process"
+_DI = frozenset({"BPMNDiagram", "import", "extension", "relationship"})
+_CHOREOGRAPHIES = frozenset(
+    {"choreography", "globalChoreographyTask", "conversation", "globalConversation"}
+)
 
 
-def read_definition(
-    reading: Reading, element: etree._Element, event: Scan, *, catches: bool
-) -> EventDefinition | None:
-    """One definition of an event; None when findings say why there is none."""
-    found = scan(reading, element, event.id)
-    line = reading.report.line(element)
-    label = event.element.get("name", "")
-    name = local(element.tag).removesuffix("EventDefinition")
+def read_roots(context: ReadingContext, definitions: etree._Element) -> list[etree._Element]:
+    """Read all root elements but the processes, which are returned in the order of the XML."""
+    shape = SHAPES[definitions.tag]
+    context.check_attributes(definitions, shape, definitions.get("id", ""))
+    language = definitions.get("expressionLanguage", "")
+    if "feel" in language.lower():
+        # Editors write XPath, BPMN's default, over files whose conditions are none.
+        context.expression_language = language
+    order = ChildOrder()
+    processes: list[etree._Element] = []
+    for element in definitions:
+        tag = element.tag
+        if not tag.startswith(BPMN):
+            continue
+        name = local(tag)
+        if tag == PROCESS:
+            processes.append(element)
+        elif name == "collaboration":
+            read_collaboration(context, element)
+        elif name.endswith("EventDefinition"):
+            if element.get("id"):
+                context.event_definitions[context.claim(element)] = element
+        elif tag in GLOBAL_TASKS:
+            if element.get("id"):
+                context.global_tasks[context.claim(element)] = element
+        elif name == "dataStore":
+            _read_data_store(context, element)
+        elif name in ("signal", "message", "error", "escalation"):
+            _read_event_root(context, element, name)
+        elif name == "correlationProperty":
+            read_property(context, element)
+        elif name in _CHOREOGRAPHIES:
+            _refuse_choreography(context, element)
+        elif name not in ROOT_NAMES and name not in _DI:
+            context.findings.warning(
+                element,
+                element.get("id", ""),
+                UNKNOWN_ELEMENT,
+                f"BPMN has no '{name}' in definitions; it is ignored",
+                did_you_mean(name, ROOT_NAMES, "delete it"),
+            )
+            continue
+        order.check(context, definitions, element, shape, definitions.get("id", ""))
+    return processes
 
-    if name == "terminate":
-        return TerminateEventDefinition(line)
-    if name == "cancel":
-        return CancelEventDefinition(line)
-    if name == "compensate":
-        wait = reading.boolean(element, "waitForCompletion", True, event.id)
-        activity = "" if catches else reference(element.get("activityRef", ""))
-        return CompensateEventDefinition(line, activity, wait)
-    if name == "timer":
-        return _timer(reading, element, event.id)
-    if name == "conditional":
-        return _conditional(reading, found)
-    if name == "link":
-        return LinkEventDefinition(line, (element.get("name") or label).strip())
-    if name == "message":
-        return _message(reading, element, event, catches=catches)
+
+def _read_event_root(context: ReadingContext, element: etree._Element, name: str) -> None:
+    identifier = context.claim(element)
+    read_children(context, element, identifier)
+    context.declared_roots.add(identifier)
+    label = element.get("name", "")
+    line = context.findings.line(element)
     if name == "signal":
-        sign = Signal(event.id, label, line)
-        signal = look_up(reading, element, reading.signals, sign)
-        return SignalEventDefinition(line, signal or _own(reading, event, reading.signals, sign))
-    if name == "error":
-        own = Error(event.id, label, line, event.id)
-        error = look_up(reading, element, reading.errors, own)
-        if error is None and not catches:
-            error = _own(reading, event, reading.errors, own)
-        return ErrorEventDefinition(line, error)
-    notice = Escalation(event.id, label, line, event.id)
-    escalation = look_up(reading, element, reading.escalations, notice)
-    if escalation is None and not catches:
-        escalation = _own(reading, event, reading.escalations, notice)
-    return EscalationEventDefinition(line, escalation)
+        returned = element.get(M2PEM + "returned", "").strip()
+        sent = _from_operator(context, element, identifier)
+        signal = Signal(identifier, label, line, sent, returned)
+        context.signals.setdefault(identifier, signal)
+    elif name == "message":
+        sent = _from_operator(context, element, identifier)
+        key = correlation_key(context, element, identifier)
+        message = Message(identifier, label, line, sent, key)
+        context.messages.setdefault(identifier, message)
+    elif name == "error":
+        error = Error(identifier, label, line, element.get("errorCode") or identifier)
+        context.errors.setdefault(identifier, error)
+    else:
+        code = element.get("escalationCode") or identifier
+        context.escalations.setdefault(identifier, Escalation(identifier, label, line, code))
 
 
-def look_up(
-    reading: Reading, element: etree._Element, table: Mapping[str, Root], stand_in: Root
-) -> Root | None:
-    """What an attribute such as `signalRef` names; None when it is absent.
-
-    A reference to nothing gives the stand-in beside a finding, so that reading can go on. The
-    stand-in has the id of the event or task that refers.
-    """
-    what = type(stand_in).__name__.lower()
-    text = element.get(f"{what}Ref")
-    if not text:
-        return None
-    name = reference(text)
-    found = table.get(name)
-    if found is not None:
-        return found
-    taken = reading.ids.get(name)
-    because = f"the element on line {taken} is none" if taken else f"no {what} has that id"
-    reading.report.error(
-        element,
-        stand_in.id,
-        DANGLING_REFERENCE,
-        f"{what}Ref names '{name}', but {because}",
-        did_you_mean(name, table, f'put <{what} id="{name}"/> into definitions, or name another'),
-    )
-    return stand_in
-
-
-def _own(reading: Reading, event: Scan, table: dict[str, Root], root: Root) -> Root:
-    """The root element of an event that names none."""
-    what = type(root).__name__.lower()
-    reading.report.warning(
-        event.element,
-        event.id,
-        MISSING_REFERENCE,
-        f"the event names no {what}; it has one of its own, with the id '{event.id}'",
-        f"add {what}Ref to its event definition",
-    )
-    return table.setdefault(event.id, root)
-
-
-def _message(
-    reading: Reading, element: etree._Element, event: Scan, *, catches: bool
-) -> MessageEventDefinition:
-    line = reading.report.line(element)
-    label = event.element.get("name", "")
-    own = Message(event.id, label, line)
-    message = look_up(reading, element, reading.messages, own)
-    definition = MessageEventDefinition(line, message or own)
-    where = reading.report.line(event.element)
-    reading.message_uses.append(MessageUse(definition, event.id, label, where, catches, message))
-    return definition
-
-
-def _conditional(reading: Reading, found: Scan) -> ConditionalEventDefinition | None:
-    for element in found.of("condition"):
-        text = text_of(element)
-        reading.check_attributes(element, SHAPES[element.tag], found.id)
-        if text:
-            condition = reading.expression(element, found.id, text, element.get("language"))
-            if condition is None:
-                return None
-            return ConditionalEventDefinition(reading.report.line(found.element), condition)
-    reading.report.error(
-        found.element,
-        found.id,
-        NO_CONDITION,
-        "the conditional event has no condition",
-        "add one, for example <condition>battery.level &lt; 20</condition>",
-    )
-    return None
-
-
-_TIMES = {kind.value: kind for kind in TimerKind}
-
-
-def _timer(
-    reading: Reading, element: etree._Element, identifier: str
-) -> TimerEventDefinition | None:
-    times = [child for child in element if local(child.tag) in _TIMES]
-    texts = [(local(child.tag), text_of(child)) for child in times]
-    written = [(name, text) for name, text in texts if text]
-    if len(written) != 1:
-        said = "several times" if written else "no time"
-        reading.report.error(
+def _from_operator(context: ReadingContext, element: etree._Element, identifier: str) -> bool:
+    sender = element.get(M2PEM + "from")
+    if sender not in (None, "operator"):
+        context.findings.error(
             element,
             identifier,
-            TIMER_TIME,
-            f"the timer has {said}",
-            "give it one timeDuration (PT30S), timeDate (2026-01-31T12:00:00Z) or timeCycle "
-            "(R3/PT10S)",
+            BAD_VALUE,
+            f"m2pem:from='{sender}' names no sender that m2pem knows",
+            'write m2pem:from="operator", or delete it',
         )
-        return None
-    name, text = written[0]
-    expression = reading.template(times[0], identifier, text)
-    if expression is None:
-        return None
-    kind = _TIMES[name]
-    if expression.constant:
-        try:
-            _CHECKS[kind](expression.evaluate(lambda _: None))
-        except (ExpressionSyntaxError, ExpressionError) as error:
-            reading.report.error(
-                times[0], identifier, TIMER_TIME, f"{name}: {error}", time_remedy(name, text)
-            )
-            return None
-    return TimerEventDefinition(reading.report.line(element), kind, expression)
+    return sender == "operator"
 
 
-_CHECKS: dict[TimerKind, Callable[[Value], object]] = {
-    TimerKind.DATE: date_us,
-    TimerKind.DURATION: lambda text: duration_us(text, 0),
-    TimerKind.CYCLE: cycle,
-}
+def _read_data_store(context: ReadingContext, element: etree._Element) -> None:
+    identifier = context.claim(element)
+    read_children(context, element, identifier)
+    key = element.get("name") or identifier
+    context.data.setdefault(identifier, DataEnd(key, [element]))
+
+
+def _refuse_choreography(context: ReadingContext, element: etree._Element) -> None:
+    word = kind(element.tag)
+    context.findings.error(
+        element,
+        element.get("id", ""),
+        NOT_EXECUTED,
+        f"m2pem does not execute {a(word)} yet",
+        "draw the mission as processes and collaborations",
+    )

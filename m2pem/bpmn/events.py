@@ -1,56 +1,256 @@
-"""Events: which definitions may stand where (BPMN 2.0.2, clause 10.5), and what they say."""
+"""Events, their definitions, and links (BPMN 2.0.2, clauses 10.5 and 10.5.5, table 10.98).
 
-from collections.abc import Iterable
+A link joins throwing link events of one container to one catching event of their name, like a
+sequence flow that is not drawn.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import TypeVar
 
 from lxml import etree
 
-from m2pem.bpmn.data_flow import read_data_flow
-from m2pem.bpmn.definitions import read_definition
-from m2pem.bpmn.names import BPMN, a, kind, local
-from m2pem.bpmn.reading import Reading, reference, text_of
+from m2pem.bpmn.children import Children, read_children
+from m2pem.bpmn.context import MessageUse, ReadingContext, reference, text_of
+from m2pem.bpmn.data import read_data_flow
+from m2pem.bpmn.foreign_syntax import time_remedy
 from m2pem.bpmn.rules.events import (
+    DANGLING_LINK,
+    DUPLICATE_LINK,
     ERROR_NOT_INTERRUPTING,
     EVENT_NOT_ALLOWED,
+    LINK_CATCH_INCOMING,
+    LINK_CROSSES_BORDER,
+    LINK_NAME,
+    LINK_THROW_OUTGOING,
+    MISSING_REFERENCE,
+    NO_CONDITION,
     NO_TRIGGER,
+    TIMER_TIME,
     TYPED_START_IN_SUBPROCESS,
     allowed_triggers,
 )
 from m2pem.bpmn.rules.references import DANGLING_REFERENCE
-from m2pem.bpmn.scan import Scan, scan
+from m2pem.bpmn.rules.rule import Rule
+from m2pem.bpmn.schema import SHAPES
+from m2pem.bpmn.xml import BPMN, a, kind, local
+from m2pem.errors import ExpressionError, ExpressionSyntaxError
+from m2pem.mission.cycle import cycle
+from m2pem.mission.duration import date_us, duration_us
 from m2pem.mission.elements import (
     BoundaryEvent,
     Container,
     EndEvent,
     Event,
+    FlowNode,
     IntermediateCatchEvent,
     IntermediateThrowEvent,
     Process,
     StartEvent,
     SubProcess,
 )
-from m2pem.mission.events import ErrorEventDefinition, EventDefinition
+from m2pem.mission.events import (
+    CancelEventDefinition,
+    CompensateEventDefinition,
+    ConditionalEventDefinition,
+    Error,
+    ErrorEventDefinition,
+    Escalation,
+    EscalationEventDefinition,
+    EventDefinition,
+    LinkEventDefinition,
+    Message,
+    MessageEventDefinition,
+    RootElement,
+    Signal,
+    SignalEventDefinition,
+    TerminateEventDefinition,
+    TimerEventDefinition,
+    TimerKind,
+)
 from m2pem.mission.near import did_you_mean
+from m2pem.mission.values import Value
+
+Root = TypeVar("Root", bound=RootElement)
+
+
+def read_definition(
+    context: ReadingContext, element: etree._Element, event: Children, *, catches: bool
+) -> EventDefinition | None:
+    """One definition of an event; None when findings say why there is none."""
+    found = read_children(context, element, event.id)
+    line = context.findings.line(element)
+    label = event.element.get("name", "")
+    name = local(element.tag).removesuffix("EventDefinition")
+
+    if name == "terminate":
+        return TerminateEventDefinition(line)
+    if name == "cancel":
+        return CancelEventDefinition(line)
+    if name == "compensate":
+        wait = context.boolean(element, "waitForCompletion", True, event.id)
+        activity = "" if catches else reference(element.get("activityRef", ""))
+        return CompensateEventDefinition(line, activity, wait)
+    if name == "timer":
+        return _timer(context, element, event.id)
+    if name == "conditional":
+        return _conditional(context, found)
+    if name == "link":
+        return LinkEventDefinition(line, (element.get("name") or label).strip())
+    if name == "message":
+        return _message(context, element, event, catches=catches)
+    if name == "signal":
+        sign = Signal(event.id, label, line)
+        signal = look_up(context, element, context.signals, sign)
+        return SignalEventDefinition(line, signal or _own(context, event, context.signals, sign))
+    if name == "error":
+        own = Error(event.id, label, line, event.id)
+        error = look_up(context, element, context.errors, own)
+        if error is None and not catches:
+            error = _own(context, event, context.errors, own)
+        return ErrorEventDefinition(line, error)
+    notice = Escalation(event.id, label, line, event.id)
+    escalation = look_up(context, element, context.escalations, notice)
+    if escalation is None and not catches:
+        escalation = _own(context, event, context.escalations, notice)
+    return EscalationEventDefinition(line, escalation)
+
+
+def look_up(
+    context: ReadingContext, element: etree._Element, table: Mapping[str, Root], stand_in: Root
+) -> Root | None:
+    """What an attribute such as `signalRef` names; None when it is absent.
+
+    A reference to nothing gives the stand-in beside a finding, so that reading can go on. The
+    stand-in has the id of the event or task that refers.
+    """
+    what = type(stand_in).__name__.lower()
+    text = element.get(f"{what}Ref")
+    if not text:
+        return None
+    name = reference(text)
+    found = table.get(name)
+    if found is not None:
+        return found
+    taken = context.ids.get(name)
+    because = f"the element on line {taken} is none" if taken else f"no {what} has that id"
+    context.findings.error(
+        element,
+        stand_in.id,
+        DANGLING_REFERENCE,
+        f"{what}Ref names '{name}', but {because}",
+        did_you_mean(name, table, f'put <{what} id="{name}"/> into definitions, or name another'),
+    )
+    return stand_in
+
+
+def _own(context: ReadingContext, event: Children, table: dict[str, Root], root: Root) -> Root:
+    """The root element of an event that names none."""
+    what = type(root).__name__.lower()
+    context.findings.warning(
+        event.element,
+        event.id,
+        MISSING_REFERENCE,
+        f"the event names no {what}; it has one of its own, with the id '{event.id}'",
+        f"add {what}Ref to its event definition",
+    )
+    return table.setdefault(event.id, root)
+
+
+def _message(
+    context: ReadingContext, element: etree._Element, event: Children, *, catches: bool
+) -> MessageEventDefinition:
+    line = context.findings.line(element)
+    label = event.element.get("name", "")
+    own = Message(event.id, label, line)
+    message = look_up(context, element, context.messages, own)
+    definition = MessageEventDefinition(line, message or own)
+    where = context.findings.line(event.element)
+    context.message_uses.append(MessageUse(definition, event.id, label, where, catches, message))
+    return definition
+
+
+def _conditional(context: ReadingContext, found: Children) -> ConditionalEventDefinition | None:
+    for element in found.of("condition"):
+        text = text_of(element)
+        context.check_attributes(element, SHAPES[element.tag], found.id)
+        if text:
+            condition = context.expression(element, found.id, text, element.get("language"))
+            if condition is None:
+                return None
+            return ConditionalEventDefinition(context.findings.line(found.element), condition)
+    context.findings.error(
+        found.element,
+        found.id,
+        NO_CONDITION,
+        "the conditional event has no condition",
+        "add one, for example <condition>battery.level &lt; 20</condition>",
+    )
+    return None
+
+
+_TIMES = {kind.value: kind for kind in TimerKind}
+
+
+def _timer(
+    context: ReadingContext, element: etree._Element, identifier: str
+) -> TimerEventDefinition | None:
+    times = [child for child in element if local(child.tag) in _TIMES]
+    texts = [(local(child.tag), text_of(child)) for child in times]
+    written = [(name, text) for name, text in texts if text]
+    if len(written) != 1:
+        said = "several times" if written else "no time"
+        context.findings.error(
+            element,
+            identifier,
+            TIMER_TIME,
+            f"the timer has {said}",
+            "give it one timeDuration (PT30S), timeDate (2026-01-31T12:00:00Z) or timeCycle "
+            "(R3/PT10S)",
+        )
+        return None
+    name, text = written[0]
+    expression = context.template(times[0], identifier, text)
+    if expression is None:
+        return None
+    kind = _TIMES[name]
+    if expression.constant:
+        try:
+            _CHECKS[kind](expression.evaluate(lambda _: None))
+        except (ExpressionSyntaxError, ExpressionError) as error:
+            context.findings.error(
+                times[0], identifier, TIMER_TIME, f"{name}: {error}", time_remedy(name, text)
+            )
+            return None
+    return TimerEventDefinition(context.findings.line(element), kind, expression)
+
+
+_CHECKS: dict[TimerKind, Callable[[Value], object]] = {
+    TimerKind.DATE: date_us,
+    TimerKind.DURATION: lambda text: duration_us(text, 0),
+    TimerKind.CYCLE: cycle,
+}
+
 
 _THROWN_IMPLICITLY = frozenset({"message", "signal", "escalation", "error", "compensate"})
 _CATCHING = frozenset({"startEvent", "intermediateCatchEvent", "boundaryEvent"})
 _NEEDS_TRIGGER = frozenset({"intermediateCatchEvent", "boundaryEvent"})
 
 
-def read_event(reading: Reading, element: etree._Element, container: Container) -> Event:
+def read_event(context: ReadingContext, element: etree._Element, container: Container) -> Event:
     """A start, end, intermediate or boundary event."""
-    identifier = reading.claim(element)
-    found = scan(reading, element, identifier)
+    identifier = context.claim(element)
+    found = read_children(context, element, identifier)
     place = local(element.tag)
-    definitions = _definitions(reading, found, place, container)
+    definitions = _definitions(context, found, place, container)
     name = element.get("name", "")
-    line = reading.report.line(element)
-    parallel = reading.boolean(element, "parallelMultiple", False, identifier)
+    line = context.findings.line(element)
+    parallel = context.boolean(element, "parallelMultiple", False, identifier)
     event: Event
     if place == "startEvent":
-        interrupting = reading.boolean(element, "isInterrupting", True, identifier)
+        interrupting = context.boolean(element, "isInterrupting", True, identifier)
         event = StartEvent(identifier, name, line, definitions, parallel, interrupting)
         if not interrupting:
-            _no_error(reading, element, event)
+            _no_error(context, element, event)
     elif place == "endEvent":
         event = EndEvent(identifier, name, line, definitions)
     elif place == "intermediateThrowEvent":
@@ -58,41 +258,41 @@ def read_event(reading: Reading, element: etree._Element, container: Container) 
     elif place == "intermediateCatchEvent":
         event = IntermediateCatchEvent(identifier, name, line, definitions, parallel)
     else:
-        event = _boundary(reading, element, identifier, definitions, parallel)
-    read_data_flow(reading, found, event)
+        event = _boundary(context, element, identifier, definitions, parallel)
+    read_data_flow(context, found, event)
     return event
 
 
 def _boundary(
-    reading: Reading,
+    context: ReadingContext,
     element: etree._Element,
     identifier: str,
     definitions: tuple[EventDefinition, ...],
     parallel: bool,
 ) -> BoundaryEvent:
-    interrupting = reading.boolean(element, "cancelActivity", True, identifier)
+    interrupting = context.boolean(element, "cancelActivity", True, identifier)
     event = BoundaryEvent(
         identifier,
         element.get("name", ""),
-        reading.report.line(element),
+        context.findings.line(element),
         definitions,
         parallel,
         interrupting,
     )
-    reading.attachments.append((event, reference(element.get("attachedToRef", ""))))
+    context.attachments.append((event, reference(element.get("attachedToRef", ""))))
     if not interrupting:
-        _no_error(reading, element, event)
+        _no_error(context, element, event)
     return event
 
 
-def _no_error(reading: Reading, element: etree._Element, event: Event) -> None:
+def _no_error(context: ReadingContext, element: etree._Element, event: Event) -> None:
     """What catches an error cannot leave running what failed (clause 10.5.6)."""
     if not any(isinstance(each, ErrorEventDefinition) for each in event.definitions):
         return
     word, attribute, what = "boundary", "cancelActivity", "activity"
     if isinstance(event, StartEvent):
         word, attribute, what = "start", "isInterrupting", "scope"
-    reading.report.error(
+    context.findings.error(
         element,
         event.id,
         ERROR_NOT_INTERRUPTING,
@@ -103,17 +303,17 @@ def _no_error(reading: Reading, element: etree._Element, event: Event) -> None:
 
 
 def _definitions(
-    reading: Reading, found: Scan, place: str, container: Container
+    context: ReadingContext, found: Children, place: str, container: Container
 ) -> tuple[EventDefinition, ...]:
-    elements = definition_elements(reading, found)
+    elements = definition_elements(context, found)
     awaited = place in _NEEDS_TRIGGER or (place == "startEvent" and _is_handler(container))
     if awaited and not elements and not found.of("eventDefinitionRef"):
-        _no_trigger(reading, found, place)
-    read = [_definition(reading, found, place, container, each) for each in elements]
+        _no_trigger(context, found, place)
+    read = [_definition(context, found, place, container, each) for each in elements]
     return tuple(definition for definition in read if definition is not None)
 
 
-def definition_elements(reading: Reading, found: Scan) -> list[etree._Element]:
+def definition_elements(context: ReadingContext, found: Children) -> list[etree._Element]:
     """The definitions that stand in an event, then those of the file that it refers to."""
     elements = [
         each
@@ -122,23 +322,23 @@ def definition_elements(reading: Reading, found: Scan) -> list[etree._Element]:
     ]
     for each in found.of("eventDefinitionRef"):
         name = reference(text_of(each))
-        target = referred_definition(reading, each, "eventDefinitionRef", name, found.id)
+        target = referred_definition(context, each, "eventDefinitionRef", name, found.id)
         if target is not None:
             elements.append(target)
     return elements
 
 
 def read_thrown(
-    reading: Reading, found: Scan, elements: Iterable[etree._Element]
+    context: ReadingContext, found: Children, elements: Iterable[etree._Element]
 ) -> tuple[EventDefinition, ...]:
     """What a multi-instance activity throws by itself (table 10.30): an implicit throw event."""
     read = []
     for element in elements:
         name = local(element.tag).removesuffix("EventDefinition")
         if name in _THROWN_IMPLICITLY:
-            read.append(read_definition(reading, element, found, catches=False))
+            read.append(read_definition(context, element, found, catches=False))
         else:
-            reading.report.error(
+            context.findings.error(
                 element,
                 found.id,
                 EVENT_NOT_ALLOWED,
@@ -153,13 +353,17 @@ def _is_handler(container: Container) -> bool:
 
 
 def _definition(
-    reading: Reading, found: Scan, place: str, container: Container, definition: etree._Element
+    context: ReadingContext,
+    found: Children,
+    place: str,
+    container: Container,
+    definition: etree._Element,
 ) -> EventDefinition | None:
     """One of its definitions; None when a finding says what is wrong with it."""
     name = local(definition.tag).removesuffix("EventDefinition")
     embedded = not _is_handler(container) and not isinstance(container, Process)
     if place == "startEvent" and embedded:
-        reading.report.error(
+        context.findings.error(
             found.element,
             found.id,
             TYPED_START_IN_SUBPROCESS,
@@ -169,32 +373,124 @@ def _definition(
         return None
     if name not in allowed_triggers(found.element):
         return None  # which a rule says
-    return read_definition(reading, definition, found, catches=place in _CATCHING)
+    return read_definition(context, definition, found, catches=place in _CATCHING)
 
 
 def referred_definition(
-    reading: Reading, referring: etree._Element, attribute: str, name: str, identifier: str
+    context: ReadingContext, referring: etree._Element, attribute: str, name: str, identifier: str
 ) -> etree._Element | None:
     """The event definition of the file that has an id; says so when there is none."""
-    target = reading.event_definitions.get(name)
+    target = context.event_definitions.get(name)
     if target is None:
-        reading.report.error(
+        context.findings.error(
             referring,
             identifier,
             DANGLING_REFERENCE,
             f"{attribute} names '{name}', which is no event definition of this file",
-            did_you_mean(name, reading.event_definitions, "name one that stands in definitions"),
+            did_you_mean(name, context.event_definitions, "name one that stands in definitions"),
         )
     return target
 
 
-def _no_trigger(reading: Reading, found: Scan, place: str) -> None:
+def _no_trigger(context: ReadingContext, found: Children, place: str) -> None:
     word = kind(found.element.tag)
     also = ", or make it an intermediateThrowEvent" if place == "intermediateCatchEvent" else ""
-    reading.report.error(
+    context.findings.error(
         found.element,
         found.id,
         NO_TRIGGER,
         f"{a(word)} must say what it waits for",
         f"give it a signal, message, timer or conditional event definition{also}",
     )
+
+
+_set = object.__setattr__
+
+
+def is_link_target(node: FlowNode) -> bool:
+    """Whether tokens come to it from link sources only."""
+    return isinstance(node, IntermediateCatchEvent) and _link(node) is not None
+
+
+def resolve_links(context: ReadingContext) -> None:
+    """Link sources and targets, both ways; says which have no counterpart, or too many."""
+    targets: dict[tuple[Container, str], IntermediateCatchEvent] = {}
+    sources: dict[IntermediateCatchEvent, list[IntermediateThrowEvent]] = {}
+    for node in context.nodes:
+        link = _link(node)
+        if link is None:
+            continue
+        if not link.name:
+            _say(
+                context,
+                node,
+                LINK_NAME,
+                "the link event has no name, so nothing says what it is joined to",
+                'name it: <linkEventDefinition name="A"/>, and the other end alike',
+            )
+        elif isinstance(node, IntermediateCatchEvent):
+            first = targets.setdefault((node.container, link.name), node)
+            if first is not node:
+                _say(
+                    context,
+                    node,
+                    DUPLICATE_LINK,
+                    f"the link '{link.name}' has another target, '{first.id}' on line {first.line}",
+                    "give it another name, or lead the sources to one of the two",
+                )
+        _check_flows(context, node)
+    for node in context.nodes:
+        link = _link(node)
+        if link is None or not link.name or not isinstance(node, IntermediateThrowEvent):
+            continue
+        target = targets.get((node.container, link.name))
+        if target is None:
+            _no_target(context, node, link, targets)
+        else:
+            _set(node, "links_to", target)
+            sources.setdefault(target, []).append(node)
+    for target, found in sources.items():
+        _set(target, "linked_from", tuple(found))
+
+
+def _link(node: FlowNode) -> LinkEventDefinition | None:
+    for definition in node.definitions if isinstance(node, Event) else ():
+        if isinstance(definition, LinkEventDefinition):
+            return definition
+    return None
+
+
+def _check_flows(context: ReadingContext, node: FlowNode) -> None:
+    catches = isinstance(node, IntermediateCatchEvent)
+    said = f"into the link target '{node.id}'" if catches else f"out of '{node.id}', a link"
+    follows = "what follows the link target"
+    for flow in node.incoming if catches else node.outgoing:
+        context.findings.error(
+            flow.line,
+            flow.id,
+            LINK_CATCH_INCOMING if catches else LINK_THROW_OUTGOING,
+            f"no sequence flow can lead {said}",
+            f"lead it to {follows}" if catches else f"let it begin at {follows}",
+        )
+
+
+def _no_target(
+    context: ReadingContext,
+    node: FlowNode,
+    link: LinkEventDefinition,
+    targets: dict[tuple[Container, str], IntermediateCatchEvent],
+) -> None:
+    near = [name for container, name in targets if container is node.container]
+    elsewhere = [each.id for (_, name), each in targets.items() if name == link.name]
+    rule, message = DANGLING_LINK, f"the link '{link.name}' has no target"
+    remedy = f'add <intermediateCatchEvent> with <linkEventDefinition name="{link.name}"/>'
+    if elsewhere:
+        rule = LINK_CROSSES_BORDER
+        message += f" here: '{elsewhere[0]}' is in another process or subprocess"
+        remedy = "links join places of one container: let a sequence flow leave the subprocess"
+    _say(context, node, rule, message, did_you_mean(link.name, near, remedy))
+
+
+def _say(context: ReadingContext, node: FlowNode, rule: Rule, message: str, remedy: str) -> None:
+    context.broken.add(node.container)
+    context.findings.error(node.line, node.id, rule, message, remedy)

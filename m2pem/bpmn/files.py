@@ -1,25 +1,47 @@
-"""The files of a mission while they are read: its own, those it calls into, those they import."""
+"""The files of a mission: opened, searched for what call activities name, and merged.
+
+Called processes and global tasks (BPMN 2.0.2, clause 10.3.6) are looked for in the calling file, in
+the files that it imports, in the mission's own file, and on the search path, in this order. A
+prefix whose namespace is another file's leaves the calling file to the last.
+
+The ids of other files' elements get the file's name in front (`survey:Start`; no XML id has a
+colon), and only the processes that are called take part. Signals, messages and correlation
+properties with one id are one, whatever files they are in.
+"""
 
 import re
+from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
+from typing import TypeVar
 
 from lxml import etree
 
-from m2pem.bpmn.containers import read_process
-from m2pem.bpmn.global_tasks import read_global_task
-from m2pem.bpmn.names import BPMN, local
-from m2pem.bpmn.reading import PendingCall, Reading
-from m2pem.bpmn.report import Report
-from m2pem.bpmn.roots import read_roots
-from m2pem.bpmn.rules.files import IMPORT_UNREADABLE, NOT_BPMN, UNUSABLE_FILE
-from m2pem.bpmn.type_names import call_by_role
-from m2pem.bpmn.xml import Document, XmlError, parse_xml
+from m2pem.bpmn.activities import read_global_task
+from m2pem.bpmn.context import PendingCall, ReadingContext
+from m2pem.bpmn.definitions import read_roots
+from m2pem.bpmn.file_findings import FileFindings
+from m2pem.bpmn.rules.activities import AMBIGUOUS_CALL, NO_CALLED_ELEMENT
+from m2pem.bpmn.rules.files import IMPORT_UNREADABLE, NOT_BPMN, NOT_EXECUTED, UNUSABLE_FILE
+from m2pem.bpmn.rules.references import DANGLING_REFERENCE
+from m2pem.bpmn.subprocesses import read_process
+from m2pem.bpmn.xml import BPMN, Document, XmlError, call_by_role, local, parse_xml
 from m2pem.errors import MissionError
 from m2pem.findings import Finding
-from m2pem.mission.elements import CallActivity, Container, Process, SubProcess
-from m2pem.mission.events import CorrelationProperty
+from m2pem.mission.elements import (
+    CallActivity,
+    Container,
+    Element,
+    FlowNode,
+    Process,
+    SequenceFlow,
+    SubProcess,
+)
+from m2pem.mission.events import CorrelationProperty, Message, RootElement, Signal
 from m2pem.mission.library import Library, LibraryError, Question, Source
+from m2pem.mission.mission import Mission
+from m2pem.mission.near import did_you_mean
 
 _SUFFIX = re.compile(r"\.(bpmn20\.xml|bpmn2?|xml)$", re.IGNORECASE)
 _MODEL = BPMN[1:-1]
@@ -36,7 +58,7 @@ class Part:
     name: str
     data: bytes
     document: Document
-    reading: Reading
+    context: ReadingContext
     qualifier: str = ""
     answers: list[Question] = field(default_factory=list)
     imports: list["Part"] = field(default_factory=list)
@@ -56,35 +78,35 @@ class Part:
 
     def read_roots(self) -> None:
         """Read the root elements but for the processes."""
-        reading = self.reading
-        self._drawn = read_roots(reading, self.document.root)
+        context = self.context
+        self._drawn = read_roots(context, self.document.root)
         self._drawn_ids = frozenset(element.get("id") for element in self._drawn)
-        for table in (reading.signals, reading.messages, reading.errors, reading.escalations):
+        for table in (context.signals, context.messages, context.errors, context.escalations):
             for root in table.values():
                 object.__setattr__(root, "file", self.name)
 
     def has(self, identifier: str) -> bool:
         """Whether a call activity can call that here: a process, or a global task."""
-        return identifier in self._drawn_ids or identifier in self.reading.global_tasks
+        return identifier in self._drawn_ids or identifier in self.context.global_tasks
 
     def read(self) -> tuple[Process, ...]:
         """Read what is in the processes, once; gives them back."""
         if not self.is_read:
             self.is_read = True
             for element in self._drawn:
-                read_process(self.reading, element)
-            for process in reversed(self.reading.processes):
+                read_process(self.context, element)
+            for process in reversed(self.context.processes):
                 self._processes[process.id] = process
             self._sort_calls()
-        return tuple(self.reading.processes)
+        return tuple(self.context.processes)
 
     def process(self, identifier: str) -> Process:
         """What `has` found."""
         self.read()
         found = self._processes.get(identifier)
         if found is None:
-            element = self.reading.global_tasks[identifier]
-            found = self._processes[identifier] = read_global_task(self.reading, element)
+            element = self.context.global_tasks[identifier]
+            found = self._processes[identifier] = read_global_task(self.context, element)
         return found
 
     def calls(self, process: Process) -> list[PendingCall]:
@@ -92,15 +114,15 @@ class Part:
         return self._calls.get(process, [])
 
     def _sort_calls(self) -> None:
-        reading = self.reading
-        of: dict[Container, Process] = {process: process for process in reading.processes}
+        context = self.context
+        of: dict[Container, Process] = {process: process for process in context.processes}
         called: dict[CallActivity, Process] = {}
-        for node, container in zip(reading.nodes, reading.containers, strict=True):
+        for node, container in zip(context.nodes, context.containers, strict=True):
             if isinstance(node, SubProcess):
                 of[node] = of[container]
             elif isinstance(node, CallActivity):
                 called[node] = of[container]
-        for pending in reading.calls:
+        for pending in context.calls:
             self._calls.setdefault(called[pending.call], []).append(pending)
 
 
@@ -115,18 +137,18 @@ def open_part(data: bytes, name: str, qualifier: str = "") -> Part:
     except XmlError as error:
         finding = error.rule.finding(name, error.line, "", error.message, error.remedy)
         raise MissionError(f"{name}: no BPMN 2.0 file", [finding]) from None
-    report = Report(name, document.line, qualifier)
+    findings = FileFindings(name, document.line, qualifier)
     if document.root.tag != BPMN + "definitions":
-        _not_bpmn(report, document)
-        raise MissionError(f"{name}: no BPMN 2.0 file", report.findings)
+        _not_bpmn(findings, document)
+        raise MissionError(f"{name}: no BPMN 2.0 file", findings.all)
     call_by_role(document.root)
-    return Part(name, data, document, Reading(report), qualifier)
+    return Part(name, data, document, ReadingContext(findings), qualifier)
 
 
-def _not_bpmn(report: Report, document: Document) -> None:
+def _not_bpmn(findings: FileFindings, document: Document) -> None:
     tag = document.root.tag
     namespace = tag.rpartition("}")[0].removeprefix("{") or "none"
-    report.error(
+    findings.error(
         document.root,
         document.root.get("id", ""),
         NOT_BPMN,
@@ -222,7 +244,7 @@ class Files:
                     self._import(part, element)
         for part in self.parts[known:]:
             for imported in part.imports:
-                _share_roots(part.reading, imported.reading)
+                _share_roots(part.context, imported.context)
 
     def _import(self, part: Part, element: etree._Element) -> None:
         location = element.get("location", "").strip()
@@ -231,7 +253,7 @@ class Files:
         try:
             source = self.library.imported(location, part.name)
         except LibraryError as error:
-            part.reading.report.warning(
+            part.context.findings.warning(
                 element, "", IMPORT_UNREADABLE, f"nothing is imported: {error}", error.remedy
             )
             return
@@ -241,7 +263,7 @@ class Files:
             part.import_namespaces.append(element.get("namespace", "").strip())
 
 
-def _share_roots(importing: Reading, imported: Reading) -> None:
+def _share_roots(importing: ReadingContext, imported: ReadingContext) -> None:
     """Signals, messages, errors and escalations may be referred to where they are imported."""
     for identifier, signal in imported.signals.items():
         importing.signals.setdefault(identifier, signal)
@@ -252,3 +274,219 @@ def _share_roots(importing: Reading, imported: Reading) -> None:
     for identifier, escalation in imported.escalations.items():
         importing.escalations.setdefault(identifier, escalation)
     importing.declared_roots |= imported.declared_roots
+
+
+_MAX_LISTED = 10
+
+
+def find_called(files: Files) -> set[Process]:
+    """Tell each call activity what it calls; gives back the processes that take part.
+
+    All of the mission's own file do, and of others those that are called, by whatever way. What
+    cannot be found is reported.
+    """
+    waiting = deque((files.main, process) for process in files.main.read())
+    reached = {process for _, process in waiting}
+    while waiting:
+        part, process = waiting.popleft()
+        for pending in part.calls(process):
+            target = _target(files, part, pending)
+            if target is None:
+                continue
+            called = target.process(pending.call.called_id)
+            object.__setattr__(pending.call, "called", called)
+            if called not in reached:
+                reached.add(called)
+                waiting.append((target, called))
+    return reached
+
+
+def _target(files: Files, part: Part, pending: PendingCall) -> Part | None:
+    """The file in which the called element is; None when a finding says why there is none."""
+    name = pending.call.called_id
+    rule, remedy = DANGLING_REFERENCE, ""
+    if not name:
+        rule, message = NO_CALLED_ELEMENT, "the call activity does not say what it calls"
+    elif name.startswith("=") or "{" in name:
+        rule = NOT_EXECUTED
+        message = "m2pem does not execute a calledElement that is an expression"
+        remedy = (
+            "write the process's id, so that it can be checked before anything moves; to choose "
+            "between several, use a gateway and a call activity for each"
+        )
+    else:
+        try:
+            found = _look(files, part, name, _namespace(part, pending))
+        except LibraryError as error:
+            rule, message, remedy = AMBIGUOUS_CALL, error.message, error.remedy
+        else:
+            if found is not None:
+                return found
+            message = f"calledElement names '{name}', which is no process or global task of "
+            places = files.library.places if files.library is not None else ()
+            message += "this file" + (
+                f", nor of a BPMN file in {', '.join(places)}" if places else ""
+            )
+    remedy = remedy or _existing(files, part, name)
+    part.context.findings.error(pending.call.line, pending.call.id, rule, message, remedy)
+    return None
+
+
+def _existing(files: Files, part: Part, name: str) -> str:
+    known = [process.id for process in part.read()] + list(part.context.global_tasks)
+    listed = ", ".join(f"'{each}'" for each in dict.fromkeys(known[:_MAX_LISTED]))
+    remedy = f"name a process of this file: {listed}"
+    if files.library is not None:
+        remedy += "; or name the folder of its file with --path"
+    return did_you_mean(name, known, remedy) if name else remedy
+
+
+def _namespace(part: Part, pending: PendingCall) -> str:
+    """The namespace that the name's prefix is bound to, if it is another file's; else ""."""
+    prefix, colon, _ = pending.element.get("calledElement", "").strip().rpartition(":")
+    namespace = pending.element.nsmap.get(prefix, "") if colon else ""
+    return "" if namespace in (part.namespace, BPMN[1:-1]) else str(namespace)
+
+
+def _look(files: Files, part: Part, name: str, namespace: str) -> Part | None:
+    if not namespace and part.has(name):
+        return part
+    imports = zip(part.imports, part.import_namespaces, strict=True)
+    imported = {
+        each: None
+        for each, declared in imports
+        if each.has(name) and namespace in ("", declared, each.namespace)
+    }
+    if len(imported) > 1:
+        raise LibraryError(
+            f"'{name}' is in several imported files: {', '.join(each.name for each in imported)}",
+            "import one of them, or write the prefix of its namespace",
+        )
+    for each in imported:
+        return each
+    main = files.main
+    if main.has(name) and namespace in ("", main.namespace):
+        return main
+    found = files.called(name, namespace)
+    if found is not None and found.has(name):
+        return found
+    return part if part.has(name) else None  # editors write prefixes that mean nothing
+
+
+Root = TypeVar("Root", bound=RootElement)
+Operated = TypeVar("Operated", Signal, Message)
+
+_set = object.__setattr__
+
+
+def merge(files: Files, reached: set[Process]) -> Mission:
+    """The mission that files without an error make; `reached`: the processes that take part."""
+    parts = [part for part in files.parts if part.is_read]
+    for part in files.parts[1:]:
+        _qualify(part)
+    inside = _inside(reached, parts)
+    nodes = [node for part in parts for node in part.context.nodes if node.container in inside]
+    flows = [ends.flow for part in parts for ends in part.context.flows if ends.container in inside]
+    processes = [p for part in parts for p in part.context.processes if p in reached]
+    for index, node in enumerate(nodes):
+        if node.index != index:
+            _set(node, "index", index)
+        if isinstance(node, CallActivity):
+            _set(node, "called_id", node.called.id)
+    for index, flow in enumerate(flows):
+        if flow.index != index:
+            _set(flow, "index", index)
+    contexts = [part.context for part in parts]
+    main = files.main.context
+    return Mission(
+        file=files.main.name,
+        source=files.main.data,
+        processes=tuple(processes),
+        nodes=tuple(nodes),
+        flows=tuple(flows),
+        signals=_operated([context.signals for context in contexts]),
+        messages=_operated([context.messages for context in contexts]),
+        errors=_first([context.errors for context in contexts]),
+        escalations=_first([context.escalations for context in contexts]),
+        participants=tuple(main.participants),
+        message_flows=tuple(flow for flow, _ in main.message_flows),
+        lanes=tuple(main.lanes),
+        warnings=tuple(each for part in files.parts for each in part.context.findings.sorted()),
+        elements=_elements(nodes, flows, processes),
+        associated=frozenset().union(*(context.written_keys for context in contexts)),
+        data_stores=frozenset(
+            context.data_key(store) for context in contexts for store in context.data_stores
+        ),
+        correlation_properties=_correlation(parts),
+        library=files.sources(),
+    )
+
+
+def _inside(reached: set[Process], parts: list[Part]) -> set[Container]:
+    """Those processes, and the subprocesses in them."""
+    inner = [each for part in parts for each in part.context.nodes if isinstance(each, SubProcess)]
+    return {*reached, *(each for each in inner if each.process in reached)}
+
+
+def _qualify(part: Part) -> None:
+    """Put the file's name in front of ids; also of events' own signals and the like, which have
+    the id of their event and are nobody else's."""
+    context = part.context
+    elements: list[Element] = [*context.processes, *context.nodes]
+    elements += [ends.flow for ends in context.flows]
+    for element in elements:
+        _set(element, "qualifier", part.qualifier)
+        _set(element, "id", f"{part.qualifier}:{element.id}")
+    for process in context.processes:
+        _set(process, "file", part.name)
+    _qualify_roots(part, context.signals)
+    _qualify_roots(part, context.messages)
+    _qualify_roots(part, context.errors)
+    _qualify_roots(part, context.escalations)
+
+
+def _qualify_roots(part: Part, table: dict[str, Root]) -> None:
+    for identifier, root in list(table.items()):
+        if not root.file:
+            _set(root, "file", part.name)
+        if identifier not in part.context.declared_roots:
+            _set(root, "id", f"{part.qualifier}:{identifier}")
+            table[root.id] = table.pop(identifier)
+
+
+def _elements(
+    nodes: list[FlowNode], flows: list[SequenceFlow], processes: list[Process]
+) -> dict[str, Element]:
+    """By id. A global task's process has the id of the task, which is the one to be found."""
+    drawn = [process for process in processes if not process.global_task]
+    everything: list[Element] = [*flows, *nodes, *drawn]
+    return {element.id: element for element in everything}
+
+
+def _first(tables: list[dict[str, Root]]) -> dict[str, Root]:
+    found: dict[str, Root] = {}
+    for table in tables:
+        for identifier, root in table.items():
+            found.setdefault(identifier, root)
+    return found
+
+
+def _operated(tables: list[dict[str, Operated]]) -> Mapping[str, Operated]:
+    """Operators send what any file says they send."""
+    found = _first(tables)
+    for table in tables:
+        for identifier, root in table.items():
+            first = found[identifier]
+            if root.from_operator and not first.from_operator:
+                found[identifier] = replace(first, from_operator=True)
+                _set(found[identifier], "file", first.file)
+    return found
+
+
+def _correlation(parts: list[Part]) -> tuple[CorrelationProperty, ...]:
+    found: dict[str, CorrelationProperty] = {}
+    for part in parts:
+        for each in part.correlation:
+            known = found.setdefault(each.id, each)
+            found[each.id] = replace(known, retrieve={**each.retrieve, **known.retrieve})
+    return tuple(found.values())

@@ -2,10 +2,10 @@
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN
-from m2pem.bpmn.reading import Reading, reference, text_of
+from m2pem.bpmn.children import Children, read_children
+from m2pem.bpmn.context import ReadingContext, reference, text_of
 from m2pem.bpmn.rules.gateways import NO_ACTIVATION_CONDITION, PARALLEL_EVENT_GATEWAY
-from m2pem.bpmn.scan import Scan, scan
+from m2pem.bpmn.xml import BPMN
 from m2pem.mission.elements import (
     ComplexGateway,
     EventBasedGateway,
@@ -26,19 +26,19 @@ _EVENT_BASED = BPMN + "eventBasedGateway"
 GATEWAYS = frozenset({*_PLAIN, _COMPLEX, _EVENT_BASED})
 
 
-def read_gateway(reading: Reading, element: etree._Element) -> Gateway:
+def read_gateway(context: ReadingContext, element: etree._Element) -> Gateway:
     """A gateway of any kind."""
-    identifier = reading.claim(element)
-    found = scan(reading, element, identifier)
-    name, line = element.get("name", ""), reading.report.line(element)
+    identifier = context.claim(element)
+    found = read_children(context, element, identifier)
+    name, line = element.get("name", ""), context.findings.line(element)
     gateway: Gateway
     if element.tag == _COMPLEX:
-        gateway = ComplexGateway(identifier, name, line, _activation(reading, found))
+        gateway = ComplexGateway(identifier, name, line, _activation(context, found))
     elif element.tag == _EVENT_BASED:
-        instantiate = reading.boolean(element, "instantiate", False, identifier)
+        instantiate = context.boolean(element, "instantiate", False, identifier)
         parallel = element.get("eventGatewayType") == "Parallel"
         if parallel and not instantiate:
-            reading.report.error(
+            context.findings.error(
                 element,
                 identifier,
                 PARALLEL_EVENT_GATEWAY,
@@ -52,16 +52,16 @@ def read_gateway(reading: Reading, element: etree._Element) -> Gateway:
         gateway = _PLAIN[element.tag](identifier, name, line)
     default = element.get("default")
     if default:
-        reading.defaults.append((gateway, reference(default), line))
+        context.defaults.append((gateway, reference(default), line))
     return gateway
 
 
-def _activation(reading: Reading, found: Scan) -> Expression | None:
+def _activation(context: ReadingContext, found: Children) -> Expression | None:
     for condition in found.of("activationCondition"):
         text = text_of(condition)
         if text:
-            return reading.expression(condition, found.id, text, condition.get("language"))
-    reading.report.warning(
+            return context.expression(condition, found.id, text, condition.get("language"))
+    context.findings.warning(
         found.element,
         found.id,
         NO_ACTIVATION_CONDITION,

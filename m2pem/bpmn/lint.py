@@ -6,14 +6,14 @@ and have no end: those load, and are errors of `check`.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-from m2pem.bpmn import collector
+from m2pem.bpmn import garbage_collection
 from m2pem.bpmn.busy_loops import busy_loops
 from m2pem.bpmn.data_names import unwritten
-from m2pem.bpmn.graph import unreachable
 from m2pem.bpmn.rules.activities import CALL_RECURSION
 from m2pem.bpmn.rules.events import OUTSIDE_ONLY
 from m2pem.bpmn.rules.gateways import NO_CONDITIONS
 from m2pem.bpmn.rules.rule import Rule
+from m2pem.bpmn.sequence_flows import unreachable
 from m2pem.findings import Finding
 from m2pem.mission.components import components
 from m2pem.mission.elements import (
@@ -55,7 +55,7 @@ def lint(
     registered service class writes; a class that is not there may write anything.
     `behavior_writes`: what behaviors write, by their names.
     """
-    with collector.paused():
+    with garbage_collection.paused():
         findings = [
             *_unreachable(mission),
             *_undecided_gateways(mission),

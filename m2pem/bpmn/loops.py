@@ -1,14 +1,30 @@
-"""Loop and multi-instance markers of activities (BPMN 2.0.2, clause 10.3.8)."""
+"""Loop and multi-instance markers of activities (BPMN 2.0.2, clause 10.3.8).
+
+The collection of a multi-instance activity is a data object, or a data input or output of the
+activity that data associations join to one (table 10.29). Those associations pass the collection
+to the whole activity, not to each instance.
+"""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from lxml import etree
 
+from m2pem.bpmn.children import Children, read_children
+from m2pem.bpmn.context import (
+    KEY,
+    DataEnd,
+    PendingCall,
+    PendingDataFlow,
+    PendingLoop,
+    ReadingContext,
+    reference,
+    text_of,
+)
 from m2pem.bpmn.events import definition_elements, read_thrown, referred_definition
-from m2pem.bpmn.names import ACTIVITI, BPMN, CAMUNDA, FLOWABLE, M2PEM, ZEEBE
-from m2pem.bpmn.reading import KEY, DataEnd, PendingLoop, Reading, reference, text_of
 from m2pem.bpmn.rules.data import BAD_KEY
+from m2pem.bpmn.rules.events import MISSING_REFERENCE
 from m2pem.bpmn.rules.loops import (
     COMPLEX_BEHAVIOR,
     INSTANCE_COUNT,
@@ -19,8 +35,9 @@ from m2pem.bpmn.rules.loops import (
     NO_LOOP,
     TWO_LOOPS,
 )
+from m2pem.bpmn.rules.references import DANGLING_REFERENCE
 from m2pem.bpmn.rules.rule import Rule
-from m2pem.bpmn.scan import Scan, scan
+from m2pem.bpmn.xml import ACTIVITI, BPMN, CAMUNDA, FLOWABLE, M2PEM, ZEEBE, local
 from m2pem.mission.elements import Activity, SubProcess
 from m2pem.mission.events import EventDefinition, Signal, SignalEventDefinition
 from m2pem.mission.expression import Expression
@@ -42,17 +59,17 @@ _EVENT_REFS = {
 }
 
 
-def read_loop(reading: Reading, found: Scan, node: Activity) -> None:
+def read_loop(context: ReadingContext, found: Children, node: Activity) -> None:
     """The marker of an activity, if it has any; `resolve_loops` adds what data objects say."""
     if _MARKERS.isdisjoint(found.children):
         return
     markers = [each for tag in LOOPS for each in found.children.get(tag, [])]
     element = markers[0]
     if len(markers) > 1:
-        _error(reading, markers[1], node, TWO_LOOPS, "an activity has one loop marker", "keep one")
+        _error(context, markers[1], node, TWO_LOOPS, "an activity has one loop marker", "keep one")
     if isinstance(node, SubProcess) and node.triggered_by_event:
         _error(
-            reading,
+            context,
             element,
             node,
             LOOP_NOT_ALLOWED,
@@ -62,48 +79,57 @@ def read_loop(reading: Reading, found: Scan, node: Activity) -> None:
         )
     loop: StandardLoop | MultiInstance
     if element.tag == _STANDARD:
-        loop = _standard_loop(reading, element, node)
+        loop = _standard_loop(context, element, node)
     elif element.tag == _MULTI_INSTANCE:
-        loop = _multi_instance(reading, found, element, node)
+        loop = _multi_instance(context, found, element, node)
         if loop.output_item:
             own = frozenset({*node.own_data, loop.output_item})
             object.__setattr__(node, "own_data", own)
     else:
         remedy = "write standardLoopCharacteristics or multiInstanceLoopCharacteristics"
-        _error(reading, element, node, NO_LOOP, "it does not say which kind of loop", remedy)
+        _error(context, element, node, NO_LOOP, "it does not say which kind of loop", remedy)
         return
     object.__setattr__(node, "loop", loop)
 
 
 def _error(
-    reading: Reading, where: etree._Element, node: Activity, rule: Rule, what: str, remedy: str
+    context: ReadingContext,
+    where: etree._Element,
+    node: Activity,
+    rule: Rule,
+    what: str,
+    remedy: str,
 ) -> None:
-    reading.report.error(where, node.id, rule, what, remedy)
+    context.findings.error(where, node.id, rule, what, remedy)
 
 
-def _expression(reading: Reading, found: Scan, name: str, node: Activity) -> Expression | None:
+def _expression(
+    context: ReadingContext, found: Children, name: str, node: Activity
+) -> Expression | None:
     for each in found.of(name):
         text = text_of(each)
         if text:
-            return reading.expression(each, node.id, text, each.get("language"))
+            return context.expression(each, node.id, text, each.get("language"))
     return None
 
 
 # --- standard loops -----------------------------------------------------------------------------
 
 
-def _standard_loop(reading: Reading, element: etree._Element, node: Activity) -> StandardLoop:
-    found = scan(reading, element, node.id)
+def _standard_loop(
+    context: ReadingContext, element: etree._Element, node: Activity
+) -> StandardLoop:
+    found = read_children(context, element, node.id)
     maximum: int | None = None
     text = element.get("loopMaximum")
     if text is not None and _NUMBER.fullmatch(text.strip()):
         maximum = int(text)
     elif text is not None:
         what = f"loopMaximum='{text}' is no number of rounds"
-        _error(reading, element, node, LOOP_MAXIMUM, what, 'write for example loopMaximum="5"')
+        _error(context, element, node, LOOP_MAXIMUM, what, 'write for example loopMaximum="5"')
     return StandardLoop(
-        _expression(reading, found, "loopCondition", node),
-        reading.boolean(element, "testBefore", False, node.id),
+        _expression(context, found, "loopCondition", node),
+        context.boolean(element, "testBefore", False, node.id),
         maximum,
     )
 
@@ -112,46 +138,46 @@ def _standard_loop(reading: Reading, element: etree._Element, node: Activity) ->
 
 
 def _multi_instance(
-    reading: Reading, activity: Scan, element: etree._Element, node: Activity
+    context: ReadingContext, activity: Children, element: etree._Element, node: Activity
 ) -> MultiInstance:
-    found = scan(reading, element, node.id)
+    found = read_children(context, element, node.id)
     zeebe = _zeebe(found)
     pending = PendingLoop(node, element, *(_reference(found, name) for name in _DATA_REFS))
     written = zeebe.get("inputCollection", "") or _editors(element, "collection")
     collection: Expression | None = None
     if written:
-        collection = reading.expression(element, node.id, written)
+        collection = context.expression(element, node.id, written)
         pending.collection_ref = ""
-    _check_count(reading, found, node, bool(written or pending.collection_ref))
+    _check_count(context, found, node, bool(written or pending.collection_ref))
     item = zeebe.get("inputElement", "") or _editors(element, "elementVariable")
-    result, output = _zeebe_output(reading, element, node, zeebe)
+    result, output = _zeebe_output(context, element, node, zeebe)
     output_collection = zeebe.get("outputCollection", "")
     if output_collection:
         pending.output_ref = ""
     if pending.collection_ref or pending.output_ref:
-        reading.loops.append(pending)
-    behavior = _behavior(reading, element, node)
+        context.loops.append(pending)
+    behavior = _behavior(context, element, node)
     return MultiInstance(
-        sequential=reading.boolean(element, "isSequential", False, node.id),
-        cardinality=_expression(reading, found, "loopCardinality", node),
+        sequential=context.boolean(element, "isSequential", False, node.id),
+        cardinality=_expression(context, found, "loopCardinality", node),
         collection=collection,
-        item=_key(reading, element, node, item or _data_item(reading, found, "inputDataItem")),
-        output_collection=_key(reading, element, node, output_collection),
+        item=_key(context, element, node, item or _data_item(context, found, "inputDataItem")),
+        output_collection=_key(context, element, node, output_collection),
         output_item=_key(
-            reading, element, node, result or _data_item(reading, found, "outputDataItem")
+            context, element, node, result or _data_item(context, found, "outputDataItem")
         ),
         output=output,
-        completion=_expression(reading, found, "completionCondition", node),
+        completion=_expression(context, found, "completionCondition", node),
         behavior=behavior,
-        events=_events(reading, activity, element, node, behavior),
-        complex=_complex(reading, found, node),
+        events=_events(context, activity, element, node, behavior),
+        complex=_complex(context, found, node),
     )
 
 
 _DATA_REFS = ("loopDataInputRef", "loopDataOutputRef")
 
 
-def _reference(found: Scan, name: str) -> str:
+def _reference(found: Children, name: str) -> str:
     return next((reference(text_of(each)) for each in found.of(name)), "")
 
 
@@ -160,7 +186,7 @@ def _editors(element: etree._Element, name: str) -> str:
     return next((text for text in found if text), "")
 
 
-def _zeebe(found: Scan) -> Mapping[str, str]:
+def _zeebe(found: Children) -> Mapping[str, str]:
     for each in found.extensions():
         if each.tag == ZEEBE + "loopCharacteristics":
             return {str(name): str(value).strip() for name, value in each.attrib.items()}
@@ -168,47 +194,49 @@ def _zeebe(found: Scan) -> Mapping[str, str]:
 
 
 def _zeebe_output(
-    reading: Reading, element: etree._Element, node: Activity, zeebe: Mapping[str, str]
+    context: ReadingContext, element: etree._Element, node: Activity, zeebe: Mapping[str, str]
 ) -> tuple[str, Expression | None]:
     """The key that an instance has for its output, and what is collected instead of it."""
     text = zeebe.get("outputElement", "")
     key = text.removeprefix("=").strip()
     if not text or KEY.fullmatch(key):
-        return key.partition(".")[0], _nested(reading, element, node, key)
-    return "", reading.expression(element, node.id, text)
+        return key.partition(".")[0], _nested(context, element, node, key)
+    return "", context.expression(element, node.id, text)
 
 
 def _nested(
-    reading: Reading, element: etree._Element, node: Activity, key: str
+    context: ReadingContext, element: etree._Element, node: Activity, key: str
 ) -> Expression | None:
-    return reading.expression(element, node.id, key, "m2pem") if "." in key else None
+    return context.expression(element, node.id, key, "m2pem") if "." in key else None
 
 
-def _data_item(reading: Reading, found: Scan, name: str) -> str:
+def _data_item(context: ReadingContext, found: Children, name: str) -> str:
     """The key of an inputDataItem or outputDataItem; data associations can refer to it."""
     for each in found.of(name):
-        scan(reading, each, found.id)
-        identifier = reading.optional_id(each)
+        read_children(context, each, found.id)
+        identifier = context.optional_id(each)
         key = each.get("name") or identifier
         if identifier:
-            reading.data.setdefault(identifier, DataEnd(key, [each]))
+            context.data.setdefault(identifier, DataEnd(key, [each]))
         return key
     return ""
 
 
-def _key(reading: Reading, element: etree._Element, node: Activity, key: str) -> str:
+def _key(context: ReadingContext, element: etree._Element, node: Activity, key: str) -> str:
     if not key or KEY.fullmatch(key):
         return key
     what = f"'{key}' is no name of the data store"
-    _error(reading, element, node, BAD_KEY, what, 'write a dotted name, for example "field"')
+    _error(context, element, node, BAD_KEY, what, 'write a dotted name, for example "field"')
     return ""
 
 
-def _check_count(reading: Reading, found: Scan, node: Activity, has_collection: bool) -> None:
+def _check_count(
+    context: ReadingContext, found: Children, node: Activity, has_collection: bool
+) -> None:
     has_cardinality = any(text_of(each) for each in found.of("loopCardinality"))
     if has_cardinality and has_collection:
         _error(
-            reading,
+            context,
             found.element,
             node,
             INSTANCES_COUNTED_TWICE,
@@ -218,7 +246,7 @@ def _check_count(reading: Reading, found: Scan, node: Activity, has_collection: 
         )
     elif not has_cardinality and not has_collection:
         _error(
-            reading,
+            context,
             found.element,
             node,
             INSTANCE_COUNT,
@@ -231,7 +259,7 @@ def _check_count(reading: Reading, found: Scan, node: Activity, has_collection: 
 # --- what instances throw -----------------------------------------------------------------------
 
 
-def _behavior(reading: Reading, element: etree._Element, node: Activity) -> InstanceBehavior:
+def _behavior(context: ReadingContext, element: etree._Element, node: Activity) -> InstanceBehavior:
     text = element.get("behavior", "All").strip()
     try:
         return InstanceBehavior(text)
@@ -239,13 +267,13 @@ def _behavior(reading: Reading, element: etree._Element, node: Activity) -> Inst
         known = list(InstanceBehavior)
         remedy = did_you_mean(text, known, f"write one of: {', '.join(known)}")
         what = f"behavior='{text}' is no behavior of a multi-instance activity"
-        _error(reading, element, node, INSTANCES_BEHAVIOR, what, remedy)
+        _error(context, element, node, INSTANCES_BEHAVIOR, what, remedy)
         return InstanceBehavior.ALL
 
 
 def _events(
-    reading: Reading,
-    activity: Scan,
+    context: ReadingContext,
+    activity: Children,
     element: etree._Element,
     node: Activity,
     behavior: InstanceBehavior,
@@ -256,21 +284,23 @@ def _events(
         return ()
     name = reference(element.get(attribute, ""))
     if name:
-        definition = referred_definition(reading, element, attribute, name, node.id)
-        return () if definition is None else read_thrown(reading, activity, [definition])
-    signal = reading.signals.setdefault(node.id, Signal(node.id, node.name, node.line))
-    return (SignalEventDefinition(reading.report.line(element), signal),)
+        definition = referred_definition(context, element, attribute, name, node.id)
+        return () if definition is None else read_thrown(context, activity, [definition])
+    signal = context.signals.setdefault(node.id, Signal(node.id, node.name, node.line))
+    return (SignalEventDefinition(context.findings.line(element), signal),)
 
 
-def _complex(reading: Reading, found: Scan, node: Activity) -> tuple[ComplexBehavior, ...]:
+def _complex(
+    context: ReadingContext, found: Children, node: Activity
+) -> tuple[ComplexBehavior, ...]:
     result = []
     for each in found.of("complexBehaviorDefinition"):
-        definition = scan(reading, each, node.id)
-        condition = _expression(reading, definition, "condition", node)
+        definition = read_children(context, each, node.id)
+        condition = _expression(context, definition, "condition", node)
         events = definition.of("event")
         if not events or not definition.of("condition"):
             _error(
-                reading,
+                context,
                 each,
                 node,
                 COMPLEX_BEHAVIOR,
@@ -278,8 +308,125 @@ def _complex(reading: Reading, found: Scan, node: Activity) -> tuple[ComplexBeha
                 "give it a condition, and an event with an event definition",
             )
         elif condition is not None:
-            thrower = scan(reading, events[0], events[0].get("id") or node.id)
-            elements = definition_elements(reading, thrower)
-            thrown = read_thrown(reading, thrower, elements)
+            thrower = read_children(context, events[0], events[0].get("id") or node.id)
+            elements = definition_elements(context, thrower)
+            thrown = read_thrown(context, thrower, elements)
             result.append(ComplexBehavior(condition, thrown))
     return tuple(result)
+
+
+def resolve_loops(context: ReadingContext) -> None:
+    """Give multi-instance activities their collections, now that all data objects are known."""
+    flows: dict[Activity, PendingDataFlow | PendingCall] = {}
+    for call in context.calls:
+        flows[call.call] = call
+    for flow in context.data_flows:
+        if isinstance(flow.node, Activity):
+            flows[flow.node] = flow
+    for pending in context.loops:
+        node = pending.node
+        loop = node.loop
+        assert isinstance(loop, MultiInstance)
+        own = flows.get(node)
+        if pending.collection_ref:
+            loop = replace(loop, collection=_collection(context, pending, own))
+        if pending.output_ref:
+            loop = replace(loop, output_collection=_output_collection(context, pending, own))
+        object.__setattr__(node, "loop", loop)
+
+
+def _collection(
+    context: ReadingContext, pending: PendingLoop, own: PendingDataFlow | PendingCall | None
+) -> Expression | None:
+    ref = pending.collection_ref
+    key = context.data_key(ref)
+    if not key and own is not None and ref in own.parameters:
+        key = own.parameters[ref]
+        passed = [each for each in own.inputs if each.target_ref == ref]
+        own.inputs[:] = [each for each in own.inputs if each.target_ref != ref]
+        _is_not_own(pending.node, key)
+        for association in passed:
+            for child in association.element:
+                if local(child.tag) == "transformation":
+                    text, language = text_of(child), child.get("language")
+                    return context.expression(child, pending.node.id, text, language)
+            key = next(_keys(context, association.source_refs), key)
+    key = key or _named(context, pending, "loopDataInputRef", ref)
+    return context.expression(pending.element, pending.node.id, key, "m2pem") if key else None
+
+
+def _output_collection(
+    context: ReadingContext, pending: PendingLoop, own: PendingDataFlow | PendingCall | None
+) -> str:
+    ref = pending.output_ref
+    key = context.data_key(ref)
+    if not key and own is not None and ref in own.parameters:
+        key = own.parameters[ref]
+        passed = [each for each in own.outputs if ref in each.source_refs]
+        own.outputs[:] = [each for each in own.outputs if ref not in each.source_refs]
+        _is_not_own(pending.node, key)
+        key = next(_keys(context, [each.target_ref for each in passed]), key)
+    return key or _named(context, pending, "loopDataOutputRef", ref)
+
+
+def _keys(context: ReadingContext, refs: list[str]) -> Iterator[str]:
+    return (key for key in map(context.data_key, refs) if key)
+
+
+def _is_not_own(node: Activity, key: str) -> None:
+    """The whole has it, not each instance."""
+    object.__setattr__(node, "own_data", node.own_data - {key})
+
+
+def _named(context: ReadingContext, pending: PendingLoop, attribute: str, ref: str) -> str:
+    """Some editors write a name of the data store where BPMN has a reference."""
+    where, identifier = pending.element, pending.node.id
+    if not KEY.fullmatch(ref):
+        remedy = did_you_mean(ref, context.data, "name a data object")
+        what = f"{attribute} names '{ref}', which is no data object"
+        context.findings.error(where, identifier, DANGLING_REFERENCE, what, remedy)
+        return ""
+    context.findings.warning(
+        where,
+        identifier,
+        DANGLING_REFERENCE,
+        f"{attribute} names '{ref}', which is no data object, data input or data output here; it "
+        "is taken for a name of the data store",
+        did_you_mean(ref, context.data, 'name a data object, or write m2pem:collection="..."'),
+    )
+    return ref
+
+
+# --- signals ------------------------------------------------------------------------------------
+
+
+def join_default_signals(context: ReadingContext) -> None:
+    """Let a boundary signal event that names no signal catch what its activity throws by default.
+
+    A multi-instance activity whose behavior names no event throws a signal of its own (table
+    10.29).
+    """
+    for node in context.nodes:
+        if not isinstance(node, Activity) or not isinstance(node.loop, MultiInstance):
+            continue
+        for thrown in node.loop.events:
+            if isinstance(thrown, SignalEventDefinition) and thrown.signal.id == node.id:
+                _catch_default(context, node, thrown)
+
+
+def _catch_default(context: ReadingContext, node: Activity, thrown: SignalEventDefinition) -> None:
+    for event in node.boundary:
+        definitions = tuple(
+            replace(each, signal=thrown.signal)
+            if isinstance(each, SignalEventDefinition) and each.signal.id == event.id
+            else each
+            for each in event.definitions
+        )
+        if definitions != event.definitions:
+            object.__setattr__(event, "definitions", definitions)
+            findings = context.findings.all
+            findings[:] = [
+                each
+                for each in findings
+                if (each.element, each.rule) != (event.id, MISSING_REFERENCE.slug)
+            ]

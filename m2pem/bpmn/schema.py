@@ -7,7 +7,7 @@ BPMN does not know from one that m2pem does not execute.
 
 from dataclasses import dataclass
 
-from m2pem.bpmn.names import BPMN
+from m2pem.bpmn.xml import BPMN
 
 _BASE = "documentation extensionElements"
 _FLOW_ELEMENT = f"{_BASE} auditing monitoring categoryValueRef"

@@ -11,9 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from m2pem.bpmn.names import BPMN, local
-from m2pem.bpmn.size import max_bytes
-from m2pem.bpmn.xml import XmlError, parse_xml
+from m2pem.bpmn.xml import BPMN, XmlError, local, max_bytes, parse_xml
 from m2pem.mission.library import LibraryError, Source
 
 VARIABLE = "M2PEM_PATH"

@@ -1,22 +1,93 @@
-"""XML from strangers: read without entities, DTDs, network or surprises about lines.
-
-Bytes are decoded here, and only here, so that the check for a document type declaration and the
-parser see the same text. A document type declaration is refused before the parser runs, which
-rules out entities of every sort; only then may the parser's own limits be lifted, because its
-depth limit of 256 elements is below what nested subprocesses need.
-"""
+"""XML of mission files: namespaces, names of elements, and safe parsing of files from strangers."""
 
 import codecs
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from operator import attrgetter
+from typing import cast
 
 from lxml import etree
 
 from m2pem.bpmn.rules.files import DOCTYPE, ENCODING, NOT_XML, TOO_DEEP, TOO_LARGE
 from m2pem.bpmn.rules.rule import Rule
-from m2pem.bpmn.size import max_bytes, too_large
+from m2pem.errors import M2pemError
+
+VARIABLE = "M2PEM_MAX_MISSION_MIB"
+DEFAULT_MIB = 64
+_MIB = 1024 * 1024
+
+
+def max_bytes() -> int:
+    """The size limit of a mission file, in bytes.
+
+    Raises:
+        M2pemError: the environment variable is no whole number of MiB from 1.
+    """
+    text = os.environ.get(VARIABLE, "").strip() or str(DEFAULT_MIB)
+    if not text.isascii() or not text.isdecimal() or int(text) < 1:
+        raise M2pemError(
+            f"{VARIABLE}={text!r} is no whole number of MiB from 1; write for example "
+            f"{VARIABLE}={DEFAULT_MIB}"
+        )
+    return int(text) * _MIB
+
+
+def too_large(has_bytes: int | None = None) -> tuple[str, str]:
+    """What is wrong with a larger file, and what would be right; its size if that is known."""
+    limit = max_bytes()
+    has = f"has {has_bytes:,} bytes, more" if has_bytes is not None else "has more"
+    return (
+        f"the file {has} than the {limit:,} that m2pem reads",
+        f"set {VARIABLE} to more than {limit // _MIB} (MiB), or split the mission",
+    )
+
+
+BPMN = "{http://www.omg.org/spec/BPMN/20100524/MODEL}"
+M2PEM = "{https://m2pem.org/schema/1}"
+CAMUNDA = "{http://camunda.org/schema/1.0/bpmn}"
+ACTIVITI = "{http://activiti.org/bpmn}"
+FLOWABLE = "{http://flowable.org/bpmn}"
+ZEEBE = "{http://camunda.org/schema/zeebe/1.0}"
+
+attribute_names = cast("Callable[[etree._Element], list[str]]", etree._Element.keys)
+"""The names of an element's attributes, with their namespaces."""
+
+
+def local(tag: str) -> str:
+    """The name without its namespace."""
+    return tag.rpartition("}")[2]
+
+
+_KINDS = {
+    "adHocSubProcess": "ad-hoc subprocess",
+    "compensateEventDefinition": "compensation event",
+    "eventBasedGateway": "event-based gateway",
+    "globalTask": "global task",
+    "multiInstanceLoopCharacteristics": "multi-instance activity",
+    "standardLoopCharacteristics": "loop activity",
+    "subProcess": "subprocess",
+    "subChoreography": "subchoreography",
+}
+
+
+def kind(tag: str) -> str:
+    """What a person calls the elements with this tag ("business rule task")."""
+    name = local(tag)
+    known = _KINDS.get(name)
+    if known is not None:
+        return known
+    if name.endswith("EventDefinition"):
+        name = name.removesuffix("Definition")
+    words = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in name)
+    return words.strip()
+
+
+def a(noun: str) -> str:
+    """The noun with its indefinite article."""
+    return f"an {noun}" if noun[:1] in "aeio" else f"a {noun}"
+
 
 MAX_ELEMENT_DEPTH = 2048
 """How deep elements may nest: libxml2's limit for `huge_tree`."""
@@ -192,3 +263,22 @@ def _line_finder(root: etree._Element, utf8: bytes) -> Callable[[etree._Element]
             starts.append(line)
     lines = dict(zip(root.iter(etree.Element), starts, strict=True))
     return lines.__getitem__
+
+
+_MEANT = {
+    ("complexBehaviorDefinition", "formalExpression"): "condition",
+    ("complexBehaviorDefinition", "implicitThrowEvent"): "event",
+    ("correlationPropertyBinding", "formalExpression"): "dataPath",
+    ("correlationPropertyRetrievalExpression", "formalExpression"): "messagePath",
+}
+_PLACES = {(BPMN + outer, BPMN + inner): BPMN + meant for (outer, inner), meant in _MEANT.items()}
+_TYPES = sorted({inner for _, inner in _PLACES})
+
+
+def call_by_role(root: etree._Element) -> None:
+    """Give each the name that BPMN has for it where it stands; what it says stays."""
+    for element in [*root.iter(*_TYPES)]:
+        parent = element.getparent()
+        meant = None if parent is None else _PLACES.get((parent.tag, element.tag))
+        if meant is not None:
+            element.tag = meant

@@ -6,9 +6,8 @@ all, or as text.
 
 from lxml import etree
 
-from m2pem.bpmn.behavior_xml import is_behavior
-from m2pem.bpmn.names import M2PEM, local
-from m2pem.bpmn.xml import XmlError, parse_xml
+from m2pem.bpmn.behaviors import is_behavior
+from m2pem.bpmn.xml import M2PEM, XmlError, local, parse_xml
 from m2pem.diagram.layout.model import BPMN, Element, children, tag
 
 _SCRIPTS = ("scriptTask", "globalScriptTask")

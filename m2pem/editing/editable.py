@@ -9,7 +9,7 @@ from lxml import etree
 
 from m2pem.api.authoring import Editable
 from m2pem.bpmn.files import open_part
-from m2pem.bpmn.names import M2PEM
+from m2pem.bpmn.xml import M2PEM
 from m2pem.diagram.interchange import NAMESPACES, add_diagrams, remove_diagrams, undrawn
 from m2pem.diagram.layout.model import Element
 from m2pem.editing.behaviors import lift_behaviors

@@ -12,8 +12,8 @@ from m2pem.api.authoring import (
     OutlineTrigger,
 )
 from m2pem.bpmn import read_partly
+from m2pem.bpmn.context import KEY, ReadingContext
 from m2pem.bpmn.files import open_part
-from m2pem.bpmn.reading import KEY, Reading
 from m2pem.diagram.layout.model import DATA, Element, children, is_node, local, tag
 from m2pem.mission.elements import Activity
 from m2pem.mission.events import Message, Signal
@@ -35,13 +35,13 @@ def outline(
         MissionError: it is no BPMN 2.0.
     """
     root = open_part(source, "mission.bpmn").document.root
-    reading = read_partly(source, "mission.bpmn", library)
+    context = read_partly(source, "mission.bpmn", library)
     return Outline(
         tuple(_processes(root)),
         tuple(_elements(root)),
-        tuple(_names(reading, service_writes or {})),
-        tuple(map(_trigger, reading.signals.values())),
-        tuple(map(_trigger, reading.messages.values())),
+        tuple(_names(context, service_writes or {})),
+        tuple(map(_trigger, context.signals.values())),
+        tuple(map(_trigger, context.messages.values())),
     )
 
 
@@ -72,22 +72,22 @@ def _elements(root: Element) -> Iterator[OutlineElement]:
                 )
 
 
-def _names(reading: Reading, services: Mapping[str, Sequence[str]]) -> Iterator[DataName]:
+def _names(context: ReadingContext, services: Mapping[str, Sequence[str]]) -> Iterator[DataName]:
     """What is written, by whom; then what is only read."""
     written: dict[tuple[str, str], None] = {}
     read: set[str] = set()
-    for _, data in reading.declared:
+    for _, data in context.declared:
         written[data.key, data.id] = None
-    for node in reading.nodes:
+    for node in context.nodes:
         for name in [*written_by(node, services), *_of_instances(node)]:
             written[name, node.id] = None
         for expression in read_by(node):
             read |= expression.names
-    for ends in reading.flows:
+    for ends in context.flows:
         if ends.flow.condition is not None:
             read |= ends.flow.condition.names
     known = {name for name, _ in written}
-    read |= reading.written_keys
+    read |= context.written_keys
     for name, source in sorted(written):
         if KEY.fullmatch(name):
             yield DataName(name, source)

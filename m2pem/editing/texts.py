@@ -2,7 +2,7 @@
 
 from lxml import etree
 
-from m2pem.bpmn.reading import text_of
+from m2pem.bpmn.context import text_of
 from m2pem.diagram.layout.model import BPMN, Element, local, tag
 
 _TYPE = "{http://www.w3.org/2001/XMLSchema-instance}type"

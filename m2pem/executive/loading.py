@@ -13,7 +13,7 @@ from m2pem.bpmn.rules.attributes import MISSPELLED_ATTRIBUTE
 from m2pem.bpmn.rules.extensions import FOREIGN_EXTENSION, MISPLACED_EXTENSION
 from m2pem.bpmn.rules.files import TOO_LARGE, UNREADABLE_FILE
 from m2pem.bpmn.search_path import SearchPath
-from m2pem.bpmn.size import max_bytes, too_large
+from m2pem.bpmn.xml import max_bytes, too_large
 from m2pem.errors import MissionError
 from m2pem.executive.arbiters import FleetArbiters
 from m2pem.findings import Finding, Severity, has_errors, lines, unreadable_remedy

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from bpmn_text import around, definitions, findings, load, summary
 
-from m2pem.bpmn.vocabulary import ELEMENTS, EXTENSIONS, looks_like_own
-from m2pem.bpmn.vocabulary_page import descriptor, page
+from m2pem.bpmn.extensions import ELEMENTS, EXTENSIONS, looks_like_own
+from m2pem.bpmn.pages import descriptor, extensions_page
 from m2pem.findings import Severity
 
 REPOSITORY = Path(__file__).parents[2]
@@ -159,13 +159,15 @@ def test_what_editors_keep_in_a_file_is_not_warned_of(content: str) -> None:
 
 def test_the_docs_are_made_of_the_table() -> None:
     written = (REPOSITORY / "docs/extensions.md").read_text(encoding="utf-8")
-    assert written == page(), "python -m m2pem.bpmn.vocabulary_page page > docs/extensions.md"
+    assert written == extensions_page(), (
+        "python -m m2pem.bpmn.pages extensions > docs/extensions.md"
+    )
 
 
 def test_the_editor_is_held_to_the_table() -> None:
     file = REPOSITORY / "plugins/ocu/web/ui/src/editor/moddle/vocabulary.json"
     assert json.loads(file.read_text(encoding="utf-8")) == descriptor(), (
-        f"python -m m2pem.bpmn.vocabulary_page json > {file.relative_to(REPOSITORY)}"
+        f"python -m m2pem.bpmn.pages editor > {file.relative_to(REPOSITORY)}"
     )
 
 

@@ -3,7 +3,7 @@
 import pytest
 from bpmn_text import around, findings, flow, load, process
 
-from m2pem.bpmn.rewriting import (
+from m2pem.bpmn.foreign_syntax import (
     EXPRESSION,
     SCRIPT,
     expression_remedy,

@@ -6,8 +6,7 @@ import pytest
 from bpmn_text import around, findings, load, process, summary
 
 from m2pem.bpmn import NO_BPMN_RULES
-from m2pem.bpmn.size import max_bytes
-from m2pem.bpmn.xml import XmlError, parse_xml
+from m2pem.bpmn.xml import XmlError, max_bytes, parse_xml
 from m2pem.errors import M2pemError, MissionError
 
 GOOD = around('<task id="T" name="Überfahrt"/>')

@@ -15,7 +15,7 @@ import test_rules_structure
 import test_rules_values
 from bpmn_text import around, findings, process, summary
 
-from m2pem.bpmn.rules.page import page
+from m2pem.bpmn.pages import rules_page
 from m2pem.bpmn.rules.registry import RULES
 from m2pem.bpmn.rules.rule import Rule
 
@@ -92,7 +92,7 @@ def test_every_rule_is_used() -> None:
 
 def test_the_docs_list_the_rules_as_they_are() -> None:
     written = (REPOSITORY / "docs" / "rules.md").read_text(encoding="utf-8")
-    assert written == page(), "make it anew: python -m m2pem.bpmn.rules.page > docs/rules.md"
+    assert written == rules_page(), "make it anew: python -m m2pem.bpmn.pages rules > docs/rules.md"
 
 
 def test_what_a_reader_has_said_a_rule_does_not_say_again() -> None:

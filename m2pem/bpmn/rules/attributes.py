@@ -4,11 +4,11 @@ from collections.abc import Collection
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN, a, attribute_names, kind, local
+from m2pem.bpmn.extensions import ATTRIBUTES
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import Check, Checks, Tree, is_true, name_of, parent
 from m2pem.bpmn.schema import Shape, shape
-from m2pem.bpmn.vocabulary import ATTRIBUTES
+from m2pem.bpmn.xml import BPMN, a, attribute_names, kind, local
 from m2pem.mission.near import did_you_mean, near
 
 BAD_EXPRESSION = Rule(

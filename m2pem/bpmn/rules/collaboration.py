@@ -5,7 +5,6 @@ BPMN 2.0.2, 7.6.3, 8.4.2, 9.3 to 9.5, 10.5 and 10.8.
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN, a, kind
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import (
     ACTIVITIES,
@@ -25,6 +24,7 @@ from m2pem.bpmn.rules.tree import (
     triggers,
     what,
 )
+from m2pem.bpmn.xml import BPMN, a, kind
 
 RETRIEVAL_MESSAGE = Rule(
     8412,

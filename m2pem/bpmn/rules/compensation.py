@@ -2,7 +2,6 @@
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN
 from m2pem.bpmn.rules.references import DANGLING_REFERENCE
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import (
@@ -20,6 +19,7 @@ from m2pem.bpmn.rules.tree import (
     parent,
     what,
 )
+from m2pem.bpmn.xml import BPMN
 
 COMPENSATED_ACTIVITY = Rule(
     10535,

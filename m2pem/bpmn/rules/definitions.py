@@ -2,9 +2,9 @@
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN, kind
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import Checks, Tree, is_true, texts, what
+from m2pem.bpmn.xml import BPMN, kind
 
 MISSING_ID = Rule(
     8301,

@@ -2,7 +2,6 @@
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN, a, kind
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import (
     SUBPROCESSES,
@@ -19,6 +18,7 @@ from m2pem.bpmn.rules.tree import (
     trigger_name,
     triggers,
 )
+from m2pem.bpmn.xml import BPMN, a, kind
 
 OUTSIDE_ONLY = Rule(
     308,

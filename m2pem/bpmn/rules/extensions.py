@@ -2,10 +2,10 @@
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN, CAMUNDA, M2PEM, ZEEBE, a, kind, local
+from m2pem.bpmn.extensions import ELEMENTS, PLACES, looks_like_own, strangers
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import Checks, Tree, parent
-from m2pem.bpmn.vocabulary import ELEMENTS, PLACES, looks_like_own, strangers
+from m2pem.bpmn.xml import BPMN, CAMUNDA, M2PEM, ZEEBE, a, kind, local
 from m2pem.mission.near import did_you_mean
 
 WRONG_NAMESPACE = Rule(

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from lxml import etree
 
-from m2pem.bpmn.names import a, kind
 from m2pem.bpmn.rules.attributes import BAD_VALUE
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.sequence_flows import CONDITION_IGNORED, CONDITION_NOT_ALLOWED
@@ -20,6 +19,7 @@ from m2pem.bpmn.rules.tree import (
     triggers,
     what,
 )
+from m2pem.bpmn.xml import a, kind
 
 NO_CONDITIONS = Rule(
     309,

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN
-from m2pem.bpmn.report import Report
+from m2pem.bpmn.file_findings import FileFindings
 from m2pem.bpmn.rules import (
     activities,
     attributes,
@@ -25,6 +24,7 @@ from m2pem.bpmn.rules import (
 )
 from m2pem.bpmn.rules.rule import Rule, declared
 from m2pem.bpmn.rules.tree import Check, Checks, Tree
+from m2pem.bpmn.xml import BPMN
 
 _FAMILIES = (
     activities,
@@ -103,9 +103,9 @@ def _by_tag() -> dict[str, list[Check]]:
 _BY_TAG = _by_tag()
 
 
-def check_rules(root: etree._Element, report: Report, source: bytes) -> None:
+def check_rules(root: etree._Element, findings: FileFindings, source: bytes) -> None:
     """Add what the checks find in a file, with its bytes `source`, to what the readers found."""
-    tree = Tree(root, report, source)
+    tree = Tree(root, findings, source)
     for element in root.iter(*_BY_TAG):
         for check in _BY_TAG[element.tag]:
             check(tree, element)

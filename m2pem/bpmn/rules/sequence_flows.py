@@ -2,7 +2,6 @@
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import (
     ACTIVITIES,
@@ -14,6 +13,7 @@ from m2pem.bpmn.rules.tree import (
     parent,
     what,
 )
+from m2pem.bpmn.xml import BPMN
 
 FLOW_INTO_START = Rule(
     7601,

@@ -10,9 +10,9 @@ from typing import TypeAlias
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN, local
-from m2pem.bpmn.report import Report
+from m2pem.bpmn.file_findings import FileFindings
 from m2pem.bpmn.rules.rule import Rule
+from m2pem.bpmn.xml import BPMN, local
 from m2pem.findings import Severity
 
 _NOTHING = " "
@@ -61,9 +61,9 @@ def named(text: str) -> str:
 class Tree:
     """The tree, and the findings about it."""
 
-    def __init__(self, root: etree._Element, report: Report, source: bytes) -> None:
+    def __init__(self, root: etree._Element, findings: FileFindings, source: bytes) -> None:
         self.root = root
-        self._report = report
+        self._findings = findings
         self._source = source
         self._target = root.get("targetNamespace", "")
         self._owners: dict[str, set[etree._Element]] = {}
@@ -172,7 +172,7 @@ class Tree:
     def _found(self) -> dict[tuple[int, str], set[str]]:
         """The slugs of the readers' findings by line and element, and by line alone."""
         found: dict[tuple[int, str], set[str]] = {}
-        for finding in self._report.findings:
+        for finding in self._findings.all:
             for name in (finding.element, ""):
                 found.setdefault((finding.line, name), set()).add(finding.rule)
         return found
@@ -190,11 +190,11 @@ class Tree:
         Nothing is reported where a reader has reported the rule, or one of `unless`, which say the
         same.
         """
-        line, identifier = self._report.line(element), finding_id(element)
+        line, identifier = self._findings.line(element), finding_id(element)
         found = self._found.get((line, identifier))
         if found is not None and any(each.slug in found for each in (rule, *unless)):
             return
-        add = self._report.error if rule.severity is Severity.ERROR else self._report.warning
+        add = self._findings.error if rule.severity is Severity.ERROR else self._findings.warning
         message = f"{rule.wrong}: {detail}" if detail else rule.wrong
         add(line, identifier, rule, message, right or rule.right)
 

@@ -9,8 +9,7 @@ from typing import Any
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN, M2PEM
-from m2pem.bpmn.xml import Document, parse_xml
+from m2pem.bpmn.xml import BPMN, M2PEM, Document, parse_xml
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.yaml_source import KeyPath, YamlSource, dotted, parse_yaml, read_yaml
 from m2pem.suggestions import suggest

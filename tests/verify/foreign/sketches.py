@@ -13,7 +13,7 @@ from contextlib import suppress
 from lxml import etree
 
 from m2pem.bpmn import parse_mission
-from m2pem.bpmn.names import BPMN, M2PEM
+from m2pem.bpmn.xml import BPMN, M2PEM
 from m2pem.errors import MissionError
 from m2pem.findings import Finding, Severity
 from m2pem.mission.mission import Mission

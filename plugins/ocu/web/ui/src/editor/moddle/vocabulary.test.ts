@@ -1,5 +1,5 @@
 // The editor's descriptor has just the names of m2pem's vocabulary, from which vocabulary.json is
-// made (`python -m m2pem.bpmn.vocabulary_page json`).
+// made (`python -m m2pem.bpmn.pages editor`).
 import { describe, expect, it } from "vitest";
 import { m2pemDescriptor } from "./descriptor";
 import vocabulary from "./vocabulary.json";

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from m2pem.bpmn import collector
+from m2pem.bpmn import garbage_collection
 
 
 @pytest.fixture(autouse=True)
@@ -17,7 +17,7 @@ def _on_again() -> Iterator[None]:
 
 
 def test_it_is_off_meanwhile_and_on_again_after_an_error() -> None:
-    with pytest.raises(KeyError), collector.paused():
+    with pytest.raises(KeyError), garbage_collection.paused():
         assert not gc.isenabled()
         raise KeyError
     assert gc.isenabled()
@@ -25,14 +25,14 @@ def test_it_is_off_meanwhile_and_on_again_after_an_error() -> None:
 
 def test_it_stays_off_where_it_was_off() -> None:
     gc.disable()
-    with collector.paused():
+    with garbage_collection.paused():
         pass
     assert not gc.isenabled()
 
 
 def test_what_a_program_has_frozen_stays_frozen() -> None:
     gc.freeze()
-    with collector.paused():
+    with garbage_collection.paused():
         pass
     assert gc.get_freeze_count() > 0
 
@@ -54,11 +54,11 @@ class Circle:
 def test_what_is_read_and_dropped_again_and_again_does_not_stay(
     monkeypatch: pytest.MonkeyPatch, circles: int, times: int
 ) -> None:
-    monkeypatch.setattr(collector, "MANY", 50)  # the larger ones are many
-    monkeypatch.setattr(collector, "AT_MOST_UNSEARCHED", 500)
+    monkeypatch.setattr(garbage_collection, "MANY", 50)  # the larger ones are many
+    monkeypatch.setattr(garbage_collection, "AT_MOST_UNSEARCHED", 500)
     gc.collect()
     for _ in range(times):
-        with collector.paused():
+        with garbage_collection.paused():
             read = [Circle() for _ in range(circles)]
         del read
     assert Circle.alive < circles * times / 2

@@ -1,4 +1,4 @@
-"""Collects the findings about one file."""
+"""The findings about one file."""
 
 from collections.abc import Callable
 from typing import TypeAlias, Union
@@ -12,10 +12,10 @@ Where: TypeAlias = Union[etree._Element, int]
 """An element, or a line."""
 
 
-class Report:
-    """Findings of one file, in the order they were made; `qualifier` goes in front of ids."""
+class FileFindings:
+    """Findings of one file, `all` in the order they were made; `qualifier` goes before ids."""
 
-    __slots__ = ("file", "findings", "line", "qualifier")
+    __slots__ = ("all", "file", "line", "qualifier")
 
     def __init__(
         self, file: str, line: Callable[[etree._Element], int], qualifier: str = ""
@@ -23,7 +23,7 @@ class Report:
         self.file = file
         self.qualifier = qualifier
         self.line = line
-        self.findings: list[Finding] = []
+        self.all: list[Finding] = []
 
     def error(self, where: Where, element: str, rule: Rule, message: str, remedy: str) -> None:
         """Note something that stops the mission from being loaded."""
@@ -39,8 +39,8 @@ class Report:
         line = where if isinstance(where, int) else self.line(where)
         if self.qualifier and element:
             element = f"{self.qualifier}:{element}"
-        self.findings.append(rule.finding(self.file, line, element, *said, severity))
+        self.all.append(rule.finding(self.file, line, element, *said, severity))
 
     def sorted(self) -> tuple[Finding, ...]:
         """All findings by line; those of one line in the order they were made."""
-        return tuple(sorted(self.findings, key=lambda finding: finding.line))
+        return tuple(sorted(self.all, key=lambda finding: finding.line))

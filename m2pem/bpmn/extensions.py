@@ -1,7 +1,7 @@
 """What m2pem adds to BPMN: its elements and attributes, where they may be, what they mean.
 
 One table for all: the reader refuses what is not in it, and the descriptor of the web page's editor
-and docs/extensions.md are made of it (`vocabulary_page`).
+and docs/extensions.md are made of it (`pages`).
 """
 
 import re
@@ -12,7 +12,7 @@ from functools import lru_cache
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN, M2PEM, a, attribute_names, kind, local
+from m2pem.bpmn.xml import BPMN, M2PEM, a, attribute_names, kind, local
 from m2pem.mission.near import did_you_mean, near
 
 

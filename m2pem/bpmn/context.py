@@ -5,14 +5,14 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
-from m2pem.bpmn.names import M2PEM, a, attribute_names, kind, local
-from m2pem.bpmn.report import Report, Where
-from m2pem.bpmn.rewriting import expression_remedy, value_remedy
+from m2pem.bpmn.extensions import looks_like_own, stranger_attribute
+from m2pem.bpmn.file_findings import FileFindings, Where
+from m2pem.bpmn.foreign_syntax import expression_remedy, value_remedy
 from m2pem.bpmn.rules.attributes import BAD_EXPRESSION, BAD_VALUE, unknown_attribute
 from m2pem.bpmn.rules.definitions import DUPLICATE_ID, MISSING_ID
 from m2pem.bpmn.rules.extensions import MISPLACED_EXTENSION, UNKNOWN_EXTENSION, WRONG_NAMESPACE
 from m2pem.bpmn.schema import Shape
-from m2pem.bpmn.vocabulary import looks_like_own, stranger_attribute
+from m2pem.bpmn.xml import M2PEM, a, attribute_names, kind, local
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.elements import (
     Activity,
@@ -137,10 +137,10 @@ class Drawn:
 
 
 @dataclass(slots=True)
-class Reading:
+class ReadingContext:
     """The state of reading one file."""
 
-    report: Report
+    findings: FileFindings
     expression_language: str | None = None
     ids: dict[str, int] = field(default_factory=dict)
     made_up: dict[str, int] = field(default_factory=dict)
@@ -193,9 +193,9 @@ class Reading:
         identifier = element.get("id") or self._make_up(element)
         first = self.ids.get(identifier)
         if first is None:
-            self.ids[identifier] = self.report.line(element)
+            self.ids[identifier] = self.findings.line(element)
         else:
-            self.report.error(
+            self.findings.error(
                 element,
                 identifier,
                 DUPLICATE_ID,
@@ -214,7 +214,7 @@ class Reading:
         identifier = f"{base}{'' if flow and number == 1 else number}"
         if not flow:
             name = element.get("name")
-            self.report.warning(
+            self.findings.warning(
                 element,
                 identifier,
                 MISSING_ID,
@@ -238,11 +238,11 @@ class Reading:
                 continue
             if key[0] != "{":
                 rule, message, remedy = unknown_attribute(element, key, shape.attributes)
-                self.report.warning(element, identifier, rule, message, remedy)
+                self.findings.warning(element, identifier, rule, message, remedy)
             elif key.startswith(M2PEM):
                 self._own_attribute(element, identifier, local(key))
             elif looks_like_own("", namespace := key[1:].partition("}")[0]):
-                self.report.error(
+                self.findings.error(
                     element,
                     identifier,
                     WRONG_NAMESPACE,
@@ -256,9 +256,9 @@ class Reading:
             return
         known, message, remedy = wrong
         if known:
-            self.report.warning(element, identifier, MISPLACED_EXTENSION, message, remedy)
+            self.findings.warning(element, identifier, MISPLACED_EXTENSION, message, remedy)
         else:
-            self.report.error(element, identifier, UNKNOWN_EXTENSION, message, remedy)
+            self.findings.error(element, identifier, UNKNOWN_EXTENSION, message, remedy)
 
     def note_outputs(self, elements: list[etree._Element]) -> list[Association]:
         """Keep data output associations: they say what the element writes."""
@@ -281,7 +281,7 @@ class Reading:
             return default
         value = _TRUTH.get(text.strip())
         if value is None:
-            self.report.error(
+            self.findings.error(
                 element,
                 identifier,
                 BAD_VALUE,
@@ -339,7 +339,7 @@ class Reading:
     def _bad_expression(
         self, where: Where, identifier: str, error: ExpressionSyntaxError, remedy: str = ""
     ) -> None:
-        self.report.error(
+        self.findings.error(
             where,
             identifier,
             BAD_EXPRESSION,

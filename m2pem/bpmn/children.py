@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN, M2PEM, a, kind, local
-from m2pem.bpmn.reading import Reading, text_of
+from m2pem.bpmn.context import ReadingContext, text_of
 from m2pem.bpmn.rules.attributes import ELEMENT_ORDER, UNKNOWN_ELEMENT
 from m2pem.bpmn.schema import SHAPES, Shape
+from m2pem.bpmn.xml import BPMN, M2PEM, a, kind, local
 from m2pem.mission.near import did_you_mean
 
 DOCUMENTATION = BPMN + "documentation"
@@ -17,7 +17,7 @@ _UNREAD = Shape(frozenset(), {})
 
 
 @dataclass(slots=True)
-class Scan:
+class Children:
     """One element's id and children; flow references are left out, since the flows say it all."""
 
     element: etree._Element
@@ -38,17 +38,17 @@ class Scan:
         return [each for outer in self.children.get(EXTENSIONS, []) for each in outer]
 
 
-def scan(reading: Reading, element: etree._Element, identifier: str) -> Scan:
+def read_children(context: ReadingContext, element: etree._Element, identifier: str) -> Children:
     """Look at the attributes and children of an element, once."""
     shape = SHAPES.get(element.tag, _UNREAD)
-    reading.check_attributes(element, shape, identifier)
-    result = Scan(element, identifier)
-    order = Order()
+    context.check_attributes(element, shape, identifier)
+    result = Children(element, identifier)
+    order = ChildOrder()
     for child in element:
         name = child.tag
         rank = shape.ranks.get(name)
         if rank is None or rank < order.reached:
-            order.check(reading, element, child, shape, identifier)
+            order.check(context, element, child, shape, identifier)
         else:
             order.reached = rank
             order.last = name
@@ -58,7 +58,7 @@ def scan(reading: Reading, element: etree._Element, identifier: str) -> Scan:
 
 
 @dataclass(slots=True)
-class Order:
+class ChildOrder:
     """How far the children of one element have come in BPMN's order; warns once."""
 
     reached: int = -1
@@ -67,7 +67,7 @@ class Order:
 
     def check(
         self,
-        reading: Reading,
+        context: ReadingContext,
         parent: etree._Element,
         child: etree._Element,
         shape: Shape,
@@ -78,7 +78,7 @@ class Order:
         rank = shape.ranks.get(name)
         if rank is None:
             if name.startswith(BPMN):
-                reading.report.warning(
+                context.findings.warning(
                     child,
                     identifier or child.get("id", ""),
                     UNKNOWN_ELEMENT,
@@ -90,7 +90,7 @@ class Order:
             self.last = name
         elif not self.warned:
             self.warned = True
-            reading.report.warning(
+            context.findings.warning(
                 child,
                 identifier,
                 ELEMENT_ORDER,
@@ -99,7 +99,7 @@ class Order:
             )
 
 
-def own_extensions(found: Scan, used: frozenset[str]) -> dict[str, list[etree._Element]]:
+def own_extensions(found: Children, used: frozenset[str]) -> dict[str, list[etree._Element]]:
     """Those m2pem extension elements that the reader uses, by local name.
 
     What the others are, rules say (`rules/extensions.py`).

@@ -5,8 +5,7 @@ from typing import TypeVar
 
 from lxml import etree
 
-from m2pem.bpmn.names import BPMN, M2PEM, local
-from m2pem.bpmn.reading import Reading
+from m2pem.bpmn.context import ReadingContext
 from m2pem.bpmn.rules.attributes import BAD_VALUE
 from m2pem.bpmn.rules.behaviors import (
     BEHAVIOR_NAME,
@@ -23,6 +22,7 @@ from m2pem.bpmn.rules.behaviors import (
     SERVICE_CLASS,
 )
 from m2pem.bpmn.rules.rule import Rule
+from m2pem.bpmn.xml import BPMN, M2PEM, local
 from m2pem.mission.behavior import Behavior, BehaviorType, Parameter, Role, RoleKind, ServiceCall
 
 _ROLE_ATTRIBUTES = frozenset({"name", "optional", "requires", *RoleKind})
@@ -33,9 +33,11 @@ Named = TypeVar("Named", Role, Parameter)
 class BehaviorReader:
     """Reads the XML inside one task; `line` finds the lines of that XML in the mission file."""
 
-    def __init__(self, reading: Reading, task: str, line: Callable[[etree._Element], int]) -> None:
-        self._reading = reading
-        self._report = reading.report
+    def __init__(
+        self, context: ReadingContext, task: str, line: Callable[[etree._Element], int]
+    ) -> None:
+        self._context = context
+        self._findings = context.findings
         self._task = task
         self._line = line
 
@@ -159,7 +161,7 @@ class BehaviorReader:
             return []
         if "{" not in text and not text.lstrip().startswith("="):
             return [Parameter(name, text, line)]
-        value = self._reading.template(line, self._task, text)
+        value = self._context.template(line, self._task, text)
         return [] if value is None else [Parameter(name, value, line)]
 
     def _resources(self, element: etree._Element) -> list[Role]:
@@ -247,7 +249,7 @@ class BehaviorReader:
         )
 
     def _error(self, line: int, rule: Rule, message: str, remedy: str) -> None:
-        self._report.error(line, self._task, rule, message, remedy)
+        self._findings.error(line, self._task, rule, message, remedy)
 
 
 def is_behavior(element: etree._Element) -> bool:

@@ -1,0 +1,288 @@
+"""Processes and subprocesses to any depth, with their flow nodes.
+
+They are walked with a stack of frames, not by recursion: files may nest as deep as `MAX_DEPTH`.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from lxml import etree
+
+from m2pem.bpmn.activities import TASKS, read_activity_attributes
+from m2pem.bpmn.children import ChildOrder, Children, read_children
+from m2pem.bpmn.collaboration import read_lanes, read_subscription
+from m2pem.bpmn.compensation import ASSOCIATION, read_association
+from m2pem.bpmn.context import ReadingContext, text_of
+from m2pem.bpmn.data import read_data, read_data_flow
+from m2pem.bpmn.events import read_event
+from m2pem.bpmn.gateways import GATEWAYS, read_gateway
+from m2pem.bpmn.loops import LOOPS, read_loop
+from m2pem.bpmn.rules.attributes import BAD_VALUE, UNKNOWN_ELEMENT
+from m2pem.bpmn.rules.files import NOT_EXECUTED, TOO_DEEP
+from m2pem.bpmn.rules.subprocesses import AD_HOC_ORDERING
+from m2pem.bpmn.schema import FLOW_ELEMENT_NAMES, SHAPES, Shape
+from m2pem.bpmn.sequence_flows import SEQUENCE_FLOW, read_flow
+from m2pem.bpmn.xml import BPMN, M2PEM, ZEEBE, a, kind, local
+from m2pem.mission.elements import (
+    Activity,
+    AdHocOrdering,
+    AdHocSubProcess,
+    Container,
+    FlowNode,
+    Process,
+    SubProcess,
+    Transaction,
+)
+from m2pem.mission.expression import Expression
+from m2pem.mission.near import did_you_mean
+
+SUBPROCESSES = frozenset(BPMN + name for name in ("subProcess", "transaction", "adHocSubProcess"))
+
+_EVENTS = frozenset(
+    BPMN + name
+    for name in (
+        "startEvent",
+        "endEvent",
+        "intermediateCatchEvent",
+        "intermediateThrowEvent",
+        "boundaryEvent",
+    )
+)
+_REFUSED = {
+    "choreographyTask": "draw the mission as processes",
+    "callChoreography": "draw the mission as processes",
+    "subChoreography": "draw the mission as processes",
+    "event": "use a start, end or intermediate event",
+    "implicitThrowEvent": "use an intermediate throw event",
+}
+
+
+def read_node(
+    context: ReadingContext, element: etree._Element, container: Container
+) -> FlowNode | None:
+    """A flow node with all but its flows; None when the tag is that of none."""
+    tag = element.tag
+    if tag in _EVENTS:
+        return read_event(context, element, container)
+    if tag in GATEWAYS:
+        return read_gateway(context, element)
+    task = TASKS.get(tag)
+    if task is None and tag not in SUBPROCESSES:
+        return _refuse(context, element)
+    identifier = context.claim(element)
+    node: Activity
+    if task is None:
+        # Its children are read with its content, by containers.py.
+        node = _subprocess(context, element, identifier)
+    else:
+        found = read_children(context, element, identifier)
+        node = task(context, found)
+        if tag != BPMN + "callActivity":
+            read_data_flow(context, found, node)
+        read_loop(context, found, node)
+    read_activity_attributes(context, element, node)
+    return node
+
+
+def _refuse(context: ReadingContext, element: etree._Element) -> FlowNode | None:
+    instead = _REFUSED.get(local(element.tag))
+    if instead is None:
+        return None
+    not_executed(context, element, element.get("id", ""), kind(element.tag), instead)
+    identifier = context.claim(element)
+    return FlowNode(identifier, element.get("name", ""), context.findings.line(element))
+
+
+def _subprocess(context: ReadingContext, element: etree._Element, identifier: str) -> SubProcess:
+    triggered = context.boolean(element, "triggeredByEvent", False, identifier)
+    if triggered and element.tag != BPMN + "subProcess":
+        context.findings.error(
+            element,
+            identifier,
+            BAD_VALUE,
+            f"{a(kind(element.tag))} cannot be an event subprocess too",
+            'put it into a plain <subProcess triggeredByEvent="true">, behind a start event',
+        )
+    if element.tag == BPMN + "adHocSubProcess":
+        return read_ad_hoc(context, element, identifier)
+    name, line = element.get("name", ""), context.findings.line(element)
+    if element.tag == BPMN + "transaction":
+        return Transaction(identifier, name, line, triggered)
+    return SubProcess(identifier, name, line, triggered)
+
+
+def not_executed(
+    context: ReadingContext, element: etree._Element, identifier: str, what: str, instead: str
+) -> None:
+    """Refuse what is BPMN but nothing that m2pem runs."""
+    context.findings.error(
+        element, identifier, NOT_EXECUTED, f"m2pem does not execute {a(what)} yet", instead
+    )
+
+
+MAX_DEPTH = 1000
+"""How deep subprocesses may nest in a process."""
+
+_DATA = frozenset(
+    BPMN + name for name in ("dataObject", "dataObjectReference", "dataStoreReference", "property")
+)
+_LANES = BPMN + "laneSet"
+_SUBSCRIPTION = BPMN + "correlationSubscription"
+_COMPLETION = BPMN + "completionCondition"
+_DATA_FLOW = ("ioSpecification", "dataInputAssociation", "dataOutputAssociation")
+_MARKS = frozenset((*LOOPS, *(BPMN + name for name in _DATA_FLOW)))
+
+
+@dataclass(slots=True)
+class _Frame:
+    container: Container
+    element: etree._Element
+    shape: Shape
+    children: Iterator[etree._Element]
+    marks: Children
+    """Its children that say what it does as an activity, read when all others have been."""
+    order: ChildOrder = field(default_factory=ChildOrder)
+
+
+def read_process(context: ReadingContext, element: etree._Element) -> None:
+    """A process and all that it contains."""
+    identifier = context.claim(element)
+    process = Process(
+        identifier,
+        element.get("name", ""),
+        context.findings.line(element),
+        context.boolean(element, "isExecutable", False, identifier),
+    )
+    context.processes.append(process)
+    stack = [_frame(context, process, element)]
+    while stack:
+        frame = stack[-1]
+        for child in frame.children:
+            inner = _read_child(context, process, frame, child)
+            if inner is None:
+                continue
+            if len(stack) <= MAX_DEPTH:
+                stack.append(_frame(context, inner, child))
+                break
+            context.broken.add(inner)
+            context.findings.error(
+                child,
+                inner.id,
+                TOO_DEEP,
+                f"subprocesses are nested more than {MAX_DEPTH} deep",
+                "move inner subprocesses to processes of their own and call them",
+            )
+        else:
+            stack.pop()
+            if isinstance(frame.container, SubProcess):
+                read_data_flow(context, frame.marks, frame.container)
+                read_loop(context, frame.marks, frame.container)
+
+
+def _frame(context: ReadingContext, container: Container, element: etree._Element) -> _Frame:
+    shape = SHAPES[element.tag]
+    context.check_attributes(element, shape, container.id)
+    return _Frame(container, element, shape, iter(element), Children(element, container.id))
+
+
+def _read_child(
+    context: ReadingContext, process: Process, frame: _Frame, child: etree._Element
+) -> SubProcess | None:
+    """Read one child; gives back a subprocess, whose content is still to be read."""
+    tag = child.tag
+    container = frame.container
+    rank = frame.shape.ranks.get(tag)
+    if rank is None:
+        if tag.startswith(BPMN):
+            _refuse_unknown(context, frame, child)
+        return None
+    if rank < frame.order.reached:
+        frame.order.check(context, frame.element, child, frame.shape, container.id)
+    else:
+        frame.order.reached = rank
+        frame.order.last = tag
+    if tag == SEQUENCE_FLOW:
+        read_flow(context, child, container)
+        return None
+    if tag in _DATA:
+        read_data(context, child, container)
+        return None
+    if tag == ASSOCIATION:
+        read_association(context, child)
+        return None
+    if tag == _LANES:
+        read_lanes(context, child, process)
+        return None
+    if tag in _MARKS:
+        frame.marks.children.setdefault(tag, []).append(child)
+        return None
+    if tag == _SUBSCRIPTION:
+        read_subscription(context, child, process)
+        return None
+    if tag == _COMPLETION:
+        return None
+    node = read_node(context, child, container)
+    if node is None:
+        return None
+    context.nodes.append(node)
+    context.containers.append(container)
+    return node if isinstance(node, SubProcess) else None
+
+
+def _refuse_unknown(context: ReadingContext, frame: _Frame, child: etree._Element) -> None:
+    name = local(child.tag)
+    context.broken.add(frame.container)
+    context.findings.error(
+        child,
+        child.get("id", "") or frame.container.id,
+        UNKNOWN_ELEMENT,
+        f"BPMN has no '{name}' in {a(kind(frame.element.tag))}",
+        did_you_mean(name, FLOW_ELEMENT_NAMES, "delete it"),
+    )
+
+
+def read_ad_hoc(
+    context: ReadingContext, element: etree._Element, identifier: str
+) -> AdHocSubProcess:
+    """An ad-hoc subprocess; what is in it is read with the content of all subprocesses."""
+    ordering = element.get("ordering", AdHocOrdering.PARALLEL.value)
+    if ordering not in [each.value for each in AdHocOrdering]:
+        context.findings.error(
+            element,
+            identifier,
+            AD_HOC_ORDERING,
+            f"ordering='{ordering}' is none that BPMN knows",
+            'write ordering="Parallel" or ordering="Sequential"',
+        )
+        ordering = AdHocOrdering.PARALLEL.value
+    return AdHocSubProcess(
+        identifier,
+        element.get("name", ""),
+        context.findings.line(element),
+        ordering=AdHocOrdering(ordering),
+        completion=_completion(context, element, identifier),
+        cancel_remaining=context.boolean(element, "cancelRemainingInstances", True, identifier),
+        active_elements=_active_elements(context, element, identifier),
+    )
+
+
+def _completion(
+    context: ReadingContext, element: etree._Element, identifier: str
+) -> Expression | None:
+    for condition in element.iterchildren(BPMN + "completionCondition"):
+        text = text_of(condition)
+        if text:
+            return context.expression(condition, identifier, text, condition.get("language"))
+    return None
+
+
+def _active_elements(
+    context: ReadingContext, element: etree._Element, identifier: str
+) -> Expression | None:
+    text = element.get(M2PEM + "activeElements", "")
+    where = element
+    for extensions in element.iterchildren(BPMN + "extensionElements"):
+        for each in extensions.iterchildren(ZEEBE + "adHoc"):
+            text = text or each.get("activeElementsCollection", "")
+            where = each
+    return context.expression(where, identifier, text) if text.strip() else None
