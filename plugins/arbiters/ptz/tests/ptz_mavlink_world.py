@@ -15,7 +15,7 @@ from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from m2pem_plugin_ptz.drivers.driver import Seat
 from m2pem_plugin_ptz.drivers.mavlink import MavlinkDriver
-from m2pem_plugin_ptz.head import PositionSetpoint
+from m2pem_plugin_ptz.gimbal import Reach
 from m2pem_plugin_ptz.settings import DriverName, Settings
 
 from m2pem.api import ArbiterContext, Connection, ResourceId, VehicleState
@@ -25,7 +25,7 @@ from m2pem.telemetry.bus import Bus
 SPEED = 10.0
 AMPLE_S = 40.0
 VEHICLE, CAMERA = ResourceId("v1"), ResourceId("v1/ptz")
-REACH = PositionSetpoint(zoom_max=11.0, rate_rad_s=2.0)
+REACH = Reach(zoom_max=11.0, rate_rad_s=2.0)
 
 
 async def until(true: Callable[[], bool]) -> None:
