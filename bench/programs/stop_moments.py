@@ -25,7 +25,7 @@ from typing import Any
 from bench.graphs import file
 from bench.programs.stage import Plugins, flows
 from m2pem.control_socket.client import ask
-from m2pem.control_socket.place import address
+from m2pem.control_socket.paths import address
 from m2pem.control_socket.server import ControlSocket
 from m2pem.errors import JournalError, M2pemError
 from m2pem.executive.clock import SystemClock

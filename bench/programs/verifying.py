@@ -20,9 +20,9 @@ from typing import Any, TypeVar
 
 from bench.measured import peak_kb
 from m2pem.bpmn import parse_mission
-from m2pem.cli.proving import asked_of, findings
+from m2pem.cli.verify import asked_of, findings
 from m2pem.executive.loading import load_source
-from m2pem.executive.proving import Engine
+from m2pem.executive.verification import Engine
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import search as search_as_it_does

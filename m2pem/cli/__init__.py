@@ -3,6 +3,6 @@
 
 def main() -> None:
     """Run the command line and exit with its status."""
-    from m2pem.cli.entry import run_command_line
+    from m2pem.cli.group import run_command_line
 
     raise SystemExit(run_command_line())

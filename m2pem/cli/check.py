@@ -95,8 +95,7 @@ def _against_fleet(
     mission: "Mission | None", fleet_file: str | None, process: str | None, data: "dict[str, Value]"
 ) -> list[Finding]:
     from m2pem.cli.options import MADE_UP
-    from m2pem.executive.loading import findings_for
-    from m2pem.executive.requiring import requirement_findings
+    from m2pem.executive.loading import findings_for, requirement_findings
     from m2pem.plugins import PluginManager
 
     if mission is None:
@@ -109,8 +108,7 @@ def _against_fleet(
     arbiters = None
     failed: FleetError | None = None
     if fleet_file is not None:
-        from m2pem.cli.fleets import arbiters_of
-        from m2pem.cli.given import get_fleet
+        from m2pem.cli.arguments import arbiters_of, get_fleet
 
         try:
             arbiters = arbiters_of(get_fleet(fleet_file, mission), plugins)

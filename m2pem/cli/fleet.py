@@ -8,7 +8,7 @@ import click
 from m2pem.cli.options import MADE_UP, as_json, example, format_option, journal_option
 
 if TYPE_CHECKING:
-    from m2pem.executive.arbiters import FleetArbiters
+    from m2pem.executive.fleet_connections import FleetArbiters
 
 
 @click.command(epilog=example("m2pem fleet fleet_configs/vignette1.yaml"))
@@ -30,8 +30,8 @@ def fleet(fleet_file: str | None, schema: bool, journal: str | None, output: str
         raise click.UsageError("name a fleet file, or say --schema")
     if fleet_file == MADE_UP:
         raise click.UsageError(f"{MADE_UP!r} is made up from a mission; name a fleet file")
-    from m2pem.cli.fleets import arbiters_of
-    from m2pem.cli.interrupted import interrupted_runs
+    from m2pem.cli.arguments import arbiters_of
+    from m2pem.cli.journals import interrupted_runs
     from m2pem.fleet.fleet_file import load_fleet
     from m2pem.plugins import PluginManager
 

@@ -1,8 +1,10 @@
-"""The top command. Its commands' modules, and plugins, are loaded only when they are needed."""
+"""The top command `m2pem`: its lazily loaded commands, its log, and its exit status."""
 
 import difflib
 import logging
+import os
 import sys
+from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 from importlib import import_module
@@ -12,6 +14,8 @@ from typing import TYPE_CHECKING
 import click
 
 import m2pem
+from m2pem.errors import M2pemError
+from m2pem.findings import escaped
 
 if TYPE_CHECKING:
     from m2pem.plugins import PluginManager
@@ -35,13 +39,17 @@ COMMANDS = {
     "fleet": "Show a fleet: who is there and can do what.",
     "completion": "Print what makes a shell complete m2pem's words.",
 }
-"""Built-in commands: module of `m2pem.cli` and first line of its help."""
+"""Built-in commands and the first lines of their help."""
+
+
+_RUN_CONTROL = frozenset({"answer", "continue", "pause", "signal", "stop"})
 
 
 def built_in(name: str) -> click.Command:
-    """The built-in command of that name, from its module; one named like a keyword ends with _."""
-    python = f"{name}_" if iskeyword(name) else name
-    command = getattr(import_module(f"m2pem.cli.{python}"), python)
+    """Return the built-in command of that name; the function `continue_` is `m2pem continue`."""
+    module = "run_control" if name in _RUN_CONTROL else name
+    function = f"{name}_" if iskeyword(name) else name
+    command = getattr(import_module(f"m2pem.cli.{module}"), function)
     assert isinstance(command, click.Command)
     return command
 
@@ -136,7 +144,7 @@ def _log_to_stderr(level: int) -> None:
 
 def log_from_a_thread() -> None:
     """Have a thread write the log: standard error that nobody reads must not hold up a mission."""
-    from m2pem.cli.writer import writer_for
+    from m2pem.cli.standard_streams import writer_for
 
     class Lines(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
@@ -157,3 +165,53 @@ class _WithoutTracebacks(logging.Formatter):
         short.exc_info = short.exc_text = short.stack_info = None
         text = super().format(short)
         return text if error is None else f"{text}: {type(error).__name__}: {error}"
+
+
+STOPPED = 130
+"""Exit status when an operator stopped it (a shell's 128 + SIGINT)."""
+
+
+def run_command_line(arguments: Sequence[str] | None = None) -> int:
+    """Carry out a command line (that of the process by default); returns the exit status.
+
+    0 well, 1 failed, 2 unusable input, 130 stopped. No exception comes out but with `--debug`.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        result = cli.main(words, prog_name="m2pem", standalone_mode=False)
+        sys.stdout.flush()
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        return STOPPED
+    except BrokenPipeError:
+        ignore_closed_stdout()
+        return 1
+    except M2pemError as error:
+        if _debugging():
+            logging.getLogger("m2pem").exception("it ended with this error")
+        click.echo(f"m2pem: {escaped(str(error), keep=chr(10))}", err=True)
+        return error.exit_status
+    except Exception as error:
+        if _debugging():
+            raise
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        click.echo(
+            f"m2pem: this is a bug in m2pem: {what}\n"
+            "Please report it, with what `m2pem --debug` and the same command print.",
+            err=True,
+        )
+        return 1
+    return result if isinstance(result, int) else 0
+
+
+def ignore_closed_stdout() -> None:
+    """Nobody reads what is printed any more; the interpreter must not complain at its end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.close(nowhere)
+
+
+def _debugging() -> bool:
+    return logging.getLogger("m2pem").isEnabledFor(logging.DEBUG)

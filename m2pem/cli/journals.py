@@ -3,16 +3,18 @@
 import os
 import shutil
 import tempfile
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import ExitStack, asynccontextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import click
 
 from m2pem.cli.options import UnusableError
+from m2pem.cli.status import Standing
 from m2pem.errors import JournalError
-from m2pem.executive.runtime_folder import runtime_folder
+from m2pem.executive.runtime_directory import runtime_folder
 from m2pem.journal import Journal, MemoryJournal, RunInfo, default_url, file_of, open_journal
 
 if TYPE_CHECKING:
@@ -139,3 +141,40 @@ async def last_decided_us(journal: Journal, line: RunInfo) -> int:
         if times or after == 0:
             return max(times, default=line.started_us)
         back *= 10
+
+
+@dataclass(frozen=True, slots=True)
+class Interrupted:
+    """A run that was left without an end. `behaviors`: what it was doing, by vehicle or payload."""
+
+    run: str
+    mission: str
+    behaviors: Mapping[str, str]
+
+    def as_text(self) -> str:
+        """For people: what may still move or stand held, and the commands to go on."""
+        held = ", ".join(f"{name} ({behavior})" for name, behavior in self.behaviors.items())
+        what = f"it has {held}, which may go on or stand held" if held else "it has no vehicle"
+        return (
+            f"{self.run} ({self.mission}) was interrupted, and no executive drives it: {what}; "
+            f"`m2pem resume {self.run}` goes on with it, and `m2pem resume {self.run} --stop` "
+            "stops it"
+        )
+
+
+async def interrupted_runs(url: str | None) -> list[Interrupted]:
+    """The interrupted runs of a journal, by what its records say."""
+    async with journal_to_read(url) as journal:
+        return [
+            await _interrupted(journal, line)
+            for line in await journal.runs()
+            if line.outcome is None and not line.driven and line.last_seq > 0
+        ]
+
+
+async def _interrupted(journal: Journal, line: RunInfo) -> Interrupted:
+    standing = Standing(line)
+    async for entry in journal.read(line.run):
+        for record in entry.records:
+            standing.take(record)
+    return Interrupted(line.run, line.header.mission_name, standing.commanded())

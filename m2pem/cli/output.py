@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from typing import TextIO
 
 from m2pem.api.control import LOGGED, Alert, Notice, RunId, StampedRecord
+from m2pem.cli.standard_streams import LineWriter, writer_for
 from m2pem.cli.story import Story, printable
-from m2pem.cli.writer import LineWriter, writer_for
 from m2pem.engine.records import RunEnded
 from m2pem.journal.codec import record_line
 from m2pem.mission.mission import Mission

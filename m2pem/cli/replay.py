@@ -1,17 +1,34 @@
 """`m2pem replay`: a run from its journal, by applying its records alone."""
 
 import asyncio
+import json
 import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 
-from m2pem.cli.options import as_json, example, fleet_option, format_option, journal_option
+from m2pem.cli.options import (
+    UnusableError,
+    as_json,
+    example,
+    fleet_option,
+    format_option,
+    journal_option,
+)
+from m2pem.cli.status import run_of
+from m2pem.findings import unreadable_remedy
+from m2pem.journal.base import Entry, RunInfo
+from m2pem.journal.codec import record_line
 
 if TYPE_CHECKING:
-    from m2pem.cli.progress import Progress
-    from m2pem.journal.base import Journal, RunInfo
+    from m2pem.cli.story import Story
+    from m2pem.engine.run import Step
+    from m2pem.journal.base import Journal
+    from m2pem.mission.mission import Mission
 
 
 @click.command(epilog=example("m2pem replay r1 --verify"))
@@ -62,7 +79,6 @@ def replay(
     if counterexample is not None:
         if run_id is not None or verify or state_only:
             raise click.UsageError("--counterexample goes with no RUN, --verify or --state")
-        from m2pem.cli.counterexample import replay_counterexample
 
         return replay_counterexample(counterexample, mission, fleet_file, violation, output)
     if run_id is None:
@@ -74,7 +90,6 @@ def replay(
 
 async def _replay(run_id: str, url: str | None, verify: bool, state_only: bool, output: str) -> int:
     from m2pem.cli.journals import find_run, journal_to_read
-    from m2pem.cli.progress import progress
 
     async with journal_to_read(url) as journal:
         line = await find_run(journal, run_id)
@@ -91,7 +106,7 @@ async def _print(
 ) -> int:
     from m2pem.api.control import StampedRecord
     from m2pem.cli.output import US_PER_S, wants_colour
-    from m2pem.cli.standing import Standing
+    from m2pem.cli.status import Standing
     from m2pem.cli.story import Story
     from m2pem.journal.codec import record_line
 
@@ -115,7 +130,6 @@ async def _print(
 
 
 async def _verify(journal: "Journal", line: "RunInfo", output: str, done: "Progress") -> int:
-    from m2pem.cli.verification import Verification
 
     verification = Verification(line)
     async for entry in journal.read(line.run):
@@ -127,3 +141,172 @@ async def _verify(journal: "Journal", line: "RunInfo", output: str, done: "Progr
     else:
         print(verification.as_text())
     return 1 if verification.difference or line.loss else 0
+
+
+VERSIONS = (1,)
+
+
+def replay_counterexample(
+    file: Path, mission_file: str | None, fleet_file: str | None, number: int, output: str
+) -> int:
+    """Play violation `number` (from 1) of a JSON report. 0: the engine did all of the run."""
+    from m2pem.cli.arguments import get_fleet
+    from m2pem.cli.output import wants_colour
+    from m2pem.cli.story import Story
+    from m2pem.verify.conformance_run import NotPlayableError, Player
+
+    report = _read(file)
+    violation = _violation(file, report, number)
+    mission = _mission(file, report, mission_file)
+    fleet = get_fleet(fleet_file or "sim", mission)
+    player = Player(mission, fleet, report["process"], report["data"])
+    story = Story(lambda _: mission, colour=wants_colour(sys.stdout))
+    _say(output, f"{violation['property']}: {violation['text']}")
+    _show(player.steps, story, output)
+    problem = ""
+    for step in [*violation["steps"], *violation["loop"]]:
+        _say(output, f"step {step['step']}: {step['text']}")
+        try:
+            _show(player.play(step), story, output)
+        except NotPlayableError as error:
+            problem = str(error)
+            break
+    if not problem and player.undone:
+        problem = f"the engine did not take {', '.join(player.undone)}"
+    if problem:
+        click.echo(f"the engine does not follow: {problem}", err=True)
+        return 1
+    left = ", ".join(player.where)
+    _say(output, f"the engine did all of it; {f'tokens are at {left}' if left else 'it is over'}")
+    return 0
+
+
+def _say(output: str, text: str) -> None:
+    from m2pem.cli.story import printable
+
+    if output == "text":
+        click.echo(printable(text))
+
+
+def _show(steps: "Sequence[Step]", story: "Story", output: str) -> None:
+    from m2pem.api.control import StampedRecord
+    from m2pem.cli.output import US_PER_S
+    from m2pem.journal.codec import record_line
+
+    for step in steps:
+        for seq, record in enumerate(step.records, step.seq):
+            if output == "json":
+                click.echo(record_line("r1", seq, step.t_us, record).decode())
+            elif told := story.tell(StampedRecord("r1", seq, step.t_us / US_PER_S, record)):
+                click.echo(told)
+
+
+def _read(file: Path) -> dict[str, Any]:
+    try:
+        report = json.loads(file.read_bytes())
+    except OSError as error:
+        remedy = unreadable_remedy(error)
+        raise UnusableError(f"{file} cannot be read: {error.strerror}; {remedy}") from error
+    except (ValueError, RecursionError) as error:
+        raise UnusableError(f"{file} is no JSON: {error}") from error
+    if not isinstance(report, dict) or report.get("version") not in VERSIONS:
+        raise UnusableError(
+            f"{file} is no report of `m2pem verify --report FILE.json` of version "
+            f"{', '.join(map(str, VERSIONS))}"
+        )
+    return report
+
+
+def _violation(file: Path, report: dict[str, Any], number: int) -> dict[str, Any]:
+    runs: list[dict[str, Any]] = [each for each in report["violations"] if each["steps"]]
+    if number > len(runs):
+        known = f"it has {len(runs)}" if runs else "it has none"
+        raise UnusableError(f"{file} has no violation {number} with a run: {known}")
+    return runs[number - 1]
+
+
+def _mission(file: Path, report: dict[str, Any], mission_file: str | None) -> "Mission":
+    from m2pem.executive.loading import load_source
+
+    mission = load_source(mission_file or report["mission"])
+    if sha256(mission.source).hexdigest() != report["sha256"]:
+        raise UnusableError(
+            f"{mission.file} is not as it was when {file} was written: verify it again"
+        )
+    return mission
+
+
+class Verification:
+    """`difference` says where the first one is; it is empty as long as there is none."""
+
+    def __init__(self, line: RunInfo) -> None:
+        self.difference: dict[str, Any] = {}
+        self._run_id = line.run
+        self._loss = line.loss
+        self._run = run_of(line)
+        self._inputs = 0
+        self._records = 0
+
+    def agrees(self, entry: Entry) -> bool:
+        """Decide the entry's input, and compare what comes of it with the entry's records."""
+        step = self._run.receive(entry.input, entry.at_us)
+        then = [self._line(entry.seq + n, entry.t_us, each) for n, each in enumerate(entry.records)]
+        now = [self._line(step.seq + n, step.t_us, each) for n, each in enumerate(step.records)]
+        if then == now:
+            self._inputs += 1
+            self._records += len(then)
+            return True
+        place = next(
+            (n for n, (one, other) in enumerate(zip(then, now, strict=False)) if one != other),
+            min(len(then), len(now)),
+        )
+        self.difference = {
+            "seq": entry.seq + place,
+            "input": type(entry.input).__name__,
+            "journal": then[place] if place < len(then) else None,
+            "decided": now[place] if place < len(now) else None,
+        }
+        return False
+
+    def _line(self, seq: int, t_us: int, record: Any) -> str:
+        return record_line(self._run_id, seq, t_us, record).decode()
+
+    def as_data(self) -> dict[str, Any]:
+        """For programs."""
+        return {
+            "run": self._run_id,
+            "inputs": self._inputs,
+            "records": self._records,
+            "difference": self.difference or None,
+            "loss": str(self._loss) if self._loss is not None else None,
+        }
+
+    def as_text(self) -> str:
+        """For people."""
+        same = f"{self._run_id}: {self._inputs} inputs decided again, {self._records} records"
+        loss = f"\n{self._run_id}: {self._loss}" if self._loss is not None else ""
+        if not self.difference:
+            return f"{same}, all the same{loss}"
+        return (
+            f"{same} the same; then {self.difference['input']} differs at record "
+            f"{self.difference['seq']}\n"
+            f"  journal: {self.difference['journal'] or 'no more records'}\n"
+            f"  decided: {self.difference['decided'] or 'no more records'}{loss}"
+        )
+
+
+Progress: TypeAlias = Callable[[int], None]
+"""Called with how much more has been done."""
+
+LONG = 10_000
+"""Less than this is done before anybody has read the bar."""
+
+
+@contextmanager
+def progress(label: str, length: int, *, shown: bool = True) -> Iterator[Progress]:
+    """A bar that fills within the block; none when it is short work or nobody looks."""
+    if not shown or length < LONG or not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    with click.progressbar(length=length, label=label, file=sys.stderr) as bar:
+        yield bar.update

@@ -50,13 +50,11 @@ async def _resume(
     stop: bool,
 ) -> int:
     from m2pem.api.operator import operator_name
-    from m2pem.cli.driving import drive_run
-    from m2pem.cli.given import get_answers
+    from m2pem.cli.arguments import get_answers
     from m2pem.cli.journals import existing_journal, find_run, last_decided_us, url_of
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
-    from m2pem.cli.setting import make_executive
-    from m2pem.cli.state_files import tidy_up
+    from m2pem.cli.session import drive_run, make_executive, tidy_up
     from m2pem.engine.state import RunStatus
     from m2pem.executive.clock import SystemClock
     from m2pem.fleet.snapshot import restore

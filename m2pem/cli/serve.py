@@ -59,12 +59,10 @@ async def _serve(
     speed: float,
     output: str,
 ) -> int:
-    from m2pem.cli.driving import driving
     from m2pem.cli.journals import journal_at, url_of
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
-    from m2pem.cli.setting import make_executive, refuse_speed
-    from m2pem.cli.state_files import tidy_up, with_shared_state
+    from m2pem.cli.session import driving, make_executive, refuse_speed, tidy_up, with_shared_state
     from m2pem.executive.clock import SystemClock
     from m2pem.fleet.fleet_file import load_fleet
     from m2pem.journal import file_of

@@ -84,7 +84,7 @@ def simulate(
     Every vehicle is simulated; the same mission, fleet and answers give the same records, byte for
     byte. Needs no fleet if the mission commands nothing. Ends as `m2pem run` does.
     """
-    from m2pem.cli.given import get_answers, get_fleet
+    from m2pem.cli.arguments import get_answers, get_fleet
     from m2pem.cli.output import output_of
     from m2pem.executive.loading import load_source
     from m2pem.plugins import PluginManager

@@ -1,6 +1,10 @@
 """`m2pem verify`: properties of a mission, proved before anything moves."""
 
+import signal
 import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,11 +21,13 @@ from m2pem.cli.options import (
     path_option,
     process_option,
 )
-from m2pem.cli.report_files import KINDS, write
 
 if TYPE_CHECKING:
+    from m2pem.executive.verification import Asked, Engine
+    from m2pem.mission.mission import Mission
     from m2pem.mission.values import Value
-    from m2pem.verify.report.findings import Findings
+    from m2pem.verify.report.findings import Findings, Violated
+    from m2pem.verify.search.explore import Progress
 
 
 @click.command(
@@ -118,9 +124,8 @@ def verify(
     what was seen until then is told.
     """
     _refuse_what_does_not_go_together(engine, storage, emit, reports)
-    from m2pem.cli.proving import asked_of, findings, promela
     from m2pem.executive.loading import load_source
-    from m2pem.executive.proving import Engine
+    from m2pem.executive.verification import Engine
     from m2pem.verify.report.data import as_data
     from m2pem.verify.search.explore import Limits
 
@@ -177,3 +182,167 @@ def _text(found: "Findings") -> str:
     if wants_colour(sys.stdout):
         return as_text(found, lambda text, colour: click.style(text, fg=colour))
     return as_text(found)
+
+
+_QUIET_S = 1.0
+"""A search that takes less is over before anybody has read how far it is."""
+_BETWEEN_LINES_S = 0.2
+
+
+def asked_of(
+    mission: "Mission",
+    fleet_file: str | None,
+    process: str | None,
+    data: "Mapping[str, Value]",
+    spec: Path | None = None,
+    *,
+    timers_in_order: bool = False,
+) -> "Asked":
+    """What is to be searched, if `m2pem check` finds no errors in it. `spec`: more requirements.
+
+    Raises:
+        MissionError: there are errors; tells them all.
+        FleetError: the fleet cannot be used.
+        RequirementsError: requirements cannot be read, or do not fit; tells all that is wrong.
+    """
+    from m2pem.cli.arguments import arbiters_of, get_fleet
+    from m2pem.executive import verification as proving
+    from m2pem.plugins import PluginManager
+
+    plugins = PluginManager()
+    fleet = get_fleet(fleet_file, mission) if fleet_file is not None else None
+    arbiters = arbiters_of(fleet, plugins) if fleet is not None else None
+    return proving.asked_of(
+        mission, arbiters, plugins, process, data, spec, timers_in_order=timers_in_order
+    )
+
+
+def findings(asked: "Asked", engine: "Engine", *, strict: bool) -> "Findings":
+    """Search, and tell what was found."""
+    from m2pem.executive.verification import prove
+
+    with _ended_as_by_hand(), progress() as show:
+        return prove(asked, engine, strict=strict, progress=show)
+
+
+def promela(asked: "Asked") -> str:
+    """The model that Spin would be given."""
+    from m2pem.verify.net.simplify import simplify
+    from m2pem.verify.spin.promela import text_of
+    from m2pem.verify.translate import translate
+
+    system = translate(asked.mission, asked.fleet, process=asked.process, options=asked.options)
+    return text_of(simplify(system)).text
+
+
+@contextmanager
+def _ended_as_by_hand() -> Iterator[None]:
+    """What else asks a program to end does what Ctrl-C does: what was seen is told, Spin ends."""
+    before = {}
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            before[number] = signal.signal(number, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def progress() -> "Iterator[Callable[[Progress], None] | None]":
+    """A line on standard error that counts up, for a person who looks."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    shown_at = 0.0
+
+    def show(searched: "Progress") -> None:
+        nonlocal shown_at
+        now = time.monotonic()
+        if searched.seconds > _QUIET_S and now > shown_at + _BETWEEN_LINES_S:
+            shown_at = now
+            _write(f"\r\033[K{_line(searched)} (Ctrl-C to stop)")
+
+    try:
+        yield show
+    finally:
+        if shown_at:
+            _write("\r\033[K")
+
+
+def _line(searched: "Progress") -> str:
+    said = [f"searching for {searched.seconds:.0f} s"]
+    if searched.states:
+        said.append(f"{searched.states:,} states found")
+    if searched.waiting:
+        said.append(f"{searched.waiting:,} of them to be searched")
+    return ", ".join(said)
+
+
+def _write(text: str) -> None:
+    print(text, end="", file=sys.stderr, flush=True)
+
+
+KINDS = (".md", ".json", ".svg")
+"""Endings of reports' files."""
+
+
+def write(file: Path, findings: "Findings") -> None:
+    """Write a report of the kind that the file's ending says.
+
+    Raises:
+        UnusableError: it cannot be written, or the mission cannot be drawn.
+    """
+    try:
+        if file.suffix == ".json":
+            from m2pem.verify.report.data import as_data
+
+            file.write_text(as_json(as_data(findings)) + "\n", encoding="utf-8")
+        elif file.suffix == ".svg":
+            first = next(iter(findings.violations), None)
+            _write_pictures(file, _pictures(findings, first))
+        else:
+            _write_markdown(file, findings)
+    except OSError as error:
+        raise UnusableError(f"{file} cannot be written: {error.strerror}") from error
+
+
+def _write_markdown(file: Path, findings: "Findings") -> None:
+    from m2pem.verify.report.markdown import as_markdown
+
+    pictures: dict[int, list[str]] = {}
+    for number, violation in enumerate(findings.violations):
+        if violation.answer.warning and not findings.strict:
+            continue
+        beside = file.with_name(f"{file.stem}-{number + 1}.svg")
+        try:
+            drawn = _pictures(findings, violation)
+        except UnusableError:  # the report is worth having without it
+            break
+        pictures[number] = _write_pictures(beside, drawn)
+    file.write_text(as_markdown(findings, pictures), encoding="utf-8")
+
+
+def _write_pictures(file: Path, drawn: Mapping[str, str]) -> list[str]:
+    """The first one as `file`, the others beside it: `FILE-PROCESSES.svg`. Answers with names."""
+    names = []
+    for qualifier, picture in drawn.items():
+        each = file.with_stem(f"{file.stem}-{_plain(qualifier)}") if qualifier else file
+        each.write_text(picture, encoding="utf-8")
+        names.append(each.name)
+    return names
+
+
+def _plain(name: str) -> str:
+    """A part of a file's name: qualifiers come from strangers' files."""
+    return "".join(each if each.isalnum() or each in "-_" else "_" for each in name)
+
+
+def _pictures(findings: "Findings", violation: "Violated | None") -> Mapping[str, str]:
+    from m2pem.verify.report.picture import pictures
+
+    try:
+        return pictures(findings, violation)
+    except ValueError as error:
+        raise UnusableError(f"{findings.mission.file} cannot be drawn: {error}") from error

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from m2pem.control_socket.place import ControlSocketError, address, live_sockets
+from m2pem.control_socket.paths import ControlSocketError, address, live_sockets
 from m2pem.control_socket.protocol import Request, line, result_of
 from m2pem.errors import M2pemError, NotDrivenError, OperatorError
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import msgspec
 
-from m2pem.control_socket.place import ControlSocketError
+from m2pem.control_socket.paths import ControlSocketError
 from m2pem.errors import NotDrivenError, OperatorError
 
 LONGEST_LINE_BYTES = 64 << 20

@@ -24,7 +24,7 @@ from m2pem.api.control import (
 )
 from m2pem.api.telemetry import PayloadState, TeamState, Telemetry, VehicleState
 from m2pem.bpmn import parse_mission
-from m2pem.control_socket.place import ControlSocketError, address
+from m2pem.control_socket.paths import ControlSocketError, address
 from m2pem.control_socket.protocol import LONGEST_LINE_BYTES, Request, line, result_of
 from m2pem.errors import OperatorError
 from m2pem.findings import Finding

@@ -16,7 +16,7 @@ import msgspec
 
 from m2pem.api.control import MissionControl
 from m2pem.control_socket.methods import METHODS, STREAMS
-from m2pem.control_socket.place import ControlSocketError, address, live_sockets, make_place
+from m2pem.control_socket.paths import ControlSocketError, address, live_sockets, make_place
 from m2pem.control_socket.protocol import (
     LONGEST_LINE_BYTES,
     Code,

@@ -32,10 +32,9 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import MissionError, OperatorError
-from m2pem.executive.loading import findings_for, library_of, load_source
-from m2pem.executive.loss import PROMPT as LOSS_PROMPT
-from m2pem.executive.prover import verify_apart
-from m2pem.executive.requiring import requirement_findings
+from m2pem.executive.journal_loss import PROMPT as LOSS_PROMPT
+from m2pem.executive.loading import findings_for, library_of, load_source, requirement_findings
+from m2pem.executive.verification_worker import verify_apart
 from m2pem.findings import Finding
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import RunInfo

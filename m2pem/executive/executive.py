@@ -28,28 +28,24 @@ from m2pem.engine.records import Record, RunEnded
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import RunStatus
 from m2pem.errors import JournalError, NotDrivenError, OperatorError, PluginError
-from m2pem.executive.arbiters import FleetArbiters
-from m2pem.executive.busy import refuse_busy
-from m2pem.executive.clearance import clearance_for
+from m2pem.executive.armed_vehicles import left_armed
+from m2pem.executive.behavior_reports import reported
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control
-from m2pem.executive.dispatch import Dispatcher
-from m2pem.executive.handover import Handover
-from m2pem.executive.immediate import ImmediateCommands
-from m2pem.executive.left_armed import left_armed
+from m2pem.executive.control_events import LoggedAlerts, Notices, Observers
+from m2pem.executive.dispatcher import Dispatcher
+from m2pem.executive.emergency import ImmediateCommands, StopMarks
+from m2pem.executive.fleet_connections import FleetArbiters
+from m2pem.executive.handover import Handover, refuse_busy
+from m2pem.executive.journal_loss import Losses
 from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
-from m2pem.executive.logged_alerts import LoggedAlerts
-from m2pem.executive.loss import Losses
-from m2pem.executive.notices import Notices
-from m2pem.executive.observers import Observers
+from m2pem.executive.lost_resources import Returning
+from m2pem.executive.process_monitors import watch_space
 from m2pem.executive.recovery import replay, take_over
-from m2pem.executive.reporting import reported
-from m2pem.executive.returning import Returning
 from m2pem.executive.runner import Outside, Runner
 from m2pem.executive.script import Script
+from m2pem.executive.separation import clearance_for
 from m2pem.executive.services import Services
-from m2pem.executive.space import watch_space
-from m2pem.executive.stop_marks import StopMarks
 from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.findings import Severity
 from m2pem.fleet.allocation import spelled_out

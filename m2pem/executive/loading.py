@@ -1,6 +1,7 @@
 """Getting a mission: from a path, a URL or bytes; and checking it against the fleet."""
 
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,10 +16,11 @@ from m2pem.bpmn.rules.files import TOO_LARGE, UNREADABLE_FILE
 from m2pem.bpmn.search_path import SearchPath
 from m2pem.bpmn.xml import max_bytes, too_large
 from m2pem.errors import MissionError
-from m2pem.executive.arbiters import FleetArbiters
+from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.findings import Finding, Severity, has_errors, lines, unreadable_remedy
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import check_mission, check_named
+from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.elements import ServiceTask
 from m2pem.mission.mission import Mission
 from m2pem.mission.near import did_you_mean
@@ -179,3 +181,27 @@ def refuse_errors(what: str, findings: Sequence[Finding]) -> None:
 def known_data(data: Mapping[str, object] | None) -> tuple[str, ...]:
     """Names that are given at start."""
     return tuple(data or ())
+
+
+_ELEMENT = b"requirement"
+
+
+def requirement_findings(
+    mission: Mission,
+    arbiters: FleetArbiters | None,
+    plugins: "PluginManager",
+    data: Iterable[str] = (),
+) -> list[Finding]:
+    """All of them. `data`: names given at start; `arbiters` None: a fleet is made up."""
+    if _ELEMENT not in mission.source:
+        return []  # most have none, and what reads them takes time to load
+    from m2pem.verify.requirements import Names, gather  # noqa: PLC0415
+    from m2pem.verify.requirements.requirement import RequirementsError  # noqa: PLC0415
+
+    writes = plugins.service_writes()
+    fleet = arbiters.fleet if arbiters is not None else fleet_for(mission)
+    try:
+        gather(Names(mission, fleet, writes, data))
+    except RequirementsError as error:
+        return [replace(finding, severity=Severity.WARNING) for finding in error.findings]
+    return []

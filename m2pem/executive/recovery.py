@@ -14,10 +14,10 @@ from m2pem.engine import commands as c
 from m2pem.engine.inputs import BehaviorMissing, ClaimRun, Input, PauseRun, ResourceFault
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import Behavior, BehaviorPhase, RunStatus
-from m2pem.executive.arbiters import FleetArbiters
-from m2pem.executive.dispatch import Dispatcher
-from m2pem.executive.loss import doubted, paused_by
-from m2pem.executive.reporting import reported, spec_of
+from m2pem.executive.behavior_reports import reported, spec_of
+from m2pem.executive.dispatcher import Dispatcher
+from m2pem.executive.fleet_connections import FleetArbiters
+from m2pem.executive.journal_loss import doubted, paused_by
 from m2pem.executive.runner import Runner
 from m2pem.executive.script import Script
 from m2pem.fleet.parameters import ParameterError

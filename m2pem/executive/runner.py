@@ -1,7 +1,7 @@
 """Drives one run: decide -> commit -> dispatch, for every input, in the order they came.
 
 Only stop, hold and cancel may go out before the commit; those of an operator's STOP and pause go
-out before the run decides them (`m2pem.executive.immediate`). Inputs that wait together are decided
+out before the run decides them (`m2pem.executive.emergency`). Inputs that wait together are decided
 together and share a commit.
 """
 
@@ -28,8 +28,8 @@ from m2pem.engine.inputs import (
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import BehaviorPhase, RunStatus
 from m2pem.errors import InternalError, M2pemError, OperatorError, StaleEpochError
-from m2pem.executive.dispatch import Dispatcher
-from m2pem.executive.notices import Notices
+from m2pem.executive.control_events import Notices
+from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.services import Services
 from m2pem.journal.base import Entry, Journal
 

@@ -13,8 +13,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from m2pem.errors import M2pemError
-from m2pem.executive.arbiters import SIMULATED, FleetArbiters
-from m2pem.executive.runtime_folder import VARIABLE, runtime_folder
+from m2pem.executive.fleet_connections import SIMULATED, FleetArbiters
+from m2pem.executive.runtime_directory import VARIABLE, runtime_folder
 from m2pem.mission.catalogue import ResourceId
 
 

@@ -9,7 +9,7 @@ import msgspec
 from m2pem.api.authoring import MissionSource
 from m2pem.api.control import RunSummary, SimulationResult, StampedRecord, TelemetrySample
 from m2pem.errors import OperatorError
-from m2pem.executive.apart import Given, Tell, apart, given, serve
+from m2pem.executive.subprocess_worker import Given, Tell, apart, given, serve
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.snapshot import dump, restore
 from m2pem.mission.library import MissionFile

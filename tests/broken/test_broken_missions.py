@@ -10,7 +10,7 @@ import pytest
 from lxml import etree
 
 from m2pem.bpmn import parse_mission
-from m2pem.cli.entry import run_command_line
+from m2pem.cli.group import run_command_line
 from tests.broken.__main__ import drawn
 from tests.broken.expected import BROKEN, EXPECTED, REPOSITORY, Expected
 

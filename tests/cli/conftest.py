@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.cli.entry import run_command_line
+from m2pem.cli.group import run_command_line
 from tests.command_line import CommandLine, command_line
 
 Invoke = Callable[..., tuple[int, str, str]]

@@ -19,7 +19,7 @@ from m2pem.api.control import (
 )
 from m2pem.cli import plain
 from m2pem.cli.plain import PlainOcu
-from m2pem.cli.writer import writer_for
+from m2pem.cli.standard_streams import writer_for
 from m2pem.engine.records import Record, RunEnded, RunOutcome, RunStarted
 from m2pem.errors import BusyError, OperatorError
 from m2pem.geo.files import read_geometry

@@ -61,7 +61,7 @@ def test_ctrl_c_ends_the_search_and_what_was_seen_is_told(
         if searched.states > 1_000:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("m2pem.cli.proving.progress", lambda: nullcontext(pressed))
+    monkeypatch.setattr("m2pem.cli.verify.progress", lambda: nullcontext(pressed))
     mission = tmp_path / "wide.bpmn"
     mission.write_text(wide(12), encoding="utf-8")
     status, out, _ = invoke("verify", mission)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from m2pem.control_socket.client import ask, ask_driver, find_executive
-from m2pem.control_socket.place import ControlSocketError
+from m2pem.control_socket.paths import ControlSocketError
 from m2pem.errors import NotDrivenError, OperatorError
 from tests.control_socket.conftest import Served
 

@@ -16,7 +16,7 @@ from m2pem.api.telemetry import (
     Telemetry,
     VehicleState,
 )
-from m2pem.control_socket.place import ControlSocketError
+from m2pem.control_socket.paths import ControlSocketError
 from m2pem.control_socket.remote import RemoteControl
 from m2pem.errors import NotDrivenError, OperatorError
 from m2pem.mission.catalogue import ResourceId

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from m2pem.control_socket import server
-from m2pem.control_socket.place import address, live_sockets
+from m2pem.control_socket.paths import address, live_sockets
 from m2pem.control_socket.server import ControlSocket
 from tests.control_socket.conftest import Served
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.cli.entry import run_command_line
+from m2pem.cli.group import run_command_line
 from tests.executive.conftest import mission, sequence
 
 from .conftest import task

@@ -30,7 +30,7 @@ SCRIPT = ("--answers", ANSWERS / "vignette1_detection.yaml")
 DYING = """
 import os, signal
 
-from m2pem.executive.observers import Observers
+from m2pem.executive.control_events import Observers
 
 seen = 0
 put = Observers.put

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.cli.entry import run_command_line
+from m2pem.cli.group import run_command_line
 from tests.console import (
     REPOSITORY,
     Command,

@@ -7,8 +7,8 @@ import pytest
 
 from m2pem.api.arbiter import ArbiterContext, Connection
 from m2pem.bpmn import parse_mission
-from m2pem.executive.arbiters import ArbiterPlugins, FleetArbiters
 from m2pem.executive.clock import SystemClock
+from m2pem.executive.fleet_connections import ArbiterPlugins, FleetArbiters
 from m2pem.executive.loading import findings_for
 from m2pem.findings import Finding
 from m2pem.fleet.behaviors import SHARED

@@ -8,7 +8,7 @@ import pytest
 from m2pem.api.arbiter import BehaviorId, BehaviorRequest, ResolvedValue
 from m2pem.api.control import RunStatus
 from m2pem.engine.records import BehaviorEnded
-from m2pem.executive.dispatch import CALL_TIMEOUT_S
+from m2pem.executive.dispatcher import CALL_TIMEOUT_S
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.simulation.arbiters import SimArbiter
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from m2pem.cli.entry import run_command_line
+from m2pem.cli.group import run_command_line
 from tests.engine.notation import xml
 
 MAIN = """

@@ -3,7 +3,7 @@ import sys
 
 CODE = """
 import sys
-from m2pem.cli.entry import run_command_line
+from m2pem.cli.group import run_command_line
 assert run_command_line(["sim", "--help"]) == 0
 heavy = ("asyncio", "pymavlink", "m2pem_plugin_mavlink.simulator")
 print(*(name for name in heavy if name in sys.modules))
@@ -23,5 +23,5 @@ def test_the_list_of_simulators_loads_none_of_them() -> None:
 
 def test_the_command_itself_has_its_options() -> None:
     words = ["sim", "mavlink", "--help"]
-    code = f"from m2pem.cli.entry import run_command_line\nrun_command_line({words!r})"
+    code = f"from m2pem.cli.group import run_command_line\nrun_command_line({words!r})"
     assert any("--copters" in line for line in printed(code))

@@ -31,7 +31,7 @@ def look(self, run_id, records):
         die()
 
 if "DIE_AT_REQUEST" in os.environ:
-    from m2pem.executive.observers import Observers
+    from m2pem.executive.control_events import Observers
 
     Observers.put = look
 

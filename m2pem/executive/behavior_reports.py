@@ -7,7 +7,7 @@ from math import isfinite
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.engine.inputs import BehaviorReported
 from m2pem.engine.state import Behavior
-from m2pem.executive.arbiters import FleetArbiters
+from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec
 from m2pem.mission.values import Value

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.control_socket.place import (
+from m2pem.control_socket.paths import (
     LONGEST_PATH_BYTES,
     ControlSocketError,
     address,

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from m2pem.api.control import Alert
-from m2pem.executive import space
-from m2pem.executive.notices import Notices
-from m2pem.executive.space import watch_space
+from m2pem.executive import process_monitors as space
+from m2pem.executive.control_events import Notices
+from m2pem.executive.process_monitors import watch_space
 from m2pem.journal.storage_checks import MIN_FREE_VARIABLE
 
 

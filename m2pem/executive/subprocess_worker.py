@@ -1,6 +1,6 @@
 """Work for minutes of a processor, in a process of its own: the executive must not feel it.
 
-    result = await apart("m2pem.executive.prover", order, tell)      # in the executive
+    result = await apart("m2pem.executive.verification_worker", order, tell)      # in the executive
     serve(work)                                                      # in the module that it names
 
 The process ends with the task that awaits it, and with the executive, however that ends.

@@ -10,10 +10,10 @@ import msgspec
 
 from m2pem.api.arbiter import ArbiterContext
 from m2pem.api.authoring import MissionSource, SearchLimits, SearchProgress
-from m2pem.executive.apart import Given, Tell, apart, given, serve
-from m2pem.executive.arbiters import FleetArbiters
 from m2pem.executive.clock import SystemClock
+from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.loading import load_source
+from m2pem.executive.subprocess_worker import Given, Tell, apart, given, serve
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.snapshot import dump, restore
 from m2pem.mission.values import Value
@@ -80,7 +80,7 @@ async def verify_apart(
 
 def _work(content: bytes, tell: Tell) -> bytes:
     # What searches is loaded here: the executive has no use for it.
-    from m2pem.executive.proving import Engine, asked_of, prove  # noqa: PLC0415
+    from m2pem.executive.verification import Engine, asked_of, prove  # noqa: PLC0415
     from m2pem.plugins import PluginManager  # noqa: PLC0415
     from m2pem.verify.report.data import as_data  # noqa: PLC0415
     from m2pem.verify.search.explore import Limits, Progress  # noqa: PLC0415

@@ -12,11 +12,13 @@ import sys
 import threading
 import time
 from importlib.metadata import entry_points
+from pathlib import Path
 from types import FrameType
 from typing import Self
 
 from m2pem.api.control import Alert
-from m2pem.executive.notices import Notices
+from m2pem.executive.control_events import Notices
+from m2pem.journal.storage_checks import space_shortage
 
 log = logging.getLogger("m2pem.loop")
 
@@ -97,3 +99,31 @@ def blocking(frame: FrameType | None) -> str:
         found.setdefault(owner, f"{module}, {frame.f_code.co_name}, line {frame.f_lineno}")
         frame = frame.f_back
     return found.get("plugin") or found.get("library") or found.get("m2pem") or "an unknown module"
+
+
+log = logging.getLogger("m2pem.executive")
+
+EVERY_S = 10.0
+"""Between two looks at the disk, in real seconds."""
+
+AGAIN_AFTER = 30
+"""Looks after which the same warning is given again: operators come and go."""
+
+CODE = "JOURNAL_SPACE"
+
+
+async def watch_space(journal: Path, notices: Notices) -> None:
+    """Look at the disk until cancelled. A disk that hangs keeps nothing else waiting."""
+    short_for = 0
+    while True:
+        try:
+            text = await asyncio.to_thread(space_shortage, journal)
+        except OSError as error:
+            log.warning("%s: its disk cannot be asked for free space: %s", journal, error.strerror)
+            text = ""
+        if text and short_for % AGAIN_AFTER == 0:
+            notices.publish(Alert("", CODE, text))
+        elif not text and short_for:
+            notices.publish(Alert("", CODE, f"there is room again in {journal.parent}"))
+        short_for = short_for + 1 if text else 0
+        await asyncio.sleep(EVERY_S)

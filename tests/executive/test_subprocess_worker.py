@@ -16,10 +16,10 @@ import pytest
 
 from m2pem.api.authoring import SearchLimits, SearchProgress
 from m2pem.errors import AnswersError, InternalError, MissionError, OperatorError
-from m2pem.executive.apart import apart
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control
 from m2pem.executive.executive import Executive
+from m2pem.executive.subprocess_worker import apart
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
@@ -34,7 +34,7 @@ FLEET = REPOSITORY / "fleet_configs" / "vignette1.yaml"
 SCHEMA = json.loads((REPOSITORY / "docs" / "verification.schema.json").read_text(encoding="utf-8"))
 ENDLESS = """
 import time
-from m2pem.executive.apart import serve
+from m2pem.executive.subprocess_worker import serve
 def work(order, tell):
     tell(str(__import__("os").getpid()).encode())
     time.sleep(600)
@@ -192,7 +192,7 @@ def test_cancelling_ends_the_process(endless: str) -> None:
 def test_the_process_ends_with_an_executive_that_is_killed(endless: str) -> None:
     script = (
         "import asyncio, os\n"
-        "from m2pem.executive.apart import apart\n"
+        "from m2pem.executive.subprocess_worker import apart\n"
         "def told(content):\n"
         "    print(content.decode(), flush=True)\n"
         "    os._exit(9)\n"

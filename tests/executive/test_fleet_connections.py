@@ -4,7 +4,7 @@ from typing import cast
 import pytest
 
 from m2pem.api import Arbiter, ArbiterContext, Area, Connection, Route
-from m2pem.executive.arbiters import ArbiterPlugins, FleetArbiters
+from m2pem.executive.fleet_connections import ArbiterPlugins, FleetArbiters
 from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle
 from m2pem.mission.catalogue import ResourceId
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from m2pem.executive.arbiters import FleetArbiters
+from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.loading import findings_for, refuse_errors
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.madeup import fleet_for

@@ -12,9 +12,8 @@ import pytest
 from m2pem.api.control import Alert, RunStatus
 from m2pem.engine.records import BehaviorRequested, RunPaused
 from m2pem.errors import OperatorError
-from m2pem.executive.loop_monitor import LoopMonitor, blocking
-from m2pem.executive.notices import Notices
-from m2pem.executive.observers import MAX_WAITING, Observers
+from m2pem.executive.control_events import MAX_WAITING, Notices, Observers
+from m2pem.executive.process_monitors import LoopMonitor, blocking
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry
 from m2pem.mission.catalogue import BehaviorState
@@ -289,7 +288,7 @@ def test_stop_all_stops_every_run_and_names_them(play):
 async def test_an_observer_that_hangs_delays_nobody_and_is_waited_for_within_a_bound(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("m2pem.executive.observers.DRAINED_WITHIN_S", 0.05)
+    monkeypatch.setattr("m2pem.executive.control_events.DRAINED_WITHIN_S", 0.05)
     goes_on, seen = threading.Event(), []
 
     def observe(run: str, records: Sequence[object]) -> None:

@@ -13,9 +13,9 @@ from functools import partial
 from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
 from m2pem.engine.commands import CancelBehavior, StartBehavior
-from m2pem.executive.arbiters import FleetArbiters
-from m2pem.executive.clearance import Clearance
+from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.script import Script
+from m2pem.executive.separation import Clearance
 from m2pem.fleet.availability import Availability
 from m2pem.fleet.parameters import ParameterError, resolve
 from m2pem.mission.behavior import BehaviorType

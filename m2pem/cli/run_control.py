@@ -1,0 +1,153 @@
+"""`m2pem answer`, `signal`, `pause`, `continue` and `stop`: one request to a running executive."""
+
+import asyncio
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from m2pem.cli.options import (
+    example,
+    journal_option,
+    optional_run_argument,
+    run_argument,
+    signal_data_option,
+)
+
+if TYPE_CHECKING:
+    from m2pem.mission.values import Value
+
+by_option = click.option(
+    "--by", metavar="NAME", help="Who asks, for the journal  [default: user@host]"
+)
+
+
+def steer(journal_url: str | None, run: str, method: str, by: str | None, **params: Any) -> None:
+    """Call a method of the executive that drives the run.
+
+    Raises:
+        OperatorError: it refused, or none drives the run; then, what the run has left behind.
+        UnusableError: the journal is in memory.
+    """
+    from m2pem.api.operator import operator_name
+    from m2pem.control_socket.client import ask_driver
+    from m2pem.errors import NotDrivenError
+
+    path = _journal_file(journal_url)
+    try:
+        ask_driver(path, run, method, by=by or operator_name(), **params)
+    except NotDrivenError as error:
+        raise NotDrivenError(f"{error}{_left_behind(journal_url, path, run)}") from error
+
+
+def steer_all(journal_url: str | None, method: str, by: str | None, **params: Any) -> list[str]:
+    """Call a method of every executive on the journal, all at once; returns their answers together.
+
+    Raises:
+        OperatorError: an executive refused, or there is none.
+        UnusableError: the journal is in memory.
+    """
+    from m2pem.api.operator import operator_name
+    from m2pem.control_socket.client import ask_all
+    from m2pem.errors import NotDrivenError
+
+    path = _journal_file(journal_url)
+    try:
+        return ask_all(path, method, by=by or operator_name(), **params)
+    except NotDrivenError as error:
+        raise NotDrivenError(f"{error}{_left_behind(journal_url, path)}") from error
+
+
+def _left_behind(journal_url: str | None, path: Path, run: str | None = None) -> str:
+    """Lines on what interrupted runs have left behind: that of `run`, or (None) all."""
+    from m2pem.cli.journals import interrupted_runs
+    from m2pem.errors import M2pemError
+
+    left = []
+    if path.exists():
+        with suppress(M2pemError):  # what the executive refused matters more
+            left = asyncio.run(interrupted_runs(journal_url))
+    return "".join(f"\n{each.as_text()}" for each in left if run in (None, each.run))
+
+
+def _journal_file(journal_url: str | None) -> Path:
+    from m2pem.cli.journals import url_of
+    from m2pem.cli.options import UnusableError
+    from m2pem.journal import file_of
+
+    path = file_of(url_of(journal_url))
+    if path is None:
+        raise UnusableError("a journal in memory has no place where its executive could be found")
+    return path
+
+
+@click.command(epilog=example("m2pem answer r1 p2 continue"))
+@run_argument
+@click.argument("prompt")
+@click.argument("decision")
+@journal_option
+@by_option
+def answer(run_id: str, prompt: str, decision: str, journal: str | None, by: str | None) -> None:
+    """Answer a prompt of a run that is running on this host.
+
+    The first answer wins; a later one ends with 1.
+    """
+    steer(journal, run_id, "answer", by, prompt=prompt, decision=decision)
+
+
+@click.command(epilog=example("m2pem signal r1 'Stop driving'"))
+@run_argument
+@click.argument("signal_id", metavar="SIGNAL")
+@signal_data_option
+@journal_option
+@by_option
+def signal(
+    run_id: str, signal_id: str, data: "dict[str, Value]", journal: str | None, by: str | None
+) -> None:
+    """Send a signal to a run that is running on this host.
+
+    SIGNAL is its id, or its name.
+    """
+    steer(journal, run_id, "signal", by, id=signal_id, data=data)
+
+
+@click.command(epilog=example("m2pem pause r1"))
+@run_argument
+@journal_option
+@by_option
+def pause(run_id: str, journal: str | None, by: str | None) -> None:
+    """Pause a run that is running on this host.
+
+    Its vehicles hold, and its timers stand.
+    """
+    steer(journal, run_id, "pause", by)
+
+
+@click.command("continue", epilog=example("m2pem continue r1"))
+@run_argument
+@journal_option
+@by_option
+def continue_(run_id: str, journal: str | None, by: str | None) -> None:
+    """Let a run on this host go on after a pause."""
+    steer(journal, run_id, "resume", by)
+
+
+@click.command(epilog=example("m2pem stop r1 --reason 'people on the road'"))
+@optional_run_argument
+@click.option("--all", "every", is_flag=True, help="Every run of the journal that is running.")
+@click.option("--reason", default="", help="Why, for the journal.")
+@journal_option
+@by_option
+def stop(run_id: str | None, every: bool, reason: str, journal: str | None, by: str | None) -> None:
+    """Stop a run that is running on this host, or all of them.
+
+    Its vehicles are sent the command to stop, and its tokens end.
+    """
+    if every == (run_id is not None):
+        raise click.UsageError("name a run to stop, or --all")
+    if run_id is not None:
+        steer(journal, run_id, "stop", by, reason=reason)
+        return
+    stopped = steer_all(journal, "stop_all", by, reason=reason)
+    click.echo(f"stopped: {', '.join(stopped) or 'no run was running'}")

@@ -1,0 +1,332 @@
+"""A session of one executive at the command line: its output, operator units, signals and files."""
+
+import asyncio
+import hashlib
+import logging
+import os
+import secrets
+import signal
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import click
+
+from m2pem.api.control import RunId, RunStatus, SimulationResult
+from m2pem.cli.group import STOPPED, ignore_closed_stdout, log_from_a_thread
+from m2pem.cli.ocus import PLAIN, Operators
+from m2pem.cli.options import UnusableError
+from m2pem.cli.output import Output
+from m2pem.cli.standard_streams import writer_for
+from m2pem.control_socket.server import ControlSocket
+from m2pem.engine.state import RunStatus as EngineStatus
+from m2pem.errors import PluginError
+from m2pem.executive.clock import SystemClock
+from m2pem.executive.executive import Executive
+from m2pem.executive.fleet_connections import SIMULATED
+from m2pem.executive.process_monitors import LoopMonitor
+from m2pem.executive.script import Script
+from m2pem.fleet.fleet import Fleet, Payload, Vehicle
+from m2pem.fleet.snapshot import dump
+from m2pem.journal.base import Journal
+from m2pem.mission.mission import Mission
+from m2pem.plugins import PluginManager
+
+if TYPE_CHECKING:
+    from m2pem.rehearsal.answers import Answers
+
+log = logging.getLogger("m2pem.cli")
+
+BACKLOG = 1_000_000
+"""Records that may wait to be printed before printing is given up."""
+
+EXIT_STATUS = {
+    RunStatus.COMPLETED: 0,
+    RunStatus.TERMINATED: 0,
+    RunStatus.FAILED: 1,
+    RunStatus.STOPPED: STOPPED,
+}
+
+
+@asynccontextmanager
+async def driving(
+    executive: Executive, output: Output, operators: Operators, journal: Path | None, *, one: bool
+) -> AsyncIterator["Interruption"]:
+    """Connect, print and serve within the block; at its end, stop what still runs and close.
+
+    `journal`: its file, beside which other processes find the executive. `one`: there is one run
+    that matters, or several.
+    """
+
+    def mission(run: RunId) -> Mission | None:
+        runner = executive.runners.get(run)
+        return runner.run.state.mission if runner is not None else None
+
+    log_from_a_thread()
+    output.tell_by(mission, one=one, asks=PLAIN not in operators.names)
+    loop = asyncio.get_running_loop()
+    with Interruption(executive) as interruption:
+
+        def nobody_reads() -> None:
+            loop.call_soon_threadsafe(interruption.stop, "nobody reads its output any more")
+
+        output.writer.when_broken(nobody_reads)
+        # First, as nothing may come between connecting and taking up a run: reports would be lost.
+        async with (
+            ControlSocket(executive.control, journal),
+            executive,
+            LoopMonitor(executive.notices),
+        ):
+            notices = executive.control.subscribe(size=BACKLOG)
+            printing = asyncio.create_task(output.follow(notices))
+            if operators.take_terminal:
+                output.cover()
+
+            def left() -> None:
+                output.uncover()
+                if any(not each.done.is_set() for each in executive.runners.values()):
+                    click.echo(
+                        "m2pem: no operator at this terminal any more; missions go on "
+                        "(m2pem attach), and Ctrl-C stops them",
+                        err=True,
+                    )
+
+            try:
+                operators.begin(executive.control, left)
+                yield interruption
+            finally:
+                await operators.end()
+                output.uncover()
+        await printing
+        await output.drain()
+    if output.writer.broken:
+        ignore_closed_stdout()
+
+
+async def drive_run(
+    executive: Executive,
+    output: Output,
+    operators: Operators,
+    answers: "Answers | None",
+    journal: Path | None,
+    begin: Callable[[], Awaitable[RunId]],
+) -> int:
+    """Begin a run, see it to its end, and return the exit status.
+
+    Runs that operators start beside it are seen to their ends, too.
+
+    Raises:
+        M2pemError: it cannot begin, or its executive can drive it no further.
+    """
+    async with driving(executive, output, operators, journal, one=True) as interruption:
+        if interruption.asked.is_set():
+            return STOPPED
+        run = await begin()
+        if interruption.asked.is_set():
+            await executive.stop_all("stopped while it began")
+        acting = asyncio.create_task(_act(answers, executive, run))
+        try:
+            summary = await executive.control.wait(run)
+            while others := [
+                key for key, each in executive.runners.items() if not each.done.is_set()
+            ]:
+                await executive.control.wait(others[0])
+        finally:
+            acting.cancel()
+    return EXIT_STATUS[summary.status]
+
+
+async def _act(answers: "Answers | None", executive: Executive, run: RunId) -> None:
+    if answers is None:
+        return
+    try:
+        await answers.act(executive.control, run, executive.clock, default_first_decision=False)
+    except Exception:
+        log.exception("the answers file broke off; the mission goes on without it")
+
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+GIVE_UP = 3
+GIVE_UP_PRINTING_S = 1.0
+
+
+class Interruption:
+    """Watches the signals within its block. `asked` is set when everything is to stop."""
+
+    def __init__(self, executive: Executive) -> None:
+        self.asked = asyncio.Event()
+        self._executive = executive
+        self._count = 0
+        self._stopping: asyncio.Task[None] | None = None
+
+    def __enter__(self) -> Self:
+        loop = asyncio.get_running_loop()
+        for number in SIGNALS:
+            loop.add_signal_handler(number, self._received, number)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        loop = asyncio.get_running_loop()
+        for number in SIGNALS:
+            loop.remove_signal_handler(number)
+
+    def stop(self, reason: str) -> None:
+        """Stop every run; what follows waits until the vehicles are released."""
+        self.asked.set()
+        if self._stopping is None:
+            self._stopping = asyncio.create_task(self._executive.stop_all(reason))
+
+    def _received(self, number: signal.Signals) -> None:
+        self._count += 1
+        name = signal.Signals(number).name
+        if self._count == 1:
+            self.stop(f"stopped by {name}")
+            if self._held():
+                self._say(f"{name}: stopping; waiting for {self._held()}")
+        elif self._count < GIVE_UP:
+            held = self._held() or "the journal"
+            self._say(f"{name}: still waiting for {held}; once more to give up")
+        else:
+            self._say(f"{name}: gave up; not released: {self._held() or 'nothing'}")
+            writer_for(sys.stderr).drain(GIVE_UP_PRINTING_S)
+            os._exit(STOPPED)
+
+    def _held(self) -> str:
+        """The resources that runs still command."""
+        held = {
+            resource: None
+            for runner in self._executive.runners.values()
+            if not runner.done.is_set()
+            for resource in runner.run.state.held
+        }
+        return ", ".join(held)
+
+    def _say(self, text: str) -> None:
+        # From a thread: standard error that nobody reads must not hold up the stop.
+        writer_for(sys.stderr).put(f"m2pem: {text}")
+
+
+def refuse_speed(fleet: Fleet, speed: float, *, simulated: bool) -> None:
+    """Real vehicles keep real time.
+
+    Raises:
+        UsageError: the clock would not be theirs.
+    """
+    if speed == 1.0 or simulated:
+        return
+    everything: list[Vehicle | Payload] = [*fleet.vehicles.values(), *fleet.payloads.values()]
+    sitl = {vehicle.id for vehicle in fleet.vehicles.values() if vehicle.sitl}
+    real = [
+        each.id
+        for each in everything
+        if each.arbiter != SIMULATED and each.id.partition("/")[0] not in sitl
+    ]
+    if real:
+        raise click.UsageError(
+            f"--speed {speed:g}: {', '.join(real)} of {fleet.file} would be real; add --simulate, "
+            "or mark what is software in the loop with `sitl: true`"
+        )
+
+
+def make_executive(
+    fleet: Fleet,
+    journal: Journal,
+    plugins: PluginManager,
+    clock: SystemClock,
+    *,
+    simulated: bool,
+    answers: Script | None = None,
+    search_path: Sequence[Path] = (),
+) -> Executive:
+    """An executive that has not connected yet.
+
+    Raises:
+        UnusableError: the fleet names an arbiter that no plugin provides.
+    """
+    try:
+        return Executive(
+            fleet,
+            journal,
+            plugins,
+            clock,
+            simulated=simulated,
+            script=answers,
+            speed=clock.speed,
+            rehearse=_rehearse,
+            search_path=search_path,
+        )
+    except PluginError as error:
+        raise UnusableError(f"{fleet.file}: {error}") from error
+
+
+async def _rehearse(*arguments: Any, **options: Any) -> SimulationResult:
+    from m2pem.rehearsal.rehearser import rehearse_apart
+
+    return await rehearse_apart(*arguments, **options)
+
+
+STATE = "state"
+"""The setting of a simulated resource that names its file."""
+
+
+def with_own_state(fleet: Fleet, journal: Path | None, *, simulated: bool) -> Fleet:
+    """The fleet, kept in a new file beside the journal: nobody else has these vehicles."""
+    return _with_state(fleet, journal, secrets.token_hex(4), simulated)
+
+
+def with_shared_state(fleet: Fleet, journal: Path | None, *, simulated: bool) -> Fleet:
+    """The fleet, kept in the file that this fleet always has beside this journal."""
+    name = hashlib.sha256(dump(fleet)).hexdigest()[:8]
+    return _with_state(fleet, journal, name, simulated)
+
+
+def _with_state(fleet: Fleet, journal: Path | None, name: str, simulated: bool) -> Fleet:
+    if journal is None:
+        return fleet
+    path = f"{_prefix(journal)}{name}"
+
+    def settings(arbiter: str, own: Mapping[str, Any]) -> Mapping[str, Any]:
+        """What the fleet says itself goes first."""
+        return {STATE: path, **own} if simulated or arbiter == SIMULATED else own
+
+    return replace(
+        fleet,
+        vehicles={
+            name: replace(vehicle, settings=settings(vehicle.arbiter, vehicle.settings))
+            for name, vehicle in fleet.vehicles.items()
+        },
+        payloads={
+            name: replace(payload, settings=settings(payload.arbiter, payload.settings))
+            for name, payload in fleet.payloads.items()
+        },
+    )
+
+
+def tidy_up(executive: Executive, journal: Path | None) -> None:
+    """Delete the files made here, unless a run has not ended and needs them to be resumed."""
+    if journal is None or any(
+        runner.failure is not None or runner.run.state.status is not EngineStatus.ENDED
+        for runner in executive.runners.values()
+    ):
+        return
+    everything: list[Vehicle | Payload] = [
+        *executive.fleet.vehicles.values(),
+        *executive.fleet.payloads.values(),
+    ]
+    for path in {str(each.settings.get(STATE, "")) for each in everything}:
+        if path.startswith(_prefix(journal)):
+            for suffix in ("", "-wal", "-shm"):
+                Path(f"{path}{suffix}").unlink(missing_ok=True)
+
+
+def _prefix(journal: Path) -> str:
+    return f"{journal.resolve()}-sim-"

@@ -1,0 +1,212 @@
+"""Tells subscribers what was committed, in order; nobody ever waits for a subscriber."""
+
+import asyncio
+import logging
+import threading
+import weakref
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import suppress
+from queue import Full, Queue
+from types import TracebackType
+from typing import Self
+
+from m2pem.api.control import LOGGED, Alert, Notice, RunId
+from m2pem.engine.records import Record
+from m2pem.errors import OperatorError
+
+
+class Subscription:
+    """Notices for one reader. A reader that falls `size` behind is cut off with an error."""
+
+    def __init__(self, run: RunId | None, size: int) -> None:
+        self._run = run
+        self._size = size
+        self._waiting: deque[Notice] = deque()
+        self._wake = asyncio.Event()
+        self._overrun = False
+        self._ended = False
+
+    def put(self, notices: Sequence[Notice]) -> None:
+        """Hand notices over, but those of another run."""
+        if self._overrun:
+            return
+        if self._run is not None:
+            notices = [notice for notice in notices if notice.run in ("", self._run)]
+        room = self._size - len(self._waiting)
+        self._overrun = len(notices) > room
+        self._waiting.extend(notices[:room])
+        self._wake.set()
+
+    def end(self) -> None:
+        """No more will come."""
+        self._ended = True
+        self._wake.set()
+
+    def __aiter__(self) -> AsyncIterator[Notice]:
+        return self
+
+    async def __anext__(self) -> Notice:
+        """The next notice; ends with the executive.
+
+        Raises:
+            OperatorError: this reader was too slow.
+        """
+        while not self._waiting:
+            if self._overrun:
+                raise OperatorError(
+                    f"the subscriber fell {self._size} notices behind; subscribe again and read"
+                    " what was missed with records()"
+                )
+            if self._ended:
+                raise StopAsyncIteration
+            self._wake.clear()
+            await self._wake.wait()
+        return self._waiting.popleft()
+
+
+class Notices:
+    """All subscriptions of an executive, held weakly: a reader that is gone leaves nothing."""
+
+    def __init__(self) -> None:
+        self._subscriptions: list[weakref.ref[Subscription]] = []
+        self._ended = False
+
+    @property
+    def anybody(self) -> bool:
+        """Whether there is anyone to tell."""
+        return bool(self._subscriptions)
+
+    def subscribe(self, run: RunId | None, size: int) -> Subscription:
+        """Everything from now on."""
+        subscription = Subscription(run, size)
+        if self._ended:
+            subscription.end()
+        else:
+            # A new list: one may be let go while `publish` walks over the old.
+            self._subscriptions = [
+                *self._subscriptions,
+                weakref.ref(subscription, self._forget),
+            ]
+        return subscription
+
+    def publish(self, *notices: Notice) -> None:
+        """Tell all."""
+        for reference in self._subscriptions:
+            subscription = reference()
+            if subscription is not None:
+                subscription.put(notices)
+
+    def end(self) -> None:
+        """Let every reader come to its end, after what waits for it."""
+        self._ended = True
+        for reference in self._subscriptions:
+            subscription = reference()
+            if subscription is not None:
+                subscription.end()
+        self._subscriptions = []
+
+    def _forget(self, gone: "weakref.ref[Subscription]") -> None:
+        self._subscriptions = [kept for kept in self._subscriptions if kept is not gone]
+
+
+MAX_WAITING = 10_000
+"""Batches of records that may wait for slow observers; beyond it, records are not observed."""
+
+DRAINED_WITHIN_S = 5.0
+"""How long the end of an executive waits for observers."""
+
+_Batch = tuple[RunId, Sequence[Record]]
+
+
+class Observers:
+    """`observe` is called with each batch of committed records, in order.
+
+    From `start` to `close` it is called from a thread; before, and where `start` is never called
+    (in virtual time nothing is late), from `put` itself.
+    """
+
+    def __init__(
+        self, observe: Callable[[RunId, Sequence[Record]], None], notices: Notices
+    ) -> None:
+        self._observe = observe
+        self._notices = notices
+        self._waiting: Queue[_Batch | None] = Queue(MAX_WAITING)
+        self._ended: asyncio.Event | None = None
+        self._behind = False
+
+    def start(self) -> None:
+        """Observe from a thread. A daemon: an observer that hangs must not keep the program."""
+        loop, ended = asyncio.get_running_loop(), asyncio.Event()
+
+        def serve() -> None:
+            while (batch := self._waiting.get()) is not None:
+                self._observe(*batch)
+            with suppress(RuntimeError):  # the executive did not wait so long
+                loop.call_soon_threadsafe(ended.set)
+
+        self._ended = ended
+        threading.Thread(target=serve, name="observers", daemon=True).start()
+
+    def put(self, run: RunId, records: Sequence[Record]) -> None:
+        """Have records observed; never waits for the thread."""
+        if self._ended is None:
+            self._observe(run, records)
+            return
+        try:
+            self._waiting.put_nowait((run, records))
+            self._behind = False
+        except Full:
+            if not self._behind:
+                text = (
+                    f"plugins that observe records are more than {MAX_WAITING:,} inputs behind: "
+                    "records are kept from them until they have caught up. The journal has all"
+                )
+                self._notices.publish(Alert("", "OBSERVERS_BEHIND", text))
+            self._behind = True
+
+    async def close(self) -> None:
+        """Let them observe what waits, within `DRAINED_WITHIN_S`."""
+        if self._ended is None:
+            return
+        with suppress(Full):
+            self._waiting.put_nowait(None)
+        try:
+            async with asyncio.timeout(DRAINED_WITHIN_S):
+                await self._ended.wait()
+        except TimeoutError:
+            left = self._waiting.qsize()
+            text = f"plugins that observe records did not end; {left} inputs were not observed"
+            self._notices.publish(Alert("", "OBSERVERS_BEHIND", text))
+
+
+LOGGERS = ("m2pem.arbiter", "m2pem.dispatch", "m2pem.executive", "m2pem.teams")
+
+
+class LoggedAlerts(logging.Handler):
+    """Between `__enter__` and `__exit__`, in an event loop: each warning or error is an alert."""
+
+    def __init__(self, notices: Notices) -> None:
+        super().__init__(logging.WARNING)
+        self._notices = notices
+
+    def __enter__(self) -> Self:
+        self._loop = asyncio.get_running_loop()
+        for name in LOGGERS:
+            logging.getLogger(name).addHandler(self)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for name in LOGGERS:
+            logging.getLogger(name).removeHandler(self)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Any thread may log."""
+        alert = Alert("", LOGGED, record.getMessage())
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._notices.publish, alert)
