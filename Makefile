@@ -22,7 +22,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),
 .PHONY: $(INSTALLED)
 endif
 
-.PHONY: help setup python-packages npm-packages page demo demo-web demo-air demo-sitl demo-ros demo-ros-vehicle demo-ros-team demo-team
+.PHONY: help setup python-packages npm-packages page demo demo-web demo-air demo-sitl demo-ros demo-team
 .PHONY: test test-long test-ros fuzz lint format docs pictures
 .PHONY: bench bench-quick conformance clean ros
 
@@ -112,115 +112,24 @@ test-ros: ros ## check the plugins that need ROS, over DDS on 127.0.0.1
 	@$(ROS_PYTHON) -m pytest -n 2 -m "not long" $(ROS_TESTS)
 	@$(ROS_PYTHON) -m bench --quick --only ros_command,team_orders,ros_fleet,ros_discovery
 
-DEMO := $(BIN)/m2pem run missions/vignette1.bpmn --fleet fleet_configs/vignette1.yaml --simulate --speed 20
-ANSWERS := missions/answers/vignette1
-
-# On a terminal only the detector is scripted, and whoever sits there is the operator.
 demo: python-packages ## run the paper's mission on simulated vehicles, in two ways
-	@if [ -t 0 ] && [ -t 1 ]; then operator=_live; else operator=; fi; \
-	echo "The first way: a hazard is detected. Continue; at the second prompt, abort."; \
-	$(DEMO) --answers $(ANSWERS)_detection$$operator.yaml; \
-	echo; \
-	echo "The second way: nothing is detected. Continue, and the route is driven to its end."; \
-	$(DEMO) --answers $(ANSWERS)_route$$operator.yaml
+	@$(BIN)/m2pem demo
 
-DEMO_WEB := .demo-web
-
-# Missions are copied: what is drawn in the demo changes none of the repository.
 demo-web: python-packages page ## draw, prove and run missions in a browser, on simulated vehicles
-	@mkdir -p $(DEMO_WEB)/missions && { [ -e $(DEMO_WEB)/missions/vignette1.bpmn ] || cp missions/vignette1.bpmn $(DEMO_WEB)/missions; }
-	@echo "Open this address in a browser. Ctrl-C ends it."
-	@M2PEM_WEB_MISSIONS=$(DEMO_WEB)/missions $(BIN)/m2pem serve --fleet fleet_configs/vignette1.yaml --simulate \
-	  --ocu web --journal $(DEMO_WEB)/journal.db
-
-AUTOPILOTS := $(BIN)/m2pem sim mavlink --copters 2 --rovers 1 --speed 10 --ekf 6s --home 38.1075,-77.3192,60 \
-  --set FS_GCS_ENABLE=1 --set FS_GCS_TIMEOUT=10 --set BATT_FS_LOW_ACT=2
-LINK_LOST := 1: cut link at 80 s for 600 s
+	@$(BIN)/m2pem demo web
 
 demo-air: python-packages ## survey a field with simulated MAVLink vehicles, one of which falls silent
-	@echo "Two copters and a rover over MAVLink, ten times as fast as real ones. uav1 will fall silent."
-	@$(AUTOPILOTS) --fault "$(LINK_LOST)" & autopilots=$$!; trap 'kill $$autopilots' EXIT; \
-	$(BIN)/m2pem run missions/survey_pair.bpmn --fleet fleet_configs/survey_pair.yaml --speed 10
-
-SITL_FLEET := fleet_configs/survey_pair.yaml
-# Nothing of ArduPilot comes with m2pem: docs/mavlink.md says how it is built.
-SITL_SPEED := 5
+	@$(BIN)/m2pem demo air
 
 demo-sitl: python-packages ## survey a field with real autopilots in the loop: FOLDER=~/ardupilot
 	@[ -n "$(FOLDER)" ] || { echo "Say where ArduPilot's programs are: make demo-sitl FOLDER=~/ardupilot" >&2; exit 1; }
-	@echo "Two ArduCopters and an ArduRover, $(SITL_SPEED) times as fast as real ones, when they are ready."
-	@autopilots=; trap 'for each in $$autopilots; do kill $$each 2>/dev/null || true; $(call TEAM_GONE,$$each); done' EXIT; \
-	exec 3< <(exec $(BIN)/m2pem sitl --ardupilot "$(FOLDER)" --fleet $(SITL_FLEET) --speed $(SITL_SPEED) </dev/null); autopilots=$$!; \
-	$(call TEAM_READY,3,ready); \
-	$(BIN)/m2pem run missions/survey_pair.bpmn --fleet $(SITL_FLEET) --speed $(SITL_SPEED)
+	@$(BIN)/m2pem demo air --ardupilot "$(FOLDER)"
 
-ROS_SPEED := 10
-# None of those that tests reserve, so that nobody else is met.
-ROS_DOMAIN := 101
-OPERATOR := examples/t22_operator_over_ros/ros_operator.py
+demo-ros: ros ## run missions on simulated ROS 2 vehicles, with an operator over ROS
+	@$(ROS_PYTHON) -m m2pem demo ros
 
-# The simulated vehicles of a fleet ($(1)) and an executive for them, while an operator does $(2). What was
-# started ends with it, also by Ctrl-C: the executive first, so that it can leave its vehicles in good order.
-define OVER_ROS
-@eval "$$($(ROS_PYTHON) -m m2pem_plugin_ros.loopback $(ROS_DOMAIN))"; vehicles= executive=; \
-trap 'for each in $$executive $$vehicles; do kill $$each 2>/dev/null || true; wait $$each || true; done' EXIT; \
-exec 3< <(exec $(ROS_PYTHON) -m m2pem sim ros --fleet $(1) --speed $(ROS_SPEED) </dev/null); vehicles=$$!; \
-while read -r line <&3; do echo "$$line"; [ "$$line" != ready ] || break; done; \
-$(ROS_PYTHON) -m m2pem serve --fleet $(1) --ocu mocu --speed $(ROS_SPEED) --journal memory: >/dev/null & executive=$$!; \
-operate() { $(ROS_PYTHON) $(OPERATOR) --mission "missions/$$1.bpmn" --answers "$(dir $(ANSWERS))$$2.yaml"; }; \
-$(2)
-endef
-
-demo-ros: demo-ros-vehicle demo-ros-team ## run missions on simulated ROS 2 vehicles, with an operator over ROS
-
-demo-ros-vehicle: ros
-	@echo "A ground vehicle with an m2pem node, $(ROS_SPEED) times as fast as a real one. Its radar finds a mine:"
-	@echo "continue; at the second prompt, abort. Then once more: nothing is left to be found, and the route is driven."
-	$(call OVER_ROS,fleet_configs/vignette1_ros.yaml,operate vignette1 vignette1_detection; operate vignette1 vignette1_route)
-
-demo-ros-team: ros
-	@echo "Three vehicles, reached in three ways, sweep a road as a team; one finds a mine, and they cross the bridge."
-	$(call OVER_ROS,fleet_configs/mehds_ros.yaml,operate mehds_vignette_1 mehds_vignette_1_swept)
-
-# As fast as real ones: how quickly a camera is told where to look, is a matter of real time.
-TEAM_SPEED := 1
-TEAM_FLEET := fleet_configs/mehds_mixed.yaml
-# Where the fleet expects the copter.
-TEAM_PORT := 14550
-TEAM_AUTOPILOT = --copters 1 --ekf 6s --home 38.107162,-77.319941,60 --to udp://127.0.0.1:$(TEAM_PORT) \
-  --set FS_GCS_ENABLE=1 --set FS_GCS_TIMEOUT=10 --set BATT_FS_LOW_ACT=2 --set LAND_SPEED=100 --set WPNAV_SPEED_DN=250
-# A simulated autopilot, or with FOLDER=~/ardupilot a real one that simulates itself (docs/mavlink.md).
-ifdef FOLDER
-TEAM_COPTER = exec 6< <(exec $(ROS_PYTHON) -m m2pem sitl --ardupilot "$(FOLDER)" --fleet $(TEAM_FLEET) --speed $(TEAM_SPEED) </dev/null); \
-  others+=" $$!"; $(call TEAM_READY,6,ready);
-else
-TEAM_COPTER = $(ROS_PYTHON) -m m2pem sim mavlink $(TEAM_AUTOPILOT) --speed $(TEAM_SPEED) </dev/null & others+=" $$!";
-endif
-TEAM_POINTING_DEG := 1
-TEAM_END := EndBypassed
-TEAM_ANSWERS := missions/answers/team_column_bypassed.yaml
-# Each program says on a line of its own that it is ready; one that ends before, ends the demo.
-TEAM_READY = line=; until [ "$$line" = $(2) ]; do read -r line <&$(1); echo "$$line"; done
-
-# Bash waits for its own children alone, and not for what it reads from.
-TEAM_GONE = while kill -0 $(1) 2>/dev/null; do sleep 0.1; done
-
-# The column, its copter and its camera are simulated by programs of their own; one more measures what they did.
 demo-team: ros ## march in a column with a camera and a copter, over ROS 2 and MAVLink, and measure how well
-	@echo "Three ROS vehicles march in a column. The camera on the last one scans, a copter follows over MAVLink; the"
-	@echo "radar on the first one finds a mine. It takes less than two minutes."
-	@eval "$$($(ROS_PYTHON) -m m2pem_plugin_ros.loopback $(ROS_DOMAIN))"; executive= others=; \
-	trap 'for each in $$executive $$others; do kill $$each 2>/dev/null || true; $(call TEAM_GONE,$$each); done' EXIT; \
-	exec 3< <(exec $(ROS_PYTHON) -m m2pem sim ros --fleet $(TEAM_FLEET) --speed $(TEAM_SPEED) </dev/null); others+=" $$!"; \
-	exec 4< <(exec $(ROS_PYTHON) -m m2pem sim ros-cameras --fleet $(TEAM_FLEET) --speed $(TEAM_SPEED) </dev/null); others+=" $$!"; \
-	$(TEAM_COPTER) \
-	$(call TEAM_READY,3,ready); $(call TEAM_READY,4,ready); \
-	$(ROS_PYTHON) -m m2pem serve --fleet $(TEAM_FLEET) --ocu mocu --speed $(TEAM_SPEED) --journal memory: >/dev/null & executive=$$!; \
-	exec 5< <(exec $(ROS_PYTHON) -m bench.column --fleet $(TEAM_FLEET) --team camera_last --camera evsg2/ptz \
-	  --speed $(TEAM_SPEED) --bound $(TEAM_POINTING_DEG) --reached $(TEAM_END) </dev/null); watch=$$!; others+=" $$watch"; \
-	$(call TEAM_READY,5,watching); \
-	$(ROS_PYTHON) $(OPERATOR) --mission missions/team_column.bpmn --answers $(TEAM_ANSWERS) --within 300; \
-	cat <&5; wait $$watch
+	@$(ROS_PYTHON) -m m2pem demo team $(if $(FOLDER),--ardupilot "$(FOLDER)")
 
 lint: setup ## check style, types and layers
 	@$(BIN)/ruff check .

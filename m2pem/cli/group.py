@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from m2pem.plugins import PluginManager
 
 COMMANDS = {
+    "demo": "Show missions on simulated vehicles.",
     "run": "Run a mission to its end.",
     "serve": "Serve operators, who start missions, until stopped.",
     "check": "Check a mission file, alone or against a fleet.",

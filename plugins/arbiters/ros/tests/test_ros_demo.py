@@ -1,4 +1,4 @@
-"""`make demo-ros` and `make demo-team`: simulated vehicles, an executive and an operator, over
+"""`m2pem demo ros` and `m2pem demo team`: simulated vehicles, an executive and an operator, over
 real DDS and UDP."""
 
 import os
@@ -26,17 +26,14 @@ POINTING_DEG = 3.0
 
 
 class Demo:
-    """A target of make in a process group of its own, as a terminal has it."""
+    """`m2pem demo` in a process group of its own, as a terminal has it."""
 
-    def __init__(self, target: str, domain: int, folder: Path, *variables: str) -> None:
-        # What is installed is what runs the tests.
-        words = ["make", "--silent", "-o", "ros", target, f"ROS_PYTHON={sys.executable}"]
-        # None of the variables of a make that runs the tests.
-        known = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
+    def __init__(self, name: str, domain: int, folder: Path, *options: str) -> None:
+        sources = os.pathsep.join(map(str, SOURCES))
         self.process = subprocess.Popen(
-            [*words, f"ROS_DOMAIN={domain}", *variables],
+            [*(sys.executable, "-m", "m2pem", "demo", name, "--domain", str(domain)), *options],
             cwd=REPOSITORY,
-            env={**known, "PYTHONPATH": os.pathsep.join(map(str, SOURCES)), "HOME": str(folder)},
+            env={**os.environ, "PYTHONPATH": sources, "HOME": str(folder)},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -91,7 +88,7 @@ def domain() -> Iterator[int]:
 def test_a_hazard_is_found_and_the_second_time_the_route_is_driven_to_its_end(
     domain: int, tmp_path: Path
 ) -> None:
-    demo = Demo("demo-ros-vehicle", domain, tmp_path)
+    demo = Demo("ros", domain, tmp_path, "--only", "vehicle")
     try:
         assert demo.rest() == 0, demo.lines[-20:]
     finally:
@@ -108,7 +105,7 @@ def test_a_hazard_is_found_and_the_second_time_the_route_is_driven_to_its_end(
 
 @pytest.mark.timeout(200)
 def test_ctrl_c_ends_all_that_was_started(domain: int, tmp_path: Path) -> None:
-    demo = Demo("demo-ros-vehicle", domain, tmp_path)
+    demo = Demo("ros", domain, tmp_path, "--only", "vehicle")
     try:
         demo.until("r1 is running")
         os.killpg(demo.process.pid, signal.SIGINT)
@@ -119,7 +116,7 @@ def test_ctrl_c_ends_all_that_was_started(domain: int, tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_a_team_sweeps_a_road_and_crosses_a_bridge(domain: int, tmp_path: Path) -> None:
-    demo = Demo("demo-ros-team", domain, tmp_path)
+    demo = Demo("ros", domain, tmp_path, "--only", "team")
     try:
         assert demo.rest() == 0, demo.lines[-20:]
     finally:
@@ -129,7 +126,7 @@ def test_a_team_sweeps_a_road_and_crosses_a_bridge(domain: int, tmp_path: Path) 
 
 @pytest.fixture
 def team(tmp_path: Path) -> Iterator[list[str]]:
-    """Variables of make: a fleet whose autopilot sends to a port of its own."""
+    """Options: a fleet whose autopilot sends to a port of its own."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
@@ -139,7 +136,7 @@ def team(tmp_path: Path) -> Iterator[list[str]]:
     text = (FLEETS / "mehds_mixed.yaml").read_text(encoding="utf-8")
     assert text.count(":14550") == 1
     fleet.write_text(text.replace(":14550", f":{port}"), encoding="utf-8")
-    yield [f"TEAM_FLEET={fleet}", f"TEAM_PORT={port}", f"TEAM_POINTING_DEG={POINTING_DEG}"]
+    yield [f"--fleet={fleet}", f"--port={port}", f"--pointing-deg={POINTING_DEG}"]
 
 
 @pytest.mark.long
@@ -147,7 +144,7 @@ def team(tmp_path: Path) -> Iterator[list[str]]:
 def test_a_column_marches_with_its_camera_on_the_target_and_drives_round_a_mine(
     domain: int, tmp_path: Path, team: list[str]
 ) -> None:
-    demo = Demo("demo-team", domain, tmp_path, *team)
+    demo = Demo("team", domain, tmp_path, *team)
     try:
         assert demo.rest() == 0, demo.lines[-20:]
     finally:
@@ -169,7 +166,7 @@ def test_a_column_of_ros_vehicles_marches_with_a_real_copter_behind_it(
 ) -> None:
     (tmp_path / "programs").mkdir()
     (tmp_path / "programs/arducopter").symlink_to(Path(os.environ["M2PEM_ARDUCOPTER"]).absolute())
-    demo = Demo("demo-team", domain, tmp_path, *team, f"FOLDER={tmp_path / 'programs'}")
+    demo = Demo("team", domain, tmp_path, *team, f"--ardupilot={tmp_path / 'programs'}")
     try:
         assert demo.rest(SITL_WITHIN_S) == 0, demo.lines[-20:]
     finally:
@@ -185,7 +182,7 @@ def test_a_demo_that_ends_elsewhere_has_failed(
 ) -> None:
     answers = tmp_path / "answers.yaml"
     answers.write_text("answers: {UserMoveOut: [abort]}", encoding="utf-8")
-    demo = Demo("demo-team", domain, tmp_path, *team, f"TEAM_ANSWERS={answers}")
+    demo = Demo("team", domain, tmp_path, *team, f"--answers={answers}")
     try:
         assert demo.rest() != 0
     finally:
@@ -195,7 +192,7 @@ def test_a_demo_that_ends_elsewhere_has_failed(
 
 @pytest.mark.long
 def test_ctrl_c_ends_the_whole_team(domain: int, tmp_path: Path, team: list[str]) -> None:
-    demo = Demo("demo-team", domain, tmp_path, *team)
+    demo = Demo("team", domain, tmp_path, *team)
     try:
         demo.until("r1 is running")
         os.killpg(demo.process.pid, signal.SIGINT)

@@ -1,4 +1,4 @@
-"""`make demo-web`, as the README has it."""
+"""`m2pem demo web`, which `make demo-web` runs."""
 
 import os
 import signal
@@ -16,10 +16,8 @@ from web_served import ENDS_WITHIN_S, REPOSITORY
 @pytest.fixture
 def demo(tmp_path: Path) -> Iterator[str]:
     """The address that it prints."""
-    words = ["make", "--silent", "-o", "python-packages", "-o", "page", "demo-web"]
-    words += [f"BIN={Path(sys.executable).parent}", f"DEMO_WEB={tmp_path}"]
     process = subprocess.Popen(
-        words,
+        [sys.executable, "-m", "m2pem", "demo", "web", "--folder", str(tmp_path)],
         cwd=REPOSITORY,
         env={**os.environ, "M2PEM_WEB_PORT": "0"},
         stdin=subprocess.DEVNULL,

@@ -1,0 +1,1 @@
+"""Demonstrations on simulated vehicles: `m2pem demo` (docs/cli.md)."""
