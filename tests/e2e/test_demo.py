@@ -1,5 +1,6 @@
 """`m2pem demo`: as a user runs it, in a folder of their own."""
 
+import os
 import shutil
 import signal
 import subprocess
@@ -18,6 +19,7 @@ def test_the_paper_mission_runs_in_two_ways_outside_of_the_repository(tmp_path: 
         m2pem("demo"),
         check=False,
         cwd=tmp_path,
+        env={**os.environ, "HOME": str(tmp_path), "XDG_STATE_HOME": str(tmp_path)},
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
