@@ -1,1 +1,2 @@
-"""The token game: inputs -> records -> commands. Pure: no clock, no random, no I/O."""
+"""The engine executes missions: inputs -> records -> commands. Pure: no clock, no random, no
+I/O."""

@@ -1,4 +1,4 @@
-"""Arming catch events: who waits for which trigger, and until when.
+"""Arming catch events: which token or scope waits for which trigger.
 
 A wait belongs to a token: at its own node (catch event, receive task, typed start event), at
 a boundary event of its activity, or at an event after the event-based gateway that it is on. Or it
@@ -16,10 +16,10 @@ data, before the next step. It fires when it is true. What catches again must fi
 """
 
 from m2pem.engine import records as r
-from m2pem.engine.data import Place, reader
+from m2pem.engine.data import reader
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.records import Trigger
-from m2pem.engine.state import Scope, Token, Wait
+from m2pem.engine.state import Scope, Token, TokenOrScope, Wait
 from m2pem.engine.throwing import throw_error, throw_error_in
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.cycle import cycle, next_round
@@ -38,7 +38,7 @@ from m2pem.mission.expression.literals import describe
 
 
 class _NotATimeError(Exception):
-    """A timer's expression gave something that is not a time."""
+    """The expression of a timer gave a value that is not a time."""
 
 
 # --- arming -------------------------------------------------------------------------------------
@@ -46,16 +46,17 @@ class _NotATimeError(Exception):
 
 def arm(
     x: Execution,
-    holder: Place,
+    holder: TokenOrScope,
     node: FlowNode,
     definition: EventDefinition,
     *,
     spent: bool = False,
 ) -> bool:
-    """Have a token or scope wait for a trigger at `node`. False: a wrong timer's error was thrown.
+    """Make a token or scope wait for a trigger at `node`. False: a timer was wrong, and its error
+    was thrown.
 
-    What waits nowhere (errors, escalations, compensation, ...) looks for its catcher when thrown.
-    A condition is looked at after the step; `spent`: it has fired before.
+    Errors, escalations and compensation are not armed: they look for their catcher when thrown.
+    A condition is evaluated after the step; `spent`: it has fired before.
     """
     match definition:
         case SignalEventDefinition():
@@ -65,7 +66,7 @@ def arm(
         case ConditionalEventDefinition():
             text = definition.condition.text
             await_event(x, holder, node, Trigger.CONDITION, text, spent=spent)
-            x.changed = True
+            x.data_changed = True
         case TimerEventDefinition():
             try:
                 _arm_timer(x, holder, node, definition)
@@ -81,7 +82,7 @@ def arm(
 
 def await_event(
     x: Execution,
-    holder: Place,
+    holder: TokenOrScope,
     node: FlowNode,
     trigger: Trigger,
     ref: str = "",
@@ -91,7 +92,7 @@ def await_event(
     period: str = "",
     spent: bool = False,
 ) -> None:
-    """State that a token or scope waits for a trigger at `node`."""
+    """Record that a token or scope waits for a trigger at `node`."""
     scope = holder if isinstance(holder, Scope) else holder.scope
     x.emit(
         r.EventAwaited(
@@ -111,11 +112,11 @@ def await_event(
     )
 
 
-def due_after(x: Execution, holder: Place, expression: Expression) -> int:
-    """Mission time, in microseconds, at which a duration that starts now is over.
+def due_after(x: Execution, holder: TokenOrScope, expression: Expression) -> int:
+    """Return the mission time, in microseconds, at which a duration from now ends.
 
     Raises:
-        ExpressionError, ExpressionSyntaxError: it is no duration.
+        ExpressionError, ExpressionSyntaxError: the value is no duration.
     """
     text = expression.evaluate(reader(holder))
     if not isinstance(text, str):
@@ -126,7 +127,7 @@ def due_after(x: Execution, holder: Place, expression: Expression) -> int:
 
 
 def _arm_timer(
-    x: Execution, holder: Place, node: FlowNode, definition: TimerEventDefinition
+    x: Execution, holder: TokenOrScope, node: FlowNode, definition: TimerEventDefinition
 ) -> None:
     if definition.kind is TimerKind.DURATION:
         due_us = due_after(x, holder, definition.expression)
@@ -148,7 +149,7 @@ def _arm_timer(
 
 
 def arm_again(x: Execution, wait: Wait) -> None:
-    """What does not interrupt catches as long as its activity, or its scope, lasts."""
+    """Arm a non-interrupting event again: it catches as long as its activity or scope lasts."""
     holder = wait.token or wait.scope
     if wait.trigger is not Trigger.TIMER:
         spent = wait.trigger is Trigger.CONDITION
@@ -170,7 +171,7 @@ def arm_again(x: Execution, wait: Wait) -> None:
 
 
 def next_timer(x: Execution) -> tuple[int, Wait] | None:
-    """The timer that is due first, with its mission time."""
+    """Return the timer that is due first, with its mission time in microseconds."""
     state = x.state
     found: tuple[int, int] | None = None
     offset_us = state.started_us + state.paused_total_us
@@ -183,7 +184,7 @@ def next_timer(x: Execution) -> tuple[int, Wait] | None:
 
 
 def definition_of(wait: Wait) -> ConditionalEventDefinition:
-    """The definition whose condition is awaited."""
+    """Return the definition of the condition that is awaited."""
     return next(
         definition
         for definition in definitions_of(wait.node)
@@ -192,10 +193,10 @@ def definition_of(wait: Wait) -> ConditionalEventDefinition:
     )
 
 
-def comes_true(x: Execution, wait: Wait) -> bool:
+def condition_fires(x: Execution, wait: Wait) -> bool:
     """Whether an armed condition fires now; a spent one that is false may fire from now on.
 
-    One that cannot be evaluated throws error EXPRESSION where it is awaited.
+    A condition that cannot be evaluated throws error EXPRESSION where it is awaited.
     """
     holder = wait.token or wait.scope
     try:
@@ -214,19 +215,19 @@ def comes_true(x: Execution, wait: Wait) -> bool:
 
 
 def arm_next(x: Execution) -> None:
-    """Arm what the first token that entered waits for, unless it has left already."""
+    """Arm the element of the first token that entered, unless the token has left already."""
     token = x.entered.popleft()
     if x.state.tokens.get(token.id) is token:
         x.handlers[type(token.node)].enter(x, token)
 
 
 def arm_entered(x: Execution) -> None:
-    """Arm what every token that entered waits for: something is about to be thrown.
+    """Arm the elements of all tokens that entered, before something is thrown.
 
-    Conditions that are true may let ever more tokens enter: those go as far as the batch.
+    Conditions that are true may let ever more tokens enter; the batch limits these.
     """
     there = len(x.entered)
-    while x.entered and (there > 0 or x.left > 0):
+    while x.entered and (there > 0 or x.steps_left > 0):
         there -= 1
-        x.left -= 1
+        x.steps_left -= 1
         arm_next(x)

@@ -1,6 +1,6 @@
-"""Commands: what the outside must do, derived from committed records and never stored.
+"""Commands: what the executive must do, derived from committed records and never stored.
 
-The executive carries them out after the commit; only `HoldResource`, `CancelBehavior` and what
+It carries them out after the commit; only `HoldResource`, `CancelBehavior` and what
 stops a run may go out before it.
 """
 
@@ -13,7 +13,7 @@ from m2pem.mission.values import Value
 
 @dataclass(frozen=True, slots=True)
 class StartBehavior:
-    """Start it on the arbiters of its resources; idempotent on `behavior`."""
+    """Start a behavior on the arbiters of its resources; idempotent on `behavior`."""
 
     behavior: str
     element: str
@@ -28,7 +28,7 @@ class StartBehavior:
 
 @dataclass(frozen=True, slots=True)
 class CancelBehavior:
-    """End it; its terminal report releases the resources."""
+    """Cancel a behavior; its terminal report releases the resources."""
 
     behavior: str
     epoch: int
@@ -37,21 +37,21 @@ class CancelBehavior:
 
 @dataclass(frozen=True, slots=True)
 class HoldResource:
-    """Bring it to its safe state; needs no journal."""
+    """Bring a resource to its safe state; needs no journal."""
 
     resource: str
 
 
 @dataclass(frozen=True, slots=True)
 class ResumeResource:
-    """Let it go on with what it did before the hold."""
+    """Resume what a resource did before the hold."""
 
     resource: str
 
 
 @dataclass(frozen=True, slots=True)
 class OpenPrompt:
-    """Ask the operators."""
+    """Show a prompt to the operators."""
 
     prompt: str
     element: str
@@ -62,7 +62,7 @@ class OpenPrompt:
 
 @dataclass(frozen=True, slots=True)
 class ClosePrompt:
-    """Take the question back, or tell who answered it (`by`) and how."""
+    """Withdraw a prompt, or say who answered it (`by`) and how."""
 
     prompt: str
     decision: str = ""
@@ -82,7 +82,7 @@ class RunService:
 
 @dataclass(frozen=True, slots=True)
 class CancelService:
-    """Nobody waits for it any more."""
+    """Cancel a service: its task waits for it no longer."""
 
     service: str
 

@@ -1,35 +1,41 @@
 """Compensation: undoing activities that have completed (BPMN 2.0.2, clauses 10.7 and 13.5.5).
 
-An activity that completes well, and that something can undo, leaves a `Completion` in its scope.
-What can undo it is its compensation activity; without one, its own scope, which is kept: by the
-compensation event subprocess in it, else by undoing what was done in it, latest first.
+An activity that completes, and that can be compensated, leaves a `CompletedActivity` in its scope.
+Its compensation activity compensates it; without one, its own scope, which is kept, does so: by the
+compensation event subprocess in it, else by compensating what was done in it, latest first.
 
-A throw makes a `Compensation`, which undoes one activity after the other: a token enters what
-undoes it, and when that token is done, the scope is looked at again (`advance`).
+A compensation event makes a `Compensation`, which handles one activity after the other. A token
+enters the compensation activity; when that is done, the scope is checked again
+(`advance_compensations`).
 """
 
 from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import TokenOutcome
-from m2pem.engine.scopes import close, compensates_around, compensator, open_scope
-from m2pem.engine.state import Compensation, Completion, Scope, Token
+from m2pem.engine.scopes import (
+    close_scope,
+    compensation_handler,
+    is_compensation_handler,
+    open_scope,
+)
+from m2pem.engine.state import Compensation, CompletedActivity, Scope, Token
 from m2pem.mission.elements import Activity, Element, SubProcess
 from m2pem.mission.events import CompensateEventDefinition
 
-# --- what can be undone -------------------------------------------------------------------------
+# --- completed activities -----------------------------------------------------------------------
 
 
-def enable(x: Execution, token: Token) -> None:
-    """An activity, or an instance of one, has completed: from here on it can be undone.
+def enable_compensation(x: Execution, token: Token) -> None:
+    """Note that an activity, or an instance of one, has completed and can be compensated.
 
-    What was ended early has not completed (figure 13.2), and what undoes is not undone. A
-    compensation activity undoes a loop or multi-instance activity as a whole.
+    What was ended early has not completed (figure 13.2), and a compensation activity is not
+    compensated. It compensates a loop or multi-instance activity as a whole.
     """
     node = token.node
     assert isinstance(node, Activity)
-    if token.abnormal or node.for_compensation or compensates_around(node):
+    if token.ended_early or node.for_compensation or is_compensation_handler(node):
         return
-    if token.kept is None and (node.compensation is None or token.instance is not None):
+    if token.kept_scope is None and (node.compensation is None or token.instance is not None):
         return
     number = x.state.last_completion + 1
     x.emit(
@@ -43,11 +49,11 @@ def enable(x: Execution, token: Token) -> None:
 
 
 def throw_compensation(x: Execution, token: Token, definition: CompensateEventDefinition) -> None:
-    """Undo the activity that an event names, or all that was done in its scope.
+    """Compensate the activity that an event names, or all that was done in its scope.
 
-    Afterwards the token has `compensations` when it has to wait. Thrown in an event subprocess, it
-    is about the scope around that (tables 10.88 and 10.89). A named activity is looked for outwards
-    from there; the activity that the event itself is in stands for all that was done in it.
+    Afterwards the token has `compensations` if it must wait. An event in an event subprocess means
+    the scope around that (tables 10.88 and 10.89). A named activity is searched from there
+    outwards; the activity that the event itself is in means all that was done in it.
     """
     qualifier = token.node.qualifier
     name = f"{qualifier}:{definition.activity}" if qualifier else definition.activity
@@ -55,14 +61,14 @@ def throw_compensation(x: Execution, token: Token, definition: CompensateEventDe
     scope = _target(token.scope, named)
     found = [
         completion
-        for completion in _undoable(scope)
+        for completion in _compensable(scope)
         if named is None or named is scope.container or completion.node is named
     ]
     trigger_compensation(x, token, scope, found, waits=definition.wait and bool(found))
 
 
 def _target(thrown_in: Scope, named: Element | None) -> Scope:
-    """The scope in which something is to be undone."""
+    """Return the scope in which activities are to be compensated."""
     scope = thrown_in
     if named is None:
         container = scope.container
@@ -80,21 +86,21 @@ def _target(thrown_in: Scope, named: Element | None) -> Scope:
     return scope
 
 
-def _undoable(scope: Scope) -> list[Completion]:
-    """What can be undone in a scope and is not being undone already, latest first."""
-    done = scope.done.values() if scope.done is not None else ()
-    return [completion for completion in reversed(done) if not completion.claimed]
+def _compensable(scope: Scope) -> list[CompletedActivity]:
+    """Return what can be compensated in a scope and is not being compensated, latest first."""
+    done = scope.compensable.values() if scope.compensable is not None else ()
+    return [completion for completion in reversed(done) if not completion.claimed_by]
 
 
-def trigger_all(x: Execution, token: Token, scope: Scope) -> None:
-    """Undo all that was done in a scope; nobody waits but the scope itself."""
-    trigger_compensation(x, token, scope, _undoable(scope), waits=False)
+def compensate_all(x: Execution, token: Token, scope: Scope) -> None:
+    """Compensate all that was done in a scope; no event waits for it, only the scope."""
+    trigger_compensation(x, token, scope, _compensable(scope), waits=False)
 
 
 def trigger_compensation(
-    x: Execution, token: Token, scope: Scope, found: list[Completion], *, waits: bool
+    x: Execution, token: Token, scope: Scope, found: list[CompletedActivity], *, waits: bool
 ) -> None:
-    """State what will be undone in a scope, in this order, and have it begun."""
+    """Record what will be compensated in a scope, in this order, and begin."""
     x.emit(
         r.CompensationTriggered(
             token.id,
@@ -110,11 +116,11 @@ def trigger_compensation(
     x.queue.append(scope)
 
 
-# --- undoing ------------------------------------------------------------------------------------
+# --- compensating -------------------------------------------------------------------------------
 
 
-def advance(x: Execution, scope: Scope) -> None:
-    """Begin to undo what comes next in each compensation of a scope, or end it."""
+def advance_compensations(x: Execution, scope: Scope) -> None:
+    """Begin the next activity of each compensation of a scope, or end the compensation."""
     for compensation in list((scope.compensations or {}).values()):
         if compensation.id not in (scope.compensations or {}) or compensation.token is not None:
             continue
@@ -129,7 +135,7 @@ def _begin(x: Execution, scope: Scope, compensation: Compensation) -> None:
     activity = completion.node
     number = x.state.last_token + 1
     node = activity
-    if completion.kept is None:
+    if completion.kept_scope is None:
         assert activity.compensation is not None
         node = activity.compensation
     x.emit(
@@ -143,39 +149,39 @@ def _begin(x: Execution, scope: Scope, compensation: Compensation) -> None:
             activity.id,
         )
     )
-    if completion.kept is None:
+    if completion.kept_scope is None:
         x.enter(number, node, scope)
-    else:  # it does not begin again, but has its scope reopened
+    else:  # the activity does not begin again: its scope is reopened
         process = x.process_of(node)
         x.emit(r.TokenEntered(number, process, node.id, scope.id, instance=completion.instance))
-        _reopen(x, x.state.tokens[number], completion.kept)
+        _reopen(x, x.state.tokens[number], completion.kept_scope)
 
 
 def _reopen(x: Execution, token: Token, scope: Scope) -> None:
-    """Undo an activity by what is in its own scope."""
+    """Compensate an activity by its own scope."""
     node = token.node
     x.emit(r.ScopeReopened(scope.id, x.process_of(node), node.id, token.id))
-    handler = compensator(scope.container) if scope.loop is None else None
+    handler = compensation_handler(scope.container) if scope.loop is None else None
     if handler is None:
-        trigger_all(x, token, scope)
+        compensate_all(x, token, scope)
         return
     inner = open_scope(x, x.spawn(handler, scope))
     for start in handler.starts:
         x.spawn(start, inner)
 
 
-def undone(x: Execution, token: Token) -> None:
-    """What undid an activity is done; its compensation goes on with the next."""
+def compensated(x: Execution, token: Token) -> None:
+    """End the token that has compensated an activity; its compensation goes on with the next."""
     x.leave(token, TokenOutcome.COMPLETED)
     x.queue.append(token.scope)
 
 
-def close_undone(x: Execution, scope: Scope) -> None:
-    """A reopened scope in which everything is undone."""
+def close_compensated(x: Execution, scope: Scope) -> None:
+    """Close a reopened scope in which everything is compensated."""
     owner = scope.owner
     assert owner is not None
-    close(x, scope, TokenOutcome.COMPLETED)
-    undone(x, owner)
+    close_scope(x, scope, TokenOutcome.COMPLETED)
+    compensated(x, owner)
 
 
 def _end(x: Execution, scope: Scope, compensation: Compensation) -> None:

@@ -1,8 +1,8 @@
-"""What passes between the data around an activity or event and its own (BPMN 2.0.2, 10.4.2)."""
+"""Data associations: data inputs and outputs of activities and events (BPMN 2.0.2, 10.4.2)."""
 
-from m2pem.engine.data import Place, flatten, reader, store_for
+from m2pem.engine.data import flatten, reader, store_for
 from m2pem.engine.execution import Execution
-from m2pem.engine.state import Token
+from m2pem.engine.state import Token, TokenOrScope
 from m2pem.engine.throwing import throw_error
 from m2pem.errors import ExpressionError
 from m2pem.mission.behavior import Mapping
@@ -14,7 +14,7 @@ from m2pem.mission.values import ReadValue, Value
 def evaluate(
     x: Execution, token: Token, mappings: tuple[Mapping, ...], read: ReadValue
 ) -> list[tuple[Mapping, Value]] | None:
-    """What each mapping passes; None: a wrong expression's error was thrown."""
+    """Evaluate mappings; None: error EXPRESSION was thrown."""
     values = []
     for mapping in mappings:
         try:
@@ -26,18 +26,18 @@ def evaluate(
 
 
 def write_values(
-    x: Execution, token: Token, place: Place, values: list[tuple[Mapping, Value]]
+    x: Execution, token: Token, context: TokenOrScope, values: list[tuple[Mapping, Value]]
 ) -> None:
-    """Write them as names are seen from a place."""
+    """Write the values of mappings, with names as seen from a token or scope."""
     for mapping, value in values:
         for key, item in flatten(mapping.target, value):
-            x.write_into(store_for(place, key), token, key, item)
+            x.write_into(store_for(context, key), token, key, item)
 
 
-def take_in(x: Execution, token: Token) -> bool:
-    """Fill the data inputs of the activity, or instance, that a token has come to.
+def fill_data_inputs(x: Execution, token: Token) -> bool:
+    """Fill the data inputs of the activity, or instance, that a token has entered.
 
-    False: an error was thrown.
+    False: error EXPRESSION was thrown.
     """
     node = token.node
     assert isinstance(node, Activity)
@@ -45,28 +45,28 @@ def take_in(x: Execution, token: Token) -> bool:
     if values is None:
         return False
     for mapping, value in values:
-        if value is not None:  # what is not there yet reads as null anyway
+        if value is not None:  # a missing value reads as null anyway
             x.write_into(token, token, mapping.target, value)
     return True
 
 
 def _around(token: Token) -> ReadValue:
-    """Reads names as they are around an activity; an instance's item and counter belong to that."""
+    """Return a function that reads names from outside an activity, but an instance's own item."""
     outside = reader(token.scope)
     if token.instance is None:
         return outside
     inside = reader(token)
-    item = token.own or {}  # nothing else is there before its inputs are
+    item = token.own or {}  # it has nothing else before its inputs
 
     def read(name: str) -> Value:
-        mine = name == LOOP_COUNTER or name in item or name.partition(".")[0] in item
-        return inside(name) if mine else outside(name)
+        own_name = name == LOOP_COUNTER or name in item or name.partition(".")[0] in item
+        return inside(name) if own_name else outside(name)
 
     return read
 
 
-def give_out(x: Execution, token: Token) -> bool:
-    """Pass the data outputs of a completed activity on. False: an error was thrown."""
+def pass_data_outputs(x: Execution, token: Token) -> bool:
+    """Write the data outputs of a completed activity. False: error EXPRESSION was thrown."""
     node = token.node
     assert isinstance(node, Activity)
     values = evaluate(x, token, node.data_flow.outputs, reader(token))
@@ -74,18 +74,18 @@ def give_out(x: Execution, token: Token) -> bool:
         return False
     gives = node.loop.output_item if isinstance(node.loop, MultiInstance) else ""
     for mapping, value in values:
-        place = token if mapping.target == gives else token.scope
-        write_values(x, token, place, [(mapping, value)])
+        context = token if mapping.target == gives else token.scope
+        write_values(x, token, context, [(mapping, value)])
     return True
 
 
-# --- what messages and signals carry ------------------------------------------------------------
+# --- data of messages and signals ---------------------------------------------------------------
 
 
 def payload(x: Execution, token: Token) -> dict[str, Value] | None:
-    """What the event or task under a token sends along: its data inputs.
+    """Return the data that an event or task sends: its data inputs.
 
-    None: a wrong expression's error was thrown.
+    None: error EXPRESSION was thrown.
     """
     node = token.node
     assert isinstance(node, Activity | Event)
@@ -97,9 +97,10 @@ def payload(x: Execution, token: Token) -> dict[str, Value] | None:
 
 
 def receive_payload(x: Execution, token: Token, data: dict[str, Value]) -> bool:
-    """Write what came where the catcher under a token says, else under its own names there.
+    """Write received data by the data outputs of the catcher, else under its own names.
 
-    A single value fits a single data output whatever their names. False: an error was thrown.
+    A single value goes to a single data output whatever their names. False: error EXPRESSION was
+    thrown.
     """
     node = token.node
     if isinstance(node, Event) and node.data_flow.outputs:

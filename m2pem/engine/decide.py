@@ -1,7 +1,8 @@
-"""What each input means: the handlers that turn inputs into records.
+"""Deciding inputs: the handlers that turn each input into records.
 
-Deciding may change between releases; what was decided is in the journal, and `apply` alone
-replays it. A handler that finds an input redundant calls `x.ignore` and does nothing else.
+Decisions may change between releases; the decided records are in the journal, and `apply` alone
+replays them. A handler that finds an input redundant calls `x.ignore` and does nothing else.
+`_DECIDERS`, at the end, has the handler of each kind of input.
 """
 
 from collections.abc import Callable
@@ -21,7 +22,7 @@ from m2pem.engine.elements.behaviors import (
     resource_fault,
 )
 from m2pem.engine.elements.subprocesses import begin
-from m2pem.engine.lifecycle import Welcome, welcome
+from m2pem.engine.lifecycle import Admission, admission
 from m2pem.engine.records import RunOutcome
 from m2pem.engine.scopes import end_run
 from m2pem.engine.state import BehaviorPhase
@@ -40,27 +41,27 @@ _THROW_NOTHING = (i.Continue, i.StopRun, i.PauseRun, i.ClaimRun, i.GeometrySet)
 
 
 def decide(x: Steps, item: i.Input) -> None:
-    """Emit what an input means; steps that it causes are left in the queue."""
-    match welcome(x.state.status, item):
-        case Welcome.IGNORE:
+    """Emit the records of an input; the steps that it causes are left in the queue."""
+    match admission(x.state.status, item):
+        case Admission.IGNORE:
             x.ignore(f"{type(item).__name__} while the run is {x.state.status.value}")
-        case Welcome.DEFER:
+        case Admission.DEFER:
             _defer(x, item)
-        case Welcome.DECIDE:
+        case Admission.DECIDE:
             number = getattr(item, "id", "")
             if number in x.state.seen:
                 x.ignore(f"{type(item).__name__} {number} was taken before")
                 return
             if not isinstance(item, _THROW_NOTHING):
-                arm_entered(x)  # what a batch left over waits for what is thrown now
-                if welcome(x.state.status, item) is not Welcome.DECIDE:  # a condition was wrong
+                arm_entered(x)  # tokens that a batch left over wait for what is thrown now
+                if admission(x.state.status, item) is not Admission.DECIDE:  # a condition was wrong
                     x.ignore(f"{type(item).__name__} while the run is {x.state.status.value}")
                     return
             _DECIDERS[type(item)](x, item)
 
 
 def _defer(x: Steps, item: i.Input) -> None:
-    refusal = _why_no_answer(x, item) if isinstance(item, i.PromptAnswer) else ""
+    refusal = _why_refused(x, item) if isinstance(item, i.PromptAnswer) else ""
     if refusal:
         x.ignore(refusal)
     else:
@@ -148,11 +149,11 @@ def _geometry(x: Steps, item: i.GeometrySet) -> None:
     x.emit(r.GeometryReceived(item.name, item.geometry, item.by))
 
 
-# --- operators, services, the outside -----------------------------------------------------------
+# --- operators, services, events ----------------------------------------------------------------
 
 
 def _answer(x: Steps, item: i.PromptAnswer) -> None:
-    refusal = _why_no_answer(x, item)
+    refusal = _why_refused(x, item)
     if refusal:
         x.ignore(refusal)
         return
@@ -178,7 +179,7 @@ def _answer(x: Steps, item: i.PromptAnswer) -> None:
     answer(x, token, item.decision)
 
 
-def _why_no_answer(x: Steps, item: i.PromptAnswer) -> str:
+def _why_refused(x: Steps, item: i.PromptAnswer) -> str:
     prompt = x.state.prompts.get(item.prompt)
     if prompt is None:
         return f"prompt {item.prompt} is not open: it was answered or withdrawn"
@@ -226,7 +227,7 @@ def _service_failed(x: Steps, item: i.ServiceFailed) -> None:
 
 
 def _signal(x: Steps, item: i.SignalReceived) -> None:
-    _note_id(x, item.id)
+    _remember_id(x, item.id)
     x.emit(r.SignalThrown(item.signal, by=item.by or "outside"))
     throw_signal(x, item.signal, item.data)
 
@@ -235,11 +236,11 @@ def _message(x: Steps, item: i.MessageReceived) -> None:
     if item.message not in x.receivable:
         x.ignore(f"nothing in the mission receives message {item.message}")
         return
-    _note_id(x, item.id)
+    _remember_id(x, item.id)
     receive(x, item.message, item.data, item.by or "outside")
 
 
-def _note_id(x: Steps, number: str) -> None:
+def _remember_id(x: Steps, number: str) -> None:
     if number:
         x.emit(r.InputSeen(number))
 

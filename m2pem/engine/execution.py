@@ -1,8 +1,8 @@
-"""The moves of the token game: what element handlers are made of.
+"""Moving tokens: the operations that the handlers of elements are made of.
 
-An `Execution` lives as long as its run and keeps nothing between inputs but tables of the mission.
-Work still to do is a queue of tokens to execute and scopes to look at; nothing here recurses.
-Every change is a record that is applied at once, so that what is decided next sees it.
+An `Execution` lives as long as its run. Between inputs it keeps only tables of the mission. The
+steps still to do are a queue of tokens to activate and scopes to check; nothing recurses. Every
+change is a record that is applied at once, so that the next decision sees it.
 """
 
 from collections import deque
@@ -46,7 +46,7 @@ from m2pem.mission.upstream import upstream
 from m2pem.mission.values import Value
 
 NO_FLEET = Fleet("", "no fleet", {})
-"""For a mission that commands no resource."""
+"""The fleet of a mission that commands no resource."""
 
 
 class Waits(Enum):
@@ -54,7 +54,7 @@ class Waits(Enum):
 
     NOTHING = "nothing"
     AT_ITSELF = "at itself"
-    """All that it does is to wait, or it opens a scope that does: there is no later step."""
+    """It only waits, or opens a scope that waits: there is no later step."""
     AT_ITS_BOUNDARY = "at its boundary"
     """Its boundary events are armed at once; its work begins in its turn."""
 
@@ -97,18 +97,18 @@ class Execution:
         "_reach",
         "_receivable",
         "_triggered_starts",
-        "changed",
+        "data_changed",
         "ended_instances",
         "entered",
         "fleet",
-        "left",
+        "joins_to_check",
         "mission",
-        "moved",
         "now_us",
         "process_ids",
         "queue",
         "records",
         "state",
+        "steps_left",
         "waits",
     )
 
@@ -119,11 +119,11 @@ class Execution:
         self.now_us = 0
         self.records: list[Record] = []
         self.queue: deque[Token | Scope] = deque()
-        self.entered: deque[Token] = deque()  # at what waits: they come before the queue
+        self.entered: deque[Token] = deque()  # at elements that wait: they come before the queue
         self.ended_instances: deque[tuple[Token, TokenOutcome]] | None = None
-        self.moved: set[int] = set()  # scopes whose inclusive joins must be looked at
-        self.left = 0  # steps that the batch still allows
-        self.changed = False  # whether conditions must be looked at before the next step
+        self.joins_to_check: set[int] = set()  # scopes whose inclusive joins must be checked
+        self.steps_left = 0  # steps that the batch still allows
+        self.data_changed = False  # whether conditions must be evaluated before the next step
         self.process_ids = [node.container.process.id for node in self.mission.nodes]
         self.waits = {
             node: waits
@@ -136,20 +136,20 @@ class Execution:
         self._triggered_starts: tuple[FlowNode, ...] | None = None
 
     def emit(self, record: Record) -> None:
-        """State a fact, and let it take effect."""
+        """Add a record and apply it."""
         self.records.append(record)
         apply(self.state, record)
 
     def ignore(self, reason: str) -> None:
-        """Say why an input changes nothing."""
+        """Record why an input changes nothing."""
         self.emit(r.InputIgnored(reason))
 
     def process_of(self, node: FlowNode) -> str:
-        """Id of the process that contains a node."""
+        """Return the id of the process that contains a node."""
         return self.process_ids[node.index]
 
     def upstream(self, join: FlowNode) -> dict[FlowNode, int]:
-        """`m2pem.mission.upstream.upstream`, worked out once for each join."""
+        """Return `m2pem.mission.upstream.upstream` of a join, computed once."""
         reach = self._reach.get(join)
         if reach is None:
             reach = self._reach[join] = upstream(join)
@@ -157,17 +157,18 @@ class Execution:
 
     @property
     def receivable(self) -> frozenset[str]:
-        """Ids of the messages that something in the mission catches."""
+        """Ids of the messages that an element of the mission catches."""
         if self._receivable is None:
             self._receivable = frozenset(_caught_messages(self.mission))
         return self._receivable
 
     @property
     def triggered_starts(self) -> tuple[FlowNode, ...]:
-        """What begins the processes that neither the run began with nor a call activity calls.
+        """Elements that begin the processes that neither the run began with nor a call activity
+        calls.
 
-        Their typed start events, instantiating receive tasks, and the events behind instantiating
-        event-based gateways. Each trigger of theirs makes an instance (docs/missions.md).
+        These are typed start events, instantiating receive tasks, and the events after
+        instantiating event-based gateways. Each trigger makes an instance (docs/missions.md).
         """
         if self._triggered_starts is None:
             assert self.state.root is not None
@@ -194,7 +195,7 @@ class Execution:
         flow: SequenceFlow | None = None,
         instance: int | None = None,
     ) -> Token:
-        """Put a token on a node, and have it executed in its turn."""
+        """Put a token on a node and queue it."""
         self.emit(
             r.TokenEntered(
                 token,
@@ -210,11 +211,11 @@ class Execution:
             self.queue.append(entered)
         else:
             self.execute_later(entered)
-        self.moved.add(scope.id)
+        self.joins_to_check.add(scope.id)
         return entered
 
     def execute_later(self, token: Token) -> None:
-        """Have a token executed in its turn, or at once if its node waits."""
+        """Queue a token, or have it armed at once if its node waits."""
         node = token.node
         waits = self.waits.get(node, Waits.NOTHING)
         if token.instance is not None:
@@ -227,18 +228,18 @@ class Execution:
             self.queue.append(token)
 
     def has_been_triggered(self, token: Token) -> bool:
-        """Whether the trigger of the start event that a token is on has made its scope."""
+        """Whether the scope of a token on a start event was opened by the event's trigger."""
         container = token.node.container
         if isinstance(container, SubProcess) and container.triggered_by_event:
             return True
         return token.scope.parent is None and token.scope is not self.state.root
 
     def spawn(self, node: FlowNode, scope: Scope) -> Token:
-        """A new token on a node."""
+        """Put a new token on a node."""
         return self.enter(self.state.last_token + 1, node, scope)
 
     def leave(self, token: Token, outcome: TokenOutcome) -> None:
-        """Take a token off its node. It is consumed unless it is entered elsewhere next."""
+        """Remove a token from its node. It is consumed unless it enters another node next."""
         node = token.node
         self.emit(
             r.TokenLeft(
@@ -250,15 +251,15 @@ class Execution:
                 token.instance,
             )
         )
-        self.moved.add(token.scope.id)
+        self.joins_to_check.add(token.scope.id)
 
     def consume(self, token: Token) -> None:
-        """The token has done its part and goes nowhere; its scope may be complete now."""
+        """Consume a token; its scope may be complete now."""
         self.leave(token, TokenOutcome.COMPLETED)
-        self.look_later(token.scope)
+        self.check_scope_later(token.scope)
 
     def proceed(self, token: Token, flows: Iterable[SequenceFlow]) -> None:
-        """Leave along `flows`: the token takes the first, a new one each of the others (4.1)."""
+        """Leave along `flows`: the token takes the first, a new token each of the others (4.1)."""
         node, scope = token.node, token.scope
         process = self.process_ids[node.index]
         self.leave(token, TokenOutcome.COMPLETED)
@@ -267,26 +268,26 @@ class Execution:
             self.emit(r.FlowTaken(number, process, node.id, scope.id, flow.id))
             self.enter(number, flow.target, scope, flow)
             number = self.state.last_token + 1
-        self.look_later(scope)
+        self.check_scope_later(scope)
 
-    def look_later(self, scope: Scope) -> None:
-        """A token of a scope has been consumed: perhaps the scope is complete."""
+    def check_scope_later(self, scope: Scope) -> None:
+        """Queue a check of a scope in which a token was consumed: it may be complete."""
         container = scope.container
         if not scope.tokens:
             self.queue.append(scope)
         elif container.event_subprocesses and not isinstance(container, AdHocSubProcess):
-            self.queue.append(scope)  # perhaps only they are left
+            self.queue.append(scope)  # maybe only these are left
 
     # --- data -----------------------------------------------------------------------------------
 
     def write(self, token: Token, key: str, value: Value) -> None:
-        """Write a value as the element that the token is on."""
+        """Write a value as seen from the element that a token is on."""
         for name, item in flatten(key, value):
             self.write_into(store_for(token, name), token, name, item)
 
     def write_into(self, place: Store, token: Token, key: str, value: Value) -> None:
-        """Write one value into the store of a given scope, or of a token's activity."""
-        self.changed = True
+        """Write one value into the given store."""
+        self.data_changed = True
         node = token.node
         own = 0
         if type(place) is Token:
@@ -307,8 +308,8 @@ class Execution:
         )
 
     def write_in(self, scope: Scope, node: FlowNode, data: dict[str, Value]) -> None:
-        """Write values for a node that no token is on, as seen from a scope."""
-        self.changed = True
+        """Write values for a node without a token, as seen from a scope."""
+        self.data_changed = True
         process = self.process_ids[node.index]
         for key, value in data.items():
             for name, item in flatten(key, value):
@@ -338,14 +339,14 @@ _MAY_WAIT: frozenset[type[FlowNode]] = frozenset(
         Transaction,
     }
 )
-"""Kinds that may wait without a boundary event."""
+"""Kinds of elements that may wait without a boundary event."""
 
 
 def waits_when_entered(node: FlowNode, *, instance: bool = False) -> Waits:
-    """What a node waits for as soon as a token enters it.
+    """Return what a node waits for as soon as a token enters it.
 
-    `instance`: of an instance of a loop or multi-instance activity, whose boundary events are the
-    whole activity's; the whole itself only begins its instances.
+    `instance`: the token is an instance of a loop or multi-instance activity. Boundary events
+    belong to the outer instance, which itself only begins its instances.
     """
     if not isinstance(node, Activity):
         if isinstance(node, StartEvent):
@@ -370,7 +371,7 @@ def waits_when_entered(node: FlowNode, *, instance: bool = False) -> Waits:
 
 
 def _is_awaited(event: Event) -> bool:
-    """Whether a trigger comes to an event; the others look for their catcher when thrown."""
+    """Whether an event is armed; the triggers of others look for their catcher when thrown."""
     return any(isinstance(definition, _AWAITED) for definition in event.definitions)
 
 
@@ -383,7 +384,7 @@ _AWAITED = (
 
 
 def definitions_of(node: FlowNode) -> Sequence[EventDefinition]:
-    """What triggers a catch event or receive task."""
+    """Return the event definitions of a catch event or receive task."""
     if isinstance(node, ReceiveTask):
         return (MessageEventDefinition(node.line, node.message),) if node.message else ()
     return node.definitions if isinstance(node, Event) else ()

@@ -1,7 +1,7 @@
-"""Inputs: everything that can happen to a run from outside. `MissionRun.receive` is the only door.
+"""Inputs: everything that can happen to a run from outside. `MissionRun.receive` takes them all.
 
-Each carries all it needs (time comes beside it), so that a journaled input can be decided again.
-`id`, where given, makes an input idempotent: a seen id is ignored, and a record says so.
+Each carries all that it needs, apart from the time, so that a journaled input can be decided again.
+`id`, where given, makes an input idempotent: an id that was seen is ignored, and a record says so.
 """
 
 from typing import TypeAlias, Union
@@ -31,10 +31,10 @@ class StartRun(_Input, frozen=True):
 
 
 class ClaimRun(_Input, frozen=True):
-    """An executive has taken the run over after a restart, with a new epoch.
+    """An executive has claimed the run after a restart, with a new epoch.
 
-    `lost`: how many records the journal has lost. So many ids of behaviors, prompts and services
-    are left out: the lost records may have used them.
+    `lost`: number of records that the journal has lost. So many ids of behaviors, prompts and
+    services are left out, because the lost records may have used them.
     """
 
     epoch: int
@@ -66,13 +66,13 @@ class Tick(_Input, frozen=True):
 
 
 class Continue(_Input, frozen=True):
-    """Go on with steps left over when one input caused more than a batch of them."""
+    """Continue the steps that were left over because one input caused more than a batch."""
 
 
 class GiveUp(_Input, frozen=True):
-    """A rehearsal can go no further: nothing scheduled can happen any more, or a limit is reached.
+    """A rehearsal cannot go on: nothing is scheduled any more, or a limit is reached.
 
-    The run fails, naming what it awaits.
+    The run fails with the elements that it waits for.
     """
 
     reason: str
@@ -92,9 +92,9 @@ class BehaviorReported(_Input, frozen=True):
 
 
 class BehaviorMissing(_Input, frozen=True):
-    """After a restart a behavior is not as it was: what to do with it, by its resume policy.
+    """After a restart a behavior is not as it was; its resume policy says what to do.
 
-    `state`: what its arbiter says of it (UNKNOWN, or RUNNING when the outage was too long).
+    `state`: the state that its arbiter reports (UNKNOWN, or RUNNING if the outage was too long).
     """
 
     behavior: str
@@ -112,7 +112,7 @@ class PromptAnswer(_Input, frozen=True):
 
 
 class ServiceCompleted(_Input, frozen=True):
-    """A service has ended well and writes `data`."""
+    """A service has completed and writes `data`."""
 
     service: str
     data: dict[str, Value] = msgspec.field(default_factory=dict)
@@ -147,7 +147,7 @@ class MessageReceived(_Input, frozen=True):
 class ResourceFault(_Input, frozen=True):
     """A vehicle or payload can no longer do its behavior: LINK_LOST, BATTERY_LOW, TAKEN_OVER.
 
-    `reachable` says whether its arbiter can still cancel what it does.
+    `reachable`: whether its arbiter can still cancel the behavior.
     """
 
     resource: str
@@ -157,21 +157,22 @@ class ResourceFault(_Input, frozen=True):
 
 
 class ControlTaken(_Input, frozen=True):
-    """An operator has taken a vehicle or payload; `by` has it until `ControlReturned`."""
+    """An operator has acquired control of a vehicle or payload; `by` keeps it until
+    `ControlReturned`."""
 
     resource: str
     by: str
 
 
 class ControlReturned(_Input, frozen=True):
-    """An operator has given a vehicle or payload back to the missions."""
+    """An operator has released control of a vehicle or payload to the missions."""
 
     resource: str
     by: str
 
 
 class GeometrySet(_Input, frozen=True):
-    """An OCU hands over a route, area or point under a name (paper, section 4.3). GeoJSON."""
+    """An OCU sends a route, area or point under a name (paper, section 4.3). GeoJSON."""
 
     name: str
     geometry: dict[str, Value]

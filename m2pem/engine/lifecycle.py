@@ -1,15 +1,15 @@
-"""The laws of a run's life.
+"""The life cycle of a run, and which inputs it takes in which status.
 
     NEW --StartRun--> RUNNING <--PauseRun / ResumeRun--> PAUSED
     RUNNING, PAUSED --StopRun, or what the mission does--> ENDED
 
 * NEW takes only StartRun.
-* PAUSED takes what changes nothing in the mission (a claim, a second pause), ResumeRun and
-  StopRun; every other input is deferred: journaled now, decided in order at resume.
+* PAUSED takes ResumeRun, StopRun, GiveUp and what changes nothing in the mission (a claim, a
+  geometry). It ignores ticks. Every other input is deferred: journaled now, decided at resume.
 * ENDED takes only claims, and what ends behaviors that are still being cancelled.
-* What is not welcome is ignored with a reason, never an error.
+* An input that is not taken is ignored with a reason; it is never an error.
 
-`WELCOME` is the whole of it: what to do with an input, by status.
+`admission` reads it from two tables.
 """
 
 from enum import Enum
@@ -32,44 +32,44 @@ from m2pem.engine.inputs import (
 from m2pem.engine.state import RunStatus
 
 
-class Welcome(Enum):
-    """What becomes of an input."""
+class Admission(Enum):
+    """What is done with an input."""
 
     DECIDE = "decide"
     DEFER = "defer"
     IGNORE = "ignore"
 
 
-_EXCEPTIONS: dict[RunStatus, dict[type, Welcome]] = {
-    RunStatus.NEW: {StartRun: Welcome.DECIDE},
-    RunStatus.RUNNING: {StartRun: Welcome.IGNORE, ResumeRun: Welcome.IGNORE},
+_EXCEPTIONS: dict[RunStatus, dict[type, Admission]] = {
+    RunStatus.NEW: {StartRun: Admission.DECIDE},
+    RunStatus.RUNNING: {StartRun: Admission.IGNORE, ResumeRun: Admission.IGNORE},
     RunStatus.PAUSED: {
-        StartRun: Welcome.IGNORE,
-        PauseRun: Welcome.IGNORE,
-        Tick: Welcome.IGNORE,
-        Continue: Welcome.IGNORE,
-        ResumeRun: Welcome.DECIDE,
-        StopRun: Welcome.DECIDE,
-        GiveUp: Welcome.DECIDE,
-        ClaimRun: Welcome.DECIDE,
-        GeometrySet: Welcome.DECIDE,
+        StartRun: Admission.IGNORE,
+        PauseRun: Admission.IGNORE,
+        Tick: Admission.IGNORE,
+        Continue: Admission.IGNORE,
+        ResumeRun: Admission.DECIDE,
+        StopRun: Admission.DECIDE,
+        GiveUp: Admission.DECIDE,
+        ClaimRun: Admission.DECIDE,
+        GeometrySet: Admission.DECIDE,
     },
     RunStatus.ENDED: {
-        BehaviorReported: Welcome.DECIDE,
-        BehaviorMissing: Welcome.DECIDE,
-        ResourceFault: Welcome.DECIDE,
-        ClaimRun: Welcome.DECIDE,
+        BehaviorReported: Admission.DECIDE,
+        BehaviorMissing: Admission.DECIDE,
+        ResourceFault: Admission.DECIDE,
+        ClaimRun: Admission.DECIDE,
     },
 }
 
-_OTHERWISE: dict[RunStatus, Welcome] = {
-    RunStatus.NEW: Welcome.IGNORE,
-    RunStatus.RUNNING: Welcome.DECIDE,
-    RunStatus.PAUSED: Welcome.DEFER,
-    RunStatus.ENDED: Welcome.IGNORE,
+_OTHERWISE: dict[RunStatus, Admission] = {
+    RunStatus.NEW: Admission.IGNORE,
+    RunStatus.RUNNING: Admission.DECIDE,
+    RunStatus.PAUSED: Admission.DEFER,
+    RunStatus.ENDED: Admission.IGNORE,
 }
 
 
-def welcome(status: RunStatus, item: Input) -> Welcome:
-    """What to do with an input in a status."""
+def admission(status: RunStatus, item: Input) -> Admission:
+    """Return what to do with an input in a status."""
     return _EXCEPTIONS[status].get(type(item), _OTHERWISE[status])

@@ -1,4 +1,4 @@
-"""The outbox is a fold over the state: which commands records lead to, and which still stand."""
+"""The outbox: the commands that records lead to, and those that are still to be carried out."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ from m2pem.engine.records import Record
 from m2pem.engine.state import Behavior, BehaviorPhase, Prompt, RunState, RunStatus, Service
 from m2pem.mission.behavior import Decision
 
-_ASKING = frozenset(
+_WITH_COMMANDS = frozenset(
     {
         r.BehaviorRequested,
         r.BehaviorRestarted,
@@ -34,18 +34,18 @@ _ASKING = frozenset(
         r.RunResumed,
     }
 )
-"""Records that may ask something of the outside: few of those that a run writes."""
+"""Records that may lead to a command: few of those that a run writes."""
 
 
 def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
-    """What newly decided records ask of the outside, in their order.
+    """Return the commands that newly decided records lead to, in their order.
 
-    What was requested and is not wanted any more within the same records is never asked for.
+    What the same records request and withdraw again leads to no command.
     """
     commands: list[Command] = []
-    unasked: set[str] = set()
+    never_opened: set[str] = set()
     for record in records:
-        if type(record) not in _ASKING:
+        if type(record) not in _WITH_COMMANDS:
             continue
         match record:
             case r.BehaviorRequested() | r.BehaviorRestarted():
@@ -69,35 +69,37 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
                 if prompt is not None:
                     commands.append(_open(prompt))
                 else:
-                    unasked.add(record.prompt)
+                    never_opened.add(record.prompt)
             case r.PromptAnswered():
                 commands.append(ClosePrompt(record.prompt, record.decision, record.by))
             case r.PromptWithdrawn():
-                if record.prompt not in unasked:
+                if record.prompt not in never_opened:
                     commands.append(ClosePrompt(record.prompt))
             case r.ServiceRequested():
                 service = state.services.get(record.service)
                 if service is not None:
                     commands.append(_run(service))
                 else:
-                    unasked.add(record.service)
+                    never_opened.add(record.service)
             case r.ServiceWithdrawn():
-                if record.service not in unasked:
+                if record.service not in never_opened:
                     commands.append(CancelService(record.service))
             case r.RunPaused():
                 commands.extend(HoldResource(resource) for resource in _commanded(state))
             case r.RunResumed():
-                commands.extend(ResumeResource(name) for name in _still_wanted(state, records))
+                commands.extend(
+                    ResumeResource(name) for name in _resources_to_resume(state, records)
+                )
             case _:
                 pass
     return commands
 
 
 def outstanding(state: RunState) -> list[Command]:
-    """What the outside should be busy with now.
+    """Return the commands of all that should be active now, for an executive that claims the run.
 
-    For behaviors that nobody has cancelled, the executive asks their arbiter before it starts them
-    (`StartBehavior` here means: it should be running).
+    `StartBehavior` here means that the behavior should be running: the executive asks the arbiter
+    before it starts it.
     """
     commands: list[Command] = []
     for behavior in state.behaviors.values():
@@ -115,7 +117,7 @@ def outstanding(state: RunState) -> list[Command]:
 
 
 def _commanded(state: RunState) -> list[str]:
-    """Resources of behaviors that are neither being cancelled nor held already."""
+    """Return the resources of behaviors that are neither being cancelled nor held already."""
     return [
         resource
         for resource, holders in state.held.items()
@@ -123,9 +125,9 @@ def _commanded(state: RunState) -> list[str]:
     ]
 
 
-def _still_wanted(state: RunState, records: Sequence[Record]) -> list[str]:
-    """Resources that go on with what a pause held: not those that what came in the pause has given
-    something else to do, which says so by a command of its own."""
+def _resources_to_resume(state: RunState, records: Sequence[Record]) -> list[str]:
+    """Return the resources that resume what a pause held, without those that got a new behavior
+    meanwhile: that has a command of its own."""
     new = {
         record.behavior
         for record in records

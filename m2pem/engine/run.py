@@ -2,7 +2,7 @@
 
     run = MissionRun(mission, fleet, "r1")
     step = run.receive(StartRun("VIGNETTE1"), now_us)
-    # write step to the journal; when it is durable, carry out step.commands
+    # write the step to the journal; when it is durable, carry out step.commands
 
 Pure: no clock, no random, no I/O. The same inputs at the same times give the same records.
 """
@@ -25,7 +25,7 @@ from m2pem.mission.mission import Mission
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What an input led to. `seq` is the first record's number; `t_us` their mission time."""
+    """The result of an input. `seq`: number of the first record; `t_us`: mission time of all."""
 
     input: Input
     at_us: int
@@ -36,7 +36,7 @@ class Step:
 
 
 class MissionRun:
-    """One run: its state, and the deciding of inputs."""
+    """A run: its state, and how inputs are decided."""
 
     def __init__(self, mission: Mission, fleet: Fleet | None, run: str, batch: int = 10_000):
         """`batch`: steps that one input may cause before the run yields (`Continue`)."""
@@ -46,7 +46,7 @@ class MissionRun:
     def receive(self, item: Input, now_us: int) -> Step:
         """Decide an input that came at `now_us` (microseconds since the Unix epoch).
 
-        Never raises for what a mission, an operator or a vehicle did. An exception is a bug in
+        Never raises because of a mission, an operator or a vehicle. An exception is a bug in
         m2pem; the state is not usable after it.
         """
         x = self._x
@@ -63,7 +63,8 @@ class MissionRun:
             apply(self.state, record)
 
     def outstanding(self) -> Sequence[Command]:
-        """What the outside should be busy with now: for an executive that takes the run over."""
+        """Return the commands of all that should be active, for an executive that claims the
+        run."""
         return outstanding(self.state)
 
     @property
@@ -73,12 +74,12 @@ class MissionRun:
 
     @property
     def steps_done(self) -> int:
-        """Elements executed since this object was made: what bounds a rehearsal."""
-        return self._x.done
+        """Number of elements executed since this object was made; a limit of rehearsals."""
+        return self._x.steps_done
 
     @property
     def next_due_us(self) -> int | None:
-        """When the next timer is due (microseconds since the Unix epoch); None: no timer runs."""
+        """Due time of the next timer (microseconds since the Unix epoch); None: no timer runs."""
         if self.state.status is not RunStatus.RUNNING:
             return None
         due = next_timer(self._x)

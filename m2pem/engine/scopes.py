@@ -21,13 +21,13 @@ def open_scope(x: Execution, token: Token) -> Scope:
     return x.state.scopes[number]
 
 
-Failing = Collection[Token | Scope]
-"""What an error goes through, from where it arose outwards: that has failed. All else that it ends
-is interrupted or terminated (clause 13.3.2)."""
+ErrorPath = Collection[Token | Scope]
+"""The tokens and scopes that an error passes, from where it arose outwards: these have failed. All
+else that the error ends is interrupted or terminated (clause 13.3.2)."""
 
 
-def failing(token: Token) -> Failing:
-    """What an error from a token goes through, until it is caught."""
+def error_path(token: Token) -> ErrorPath:
+    """Return the tokens and scopes that an error from a token passes until it is caught."""
     place: Token | None = token
     found: set[Token | Scope] = set()
     while place is not None:
@@ -36,8 +36,10 @@ def failing(token: Token) -> Failing:
     return found
 
 
-def withdraw(x: Execution, token: Token, outcome: TokenOutcome, failed: Failing = ()) -> None:
-    """End what the activity under a token does: its behavior, prompt, service or inside."""
+def stop_activity(
+    x: Execution, token: Token, outcome: TokenOutcome, failed: ErrorPath = ()
+) -> None:
+    """End the work of the activity that a token is on: its behavior, prompt, service or scope."""
     if token.behavior:
         x.emit(r.BehaviorCancelRequested(token.behavior))
     if token.prompt:
@@ -45,35 +47,35 @@ def withdraw(x: Execution, token: Token, outcome: TokenOutcome, failed: Failing 
     if token.service:
         x.emit(r.ServiceWithdrawn(token.service))
     if token.inner is not None:
-        kill(x, token.inner, outcome, failed)
+        end_scope(x, token.inner, outcome, failed)
 
 
-def kill(x: Execution, scope: Scope, outcome: TokenOutcome, failed: Failing = ()) -> None:
+def end_scope(x: Execution, scope: Scope, outcome: TokenOutcome, failed: ErrorPath = ()) -> None:
     """End a scope and all within it, innermost first."""
-    empty(x, scope, outcome, failed)
-    close(x, scope, _how(scope, outcome, failed))
+    end_tokens(x, scope, outcome, failed)
+    close_scope(x, scope, _outcome_of(scope, outcome, failed))
 
 
-def empty(x: Execution, scope: Scope, outcome: TokenOutcome, failed: Failing = ()) -> None:
-    """End every token of a scope, and all within it, but not the scope itself."""
+def end_tokens(x: Execution, scope: Scope, outcome: TokenOutcome, failed: ErrorPath = ()) -> None:
+    """End every token of a scope, and all within them, but not the scope itself."""
     doomed = [scope]
     for each in doomed:
         doomed.extend(token.inner for token in each.tokens.values() if token.inner is not None)
     for each in reversed(doomed):
         for token in list(each.tokens.values()):
-            withdraw(x, token, outcome, failed)
-            x.leave(token, _how(token, outcome, failed))
+            stop_activity(x, token, outcome, failed)
+            x.leave(token, _outcome_of(token, outcome, failed))
         if each is not scope:
-            close(x, each, _how(each, outcome, failed))
+            close_scope(x, each, _outcome_of(each, outcome, failed))
 
 
-def _how(item: Token | Scope, outcome: TokenOutcome, failed: Failing) -> TokenOutcome:
+def _outcome_of(item: Token | Scope, outcome: TokenOutcome, failed: ErrorPath) -> TokenOutcome:
     return TokenOutcome.FAILED if item in failed else outcome
 
 
-def close(x: Execution, scope: Scope, outcome: TokenOutcome) -> None:
-    """State that a scope has ended. Nothing may be left in it."""
-    kept = outcome is TokenOutcome.COMPLETED and _can_be_undone(scope)
+def close_scope(x: Execution, scope: Scope, outcome: TokenOutcome) -> None:
+    """Close a scope in which nothing is left."""
+    kept = outcome is TokenOutcome.COMPLETED and _can_be_compensated(scope)
     if scope.owner is not None:
         node = scope.owner.node
         process, element = x.process_of(node), node.id
@@ -82,32 +84,35 @@ def close(x: Execution, scope: Scope, outcome: TokenOutcome) -> None:
     x.emit(r.ScopeClosed(scope.id, process, element, outcome, kept))
 
 
-def _can_be_undone(scope: Scope) -> bool:
-    """Whether what is in a scope that has completed can undo its activity (clause 13.5.5).
+def _can_be_compensated(scope: Scope) -> bool:
+    """Whether a completed scope can compensate its activity (clause 13.5.5).
 
-    By its compensation event subprocess, else by undoing what was done in it. What was interrupted
-    has not completed; a compensation activity is not undone; one of its own goes first.
+    By its compensation event subprocess, else by compensating what was done in it. What was
+    interrupted has not completed, a compensation activity is not compensated, and the activity's
+    own compensation activity comes first.
     """
     owner = scope.owner
-    if owner is None or owner.undoes is not None or scope.interrupted:
+    if owner is None or owner.compensates is not None or scope.interrupted:
         return False
     node = owner.node
     assert isinstance(node, Activity)
-    if node.for_compensation or node.compensation is not None or compensates_around(node):
+    if node.for_compensation or node.compensation is not None or is_compensation_handler(node):
         return False
-    return bool(scope.done) or (scope.loop is None and compensator(scope.container) is not None)
+    return bool(scope.compensable) or (
+        scope.loop is None and compensation_handler(scope.container) is not None
+    )
 
 
-def compensator(container: Container) -> SubProcess | None:
-    """The compensation event subprocess of a container."""
+def compensation_handler(container: Container) -> SubProcess | None:
+    """Return the compensation event subprocess of a container."""
     for inner in container.event_subprocesses:
-        if compensates_around(inner):
+        if is_compensation_handler(inner):
             return inner
     return None
 
 
-def compensates_around(node: Activity) -> bool:
-    """Whether it is a compensation event subprocess."""
+def is_compensation_handler(node: Activity) -> bool:
+    """Whether an activity is a compensation event subprocess."""
     return (
         isinstance(node, SubProcess)
         and node.triggered_by_event
@@ -119,31 +124,33 @@ def compensates_around(node: Activity) -> bool:
     )
 
 
-def divert(x: Execution, token: Token, boundary: BoundaryEvent, failed: Failing = ()) -> Token:
+def move_to_boundary(
+    x: Execution, token: Token, boundary: BoundaryEvent, failed: ErrorPath = ()
+) -> Token:
     """Move a token from its activity to a boundary event of it, ending what it did there.
 
     The activity's other boundary events are disarmed with it (paper, section 4.4). `failed`: what
-    an error has gone through; all else is interrupted.
+    an error has passed; all else is interrupted.
     """
-    withdraw(x, token, TokenOutcome.INTERRUPTED, failed)
+    stop_activity(x, token, TokenOutcome.INTERRUPTED, failed)
     x.leave(token, TokenOutcome.FAILED if failed else TokenOutcome.INTERRUPTED)
-    if token.undoes is not None:
-        x.queue.append(token.scope)  # it has undone as much as it could: the next one's turn
+    if token.compensates is not None:
+        x.queue.append(token.scope)  # it was compensating: the next one's turn
     return x.enter(token.id, boundary, token.scope)
 
 
-def begin_event_subprocess(
-    x: Execution, scope: Scope, start: StartEvent, failed: Failing = ()
+def start_event_subprocess(
+    x: Execution, scope: Scope, start: StartEvent, failed: ErrorPath = ()
 ) -> Token:
     """Begin the event subprocess whose start event was triggered in `scope` (clause 13.5.4).
 
-    An interrupting one ends all else in the scope first. `failed`: what an error has gone through;
+    An interrupting one ends all else in the scope first. `failed`: what an error has passed;
     all else is interrupted. Returns the token on its start event.
     """
     container = start.container
     assert isinstance(container, SubProcess)
     if start.interrupting:
-        empty(x, scope, TokenOutcome.INTERRUPTED, failed)
+        end_tokens(x, scope, TokenOutcome.INTERRUPTED, failed)
         if scope.owner is not None and scope.owner.prompt:
             x.emit(r.PromptWithdrawn(scope.owner.prompt))  # an ad-hoc subprocess: nothing to choose
         x.emit(r.ScopeInterrupted(scope.id, x.process_of(container), container.id))
@@ -151,17 +158,17 @@ def begin_event_subprocess(
 
 
 def end_run(
-    x: Execution, outcome: RunOutcome, detail: str = "", failed: Failing | None = None
+    x: Execution, outcome: RunOutcome, detail: str = "", failed: ErrorPath | None = None
 ) -> None:
     """End the run and all that is active in it.
 
-    `failed`: what the error has gone through that ends the run; None: all that is active, if the
+    `failed`: what the error has passed that ends the run; None: all that is active, if the
     run has failed because nothing can go on.
     """
     stuck = outcome is RunOutcome.FAILED and failed is None
     left = TokenOutcome.FAILED if stuck else TokenOutcome.TERMINATED
     for scope in [scope for scope in x.state.scopes.values() if scope.parent is None]:
-        kill(x, scope, left, failed or ())
+        end_scope(x, scope, left, failed or ())
     x.queue.clear()
     x.entered.clear()
     x.emit(r.RunEnded(outcome, detail))

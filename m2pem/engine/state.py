@@ -1,12 +1,13 @@
-"""What a run is at one moment. Only `m2pem.engine.apply` changes it.
+"""The state of a run. Only `m2pem.engine.apply` changes it.
 
-Finished tokens, scopes, behaviors and prompts leave the state: what it holds is bounded by what is
-active, however long the run. All dicts are in order of creation, which makes every walk over them
-the same on every machine.
+Finished tokens, scopes, behaviors and prompts leave the state: its size depends on what is active,
+not on the length of the run. All dicts are in order of creation, so that every iteration is the
+same on every machine.
 """
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import TypeAlias
 
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import RunOutcome, Trigger
@@ -22,7 +23,7 @@ from m2pem.mission.values import Value
 
 
 class RunStatus(StrEnum):
-    """The run's life: `m2pem.engine.lifecycle` says which input is welcome when."""
+    """The status of a run: `m2pem.engine.lifecycle` says which inputs it takes in each."""
 
     NEW = "new"
     RUNNING = "running"
@@ -31,7 +32,7 @@ class RunStatus(StrEnum):
 
 
 @dataclass(slots=True, eq=False)
-class Shared:
+class DataStores:
     """The data stores of a run, which all its processes share (BPMN 2.0.2, clause 10.4.1)."""
 
     keys: frozenset[str]
@@ -42,13 +43,13 @@ class Shared:
 class Scope:
     """An instance of a container: a process or a subprocess.
 
-    `owner` is the token on the activity in `parent`; both None for a process that nobody called.
+    `owner` is the token on the activity in `parent`; both None for a process that was not called.
     `joins` are the tokens waiting at each join, by the flow that they came by. `waits` are the
     start events of its event subprocesses. `loop`: it holds the instances of a loop or
     multi-instance activity, which is the owner's; its container is then the activity's own.
-    `done`: activities that completed in it and can be undone, in that order. `compensations`:
-    what is being undone in it. A scope that holds something to undo is kept by its `Completion`
-    when it has completed, out of `RunState.scopes`.
+    `compensable`: activities that completed in it and can be undone, in that order.
+    `compensations`: what is being undone in it. A scope that holds something to undo is kept by its
+    `CompletedActivity` when it has completed, out of `RunState.scopes`.
     """
 
     id: int
@@ -56,39 +57,39 @@ class Scope:
     parent: "Scope | None"
     owner: "Token | None"
     depth: int
-    shared: Shared
+    shared: DataStores
     tokens: "dict[int, Token]" = field(default_factory=dict)
     data: dict[str, Value] = field(default_factory=dict)
     joins: "dict[FlowNode, Join]" = field(default_factory=dict)
     waits: "dict[int, Wait] | None" = None
     loop: "Loop | None" = None
     gathered: "dict[FlowNode, list[Token]]" = field(default_factory=dict)
-    """Tokens at activities that several must begin, and that have not begun."""
+    """Tokens at activities that begin with several tokens, and have not begun."""
     activated: "dict[FlowNode, tuple[SequenceFlow, ...]]" = field(default_factory=dict)
     """Complex gateways that wait to reset, and the flows whose tokens activated them."""
     chosen: "list[FlowNode]" = field(default_factory=list)
-    """Of an ad-hoc subprocess: what is to begin, and has not."""
+    """Of an ad-hoc subprocess: chosen activities that have not begun."""
     begun: "dict[FlowNode, None]" = field(default_factory=dict)
-    """Of an ad-hoc subprocess: what was begun by choice."""
+    """Of an ad-hoc subprocess: activities that were begun by choice."""
     completing: bool = False
-    """Only event subprocesses are active in it any more: no other one can begin."""
+    """Only event subprocesses are still active in it: no other one can begin."""
     interrupted: bool = False
     """An interrupting event subprocess of it has begun: no other one can."""
-    done: "dict[int, Completion] | None" = None
+    compensable: "dict[int, CompletedActivity] | None" = None
     compensations: "dict[int, Compensation] | None" = None
     reopened: bool = False
-    """It had completed, and is being undone."""
+    """It had completed, and is being compensated."""
     cancelled: bool = False
-    """A transaction that is left as soon as what was done in it is undone."""
+    """A transaction that is left as soon as what was done in it is compensated."""
 
 
 @dataclass(slots=True, eq=False)
 class Loop:
-    """How far the instances of an activity have come (BPMN 2.0.2, table 10.31).
+    """Progress of the instances of an activity (BPMN 2.0.2, table 10.31).
 
-    `total`: instances there will be, -1 while nobody knows (a standard loop). `items`: what each
-    reads, when they come from a collection. `outputs`: what each gave, by instance. Those that
-    were begun are active, or `completed`, or ended otherwise (`terminated`).
+    `total`: number of instances, -1 if not known (a standard loop). `items`: the item of each, when
+    they come from a collection. `outputs`: the output of each, by instance. Started instances are
+    active, or `completed`, or ended otherwise (`terminated`).
     """
 
     total: int
@@ -100,12 +101,12 @@ class Loop:
 
 
 @dataclass(slots=True, eq=False)
-class Completion:
-    """An activity, or an instance of one, that completed in `scope` and can be undone.
+class CompletedActivity:
+    """An activity, or an instance of one, that completed in `scope` and can be compensated.
 
-    `kept`: its own scope as it was then, to be undone by what is in it; None: the activity's
-    compensation activity undoes it. `own`: the data of the activity itself then. `claimed`: the
-    compensation that will undo it; 0: none yet.
+    `kept_scope`: its own scope as it was then, to be compensated by what is in it; None: the
+    activity's compensation activity compensates it. `own`: the data of the activity itself then.
+    `claimed_by`: the compensation that will handle it; 0: none yet.
     """
 
     id: int
@@ -113,24 +114,24 @@ class Completion:
     node: Activity
     instance: int | None
     own: dict[str, Value] | None
-    kept: Scope | None
-    claimed: int = 0
+    kept_scope: Scope | None
+    claimed_by: int = 0
 
 
 @dataclass(slots=True, eq=False)
 class Compensation:
-    """Completed activities of `scope` that are being undone, one after the other.
+    """A compensation: completed activities of `scope` that are undone one after the other.
 
     `left`: those that are still to be undone, in this order. `begins`: the one whose turn it is,
-    and the id of the token that will undo it. `token`: on what undoes it now. `waiter`: on the
-    event that threw it and waits for its end; None: nobody waits.
+    and the id of the token that will undo it. `token`: on what compensates it now. `waiter`: on the
+    event that threw it and waits for its end; None: no event waits.
     """
 
     id: int
     scope: Scope
-    left: list[Completion]
+    left: list[CompletedActivity]
     waiter: "Token | None" = None
-    begins: tuple[int, Completion] | None = None
+    begins: tuple[int, CompletedActivity] | None = None
     token: "Token | None" = None
 
 
@@ -145,7 +146,7 @@ class Join:
 class Token:
     """A token on a flow node. `flow`: how it came. A move makes a new object with the same id.
 
-    At most one of `behavior`, `prompt`, `service` and `inner` is set: what its activity does.
+    At most one of `behavior`, `service` and `inner` is set: the work of its activity.
     `instance`: which instance of a loop or multi-instance activity it is, from 0; None: none.
     `own`: data of the activity itself (item variable, data inputs and outputs); None: nothing.
     """
@@ -162,28 +163,28 @@ class Token:
     instance: int | None = None
     own: dict[str, Value] | None = None
     compensations: dict[int, Compensation] | None = None
-    """What the compensation event that it is on waits for."""
-    undoes: Compensation | None = None
-    """It is on a compensation activity, or again on a completed activity, to undo one."""
-    kept: Scope | None = None
-    """The scope of its activity, which has completed and holds something to undo."""
+    """The compensations that its compensation event waits for."""
+    compensates: Compensation | None = None
+    """The compensation that it is part of, on a compensation or a completed activity."""
+    kept_scope: Scope | None = None
+    """The completed scope of its activity, which can be compensated."""
     armed: bool = False
-    """It has begun to wait: what it waits for is not armed again in its turn."""
-    abnormal: bool = False
-    """What its activity did was ended early (terminated, or interrupted by an event subprocess),
-    so that there is nothing to undo."""
+    """Its events have been armed: they are not armed again in its turn."""
+    ended_early: bool = False
+    """Its activity was ended early (terminated, or interrupted by an event subprocess), so that
+    there is nothing to compensate."""
 
     @property
     def is_reopened(self) -> bool:
-        """Whether its activity had completed, and is being undone."""
+        """Whether its activity had completed, and is being compensated."""
         return self.inner is not None and self.inner.reopened
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wait:
-    """A catch event that is armed.
+    """An armed catch event.
 
-    `token` waits: at its own node, at a boundary event of it, or at an event behind the
+    `token` waits: at its own node, at a boundary event of its activity, or at an event after the
     event-based gateway that it is on. None: `scope` waits, for the start event of an event
     subprocess of it, or for a condition that begins another process.
     Other fields as in record `EventAwaited`.
@@ -201,8 +202,12 @@ class Wait:
     cycle: str
 
 
+TokenOrScope: TypeAlias = Token | Scope
+"""A place in the mission where names are read and events are awaited."""
+
+
 class BehaviorPhase(StrEnum):
-    """What the engine wants of a behavior: to run, to end, or an operator's word about it."""
+    """The phase of a behavior: running, being cancelled, or waiting for an operator's decision."""
 
     ACTIVE = "active"
     CANCELLING = "cancelling"
@@ -232,7 +237,7 @@ class Behavior:
 
 @dataclass(slots=True, eq=False)
 class Prompt:
-    """A prompt that stands. `behavior`: set when it asks what to do with one after a restart."""
+    """An open prompt. `behavior`: the behavior that it asks about after a restart."""
 
     id: str
     token: Token
@@ -244,7 +249,7 @@ class Prompt:
 
 @dataclass(slots=True, eq=False)
 class Service:
-    """A service that runs."""
+    """A running service."""
 
     id: str
     token: Token
@@ -254,8 +259,8 @@ class Service:
 
 
 @dataclass(frozen=True, slots=True)
-class Letter:
-    """A message that nobody took yet: what it carries, and its correlation keys."""
+class KeptMessage:
+    """A message without a receiver yet: its data and its correlation keys."""
 
     data: dict[str, Value]
     keys: dict[str, Value]
@@ -263,7 +268,8 @@ class Letter:
 
 @dataclass(slots=True, eq=False)
 class RunState:
-    """A whole run. Times are microseconds: `_us` since the Unix epoch unless said otherwise."""
+    """The state of a run. Times are microseconds: `_us` since the Unix epoch unless said
+    otherwise."""
 
     run: str
     mission: Mission
@@ -285,7 +291,7 @@ class RunState:
     last_prompt: int = 0
     last_service: int = 0
 
-    shared: Shared = field(init=False)
+    shared: DataStores = field(init=False)
     root: Scope | None = None
     scopes: dict[int, Scope] = field(default_factory=dict)
     tokens: dict[int, Token] = field(default_factory=dict)
@@ -306,8 +312,8 @@ class RunState:
     """Heap of (due mission time, wait); waits that are over may still be in it, but not first."""
     dates: list[tuple[int, int]] = field(default_factory=list)
     """Heap of (due time since the Unix epoch, wait); likewise."""
-    mailbox: dict[str, list[Letter]] = field(default_factory=dict)
-    """Messages that nobody was waiting for yet, by message id; first come first."""
+    kept_messages: dict[str, list[KeptMessage]] = field(default_factory=dict)
+    """Messages that no receiver waits for yet, by message id; first come first."""
 
     geometries: dict[str, dict[str, Value]] = field(default_factory=dict)
     deferred: list[Input] = field(default_factory=list)
@@ -316,7 +322,7 @@ class RunState:
     """Ids of inputs that carried one."""
 
     def __post_init__(self) -> None:
-        self.shared = Shared(self.mission.data_stores)
+        self.shared = DataStores(self.mission.data_stores)
 
     def mission_time_us(self, now_us: int) -> int:
         """Microseconds from the start of the run, not counting pauses."""

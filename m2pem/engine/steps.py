@@ -1,12 +1,12 @@
-"""Doing the steps that an input causes, one after the other: the engine's only loop."""
+"""Executing the steps that an input causes, one after the other: the engine's only loop."""
 
 from collections import deque
 from collections.abc import Iterator
 
 from m2pem.engine import records as r
-from m2pem.engine.arming import arm_next, comes_true
+from m2pem.engine.arming import arm_next, condition_fires
 from m2pem.engine.elements import HANDLERS
-from m2pem.engine.elements.activities import has_entered
+from m2pem.engine.elements.activities import has_been_entered
 from m2pem.engine.elements.gateways import fire_joins
 from m2pem.engine.elements.subprocesses import check_scope
 from m2pem.engine.execution import Execution, definitions_of
@@ -21,22 +21,22 @@ _ACTIVATE = {kind: handler.activate for kind, handler in HANDLERS.items()}
 
 
 class Steps(Execution):
-    """An execution that can work its queue off."""
+    """An execution with its loop. `batch`: steps that one input may cause before a yield."""
 
-    __slots__ = ("batch", "done")
+    __slots__ = ("batch", "steps_done")
 
     handlers = HANDLERS
 
     def __init__(self, state: RunState, fleet: Fleet | None, batch: int) -> None:
         super().__init__(state, fleet)
         self.batch = batch
-        self.left = batch
-        self.done = 0
+        self.steps_left = batch
+        self.steps_done = 0
 
     def begin(self, now_us: int) -> None:
-        """Get ready for an input that came at `now_us`; steps left over go first."""
+        """Prepare for an input that came at `now_us`; steps left over come first."""
         self.now_us = now_us
-        self.left = self.batch
+        self.steps_left = self.batch
         if self.state.yielded and self.state.status is RunStatus.RUNNING:
             self.reload_queue()
 
@@ -44,16 +44,16 @@ class Steps(Execution):
         """Execute tokens until none can move, or the batch is used up."""
         state, queue, entered = self.state, self.queue, self.entered
         while state.status is RunStatus.RUNNING:
-            while queue or entered or self.changed:
-                # Of what comes at once, too, each takes its part: tokens may double at each turn.
-                if self.left <= 0 and self._has_steps():
+            while queue or entered or self.data_changed:
+                # Tokens that are armed at once count, too: their number may double at each turn.
+                if self.steps_left <= 0 and self._has_steps():
                     return
                 if entered:
-                    self.left -= 1
+                    self.steps_left -= 1
                     arm_next(self)
                     continue
-                if self.changed:
-                    self.changed = False
+                if self.data_changed:
+                    self.data_changed = False
                     self._fire_conditions()
                     continue
                 if not queue:
@@ -62,55 +62,55 @@ class Steps(Execution):
                 # Written out, as this is the inner loop.
                 if type(item) is Token:
                     if state.tokens.get(item.id) is item:
-                        self.left -= 1
+                        self.steps_left -= 1
                         _ACTIVATE[type(item.node)](self, item)
                 elif state.scopes.get(item.id) is item:
                     assert isinstance(item, Scope)
-                    self.left -= 1
+                    self.steps_left -= 1
                     check_scope(self, item)
             if not fire_joins(self):
                 return
 
     def _has_steps(self) -> bool:
-        """Whether anything of what came next is still there; what has gone is forgotten."""
+        """Whether a queued token or scope is still current; drops those before it that are not."""
         queue, entered = self.queue, self.entered
-        while queue and not self._is_there(queue[0]):
+        while queue and not self._is_current(queue[0]):
             queue.popleft()
-        while entered and not self._is_there(entered[0]):
+        while entered and not self._is_current(entered[0]):
             entered.popleft()
         return bool(queue or entered)
 
     def _fire_conditions(self) -> None:
-        """Those that have become true, in the order in which they were armed; as far as the batch
-        goes, and one at least."""
+        """Fire the conditions that have become true, in the order of arming; as many as the batch
+        allows, and one at least."""
         conditions, waits = self.state.conditions, self.state.waits
         for number in list(conditions):
-            if self.left <= 0 and (self.queue or self.entered):
-                self.changed = True
+            if self.steps_left <= 0 and (self.queue or self.entered):
+                self.data_changed = True
                 return
-            if number in conditions and comes_true(self, waits[number]):
-                self.left -= 1
+            if number in conditions and condition_fires(self, waits[number]):
+                self.steps_left -= 1
                 trigger(self, waits[number], {})
 
-    def _is_there(self, item: Token | Scope) -> bool:
-        """Whether it is still where it was when it was queued, and not ended before its turn."""
+    def _is_current(self, item: Token | Scope) -> bool:
+        """Whether a queued token or scope has not moved or ended before its turn."""
         if type(item) is Token:
             return self.state.tokens.get(item.id) is item
         return self.state.scopes.get(item.id) is item
 
     def finish(self) -> list[Record]:
-        """All records of the input: its steps are done, or left over in a `RunYielded`."""
+        """Return all records of the input; steps that are left over are in a `RunYielded`."""
         self.run_steps()
         if self.queue or self.entered:
             self._yield()
         else:
-            self._notice_a_stuck_run()
-        self.done += self.batch - self.left
+            self._fail_if_stuck()
+        self.steps_done += self.batch - self.steps_left
         records, self.records = self.records, []
         return records
 
     def _yield(self) -> None:
-        # Written out, as there may be many thousands at each of many batches.
+        # Written out for speed: there may be thousands at each of many batches.
         tokens, scopes = self.state.tokens, self.state.scopes
         steps = []
         for item in dict.fromkeys(self._in_order()):
@@ -124,7 +124,7 @@ class Steps(Execution):
         self.emit(r.RunYielded(tuple(steps)))
 
     def _in_order(self) -> Iterator[Token | Scope]:
-        """What is queued and what has entered, each in its order; a token may be in both."""
+        """Yield what is queued and what has entered, each in its order; a token may be in both."""
         entered = deque(self.entered)
         in_both = set(entered) & set(self.queue) if entered else ()
         for item in self.queue:
@@ -134,20 +134,20 @@ class Steps(Execution):
         yield from entered
 
     def reload_queue(self) -> None:
-        """Take up the steps that a yield left over."""
+        """Queue the steps that a yield left over."""
         steps = self.state.yielded
         if steps:
             self.emit(r.RunYielded(()))
             # The batch before may have been another process.
-            self.moved.update(self.state.scopes)
-            self.changed = True
+            self.joins_to_check.update(self.state.scopes)
+            self.data_changed = True
         tokens, queue, waits = self.state.tokens, self.queue, self.waits
         for number in steps:
             if number > 0:
                 token = tokens.get(number)
                 if token is None:
                     continue
-                if (token.instance is None and token.node not in waits) or has_entered(token):
+                if (token.instance is None and token.node not in waits) or has_been_entered(token):
                     queue.append(token)
                 else:
                     self.execute_later(token)
@@ -156,7 +156,7 @@ class Steps(Execution):
                 if scope is not None:
                     self.queue.append(scope)
 
-    def _others_can_begin(self) -> bool:
+    def _another_process_can_begin(self) -> bool:
         """Whether a signal or message from outside can begin another process."""
         return any(
             isinstance(definition, SignalEventDefinition | MessageEventDefinition)
@@ -164,15 +164,15 @@ class Steps(Execution):
             for definition in definitions_of(start)
         )
 
-    def _notice_a_stuck_run(self) -> None:
-        """No token can move and nothing is awaited: the run has failed (a deadlock)."""
+    def _fail_if_stuck(self) -> None:
+        """Fail the run if no token can move and nothing is awaited (a deadlock)."""
         state = self.state
         if state.status is not RunStatus.RUNNING:
             return
         if state.prompts or state.services or len(state.waits) > len(state.conditions):
             return
-        if state.conditions and state.shared.keys and self._others_can_begin():
-            return  # they may write to a data store what a condition reads
+        if state.conditions and state.shared.keys and self._another_process_can_begin():
+            return  # it may write to a data store what a condition reads
         if any(token.behavior for token in state.tokens.values()):
             return
         stuck = dict.fromkeys(

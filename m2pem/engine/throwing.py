@@ -1,4 +1,4 @@
-"""Errors and escalations: they go up, scope by scope, to what catches them."""
+"""Throwing errors and escalations: scope by scope outwards, to the event that catches them."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,7 +7,13 @@ from typing import TypeVar
 from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import RunOutcome, TokenOutcome
-from m2pem.engine.scopes import Failing, begin_event_subprocess, divert, end_run, failing
+from m2pem.engine.scopes import (
+    ErrorPath,
+    end_run,
+    error_path,
+    move_to_boundary,
+    start_event_subprocess,
+)
 from m2pem.engine.state import Scope, Token
 from m2pem.mission.elements import Activity, BoundaryEvent, Event, StartEvent
 from m2pem.mission.events import (
@@ -23,15 +29,15 @@ from m2pem.mission.events import (
 def throw_error(
     x: Execution, token: Token, code: str, reason: str = "", *, leaving: bool = False
 ) -> None:
-    """Throw an error where a token is; it goes up scope by scope (BPMN 2.0.2, clause 10.5.7).
+    """Throw an error where a token is; it goes outwards scope by scope (BPMN 2.0.2, clause 10.5.7).
 
-    An activity's own boundary events are asked first, then the event subprocesses of its scope,
+    An activity's own boundary events are checked first, then the event subprocesses of its scope,
     then the boundary events of the activity around it, and so on. What catches it ends the
-    activity or scope. Uncaught, the run fails. `leaving`: the token has done its part with this
-    (an error end event).
+    activity or scope. Uncaught, the run fails. `leaving`: the token is consumed (an error end
+    event).
     """
     node = token.node
-    caught = _catcher(token, code, _error_code)
+    caught = _find_catcher(token, code, _error_code)
     x.emit(
         r.ErrorThrown(
             token.id,
@@ -43,7 +49,7 @@ def throw_error(
             caught.event.id if caught is not None else "",
         )
     )
-    failed = failing(token)
+    failed = error_path(token)
     if leaving:
         x.leave(token, TokenOutcome.COMPLETED)
     if caught is None:
@@ -55,11 +61,11 @@ def throw_error(
             failed,
         )
     else:
-        _hand_over(x, caught, failed)
+        _catch(x, caught, failed)
 
 
 def throw_error_in(x: Execution, scope: Scope, code: str, reason: str) -> None:
-    """Throw an error that arose in a scope as a whole: it is the activity's around it."""
+    """Throw an error that arose in a scope as a whole, from the activity of the scope."""
     if scope.owner is not None:
         throw_error(x, scope.owner, code, reason)
         return
@@ -76,11 +82,11 @@ def throw_escalation(
 ) -> bool:
     """Throw an escalation from the event under a token; the nearest outer scope catches it.
 
-    Returns whether the scope goes on: an interrupting catch ends it. `leaving`: the token has done
-    its part with this (an escalation end event).
+    Returns whether the scope goes on: an interrupting catch ends it. `leaving`: the token is
+    consumed (an escalation end event).
     """
     node = token.node
-    caught = _catcher(token, escalation.code, _escalation_code)
+    caught = _find_catcher(token, escalation.code, _escalation_code)
     x.emit(
         r.EscalationThrown(
             token.id,
@@ -100,13 +106,13 @@ def throw_escalation(
         if isinstance(caught.event, BoundaryEvent):
             x.spawn(caught.event, caught.place.scope)
         else:
-            begin_event_subprocess(x, caught.place, caught.event)
+            start_event_subprocess(x, caught.place, caught.event)
         return True
-    _hand_over(x, caught)
+    _catch(x, caught)
     return False
 
 
-# --- who catches --------------------------------------------------------------------------------
+# --- catchers --------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,15 +127,15 @@ class _InScope:
     event: StartEvent
 
 
-def _hand_over(x: Execution, caught: _AtBoundary | _InScope, failed: Failing = ()) -> None:
+def _catch(x: Execution, caught: _AtBoundary | _InScope, failed: ErrorPath = ()) -> None:
     if isinstance(caught, _AtBoundary):
-        divert(x, caught.place, caught.event, failed)
+        move_to_boundary(x, caught.place, caught.event, failed)
     else:
-        begin_event_subprocess(x, caught.place, caught.event, failed)
+        start_event_subprocess(x, caught.place, caught.event, failed)
 
 
 def _error_code(definition: EventDefinition) -> str | None:
-    """The code that an error definition catches, "" for every one; None: it catches no error."""
+    """Return the code that an error definition catches, "" for all; None: it catches no error."""
     if not isinstance(definition, ErrorEventDefinition):
         return None
     return definition.error.code if definition.error is not None else ""
@@ -141,27 +147,27 @@ def _escalation_code(definition: EventDefinition) -> str | None:
     return definition.escalation.code if definition.escalation is not None else ""
 
 
-def _catcher(
+def _find_catcher(
     thrower: Token, code: str, code_of: Callable[[EventDefinition], str | None]
 ) -> _AtBoundary | _InScope | None:
-    """The nearest event that catches a code; one that names it before one that takes all.
+    """Return the nearest event that catches a code; one that names it comes before a catch-all.
 
     An event subprocess does not catch what is thrown in itself, and none begins in a scope that
     one has interrupted, or in which only they are left. The boundary events of a loop or
-    multi-instance activity are the whole activity's, not its instances'; those of an activity that
-    is undone are over.
+    multi-instance activity belong to the outer instance; those of an activity that
+    is being compensated are over.
     """
     token: Token | None = thrower
     while token is not None:
         node, scope = token.node, token.scope
         if isinstance(node, Activity) and token.instance is None and not token.is_reopened:
-            boundary = _best(node.boundary, code, code_of)
+            boundary = _best_match(node.boundary, code, code_of)
             if boundary is not None:
                 return _AtBoundary(token, boundary)
         if scope.loop is None and not (scope.interrupted or scope.completing):
             handlers = scope.container.event_subprocesses
             starts = [start for each in handlers if each is not node for start in each.starts]
-            start = _best(starts, code, code_of)
+            start = _best_match(starts, code, code_of)
             if start is not None:
                 return _InScope(scope, start)
         token = scope.owner
@@ -169,15 +175,15 @@ def _catcher(
 
 
 def catcher_of_error(thrower: Token, code: str) -> Event | None:
-    """The event that would catch an error thrown now where a token is; None: the run would fail."""
-    caught = _catcher(thrower, code, _error_code)
+    """Return the event that would catch an error thrown at a token; None: the run would fail."""
+    caught = _find_catcher(thrower, code, _error_code)
     return caught.event if caught is not None else None
 
 
 Catching = TypeVar("Catching", bound=Event)
 
 
-def _best(
+def _best_match(
     events: Sequence[Catching], code: str, code_of: Callable[[EventDefinition], str | None]
 ) -> Catching | None:
     for_all = None

@@ -7,14 +7,13 @@ receive it at all.
 """
 
 from m2pem.engine import records as r
-from m2pem.engine.arming import arm, arm_again, comes_true, definition_of
-from m2pem.engine.correlation import fits, keys_of, remember
-from m2pem.engine.data import Place
+from m2pem.engine.arming import arm, arm_again, condition_fires, definition_of
+from m2pem.engine.correlation import keys_of, matches, remember_keys
 from m2pem.engine.data_flow import payload, receive_payload
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.records import Trigger
-from m2pem.engine.scopes import begin_event_subprocess, divert
-from m2pem.engine.state import Scope, Token, Wait
+from m2pem.engine.scopes import move_to_boundary, start_event_subprocess
+from m2pem.engine.state import Scope, Token, TokenOrScope, Wait
 from m2pem.engine.throwing import throw_error
 from m2pem.errors import ExpressionError
 from m2pem.mission.elements import (
@@ -40,14 +39,14 @@ from m2pem.mission.values import Value
 def arm_boundary(x: Execution, token: Token, activity: Activity) -> bool:
     """Arm the boundary events of the activity that a token has entered.
 
-    Errors and escalations are not armed: they look for their catcher. False: the token has left
-    already, because a timer was wrong, a message had been kept or a condition was true.
+    False: the token has left already, because a timer was wrong, a message had been kept or a
+    condition was true.
     """
     for boundary in activity.boundary:
         for definition in boundary.definitions:
             if not arm(x, token, boundary, definition):
                 return False
-    return collect_letters(x, token) and look_at_conditions(x, token)
+    return take_kept_messages(x, token) and fire_true_conditions(x, token)
 
 
 def arm_event_subprocesses(x: Execution, scope: Scope) -> bool:
@@ -76,31 +75,31 @@ def arm_triggered_timers(x: Execution, root: Scope) -> bool:
     return True
 
 
-def collect_letters(x: Execution, holder: Place) -> bool:
-    """Let a token or scope that waits for messages have those kept for it.
+def take_kept_messages(x: Execution, holder: TokenOrScope) -> bool:
+    """Trigger the message events of a token or scope for which a message was kept.
 
-    False: the token has left with one.
+    False: the token has left with a message.
     """
-    found = bool(x.state.mailbox)
+    found = bool(x.state.kept_messages)
     while found and holder.waits is not None:
         found = False
         for wait in list(holder.waits.values()):
-            number = _letter_for(x, wait) if wait.id in x.state.waits else None
+            number = _kept_message_for(x, wait) if wait.id in x.state.waits else None
             if number is not None:
                 found = True
-                letter = x.state.mailbox[wait.ref][number]
-                trigger(x, wait, letter.data, letter.keys, letter=number)
+                kept = x.state.kept_messages[wait.ref][number]
+                trigger(x, wait, kept.data, kept.keys, kept_index=number)
                 if isinstance(holder, Token) and x.state.tokens.get(holder.id) is not holder:
                     return False
     return True
 
 
-def _letter_for(x: Execution, wait: Wait) -> int | None:
-    """Which of the messages that were kept is for somebody who waits."""
+def _kept_message_for(x: Execution, wait: Wait) -> int | None:
+    """Return the index of the first kept message that a wait matches."""
     if wait.trigger is not Trigger.MESSAGE:
         return None
-    for number, letter in enumerate(x.state.mailbox.get(wait.ref, ())):
-        if fits(x, wait.ref, letter.keys, wait.token or wait.scope):
+    for number, kept in enumerate(x.state.kept_messages.get(wait.ref, ())):
+        if matches(x, wait.ref, kept.keys, wait.token or wait.scope):
             return number
     return None
 
@@ -111,8 +110,8 @@ def _letter_for(x: Execution, wait: Wait) -> int | None:
 def arm_conditional_starts(x: Execution, root: Scope) -> None:
     """Arm the conditions that begin the other processes of the file.
 
-    Those have no data before they begin: the conditions read that of the process that the run
-    began with, and are awaited as long as it lasts (docs/missions.md).
+    A process has no data before it begins: the conditions read the data of the process that the
+    run began with, and are awaited as long as that lasts (docs/missions.md).
     """
     for start in x.triggered_starts:
         for definition in definitions_of(start):
@@ -120,11 +119,13 @@ def arm_conditional_starts(x: Execution, root: Scope) -> None:
                 arm(x, root, start, definition)
 
 
-def look_at_conditions(x: Execution, token: Token) -> bool:
-    """Fire the conditions that a token waits for and that are true, in the order in which they were
-    armed. False: it has left with one."""
+def fire_true_conditions(x: Execution, token: Token) -> bool:
+    """Fire the true conditions that a token waits for, in the order in which they were armed.
+
+    False: the token has left.
+    """
     for number in list(token.waits or ()):
-        if number in x.state.conditions and comes_true(x, x.state.waits[number]):
+        if number in x.state.conditions and condition_fires(x, x.state.waits[number]):
             trigger(x, x.state.waits[number], {})
     return x.state.tokens.get(token.id) is token
 
@@ -138,28 +139,29 @@ def trigger(
     data: dict[str, Value],
     keys: dict[str, Value] | None = None,
     *,
-    letter: int | None = None,
+    kept_index: int | None = None,
 ) -> None:
-    """What a token waited for has come: a catch event goes on, a boundary event is entered.
+    """Trigger an awaited event: a catch event is left, a boundary event is entered.
 
-    `keys`: of a message. `letter`: it is the one of that number that was kept.
+    `keys`: the correlation keys of a message. `kept_index`: the index of the kept message that it
+    is.
     """
-    x.emit(r.EventTriggered(wait.id, letter is not None, letter or 0))
+    x.emit(r.EventTriggered(wait.id, kept_index is not None, kept_index or 0))
     token, node = wait.token, wait.node
     if keys and token is not None:
-        remember(x, token, keys)
+        remember_keys(x, token, keys)
     if token is None:
-        _in_scope(x, wait, data, keys or {})
+        _trigger_in_scope(x, wait, data, keys or {})
     elif node is token.node:
-        if receive_payload(x, token, data) and not _is_one_of_several(node, token.waits):
+        if receive_payload(x, token, data) and not _awaits_more_triggers(node, token.waits):
             x.handlers[type(node)].trigger(x, token)
     elif isinstance(node, BoundaryEvent):
-        _at_boundary(x, wait, token, node, data)
+        _trigger_boundary(x, wait, token, node, data)
     else:
-        _behind_gateway(x, token, node, data)
+        _trigger_of_gateway(x, token, node, data)
 
 
-def _is_one_of_several(node: FlowNode, waits: dict[int, Wait] | None) -> bool:
+def _awaits_more_triggers(node: FlowNode, waits: dict[int, Wait] | None) -> bool:
     """Whether a parallel multiple event must still wait for others of its triggers (10.5.1)."""
     if not isinstance(node, Event) or not node.parallel_multiple:
         return False
@@ -167,7 +169,7 @@ def _is_one_of_several(node: FlowNode, waits: dict[int, Wait] | None) -> bool:
 
 
 def _arm_again(x: Execution, wait: Wait) -> None:
-    """What does not interrupt catches again; a parallel multiple event, all of its triggers."""
+    """Arm a non-interrupting event again; a parallel multiple event, with all its triggers."""
     node = wait.node
     if isinstance(node, Event) and node.parallel_multiple:
         for definition in node.definitions:
@@ -177,39 +179,41 @@ def _arm_again(x: Execution, wait: Wait) -> None:
         arm_again(x, wait)
 
 
-def _at_boundary(
+def _trigger_boundary(
     x: Execution, wait: Wait, token: Token, node: BoundaryEvent, data: dict[str, Value]
 ) -> None:
-    if _is_one_of_several(node, token.waits):
+    if _awaits_more_triggers(node, token.waits):
         x.write_all(token, data)
     elif node.interrupting:
-        receive_payload(x, divert(x, token, node), data)
+        receive_payload(x, move_to_boundary(x, token, node), data)
     else:
         _arm_again(x, wait)
         receive_payload(x, x.spawn(node, token.scope), data)
 
 
-def _in_scope(x: Execution, wait: Wait, data: dict[str, Value], keys: dict[str, Value]) -> None:
-    """The start event of an event subprocess, which goes on as one that has happened; or a timer
-    or condition that begins a process."""
+def _trigger_in_scope(
+    x: Execution, wait: Wait, data: dict[str, Value], keys: dict[str, Value]
+) -> None:
+    """Trigger the start event of an event subprocess, or a timer or condition that begins a
+    process."""
     node = wait.node
     if isinstance(node.container, Process):
         arm_again(x, wait)
-        _instance(x, node, _came(wait), data, keys)
+        _start_process(x, node, _definition_of(wait), data, keys)
         return
     assert isinstance(node, StartEvent)
-    if _is_one_of_several(node, wait.scope.waits):
+    if _awaits_more_triggers(node, wait.scope.waits):
         x.write_in(wait.scope, node, data)
         return
     if not node.interrupting:
         _arm_again(x, wait)
-    begun = begin_event_subprocess(x, wait.scope, node)
-    remember(x, begun, keys)
+    begun = start_event_subprocess(x, wait.scope, node)
+    remember_keys(x, begun, keys)
     receive_payload(x, begun, data)
 
 
-def _came(wait: Wait) -> EventDefinition:
-    """The definition of a condition or timer that begins a process."""
+def _definition_of(wait: Wait) -> EventDefinition:
+    """Return the definition of a condition or timer that begins a process."""
     if wait.trigger is Trigger.CONDITION:
         return definition_of(wait)
     definitions = definitions_of(wait.node)
@@ -219,10 +223,10 @@ def _came(wait: Wait) -> EventDefinition:
 # --- event-based gateways -----------------------------------------------------------------------
 
 
-def await_behind(x: Execution, token: Token, but: FlowNode | None = None) -> bool:
-    """Have a token on an event-based gateway wait for the events behind it, other than `but`.
+def await_events_of_gateway(x: Execution, token: Token, but: FlowNode | None = None) -> bool:
+    """Make a token on an event-based gateway wait for the events after it, except `but`.
 
-    False: the token has left already: a timer was wrong, or a condition is true.
+    False: the token has left already, because a timer was wrong or a condition is true.
     """
     for flow in token.node.outgoing:
         if flow.target is but:
@@ -235,15 +239,15 @@ def await_behind(x: Execution, token: Token, but: FlowNode | None = None) -> boo
     return True
 
 
-def _behind_gateway(x: Execution, token: Token, node: FlowNode, data: dict[str, Value]) -> None:
-    """One of the events behind an event-based gateway: the token goes there (13.4.4).
+def _trigger_of_gateway(x: Execution, token: Token, node: FlowNode, data: dict[str, Value]) -> None:
+    """Move a token from an event-based gateway to the event that has occurred (13.4.4).
 
-    Behind a parallel one, which begins a process, each event gets a token, and the gateway's own
-    goes with the last.
+    After a parallel one, which begins a process, each event gets a token; the last event gets the
+    gateway's own.
     """
     gateway = token.node
     assert isinstance(gateway, EventBasedGateway)
-    if _is_one_of_several(node, token.waits):
+    if _awaits_more_triggers(node, token.waits):
         x.write_all(token, data)
         return
     flow = next(flow for flow in gateway.outgoing if flow.target is node)
@@ -262,7 +266,7 @@ def _behind_gateway(x: Execution, token: Token, node: FlowNode, data: dict[str, 
 
 
 def throw_signal(x: Execution, signal: str, data: dict[str, Value]) -> bool:
-    """Reach every catcher in the run, in the order they were armed. True: there was one."""
+    """Trigger every catcher of a signal, in the order of arming. True: there was one."""
     waits = list(x.state.catchers.get((Trigger.SIGNAL, signal), {}).values())
     for wait in waits:
         if wait.id in x.state.waits:
@@ -271,15 +275,15 @@ def throw_signal(x: Execution, signal: str, data: dict[str, Value]) -> bool:
     for start in x.triggered_starts:
         for definition in definitions_of(start):
             if isinstance(definition, SignalEventDefinition) and definition.signal.id == signal:
-                _instance(x, start, definition, data, {})
+                _start_process(x, start, definition, data, {})
                 started = True
     return bool(waits) or started
 
 
 def message_receiver(x: Execution, message: str, keys: dict[str, Value]) -> Wait | FlowNode | None:
-    """Who gets a message: the one that has waited longest, else a process that it starts."""
+    """Return the receiver of a message: the longest wait that matches, else a process to start."""
     for wait in x.state.catchers.get((Trigger.MESSAGE, message), {}).values():
-        if not keys or fits(x, message, keys, wait.token or wait.scope):
+        if not keys or matches(x, message, keys, wait.token or wait.scope):
             return wait
     for start in x.triggered_starts:
         for definition in definitions_of(start):
@@ -295,39 +299,39 @@ def deliver(
     data: dict[str, Value],
     keys: dict[str, Value],
 ) -> None:
-    """Hand a message over."""
+    """Deliver a message to its receiver."""
     if isinstance(receiver, Wait):
         trigger(x, receiver, data, keys)
         return
     for definition in definitions_of(receiver):
         if isinstance(definition, MessageEventDefinition) and definition.message.id == message:
-            _instance(x, receiver, definition, data, keys)
+            _start_process(x, receiver, definition, data, keys)
             return
 
 
-def _instance(
+def _start_process(
     x: Execution,
     start: FlowNode,
     came: EventDefinition,
     data: dict[str, Value],
     keys: dict[str, Value],
 ) -> None:
-    """One instance of a process, from the element whose trigger came (clause 13.2).
+    """Start an instance of a process at the element whose trigger has occurred (clause 13.2).
 
-    Of several triggers that must all come, the others are awaited in the instance.
+    Of several triggers that must all occur, the others are awaited in the instance.
     """
     process = start.container
     number = x.state.last_scope + 1
     x.emit(r.ScopeOpened(number, process.id, process.id))
     scope = x.state.scopes[number]
-    _begin_with(x, scope, start, came, data, keys)
-    # Last: what its event subprocesses wait for may be read from the data that came.
+    _enter_start(x, scope, start, came, data, keys)
+    # Last: its event subprocesses may read the data that came.
     gone = x.state.scopes.get(number) is not scope
     if not gone and not scope.interrupted and arm_event_subprocesses(x, scope):
-        collect_letters(x, scope)
+        take_kept_messages(x, scope)
 
 
-def _begin_with(
+def _enter_start(
     x: Execution,
     scope: Scope,
     start: FlowNode,
@@ -337,27 +341,27 @@ def _begin_with(
 ) -> None:
     if isinstance(start, StartEvent):
         token = x.spawn(start, scope)
-        remember(x, token, keys)
+        remember_keys(x, token, keys)
         receive_payload(x, token, data)
         others = start.definitions if start.parallel_multiple else ()
         for definition in others:
             if definition is not came and not arm(x, token, start, definition):
                 return
-        collect_letters(x, token)
+        take_kept_messages(x, token)
     elif isinstance(start, ReceiveTask) and start.instantiate:
         token = x.spawn(start, scope)
-        remember(x, token, keys)
+        remember_keys(x, token, keys)
         if receive_payload(x, token, data):
             x.handlers[type(start)].trigger(x, token)
     else:
         gateway = start.incoming[0].source
         assert isinstance(gateway, EventBasedGateway)
         token = x.spawn(gateway, scope)
-        remember(x, token, keys)
-        if not gateway.parallel or await_behind(x, token, start):
-            _behind_gateway(x, token, start, data)
+        remember_keys(x, token, keys)
+        if not gateway.parallel or await_events_of_gateway(x, token, start):
+            _trigger_of_gateway(x, token, start, data)
             if x.state.tokens.get(token.id) is token:
-                collect_letters(x, token)
+                take_kept_messages(x, token)
 
 
 def send(x: Execution, token: Token, message: str) -> None:
@@ -371,7 +375,7 @@ def send(x: Execution, token: Token, message: str) -> None:
     except ExpressionError as error:
         throw_error(x, token, "EXPRESSION", f"correlation of message {message}: {error}")
         return
-    remember(x, token, keys)
+    remember_keys(x, token, keys)
     receiver = message_receiver(x, message, keys)
     kept = receiver is None and message in x.receivable
     x.emit(
@@ -391,7 +395,7 @@ def send(x: Execution, token: Token, message: str) -> None:
 
 
 def receive(x: Execution, message: str, data: dict[str, Value], by: str) -> None:
-    """Take a message from outside; something in the mission receives it."""
+    """Receive a message from outside that some element of the mission catches."""
     try:
         keys = keys_of(x, message, data, None)
     except ExpressionError as error:

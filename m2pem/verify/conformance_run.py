@@ -47,10 +47,10 @@ class _Patient(Steps):
 
     __slots__ = ()
 
-    def _notice_a_stuck_run(self) -> None:
+    def _fail_if_stuck(self) -> None:
         """A condition may still become true."""
         if not self.state.conditions:
-            super()._notice_a_stuck_run()
+            super()._fail_if_stuck()
 
 
 class _Run(MissionRun):

@@ -19,7 +19,7 @@ def check_state(state: RunState) -> None:
         assert not state.services
         assert not state.yielded
         assert all(b.phase is BehaviorPhase.CANCELLING for b in state.behaviors.values())
-        assert not state.mailbox
+        assert not state.kept_messages
         assert not state.deferred
         assert not state.timers
         assert not state.dates
@@ -56,23 +56,23 @@ def _check_done(scope: Scope, *, looked_at: bool) -> None:
         claims |= {completion.id: number for completion in compensation.left}
         waiter, token = compensation.waiter, compensation.token
         assert waiter is None or (waiter.compensations or {})[number] is compensation
-        assert token is None or token.undoes is compensation
+        assert token is None or token.compensates is compensation
         assert token is None or scope.tokens[token.id] is token
     for token in scope.tokens.values():
-        assert token.kept is None, "what is kept has been handed over"
-        undoes = token.undoes
-        assert undoes is None or (scope.compensations or {})[undoes.id] is undoes
+        assert token.kept_scope is None, "what is kept has been handed over"
+        compensates = token.compensates
+        assert compensates is None or (scope.compensations or {})[compensates.id] is compensates
     kept = [scope]
     for each in kept:
-        for number, completion in (each.done or {}).items():
+        for number, completion in (each.compensable or {}).items():
             assert completion.id == number
             assert completion.scope is each
             assert completion.node.container is each.container
-            assert completion.claimed == (claims.get(number, 0) if each is scope else 0)
-            if completion.kept is None:
+            assert completion.claimed_by == (claims.get(number, 0) if each is scope else 0)
+            if completion.kept_scope is None:
                 assert completion.node.compensation is not None
             else:
-                inner = completion.kept
+                inner = completion.kept_scope
                 assert inner.parent is each
                 assert inner.owner is None
                 assert not inner.tokens
@@ -93,7 +93,7 @@ def _check_loop(scope: Scope) -> None:
     assert isinstance(owner.node, Activity)
     assert owner.node.loop is not None
     assert all(token.node is owner.node for token in scope.tokens.values())
-    numbers = [token.instance for token in scope.tokens.values() if token.undoes is None]
+    numbers = [token.instance for token in scope.tokens.values() if token.compensates is None]
     assert len(set(numbers)) == len(numbers) == loop.started - loop.completed - loop.terminated
     assert loop.total < 0 or loop.started <= loop.total
     assert set(loop.outputs) <= set(range(loop.started))
@@ -121,7 +121,7 @@ def _check_waits(state: RunState) -> None:
     assert set(caught) <= set(state.waits)
     for (trigger, ref), waits in state.catchers.items():
         assert waits, "nobody catches: absent"
-        for letter in state.mailbox.get(ref, ()) if trigger.value == "message" else ():
+        for letter in state.kept_messages.get(ref, ()) if trigger.value == "message" else ():
             assert letter.keys, "a letter and its catcher"
 
 

@@ -1,4 +1,4 @@
-"""Lays compensation over a random mission: what undoes, what throws, transactions."""
+"""Lays compensation over a random mission: what compensates, what throws, transactions."""
 
 from random import Random
 

@@ -6,22 +6,22 @@ from typing import Any
 from m2pem.engine.state import (
     Behavior,
     Compensation,
-    Completion,
+    CompletedActivity,
+    DataStores,
     Join,
-    Letter,
+    KeptMessage,
     Loop,
     Prompt,
     RunState,
     Scope,
     Service,
-    Shared,
     Token,
     Wait,
 )
 from m2pem.mission.elements import Element
 from m2pem.mission.mission import Mission
 
-_OBJECTS = (Scope, Token, Wait, Behavior, Prompt, Service, Completion, Compensation)
+_OBJECTS = (Scope, Token, Wait, Behavior, Prompt, Service, CompletedActivity, Compensation)
 
 
 def snapshot(state: RunState) -> dict[str, Any]:
@@ -34,10 +34,10 @@ def snapshot(state: RunState) -> dict[str, Any]:
         held.extend(also.values())
     for each in held:
         if isinstance(each, Scope):  # grows while it is walked
-            held.extend((each.done or {}).values())
+            held.extend((each.compensable or {}).values())
             held.extend((each.compensations or {}).values())
-        elif isinstance(each, Completion) and each.kept is not None:
-            held.append(each.kept)
+        elif isinstance(each, CompletedActivity) and each.kept_scope is not None:
+            held.append(each.kept_scope)
     whole["objects"] = [
         (type(each).__name__, {f.name: _plain(getattr(each, f.name)) for f in fields(each)})  # type: ignore[arg-type]
         for each in held
@@ -52,7 +52,7 @@ def _plain(value: object) -> object:
         return value.id
     if isinstance(value, _OBJECTS):
         return f"{type(value).__name__} {value.id}"
-    if isinstance(value, (Letter, Loop, Shared)):
+    if isinstance(value, (KeptMessage, Loop, DataStores)):
         return [(each.name, _plain(getattr(value, each.name))) for each in fields(value)]
     if isinstance(value, Join):
         return _plain(value.by_flow)

@@ -223,7 +223,7 @@ def test_a_subprocess_with_nothing_to_undo_is_forgotten() -> None:
     ).start()
     root = play.run.state.root
     assert root is not None
-    assert not root.done
+    assert not root.compensable
     assert "close sub" in play.trace()
 
 

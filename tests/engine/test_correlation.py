@@ -48,7 +48,7 @@ def test_one_that_fits_nobody_yet_is_kept_for_whom_it_fits() -> None:
     play.message("REPLY", {"n": 2}).message("REPLY", {"n": 1}).message("REPLY", {"n": 3})
     play.answer(prompt="first").answer(prompt="first")
     assert sorted(map(str, at(play, "done"))) == ["1", "2"]
-    assert [letter.keys for letter in play.run.state.mailbox["REPLY"]] == [{"key": 3}]
+    assert [letter.keys for letter in play.run.state.kept_messages["REPLY"]] == [{"key": 3}]
 
 
 def test_a_message_without_a_key_goes_to_who_has_waited_longest() -> None:

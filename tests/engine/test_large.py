@@ -75,14 +75,14 @@ def test_many_inclusive_joins_wait_without_being_asked_again_and_again(
 ) -> None:
     # Each answer concerns one of them; asking all would make this quadratic.
     asked = 0
-    more_can_come = gateways._more_can_come
+    more_can_come = gateways._more_tokens_can_come
 
     def counting(*arguments: Any) -> bool:
         nonlocal asked
         asked += 1
         return more_can_come(*arguments)
 
-    monkeypatch.setattr(gateways, "_more_can_come", counting)
+    monkeypatch.setattr(gateways, "_more_tokens_can_come", counting)
     calls = "\n".join(
         f'<callActivity id="c{n}" calledElement="P"/>\nfork -> c{n}' for n in range(100)
     )

@@ -53,7 +53,7 @@ def test_a_message_that_nothing_in_the_mission_receives_is_not_kept() -> None:
         start -> send
     """).start()
     assert "message m" in play.trace()
-    assert play.run.state.mailbox == {}
+    assert play.run.state.kept_messages == {}
     before = snapshot(play.run.state)
     play.give(MessageReceived("m", id="9"))
     assert play.ignored() == "nothing in the mission receives message m"
@@ -84,7 +84,7 @@ def test_a_boundary_that_does_not_interrupt_takes_every_message_that_was_kept() 
     play.trace()
     assert play.answer().at == "v n n"
     assert play.trace("write")[1:] == ["write x = 1", "write x = 2"]
-    assert play.run.state.mailbox == {}
+    assert play.run.state.kept_messages == {}
     assert play.message("m").at == "v n n n"
 
 

@@ -1,34 +1,34 @@
-"""The part of the fold that is about compensation: what can be undone, and what is being undone."""
+"""What records about compensation do to the state."""
 
 from m2pem.engine import records as r
-from m2pem.engine.state import Compensation, Completion, RunState, Scope, Token
+from m2pem.engine.state import Compensation, CompletedActivity, RunState, Scope, Token
 from m2pem.mission.elements import Activity
 
 
 def compensation_enabled(state: RunState, record: r.CompensationEnabled) -> None:
-    """An activity has completed and can be undone."""
+    """Note a completed activity that can be compensated."""
     token = state.tokens[record.token]
     scope = token.scope
     assert isinstance(token.node, Activity)
     state.last_completion = record.completion
-    if scope.done is None:
-        scope.done = {}
-    scope.done[record.completion] = Completion(
-        record.completion, scope, token.node, record.instance, token.own, token.kept
+    if scope.compensable is None:
+        scope.compensable = {}
+    scope.compensable[record.completion] = CompletedActivity(
+        record.completion, scope, token.node, record.instance, token.own, token.kept_scope
     )
-    token.kept = None
+    token.kept_scope = None
 
 
 def compensation_triggered(state: RunState, record: r.CompensationTriggered) -> None:
-    """What will be undone is claimed, so that nothing else undoes it too."""
+    """Claim the activities of a compensation, so that no other one compensates them."""
     state.last_compensation = record.compensation
     if not record.completions:
         return
     scope = state.scopes[record.target]
-    assert scope.done is not None
-    left = [scope.done[number] for number in record.completions]
+    assert scope.compensable is not None
+    left = [scope.compensable[number] for number in record.completions]
     for completion in left:
-        completion.claimed = record.compensation
+        completion.claimed_by = record.compensation
     compensation = Compensation(record.compensation, scope, left)
     if scope.compensations is None:
         scope.compensations = {}
@@ -41,33 +41,33 @@ def compensation_triggered(state: RunState, record: r.CompensationTriggered) -> 
 
 
 def compensation_began(state: RunState, record: r.CompensationBegan) -> None:
-    """One of them is being undone: it cannot be undone again."""
+    """Begin to compensate an activity: it cannot be compensated again."""
     scope = state.scopes[record.scope]
-    assert scope.done is not None
+    assert scope.compensable is not None
     assert scope.compensations is not None
-    completion = scope.done.pop(record.completion)
+    completion = scope.compensable.pop(record.completion)
     compensation = scope.compensations[record.compensation]
     compensation.left.remove(completion)
     compensation.begins = record.token, completion
 
 
-def enter_to_undo(scope: Scope, token: Token) -> bool:
-    """Whether a token that enters does so to undo something; then note what."""
+def enter_compensation(scope: Scope, token: Token) -> bool:
+    """Whether a token enters to compensate an activity; if so, note which."""
     for compensation in scope.compensations.values() if scope.compensations is not None else ():
         if compensation.begins is not None and compensation.begins[0] == token.id:
             completion = compensation.begins[1]
             compensation.begins = None
             compensation.token = token
-            token.undoes = compensation
-            if completion.kept is not None:
-                token.kept = completion.kept
+            token.compensates = compensation
+            if completion.kept_scope is not None:
+                token.kept_scope = completion.kept_scope
                 token.own = completion.own
             return True
     return False
 
 
 def compensation_ended(state: RunState, record: r.CompensationEnded) -> None:
-    """Nobody waits for it any more."""
+    """End a compensation and the wait for it."""
     scope = state.scopes[record.scope]
     assert scope.compensations is not None
     compensation = scope.compensations.pop(record.compensation)
@@ -78,11 +78,11 @@ def compensation_ended(state: RunState, record: r.CompensationEnded) -> None:
 
 
 def scope_reopened(state: RunState, record: r.ScopeReopened) -> None:
-    """The scope that a completed activity had is there again."""
+    """Open the kept scope of a completed activity again."""
     token = state.tokens[record.token]
-    scope = token.kept
+    scope = token.kept_scope
     assert scope is not None
-    token.kept = None
+    token.kept_scope = None
     token.inner = scope
     scope.owner = token
     scope.reopened = True
@@ -91,30 +91,31 @@ def scope_reopened(state: RunState, record: r.ScopeReopened) -> None:
 
 
 def drop_compensations(scope: Scope) -> None:
-    """All in the scope has ended: what was to be undone and was not begun can be undone again."""
+    """Drop the compensations of a scope whose content has ended; what they had not begun can be
+    compensated again."""
     scope.compensations = None
-    for completion in scope.done.values() if scope.done is not None else ():
-        completion.claimed = 0
+    for completion in scope.compensable.values() if scope.compensable is not None else ():
+        completion.claimed_by = 0
 
 
 def leave_compensation(token: Token) -> None:
-    """A token has gone: it undoes nothing any more, and waits for nothing."""
-    if token.undoes is not None:
-        token.undoes.token = None
+    """Remove a token that has left from its compensation, and from those that it waits for."""
+    if token.compensates is not None:
+        token.compensates.token = None
     if token.compensations:
         for compensation in token.compensations.values():
             compensation.waiter = None
 
 
-def settle_owner(scope: Scope, record: r.ScopeClosed) -> None:
-    """Note on the token whose activity a closed scope was what of it can be undone."""
+def note_on_owner(scope: Scope, record: r.ScopeClosed) -> None:
+    """Note on the token of a closed scope's activity whether the scope can be compensated."""
     owner = scope.owner
     if owner is None:
         return
     owner.inner = None
     if record.kept:
-        owner.kept = scope
+        owner.kept_scope = scope
         scope.owner = None
         drop_compensations(scope)
     elif scope.interrupted or record.outcome is not r.TokenOutcome.COMPLETED:
-        owner.abnormal = True
+        owner.ended_early = True

@@ -1,10 +1,10 @@
-"""What records about data, and about what is awaited, do to the state."""
+"""What records about data and events do to the state."""
 
 from heapq import heapify, heappop, heappush
 
 from m2pem.engine import records as r
 from m2pem.engine.state import (
-    Letter,
+    KeptMessage,
     RunState,
     Scope,
     Token,
@@ -15,11 +15,11 @@ from m2pem.mission.elements import (
 )
 
 STALE_TIMERS = 64
-"""Timers that are over stay inside their heap until there are this many more than live ones."""
+"""Ended timers stay in their heap until there are this many more than active ones."""
 
 
 def node_of(state: RunState, element: str) -> FlowNode:
-    """The flow node of an id."""
+    """Return the flow node of an id."""
     node = state.mission.elements[element]
     assert isinstance(node, FlowNode)
     return node
@@ -70,7 +70,7 @@ def event_awaited(state: RunState, record: r.EventAwaited) -> None:
 
 
 def end_wait(state: RunState, wait: Wait) -> None:
-    """It is over: it came, or nobody waits any more."""
+    """Remove a wait: its event has occurred, or is awaited no longer."""
     del state.waits[wait.id]
     waits = wait.token.waits if wait.token is not None else wait.scope.waits
     assert waits is not None
@@ -97,10 +97,10 @@ def event_triggered(state: RunState, record: r.EventTriggered) -> None:
     wait = state.waits[record.wait]
     end_wait(state, wait)
     if record.kept:
-        letters = state.mailbox[wait.ref]
-        letters.pop(record.letter)
-        if not letters:
-            del state.mailbox[wait.ref]
+        messages = state.kept_messages[wait.ref]
+        messages.pop(record.letter)
+        if not messages:
+            del state.kept_messages[wait.ref]
 
 
 def condition_reset(state: RunState, record: r.ConditionReset) -> None:
@@ -109,4 +109,6 @@ def condition_reset(state: RunState, record: r.ConditionReset) -> None:
 
 def message_thrown(state: RunState, record: r.MessageThrown) -> None:
     if record.kept:
-        state.mailbox.setdefault(record.message, []).append(Letter(record.data, record.keys))
+        state.kept_messages.setdefault(record.message, []).append(
+            KeptMessage(record.data, record.keys)
+        )

@@ -34,7 +34,7 @@ def run_ended(state: RunState, record: r.RunEnded) -> None:
     state.status = RunStatus.ENDED
     state.outcome = record.outcome
     state.detail = record.detail
-    state.mailbox.clear()
+    state.kept_messages.clear()
     state.deferred.clear()
     state.yielded = ()
 

@@ -50,7 +50,7 @@ def token_entered(state: RunState, record: r.TokenEntered) -> None:
     state.tokens[record.token] = token
     scope.tokens[record.token] = token
     state.last_token = max(state.last_token, record.token)
-    if scope.compensations and compensation.enter_to_undo(scope, token):
+    if scope.compensations and compensation.enter_compensation(scope, token):
         return
     if flow is not None and _is_join(node):
         join = scope.joins.get(node)
@@ -110,7 +110,7 @@ def token_left(state: RunState, record: r.TokenLeft) -> None:
             del join.by_flow[token.flow]
             if not join.by_flow:
                 del scope.joins[token.node]
-    elif scope.loop is not None and token.undoes is None:
+    elif scope.loop is not None and token.compensates is None:
         if record.outcome is r.TokenOutcome.COMPLETED:
             scope.loop.completed += 1
         else:
@@ -155,7 +155,7 @@ def scope_closed(state: RunState, record: r.ScopeClosed) -> None:
     scope = state.scopes.pop(record.scope)
     for wait in list(scope.waits.values()) if scope.waits is not None else ():
         end_wait(state, wait)
-    compensation.settle_owner(scope, record)
+    compensation.note_on_owner(scope, record)
 
 
 def scope_interrupted(state: RunState, record: r.ScopeInterrupted) -> None:
@@ -179,7 +179,7 @@ def _disarm_event_subprocesses(state: RunState, scope: Scope) -> None:
 
 
 def transaction_cancelled(state: RunState, record: r.TransactionCancelled) -> None:
-    """The transaction is not active any more: nothing but its rollback can happen to it."""
+    """Deactivate a transaction: from here only its compensation is executed."""
     scope = state.scopes[record.scope]
     scope.cancelled = scope.interrupted = True
     scope.activated.clear()

@@ -26,7 +26,7 @@ HANDLERS: dict[type[FlowNode], ElementHandler] = {
     e.Task: _activity(tasks.pass_through),
     e.ManualTask: _activity(tasks.pass_through),
     e.UserTask: replace(
-        _activity(tasks.user_task), trigger=tasks.prompt_timed_out, answer=tasks.answered
+        _activity(tasks.user_task), trigger=tasks.prompt_timed_out, answer=tasks.answer_user_task
     ),
     e.ScriptTask: _activity(tasks.script_task),
     e.ServiceTask: _activity(tasks.service_task),
@@ -35,7 +35,7 @@ HANDLERS: dict[type[FlowNode], ElementHandler] = {
     e.ReceiveTask: _activity(tasks.receive_task),
     e.SubProcess: _activity(subprocesses.subprocess),
     e.Transaction: _activity(subprocesses.subprocess),
-    e.AdHocSubProcess: replace(_activity(subprocesses.ad_hoc), answer=subprocesses.chosen),
+    e.AdHocSubProcess: replace(_activity(subprocesses.ad_hoc), answer=subprocesses.answer_ad_hoc),
     e.CallActivity: _activity(subprocesses.call_activity),
     # Gateways
     e.ExclusiveGateway: ElementHandler(activate=gateways.exclusive),

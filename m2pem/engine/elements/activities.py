@@ -1,8 +1,8 @@
 """What all activities have in common: how they begin and complete (BPMN 2.0.2, clause 13.3.2)."""
 
 from m2pem.engine import records as r
-from m2pem.engine.compensation import enable, undone
-from m2pem.engine.data_flow import give_out, take_in
+from m2pem.engine.compensation import compensated, enable_compensation
+from m2pem.engine.data_flow import fill_data_inputs, pass_data_outputs
 from m2pem.engine.elements.loops import begin_loop, instance_done
 from m2pem.engine.elements.sequence_flows import true_flows
 from m2pem.engine.execution import Execution, Waits, waits_when_entered
@@ -14,7 +14,7 @@ from m2pem.mission.reach import begins_by_itself
 
 
 def _gather(x: Execution, token: Token, node: Activity) -> bool:
-    """Whether enough tokens have come to begin; all but this one are then consumed (table 10.3)."""
+    """Whether enough tokens have arrived (`startQuantity`); all others are then consumed (10.3)."""
     waiting = token.scope.gathered.get(node, [])
     if token not in waiting:
         return True
@@ -38,8 +38,8 @@ def enter_activity(x: Execution, token: Token) -> None:
         arm_boundary(x, token, node)
 
 
-def has_entered(token: Token) -> bool:
-    """Whether a token that waits for its turn has done what `enter_activity` does before it."""
+def has_been_entered(token: Token) -> bool:
+    """Whether `enter_activity` was called for a token that is still in the queue."""
     node = token.node
     if not isinstance(node, Activity):
         return False
@@ -49,8 +49,8 @@ def has_entered(token: Token) -> bool:
 def begin_activity(x: Execution, token: Token) -> None:
     """Begin the work of an activity, whose boundary events are armed.
 
-    An instance of a loop or multi-instance activity only works: what else there is to an activity
-    is the whole's, once.
+    An instance of a loop or multi-instance activity only executes. All else is done once, for the
+    outer instance.
     """
     node = token.node
     assert isinstance(node, Activity)
@@ -61,42 +61,42 @@ def begin_activity(x: Execution, token: Token) -> None:
             return
         if node.loop is not None and token.inner is None:
             if begin_loop(x, token, node.loop):
-                pass_on(x, token)
+                leave_activity(x, token)
             return
-    if node.data_flow.inputs and not take_in(x, token):
+    if node.data_flow.inputs and not fill_data_inputs(x, token):
         return
     x.handlers[type(node)].execute(x, token)
 
 
 def complete(x: Execution, token: Token, outcome: TokenOutcome = TokenOutcome.COMPLETED) -> None:
-    """The work of an activity, or of one instance of it, is done.
+    """Complete the work of an activity, or of one instance of it.
 
-    `outcome` TERMINATED: by a terminate end event in it.
+    `outcome` is TERMINATED when a terminate end event in it has ended it.
     """
     node = token.node
     assert isinstance(node, Activity)
-    if node.data_flow.outputs and not give_out(x, token):
+    if node.data_flow.outputs and not pass_data_outputs(x, token):
         return
     if token.instance is None:
-        pass_on(x, token)
+        leave_activity(x, token)
         return
-    for whole in instance_done(x, token, outcome):
-        pass_on(x, whole)
+    for outer in instance_done(x, token, outcome):
+        leave_activity(x, outer)
 
 
-def pass_on(x: Execution, token: Token) -> None:
-    """The activity as a whole is done: leave by every flow that is true.
+def leave_activity(x: Execution, token: Token) -> None:
+    """Leave a completed activity by every flow whose condition is true.
 
-    What undoes another activity leaves by none: it is outside the normal flow (clause 10.7).
+    A compensation activity leaves by no flow: it is outside the normal flow (clause 10.7).
     """
     node = token.node
     assert isinstance(node, Activity)
-    if token.undoes is not None:
-        undone(x, token)
+    if token.compensates is not None:
+        compensated(x, token)
         return
     flows = true_flows(x, token, node.default)
     if flows is not None:
-        enable(x, token)
+        enable_compensation(x, token)
         x.proceed(token, [*flows] * node.completion_quantity)
         if isinstance(node.container, AdHocSubProcess) and not begins_by_itself(node):
             x.queue.append(token.scope)

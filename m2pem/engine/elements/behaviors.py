@@ -35,9 +35,10 @@ YEAR_10000_US = 253_402_300_800_000_000
 
 
 def request_behavior(x: Execution, token: Token, behavior: BehaviorOfTask) -> None:
-    """Have the arbiters start a behavior; their terminal report completes the task.
+    """Request a behavior from the arbiters; their terminal report completes the task.
 
-    A resource that another behavior holds, and is not giving up, is RESOURCE_UNAVAILABLE at once.
+    A resource that another behavior holds, and that is not being cancelled, is
+    RESOURCE_UNAVAILABLE.
     """
     node = token.node
     parameters = _evaluate(x, token, behavior)
@@ -86,7 +87,7 @@ def request_behavior(x: Execution, token: Token, behavior: BehaviorOfTask) -> No
 
 
 def _evaluate(x: Execution, token: Token, behavior: BehaviorOfTask) -> dict[str, Value] | None:
-    """Values of the parameters now; None: an error was thrown instead."""
+    """Evaluate the parameters; None: error EXPRESSION was thrown."""
     read = reader(token)
     values: dict[str, Value] = {}
     for parameter in behavior.parameters:
@@ -102,7 +103,7 @@ def _evaluate(x: Execution, token: Token, behavior: BehaviorOfTask) -> dict[str,
 
 
 def _hold_for(x: Execution, token: Token, duration: Value) -> None:
-    """A `hold` without any role commands nothing: it is a wait of its duration."""
+    """Wait for the duration of a `hold` that has no role, and so commands no resource."""
     due_us = x.state.mission_time_us(x.now_us)
     if duration is not None:
         try:
@@ -114,7 +115,7 @@ def _hold_for(x: Execution, token: Token, duration: Value) -> None:
 
 
 def wait_us(duration: Value, at_us: int) -> int:
-    """A `hold`'s duration in microseconds: "30 s", a number of seconds, or ISO 8601.
+    """Return a `hold`'s duration in microseconds: from "30 s", a number of seconds, or ISO 8601.
 
     Raises:
         UnitError, ExpressionSyntaxError: no duration, a negative one, or beyond the year 9999.
@@ -136,18 +137,18 @@ DEFAULT_CODES: dict[BehaviorState, str] = {
     BehaviorState.LOST: "LINK_LOST",
     BehaviorState.UNKNOWN: "FAILED",
 }
-"""Error code of a task whose behavior ended so, where its arbiter gave none."""
+"""Error code of a task by the end of its behavior, where the arbiter gave no code."""
 
 RECOVERY_DECISIONS: tuple[dict[str, str], ...] = (
     {"value": "resume", "label": "Resume"},
     {"value": "skip", "label": "Skip the task"},
     {"value": "abort", "label": "Abort the mission"},
 )
-"""What an operator may say of a behavior that is not as it was after a restart."""
+"""The decisions that an operator has about a behavior that is not as it was after a restart."""
 
 
 def behavior_reported(x: Execution, item: i.BehaviorReported) -> None:
-    """An arbiter's word: a terminal one completes the task, or throws its error."""
+    """Handle an arbiter's report: a terminal one completes the task, or throws its error."""
     behavior = x.state.behaviors.get(item.behavior)
     if behavior is None:
         x.ignore(f"{item.state.value} for {item.behavior}, which is not active")
@@ -192,7 +193,7 @@ def _ended(
     )
     if token is None:
         return
-    x.write_all(token, outputs or {})  # also of one that failed: the pictures it took are there
+    x.write_all(token, outputs or {})  # also those of a failed behavior, such as pictures
     if state is BehaviorState.SUCCEEDED:
         complete(x, token)
     else:
@@ -200,7 +201,7 @@ def _ended(
 
 
 def behavior_missing(x: Execution, item: i.BehaviorMissing) -> None:
-    """After a restart it is not as it was: by its policy it starts again, fails, or is held."""
+    """Restart, fail or hold a behavior that is not as it was after a restart, by its policy."""
     behavior = x.state.behaviors.get(item.behavior)
     if behavior is None:
         x.ignore(f"{item.behavior} is not active")
@@ -240,7 +241,7 @@ def _ask_what_to_do(x: Execution, behavior: Behavior, item: i.BehaviorMissing) -
 
 
 def recovery_answered(x: Execution, behavior: Behavior, answer: i.PromptAnswer) -> None:
-    """An operator has said what to do with a behavior that was held after a restart."""
+    """Carry out an operator's decision about a behavior that was held after a restart."""
     if answer.decision == "resume":
         if behavior.state in (BehaviorState.RUNNING, BehaviorState.ACCEPTED):
             x.emit(r.BehaviorContinued(behavior.id, answer.by))
@@ -255,8 +256,8 @@ def recovery_answered(x: Execution, behavior: Behavior, answer: i.PromptAnswer) 
 
 
 def resource_fault(x: Execution, item: i.ResourceFault) -> None:
-    """What a resource does for the run ends with the fault's error (`ResourceFault`)."""
-    told = False
+    """End the behaviors of a faulty resource with the fault's error (`ResourceFault`)."""
+    ended = False
     for holder in list(x.state.held.get(item.resource, ())):
         behavior = x.state.behaviors[holder]
         if not item.reachable and len(behavior.resources) == 1:
@@ -265,13 +266,13 @@ def resource_fault(x: Execution, item: i.ResourceFault) -> None:
             fail_behavior(x, behavior, item.code, item.reason)
         else:
             continue  # it ends by its report, or when it has not answered its cancel in time
-        told = True
-    if not told:
+        ended = True
+    if not ended:
         x.ignore(f"{item.code} of {item.resource}, which does nothing for this run")
 
 
 def fail_behavior(x: Execution, behavior: Behavior, code: str, reason: str) -> None:
-    """Cancel it, for what can still be reached of its resources must stop."""
+    """Cancel a behavior, so that its reachable resources stop, and throw its error."""
     token = x.state.tokens[behavior.token]
     if token.prompt:
         x.emit(r.PromptWithdrawn(token.prompt))
@@ -283,20 +284,21 @@ CODE = "TAKEN_OVER"
 
 
 def control_taken(x: Execution, item: i.ControlTaken) -> None:
-    """What the resource does for the run ends with TAKEN_OVER."""
+    """End the behavior of a resource with TAKEN_OVER: an operator has taken control."""
     if item.resource in x.state.taken:
         x.ignore(f"{item.resource} is with {x.state.taken[item.resource]} already")
         return
     x.emit(r.OperatorTookControl(item.resource, item.by))
     for behavior in _commanding(x.state, item.resource):
-        if behavior.phase is not BehaviorPhase.CANCELLING:  # as the behavior before it left it
+        if behavior.phase is not BehaviorPhase.CANCELLING:  # then it is ending already
             fail_behavior(x, behavior, CODE, f"{item.resource} was taken by {item.by}")
 
 
 def preview_control_taken(state: RunState, resource: str) -> list[tuple[Behavior, Event | None]]:
-    """The behaviors that `control_taken` would end now, each with the event that catches its error.
+    """Return the behaviors that `control_taken` would end, each with the event that catches its
+    error.
 
-    None: no event catches it, so the run would fail.
+    None instead of an event: none catches it, so the run would fail.
     """
     return [
         (behavior, catcher_of_error(state.tokens[behavior.token], CODE))
@@ -305,7 +307,7 @@ def preview_control_taken(state: RunState, resource: str) -> list[tuple[Behavior
 
 
 def _commanding(state: RunState, resource: str) -> list[Behavior]:
-    """The behaviors that command a resource and are not being cancelled."""
+    """Return the behaviors that hold a resource and are not being cancelled."""
     holders = [state.behaviors.get(each) for each in state.held.get(resource, ())]
     return [
         each for each in holders if each is not None and each.phase is not BehaviorPhase.CANCELLING
@@ -313,7 +315,7 @@ def _commanding(state: RunState, resource: str) -> list[Behavior]:
 
 
 def control_returned(x: Execution, item: i.ControlReturned) -> None:
-    """The resource can be commanded again; signals that wait for it are thrown."""
+    """Let missions command the resource again, and throw the signals of its return."""
     if item.resource not in x.state.taken:
         x.ignore(f"{item.resource} is not with an operator")
         return

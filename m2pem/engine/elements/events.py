@@ -8,10 +8,10 @@ from m2pem.engine.elements.sequence_flows import true_flows
 from m2pem.engine.elements.subprocesses import cancel, finish
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import RunOutcome, TokenOutcome
-from m2pem.engine.scopes import empty, end_run
+from m2pem.engine.scopes import end_run, end_tokens
 from m2pem.engine.state import Token
 from m2pem.engine.throwing import throw_error, throw_escalation
-from m2pem.engine.triggering import collect_letters, send, throw_signal
+from m2pem.engine.triggering import send, take_kept_messages, throw_signal
 from m2pem.mission.elements import (
     Event,
     IntermediateCatchEvent,
@@ -31,38 +31,38 @@ from m2pem.mission.events import (
 
 
 def complete(x: Execution, token: Token) -> None:
-    """The event has happened: leave by every flow."""
+    """Leave an event that has occurred, by every flow."""
     flows = true_flows(x, token, None)
     if flows is not None:
         x.proceed(token, flows)
 
 
 def start(x: Execution, token: Token) -> None:
-    """A plain start goes on at once; a typed one waits for its trigger (paper, section 4.1).
+    """Leave a plain start event at once; a typed one waits for its trigger (paper, section 4.1).
 
-    That of an instance, or of an event subprocess, which its trigger has made has happened already.
+    The start event of an event subprocess, or of an instance, has been triggered already.
     """
     node = token.node
     assert isinstance(node, StartEvent)
     if node.definitions and not x.has_been_triggered(token):
         catch(x, token)
-    elif not token.waits:  # else others of its triggers must still come
+    elif not token.waits:  # else others of its triggers must still occur
         complete(x, token)
 
 
 def catch(x: Execution, token: Token) -> None:
-    """Wait for the trigger; the target of a link has none (table 10.98)."""
+    """Wait for the trigger of a catch event; the target of a link has none (table 10.98)."""
     node = token.node
     assert isinstance(node, Event)
     if not node.definitions or (isinstance(node, IntermediateCatchEvent) and node.linked_from):
         complete(x, token)
         return
     if all(arm(x, token, node, definition) for definition in node.definitions):
-        collect_letters(x, token)
+        take_kept_messages(x, token)
 
 
 def throw(x: Execution, token: Token) -> None:
-    """Throw, and go on, unless what was thrown ended the scope."""
+    """Throw the results of an event and leave it, unless a result ended the scope."""
     node = token.node
     assert isinstance(node, Event)
     for definition in node.definitions:
@@ -93,7 +93,7 @@ def _throw(x: Execution, token: Token, definition: EventDefinition) -> None:
 
 
 def signal(x: Execution, token: Token, signal_id: str) -> None:
-    """Broadcast a signal, with its data inputs, in the run."""
+    """Broadcast a signal in the run, with its data inputs."""
     node = token.node
     data = payload(x, token)
     if data is None:
@@ -103,7 +103,7 @@ def signal(x: Execution, token: Token, signal_id: str) -> None:
 
 
 def end(x: Execution, token: Token) -> None:
-    """The token ends here, perhaps throwing something."""
+    """Consume the token of an end event, after throwing its results."""
     node = token.node
     assert isinstance(node, Event)
     for definition in sorted(node.definitions, key=_ends_the_scope):
@@ -125,7 +125,7 @@ def end(x: Execution, token: Token) -> None:
                 assert escalation is not None
                 goes_on = throw_escalation(x, token, escalation, leaving=True)
                 if goes_on:
-                    x.look_later(token.scope)
+                    x.check_scope_later(token.scope)
                 return
             case _:
                 _throw(x, token, definition)
@@ -136,18 +136,18 @@ def end(x: Execution, token: Token) -> None:
 
 
 def _ends_the_scope(definition: EventDefinition) -> int:
-    """Of several results, those that end the scope come last, so that all are thrown."""
+    """Sort key of results: those that end the scope come last, so that all are thrown."""
     if isinstance(definition, TerminateEventDefinition | CancelEventDefinition):
         return 2
     return 1 if isinstance(definition, ErrorEventDefinition) else 0
 
 
 def _terminate(x: Execution, token: Token) -> None:
-    """End its scope at once (clause 13.5.6); in the process the run began with, end the run."""
+    """End the scope at once (13.5.6), or the run, in the process that the run began with."""
     scope = token.scope
     x.leave(token, TokenOutcome.COMPLETED)
     if scope is x.state.root:
         end_run(x, RunOutcome.TERMINATED, f"terminated by {token.node.label}")
         return
-    empty(x, scope, TokenOutcome.TERMINATED)
+    end_tokens(x, scope, TokenOutcome.TERMINATED)
     finish(x, scope, TokenOutcome.TERMINATED)

@@ -19,7 +19,7 @@ from m2pem.engine.execution import Execution
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.state import Join, Scope, Token
 from m2pem.engine.throwing import throw_error, throw_error_in
-from m2pem.engine.triggering import await_behind, collect_letters
+from m2pem.engine.triggering import await_events_of_gateway, take_kept_messages
 from m2pem.errors import ExpressionError
 from m2pem.mission.elements import (
     ComplexGateway,
@@ -32,7 +32,7 @@ from m2pem.mission.values import ReadValue, Value
 
 
 def exclusive(x: Execution, token: Token) -> None:
-    """First true flow, else the default, else error NO_FLOW. Every incoming token passes."""
+    """Take the first true flow, else the default, else throw NO_FLOW. Every token passes."""
     node = token.node
     assert isinstance(node, ExclusiveGateway)
     if len(node.outgoing) == 1 and node.outgoing[0].condition is None:
@@ -44,10 +44,10 @@ def exclusive(x: Execution, token: Token) -> None:
 
 
 def parallel(x: Execution, token: Token) -> None:
-    """Goes on when every incoming flow has a token (clause 13.4.1, table 13.1).
+    """Proceed when every incoming flow has a token (clause 13.4.1, table 13.1).
 
-    The token that came last goes on, the others are consumed; a second token on a flow stays for
-    the next round.
+    The token that arrived last proceeds, the others are consumed; a second token on a flow stays
+    for the next round.
     """
     node = token.node
     if len(node.incoming) > 1:
@@ -59,14 +59,14 @@ def parallel(x: Execution, token: Token) -> None:
 
 
 def inclusive(x: Execution, token: Token) -> None:
-    """A split goes on at once; a join, when no other step is left (`fire_joins`)."""
+    """Split at once; a join fires when no other step is left (`fire_joins`)."""
     node = token.node
     assert isinstance(node, InclusiveGateway)
     if len(node.incoming) <= 1:
-        split(x, token, node)
+        split_inclusive(x, token, node)
 
 
-def split(x: Execution, token: Token, node: InclusiveGateway) -> None:
+def split_inclusive(x: Execution, token: Token, node: InclusiveGateway) -> None:
     """Take every true flow, else the default (table 13.3)."""
     flows = true_flows(x, token, node.default)
     if flows is not None:
@@ -74,17 +74,17 @@ def split(x: Execution, token: Token, node: InclusiveGateway) -> None:
 
 
 def merge(x: Execution, last: Token, join: Join) -> None:
-    """Consume one token of each flow that has any, but for `last`, which goes on."""
+    """Consume one token of each flow that has any, except `last`, which proceeds."""
     for tokens in [tokens for flow, tokens in join.by_flow.items() if flow is not last.flow]:
         x.leave(tokens[0], TokenOutcome.COMPLETED)
 
 
 def event_based(x: Execution, token: Token) -> None:
-    """Wait for the events behind it; where one comes, `m2pem.engine.triggering` goes on."""
+    """Wait for the events after it; `m2pem.engine.triggering` handles the first that occurs."""
     if token.waits is not None:
-        return  # it began its process: the first of its events has come
-    if await_behind(x, token):
-        collect_letters(x, token)
+        return  # it began its process: the first of its events has occurred
+    if await_events_of_gateway(x, token):
+        take_kept_messages(x, token)
 
 
 ACTIVATION_COUNT = "activationCount"
@@ -92,12 +92,12 @@ WAITING_FOR_START = "waitingForStart"
 
 
 def complex_gateway(x: Execution, token: Token) -> None:
-    """A token has come: perhaps it activates the gateway."""
+    """Activate a complex gateway if its condition is true with the token that has arrived."""
     node, scope = token.node, token.scope
     assert isinstance(node, ComplexGateway)
     if node in scope.activated:
         return
-    read = _reader(scope, node, reader(token), waiting_for_start=True)
+    read = _gateway_reader(scope, node, reader(token), waiting_for_start=True)
     if node.activation is not None:
         try:
             active = node.activation.holds(read)
@@ -109,19 +109,19 @@ def complex_gateway(x: Execution, token: Token) -> None:
     flows = true_flows(x, token, node.default, read=read)
     if flows is None:
         return
-    used = _use(x, scope, node, keep=token)
+    used = _consume_tokens(x, scope, node, keep=token)
     if len(used) < len(node.incoming):
         flow_ids = tuple(flow.id for flow in used)
         x.emit(r.GatewayActivated(x.process_of(node), node.id, scope.id, flow_ids))
     x.proceed(token, flows)
 
 
-def reset(x: Execution, scope: Scope, node: ComplexGateway) -> None:
-    """Every token that could still come has come: use them up, and begin anew.
+def reset_complex_gateway(x: Execution, scope: Scope, node: ComplexGateway) -> None:
+    """Consume the tokens of the second phase, and reset a complex gateway.
 
     A flow without a condition has had its token in the first phase, and gets none here.
     """
-    read = _reader(scope, node, reader(scope), waiting_for_start=False)
+    read = _gateway_reader(scope, node, reader(scope), waiting_for_start=False)
     flows: list[SequenceFlow] = []
     for flow in node.outgoing:
         if flow is node.default or flow.condition is None:
@@ -134,25 +134,25 @@ def reset(x: Execution, scope: Scope, node: ComplexGateway) -> None:
             return
     if not flows and node.default is not None:
         flows.append(node.default)
-    _use(x, scope, node, but=scope.activated[node])
+    _consume_tokens(x, scope, node, but=scope.activated[node])
     process = x.process_of(node)
     x.emit(r.GatewayReset(process, node.id, scope.id))
     for flow in flows:
         number = x.state.last_token + 1
         x.emit(r.FlowTaken(number, process, node.id, scope.id, flow.id))
         x.enter(number, flow.target, scope, flow)
-    for waiting in _waiting(scope, node):
+    for waiting in _waiting_tokens(scope, node):
         x.queue.append(waiting)
         break
-    x.look_later(scope)
+    x.check_scope_later(scope)
 
 
-def _waiting(scope: Scope, node: ComplexGateway) -> list[Token]:
+def _waiting_tokens(scope: Scope, node: ComplexGateway) -> list[Token]:
     join = scope.joins.get(node)
     return [tokens[0] for tokens in join.by_flow.values()] if join is not None else []
 
 
-def _use(
+def _consume_tokens(
     x: Execution,
     scope: Scope,
     node: ComplexGateway,
@@ -162,7 +162,7 @@ def _use(
 ) -> list[SequenceFlow]:
     """Consume the first token of each incoming flow, other than `keep` and those of `but`."""
     used: list[SequenceFlow] = []
-    for token in _waiting(scope, node):
+    for token in _waiting_tokens(scope, node):
         flow = token.flow
         assert flow is not None
         if flow in but:
@@ -173,10 +173,10 @@ def _use(
     return used
 
 
-def _reader(
+def _gateway_reader(
     scope: Scope, node: ComplexGateway, outer: ReadValue, *, waiting_for_start: bool
 ) -> ReadValue:
-    """Reads what its conditions may refer to besides the data."""
+    """Return a reader of the data, of the counts of tokens by flow, and of the gateway's state."""
     join = scope.joins.get(node)
     by_flow = join.by_flow if join is not None else {}
     own: dict[str, Value] = {
@@ -193,42 +193,44 @@ def _reader(
 
 
 def fire_joins(x: Execution) -> bool:
-    """Let joins go on that need to wait no more, one in each scope. False: none could.
+    """Fire joins that need to wait no longer, one in each scope. False: there was none.
 
-    Called when no other step is left, so that whatever can move without outside input has moved.
+    Called when no other step is left: then all tokens that can move without an input have moved.
     Whether a join is complete depends on the tokens of its scope alone.
     """
-    moved = sorted(x.moved)
-    x.moved.clear()
+    moved = sorted(x.joins_to_check)
+    x.joins_to_check.clear()
     fired = False
     for number in moved:
         scope = x.state.scopes.get(number)
         if scope is not None and (scope.joins or scope.activated) and _fire_one(x, scope):
-            x.moved.add(number)  # what one has done may be what another waited for
+            x.joins_to_check.add(number)  # another join may have waited for this one
             fired = True
     return fired
 
 
 def _fire_one(x: Execution, scope: Scope) -> bool:
     for node, join in scope.joins.items():
-        if isinstance(node, InclusiveGateway) and not _more_can_come(x, scope, node, join.by_flow):
+        if isinstance(node, InclusiveGateway) and not _more_tokens_can_come(
+            x, scope, node, join.by_flow
+        ):
             last = list(join.by_flow.values())[-1][0]
             merge(x, last, join)
-            split(x, last, node)
+            split_inclusive(x, last, node)
             return True
     for node, used in scope.activated.items():
         waiting = scope.joins[node].by_flow if node in scope.joins else {}
-        if not _more_can_come(x, scope, node, {*used, *waiting}):
+        if not _more_tokens_can_come(x, scope, node, {*used, *waiting}):
             assert isinstance(node, ComplexGateway)
-            reset(x, scope, node)
+            reset_complex_gateway(x, scope, node)
             return True
     return False
 
 
-def _more_can_come(
+def _more_tokens_can_come(
     x: Execution, scope: Scope, node: FlowNode, taken: Container[SequenceFlow]
 ) -> bool:
-    """Whether a flow that no token came by may still get one (the rule of table 13.3).
+    """Whether an incoming flow without a token may still get one (the rule of table 13.3).
 
     A token elsewhere in the scope keeps the join waiting when it can reach such a flow, along a
     path that does not pass the join, unless it can also reach one that is taken already. Those
@@ -236,9 +238,9 @@ def _more_can_come(
     """
     reach = x.upstream(node)
     bits = 0
-    for place, flow in enumerate(node.incoming):
+    for index, flow in enumerate(node.incoming):
         if flow in taken:
-            bits |= 1 << place
+            bits |= 1 << index
     for token in scope.tokens.values():
         reachable = 0 if token.is_reopened else reach.get(token.node, 0)
         if reachable & ~bits and not reachable & bits:

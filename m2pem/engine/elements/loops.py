@@ -10,11 +10,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from m2pem.engine import records as r
-from m2pem.engine.compensation import enable, throw_compensation
+from m2pem.engine.compensation import enable_compensation, throw_compensation
 from m2pem.engine.data import instance_counts, reader, store_for
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import TokenOutcome, Trigger
-from m2pem.engine.scopes import close, empty
+from m2pem.engine.scopes import close_scope, end_tokens
 from m2pem.engine.state import Scope, Token
 from m2pem.engine.throwing import throw_error, throw_escalation
 from m2pem.engine.triggering import send, throw_signal, trigger
@@ -34,7 +34,7 @@ from m2pem.mission.loops import LOOP_COUNTER, InstanceBehavior, MultiInstance, S
 from m2pem.mission.values import ReadValue, Value
 
 MAX_PARALLEL = 1_000_000
-"""Instances that may be active at a time: what memory can be expected to hold."""
+"""Instances of one activity that may be active at a time, because of memory."""
 
 ROUNDS_UNKNOWN = -1
 
@@ -42,34 +42,34 @@ ROUNDS_UNKNOWN = -1
 # --- the beginning ------------------------------------------------------------------------------
 
 
-def begin_loop(x: Execution, whole: Token, loop: StandardLoop | MultiInstance) -> bool:
-    """Begin the instances of the activity that a token has come to. True: there are none."""
+def begin_loop(x: Execution, outer: Token, loop: StandardLoop | MultiInstance) -> bool:
+    """Begin the instances of the activity that a token has entered. True: there are none."""
     if isinstance(loop, MultiInstance):
-        return _begin_multi_instance(x, whole, loop)
-    goes_on = _begins(x, whole, loop)
+        return _begin_multi_instance(x, outer, loop)
+    goes_on = _begins(x, outer, loop)
     if goes_on:
-        _enter_instance(x, _open(x, whole, ROUNDS_UNKNOWN, None))
+        _enter_instance(x, _open(x, outer, ROUNDS_UNKNOWN, None))
     return goes_on is False
 
 
-def _begin_multi_instance(x: Execution, whole: Token, loop: MultiInstance) -> bool:
+def _begin_multi_instance(x: Execution, outer: Token, loop: MultiInstance) -> bool:
     items: tuple[Value, ...] | None = None
     try:
         if loop.collection is not None:
-            items = _items(loop.collection, reader(whole))
+            items = _items(loop.collection, reader(outer))
             total = len(items)
         else:
             assert loop.cardinality is not None
-            total = natural(loop.cardinality, reader(whole))
+            total = instance_count(loop.cardinality, reader(outer))
         if total > MAX_PARALLEL and not loop.sequential:
             raise ExpressionError(f"{total} parallel instances are more than {MAX_PARALLEL}")
     except ExpressionError as error:
-        throw_error(x, whole, "EXPRESSION", f"instances of {whole.node.id}: {error}")
+        throw_error(x, outer, "EXPRESSION", f"instances of {outer.node.id}: {error}")
         return False
     if not total:
-        _write_outputs(x, whole, loop, [])
+        _write_outputs(x, outer, loop, [])
         return True
-    scope = _open(x, whole, total, items)
+    scope = _open(x, outer, total, items)
     if loop.sequential:
         _enter_instance(x, scope)
     else:
@@ -85,11 +85,11 @@ def _items(collection: Expression, read: ReadValue) -> tuple[Value, ...]:
     return tuple(value)
 
 
-def _open(x: Execution, whole: Token, total: int, items: tuple[Value, ...] | None) -> Scope:
-    node = whole.node
+def _open(x: Execution, outer: Token, total: int, items: tuple[Value, ...] | None) -> Scope:
+    node = outer.node
     number = x.state.last_scope + 1
     x.emit(
-        r.ScopeOpened(number, x.process_of(node), node.id, whole.scope.id, whole.id, total, items)
+        r.ScopeOpened(number, x.process_of(node), node.id, outer.scope.id, outer.id, total, items)
     )
     return x.state.scopes[number]
 
@@ -120,9 +120,9 @@ def _enter_instance(x: Execution, scope: Scope) -> None:
 
 
 def instance_done(x: Execution, token: Token, outcome: TokenOutcome) -> Iterator[Token]:
-    """The work of an instance is done. Gives the wholes that have completed with it.
+    """Complete an instance, and yield the outer instances that have completed with it.
 
-    What an instance throws may end other instances: they come after it, not within it.
+    What an instance throws may end other instances: these are handled after it, not within it.
     """
     if x.ended_instances is not None:
         x.ended_instances.append((token, outcome))
@@ -131,53 +131,57 @@ def instance_done(x: Execution, token: Token, outcome: TokenOutcome) -> Iterator
     while x.ended_instances:
         ended, how = x.ended_instances.popleft()
         if x.state.tokens.get(ended.id) is ended:
-            whole = _settle(x, ended, how)
-            if whole is not None:
-                yield whole
+            outer = _end_instance(x, ended, how)
+            if outer is not None:
+                yield outer
     x.ended_instances = None
 
 
-def _settle(x: Execution, token: Token, outcome: TokenOutcome) -> Token | None:
-    """Take an instance off, and go on with the others. Gives the whole if it has completed."""
+def _end_instance(x: Execution, token: Token, outcome: TokenOutcome) -> Token | None:
+    """Remove an instance, and go on with the others. Return the outer instance if it completed."""
     scope = token.scope
-    whole = scope.owner
-    assert whole is not None
-    assert isinstance(whole.node, Activity)
-    loop = whole.node.loop
+    outer = scope.owner
+    assert outer is not None
+    assert isinstance(outer.node, Activity)
+    loop = outer.node.loop
     if isinstance(loop, StandardLoop):
-        enable(x, token)
+        enable_compensation(x, token)
         x.leave(token, outcome)
-        return _next_round(x, token, whole, loop)
+        return _next_round(x, token, outer, loop)
     assert loop is not None
     assert scope.loop is not None
-    if loop.output_collection and not collect(x, token, loop):
+    if loop.output_collection and not collect_output(x, token, loop):
         return None
-    enable(x, token)
+    enable_compensation(x, token)
     x.leave(token, outcome)
-    if outcome is TokenOutcome.COMPLETED and not _throw_all(x, token, whole, loop):
+    if outcome is TokenOutcome.COMPLETED and not _throw_events_of_completion(x, token, outer, loop):
         return None
     if loop.completion is not None:
-        enough = _holds(x, whole, loop.completion, reader(token), "completion condition")
+        enough = _condition_holds(x, outer, loop.completion, reader(token), "completion condition")
         if enough is None:
             return None
         if enough:
-            empty(x, scope, TokenOutcome.INTERRUPTED)
-            return _finish(x, scope, whole, loop)
+            end_tokens(x, scope, TokenOutcome.INTERRUPTED)
+            return _finish(x, scope, outer, loop)
     if scope.loop.started < scope.loop.total and loop.sequential:
         _enter_instance(x, scope)
     elif not scope.tokens:
-        return _finish(x, scope, whole, loop)
+        return _finish(x, scope, outer, loop)
     return None
 
 
-def _throw_all(x: Execution, token: Token, whole: Token, loop: MultiInstance) -> bool:
-    """Throw what the completion of an instance throws. False: that ended the whole."""
+def _throw_events_of_completion(
+    x: Execution, token: Token, outer: Token, loop: MultiInstance
+) -> bool:
+    """Throw the events of an instance's completion. False: that ended the outer instance."""
     scope = token.scope
     assert scope.loop is not None
-    for condition, events in occasions(loop, first=scope.loop.completed == 1):
-        due = condition is None or _holds(x, whole, condition, reader(token), "behavior condition")
+    for condition, events in events_of_completion(loop, first=scope.loop.completed == 1):
+        due = condition is None or _condition_holds(
+            x, outer, condition, reader(token), "behavior condition"
+        )
         for definition in events if due else ():
-            throw(x, whole, scope, definition)
+            throw_event(x, outer, scope, definition)
             if x.state.scopes.get(scope.id) is not scope:
                 return False
         if x.state.scopes.get(scope.id) is not scope:
@@ -185,69 +189,71 @@ def _throw_all(x: Execution, token: Token, whole: Token, loop: MultiInstance) ->
     return True
 
 
-def _finish(x: Execution, scope: Scope, whole: Token, loop: MultiInstance) -> Token:
+def _finish(x: Execution, scope: Scope, outer: Token, loop: MultiInstance) -> Token:
     assert scope.loop is not None
     outputs = [scope.loop.outputs.get(number) for number in range(scope.loop.total)]
-    close(x, scope, TokenOutcome.COMPLETED)
-    _write_outputs(x, whole, loop, outputs)
-    return whole
+    close_scope(x, scope, TokenOutcome.COMPLETED)
+    _write_outputs(x, outer, loop, outputs)
+    return outer
 
 
-def _write_outputs(x: Execution, whole: Token, loop: MultiInstance, outputs: list[Value]) -> None:
+def _write_outputs(x: Execution, outer: Token, loop: MultiInstance, outputs: list[Value]) -> None:
     key = loop.output_collection
     if key:
-        x.write_into(store_for(whole, key), whole, key, outputs)
+        x.write_into(store_for(outer, key), outer, key, outputs)
 
 
 # --- rounds -------------------------------------------------------------------------------------
 
 
-def _begins(x: Execution, whole: Token, loop: StandardLoop) -> bool | None:
+def _begins(x: Execution, outer: Token, loop: StandardLoop) -> bool | None:
     if loop.maximum == 0:
         return False
     if not loop.test_before or loop.condition is None:
         return True
-    return _holds(x, whole, loop.condition, _counting(reader(whole), 0), "loop condition")
+    return _condition_holds(
+        x, outer, loop.condition, _with_loop_counter(reader(outer), 0), "loop condition"
+    )
 
 
-def _next_round(x: Execution, token: Token, whole: Token, loop: StandardLoop) -> Token | None:
-    """Begin another round after that of `token`; gives the whole if there is none."""
+def _next_round(x: Execution, token: Token, outer: Token, loop: StandardLoop) -> Token | None:
+    """Begin another round after that of `token`; return the outer instance if there is none."""
     scope = token.scope
     assert scope.loop is not None
     rounds = scope.loop.started
     goes_on: bool | None = loop.maximum is None or rounds < loop.maximum
     if goes_on and loop.condition is not None:
-        read = _counting(reader(token), rounds)
-        goes_on = _holds(x, whole, loop.condition, read, "loop condition")
+        read = _with_loop_counter(reader(token), rounds)
+        goes_on = _condition_holds(x, outer, loop.condition, read, "loop condition")
     if goes_on:
         _enter_instance(x, scope)
     elif goes_on is False:
-        close(x, scope, TokenOutcome.COMPLETED)
-        return whole
+        close_scope(x, scope, TokenOutcome.COMPLETED)
+        return outer
     return None
 
 
-def _counting(read: ReadValue, rounds: int) -> ReadValue:
-    """Between two rounds the counter is that of the next: how many there have been."""
+def _with_loop_counter(read: ReadValue, rounds: int) -> ReadValue:
+    """Read names with the loop counter of the next round: the number of rounds so far."""
     return lambda name: rounds if name == LOOP_COUNTER else read(name)
 
 
-def _holds(
-    x: Execution, whole: Token, condition: Expression, read: ReadValue, what: str
+def _condition_holds(
+    x: Execution, outer: Token, condition: Expression, read: ReadValue, what: str
 ) -> bool | None:
-    """Whether a condition is true; None: it could not be evaluated, and its error was thrown."""
+    """Evaluate a condition; None: it could not be evaluated, and error EXPRESSION was thrown."""
     try:
         return condition.holds(read)
     except ExpressionError as error:
-        throw_error(x, whole, "EXPRESSION", f"{what} of {whole.node.id}: {error}")
+        throw_error(x, outer, "EXPRESSION", f"{what} of {outer.node.id}: {error}")
         return None
 
 
-def natural(cardinality: Expression, read: ReadValue) -> int:
-    """How many instances a cardinality asks for.
+def instance_count(cardinality: Expression, read: ReadValue) -> int:
+    """Return the number of instances that a cardinality expression gives.
 
     Raises:
-        ExpressionError: it is no natural number.
+        ExpressionError: the cardinality is not a natural number.
     """
     value = cardinality.evaluate(read)
     if isinstance(value, float) and value.is_integer():
@@ -261,10 +267,10 @@ def natural(cardinality: Expression, read: ReadValue) -> int:
 # --- outputs ------------------------------------------------------------------------------------
 
 
-def collect(x: Execution, token: Token, loop: MultiInstance) -> bool:
-    """Keep what an instance gives, if anything. False: a wrong expression's error was thrown."""
+def collect_output(x: Execution, token: Token, loop: MultiInstance) -> bool:
+    """Keep the output of an instance, if any. False: error EXPRESSION was thrown."""
     if loop.output is None:
-        value = _whole(token.own or {}, loop.output_item)
+        value = _assembled(token.own or {}, loop.output_item)
     else:
         try:
             value = loop.output.evaluate(reader(token))
@@ -279,8 +285,8 @@ def collect(x: Execution, token: Token, loop: MultiInstance) -> bool:
     return True
 
 
-def _whole(own: Mapping[str, Value], key: str) -> Value:
-    """A value, or the map that was written entry by entry (`key.entry`)."""
+def _assembled(own: Mapping[str, Value], key: str) -> Value:
+    """Return a value, or the map that was written entry by entry (`key.entry`)."""
     value = own.get(key)
     entries = [name for name in own if name.startswith(f"{key}.")]
     if not entries:
@@ -300,10 +306,10 @@ def _whole(own: Mapping[str, Value], key: str) -> Value:
 # --- events -------------------------------------------------------------------------------------
 
 
-def occasions(
+def events_of_completion(
     loop: MultiInstance, *, first: bool
 ) -> Iterator[tuple[Expression | None, tuple[EventDefinition, ...]]]:
-    """What the completion of an instance throws, each under its condition (None is true)."""
+    """Yield what the completion of an instance throws, with its condition (None: always)."""
     match loop.behavior:
         case InstanceBehavior.NONE:
             yield None, loop.events
@@ -314,34 +320,34 @@ def occasions(
                 yield each.condition, each.events
 
 
-def throw(x: Execution, whole: Token, scope: Scope, definition: EventDefinition) -> None:
-    """Throw from a multi-instance activity; its own boundary events are the first to catch."""
-    node = whole.node
+def throw_event(x: Execution, outer: Token, scope: Scope, definition: EventDefinition) -> None:
+    """Throw an event from a multi-instance activity; its own boundary events catch first."""
+    node = outer.node
     match definition:
         case SignalEventDefinition(signal=signal):
-            place = (x.process_of(node), node.id, whole.scope.id)
-            x.emit(r.SignalThrown(signal.id, whole.id, *place))
+            place = (x.process_of(node), node.id, outer.scope.id)
+            x.emit(r.SignalThrown(signal.id, outer.id, *place))
             assert scope.loop is not None
             default = signal.id == node.id  # it carries the runtime attributes (table 10.29)
             throw_signal(x, signal.id, {**instance_counts(scope.loop)} if default else {})
         case MessageEventDefinition(message=message):
-            _throw_message(x, whole, message.id)
-        case CompensateEventDefinition():  # it goes on meanwhile, as it works itself
-            throw_compensation(x, whole, replace(definition, wait=False))
+            _throw_message(x, outer, message.id)
+        case CompensateEventDefinition():  # the activity does not wait for it
+            throw_compensation(x, outer, replace(definition, wait=False))
         case EscalationEventDefinition(escalation=escalation):
             assert escalation is not None
-            throw_escalation(x, whole, escalation)
+            throw_escalation(x, outer, escalation)
         case ErrorEventDefinition(error=error):
             assert error is not None
-            throw_error(x, whole, error.code, f"thrown by an instance of {node.label}")
+            throw_error(x, outer, error.code, f"thrown by an instance of {node.label}")
 
 
-def _throw_message(x: Execution, whole: Token, message: str) -> None:
-    node = whole.node
-    for wait in (whole.waits or {}).values():
+def _throw_message(x: Execution, outer: Token, message: str) -> None:
+    node = outer.node
+    for wait in (outer.waits or {}).values():
         if wait.trigger is Trigger.MESSAGE and wait.ref == message:
-            place = (x.process_of(node), node.id, whole.scope.id)
-            x.emit(r.MessageThrown(message, whole.id, *place))
+            place = (x.process_of(node), node.id, outer.scope.id)
+            x.emit(r.MessageThrown(message, outer.id, *place))
             trigger(x, wait, {})
             return
-    send(x, whole, message)
+    send(x, outer, message)

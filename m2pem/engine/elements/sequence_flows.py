@@ -19,12 +19,12 @@ def true_flows(
     first_only: bool = False,
     read: ReadValue | None = None,
 ) -> Sequence[SequenceFlow] | None:
-    """The flows whose condition is true, in the XML's order, else the default one.
+    """Return the flows whose condition is true, in the XML's order, else the default one.
 
     Out of an activity, flows with and without conditions are an inclusive and a parallel split
     (clause 13.3.1): its default is taken when no condition is true, beside those that have none.
-    `read`: how conditions read names, when not just as the token's element does. None: an error
-    was thrown instead, because a condition could not be evaluated (EXPRESSION) or nothing was true
+    `read`: reads names for conditions; by default as the token's element does. None: an error was
+    thrown instead, because a condition could not be evaluated (EXPRESSION) or nothing was true
     and there is no default (NO_FLOW).
     """
     node = token.node

@@ -8,32 +8,32 @@ compensates what was done in it; then the token leaves by its cancel boundary ev
 """
 
 from m2pem.engine import records as r
-from m2pem.engine.compensation import advance, close_undone, trigger_all
+from m2pem.engine.compensation import advance_compensations, close_compensated, compensate_all
 from m2pem.engine.data import flatten, reader
 from m2pem.engine.data_flow import evaluate, write_values
 from m2pem.engine.elements.activities import complete
 from m2pem.engine.elements.loops import begin_instances
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import RunOutcome, TokenOutcome
-from m2pem.engine.scopes import close, empty, end_run, open_scope, withdraw
+from m2pem.engine.scopes import close_scope, end_run, end_tokens, open_scope, stop_activity
 from m2pem.engine.state import Scope, Token
 from m2pem.engine.throwing import throw_error
-from m2pem.engine.triggering import arm_event_subprocesses, collect_letters
+from m2pem.engine.triggering import arm_event_subprocesses, take_kept_messages
 from m2pem.errors import ExpressionError
 from m2pem.mission.elements import Activity, AdHocOrdering, AdHocSubProcess, CallActivity, FlowNode
 from m2pem.mission.events import CancelEventDefinition
 from m2pem.mission.expression import Expression
 
 MAX_DEPTH = 1000
-"""Scopes within scopes; more is a process that calls itself without end."""
+"""Nested scopes that are allowed; more is a process that calls itself without end."""
 
 
 def subprocess(x: Execution, token: Token) -> None:
-    """Open its scope and start what is in it."""
+    """Open the scope of a subprocess and begin what is in it."""
     if token.inner is not None:
-        # An event subprocess, which its trigger has begun.
+        # An event subprocess that its trigger has begun.
         if arm_event_subprocesses(x, token.inner):
-            collect_letters(x, token.inner)
+            take_kept_messages(x, token.inner)
         return
     scope = open_inside(x, token)
     if scope is not None:
@@ -41,7 +41,7 @@ def subprocess(x: Execution, token: Token) -> None:
 
 
 def call_activity(x: Execution, token: Token) -> None:
-    """Open an instance of the called process; only what the mappings say passes in and out."""
+    """Open an instance of the called process; only its mappings pass data in and out."""
     node = token.node
     assert isinstance(node, CallActivity)
     values = evaluate(x, token, node.mappings.inputs, reader(token))
@@ -57,7 +57,7 @@ def call_activity(x: Execution, token: Token) -> None:
 
 
 def open_inside(x: Execution, token: Token) -> Scope | None:
-    """Open the scope of an activity. None: it is too deep, and that error was thrown."""
+    """Open the scope of an activity. None: it is too deep, and error RECURSION was thrown."""
     if token.scope.depth >= MAX_DEPTH:
         throw_error(x, token, "RECURSION", _too_deep(token))
         return None
@@ -78,18 +78,18 @@ def _too_deep(token: Token) -> str:
 
 
 def begin(x: Execution, scope: Scope) -> None:
-    """A token for each start event of the scope's container (paper, section 4.1)."""
+    """Put a token on each start event of the scope's container (paper, section 4.1)."""
     if scope.container.event_subprocesses and not arm_event_subprocesses(x, scope):
         return
     for entry in scope.container.entries:
         x.spawn(entry, scope)
     if not scope.tokens:
         x.queue.append(scope)
-    collect_letters(x, scope)
+    take_kept_messages(x, scope)
 
 
 def check_container(x: Execution, scope: Scope) -> None:
-    """A scope in which a token was consumed: if it was the last one, the scope has completed."""
+    """Complete a scope if its last token was consumed."""
     if scope.loop is not None:
         begin_instances(x, scope)
     elif not scope.tokens:
@@ -99,8 +99,7 @@ def check_container(x: Execution, scope: Scope) -> None:
 
 
 def _complete_handlers(x: Execution, scope: Scope) -> None:
-    """A scope whose own work is done waits for its event subprocesses, and begins no more of them
-    (clause 13.3.2: it is completing)."""
+    """Note that only event subprocesses are left in a scope: it begins no more of them (13.3.2)."""
     handlers = scope.container.event_subprocesses
     if all(token.node in handlers for token in scope.tokens.values()):
         owner = scope.owner
@@ -109,13 +108,13 @@ def _complete_handlers(x: Execution, scope: Scope) -> None:
 
 
 def finish(x: Execution, scope: Scope, outcome: TokenOutcome = TokenOutcome.COMPLETED) -> None:
-    """A scope has ended: its activity goes on, or, without one, perhaps the run is over.
+    """Close a scope that has ended: its activity completes; without one, the run may end.
 
-    `outcome` TERMINATED: by a terminate end event in it.
+    `outcome` is TERMINATED when a terminate end event in it has ended it.
     """
     token = scope.owner
     if token is None:
-        close(x, scope, outcome)
+        close_scope(x, scope, outcome)
         if not x.state.scopes:
             end_run(x, RunOutcome.COMPLETED)
         return
@@ -125,17 +124,17 @@ def finish(x: Execution, scope: Scope, outcome: TokenOutcome = TokenOutcome.COMP
         values = evaluate(x, token, node.mappings.outputs, reader(scope))
         if values is None:
             return
-    close(x, scope, outcome)
+    close_scope(x, scope, outcome)
     write_values(x, token, token, values or [])
     complete(x, token, outcome)
 
 
 COMPLETE = "complete"
-"""The decision that nothing more is to be done."""
+"""The decision of an operator to complete the ad-hoc subprocess."""
 
 
 def ad_hoc(x: Execution, token: Token) -> None:
-    """Open its scope, and have the first activities chosen."""
+    """Open the scope of an ad-hoc subprocess, and choose its first activities."""
     node = token.node
     assert isinstance(node, AdHocSubProcess)
     scope = open_inside(x, token)
@@ -149,11 +148,11 @@ def ad_hoc(x: Execution, token: Token) -> None:
             return
         x.emit(r.ActivitiesChosen(token.id, x.process_of(node), node.id, scope.id, chosen))
     _go_on(x, token, node, scope)
-    collect_letters(x, scope)
+    take_kept_messages(x, scope)
 
 
 def check_ad_hoc(x: Execution, scope: Scope) -> None:
-    """An activity in it has completed: perhaps all of it has."""
+    """Check an ad-hoc subprocess in which an activity has completed."""
     token = scope.owner
     assert token is not None
     node = token.node
@@ -170,7 +169,7 @@ def check_ad_hoc(x: Execution, scope: Scope) -> None:
             return
         if complete:
             if node.cancel_remaining:
-                empty(x, scope, TokenOutcome.INTERRUPTED)
+                end_tokens(x, scope, TokenOutcome.INTERRUPTED)
             if scope.tokens:
                 _withdraw_prompt(x, token)
             else:
@@ -179,13 +178,13 @@ def check_ad_hoc(x: Execution, scope: Scope) -> None:
     _go_on(x, token, node, scope)
 
 
-def chosen(x: Execution, token: Token, decision: str) -> None:
-    """An operator has chosen what to do next."""
+def answer_ad_hoc(x: Execution, token: Token, decision: str) -> None:
+    """Begin the activity that an operator has chosen, or complete the subprocess."""
     node, scope = token.node, token.inner
     assert isinstance(node, AdHocSubProcess)
     assert scope is not None
     if decision == COMPLETE:
-        empty(x, scope, TokenOutcome.INTERRUPTED)
+        end_tokens(x, scope, TokenOutcome.INTERRUPTED)
         _finish_ad_hoc(x, token, scope)
         return
     x.spawn(next(each for each in node.entries if each.id == decision), scope)
@@ -193,7 +192,7 @@ def chosen(x: Execution, token: Token, decision: str) -> None:
 
 
 def _go_on(x: Execution, token: Token, node: AdHocSubProcess, scope: Scope) -> None:
-    """Begin what was chosen, or ask what to begin next."""
+    """Begin the chosen activities, or prompt the operators for the next one."""
     one_at_a_time = node.ordering is AdHocOrdering.SEQUENTIAL
     if node.active_elements is not None:
         while scope.chosen and not (one_at_a_time and scope.tokens):
@@ -207,7 +206,7 @@ def _go_on(x: Execution, token: Token, node: AdHocSubProcess, scope: Scope) -> N
 
 
 def _ask(x: Execution, token: Token, node: AdHocSubProcess, scope: Scope) -> None:
-    """Ask the operators; what has not been done yet comes first."""
+    """Open a prompt for the next activity; activities that were not begun yet come first."""
     new = [each for each in node.entries if each not in scope.begun]
     again = [each for each in node.entries if each in scope.begun]
     decisions = [_decision(each) for each in new]
@@ -248,7 +247,7 @@ def _finish_ad_hoc(x: Execution, token: Token, scope: Scope) -> None:
 def _evaluate_active_elements(
     x: Execution, token: Token, node: AdHocSubProcess, expression: Expression
 ) -> tuple[str, ...] | None:
-    """The ids that the subprocess's own expression gives; None: its error was thrown."""
+    """Return the ids that `activeElements` gives; None: error EXPRESSION was thrown."""
     known = {each.local_id: each.id for each in node.entries}
     try:
         value = expression.evaluate(reader(token))
@@ -267,46 +266,46 @@ def _evaluate_active_elements(
 
 
 def cancel(x: Execution, token: Token) -> None:
-    """End a transaction from the cancel end event that a token is on, and roll it back.
+    """End a transaction at the cancel end event that a token is on, and compensate it.
 
     Until that is done, its boundary events and event subprocesses wait for nothing; only what is
-    thrown by what undoes it is still caught.
+    thrown during its compensation is still caught.
     """
     scope, node = token.scope, token.node
     x.leave(token, TokenOutcome.COMPLETED)
-    empty(x, scope, TokenOutcome.TERMINATED)
+    end_tokens(x, scope, TokenOutcome.TERMINATED)
     x.emit(r.TransactionCancelled(token.id, x.process_of(node), node.id, scope.id))
-    trigger_all(x, token, scope)
+    compensate_all(x, token, scope)
 
 
 def leave_cancelled(x: Execution, scope: Scope) -> None:
-    """The rollback is done: go on at the cancel boundary event; without one, the token ends.
+    """Leave a compensated transaction by its cancel boundary event; without one, the token ends.
 
     An instance of a multi-instance transaction ends the others too, as boundary events do.
     """
-    whole = scope.owner
-    assert whole is not None
-    while whole.instance is not None:
-        assert whole.scope.owner is not None
-        whole = whole.scope.owner
-    node = whole.node
+    outer = scope.owner
+    assert outer is not None
+    while outer.instance is not None:
+        assert outer.scope.owner is not None
+        outer = outer.scope.owner
+    node = outer.node
     assert isinstance(node, Activity)
-    withdraw(x, whole, TokenOutcome.TERMINATED)
-    x.leave(whole, TokenOutcome.TERMINATED)
-    x.queue.append(whole.scope)
+    stop_activity(x, outer, TokenOutcome.TERMINATED)
+    x.leave(outer, TokenOutcome.TERMINATED)
+    x.queue.append(outer.scope)
     for boundary in node.boundary:
         if any(isinstance(each, CancelEventDefinition) for each in boundary.definitions):
-            x.enter(whole.id, boundary, whole.scope)
+            x.enter(outer.id, boundary, outer.scope)
             return
 
 
 def check_scope(x: Execution, scope: Scope) -> None:
     """Something in a scope has ended: the scope may have completed, or its compensation goes on."""
     if scope.compensations:
-        advance(x, scope)
+        advance_compensations(x, scope)
     elif scope.cancelled or scope.reopened:
         if not scope.tokens:
-            leave = leave_cancelled if scope.cancelled else close_undone
+            leave = leave_cancelled if scope.cancelled else close_compensated
             leave(x, scope)
     elif isinstance(scope.container, AdHocSubProcess) and scope.loop is None:
         check_ad_hoc(x, scope)

@@ -9,7 +9,7 @@ from m2pem.engine.execution import Execution
 from m2pem.engine.records import Trigger
 from m2pem.engine.state import Token
 from m2pem.engine.throwing import throw_error
-from m2pem.engine.triggering import collect_letters, send
+from m2pem.engine.triggering import send, take_kept_messages
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.fleet.allocation import AllocationError, allocate
 from m2pem.mission.behavior import Assignment, ServiceCall
@@ -25,12 +25,12 @@ from m2pem.mission.values import Value
 
 
 def pass_through(x: Execution, token: Token) -> None:
-    """A task without work of its own, or with work that m2pem knows nothing of."""
+    """Complete a task that has no work of its own, or none that m2pem knows."""
     complete(x, token)
 
 
 def user_task(x: Execution, token: Token) -> None:
-    """Open the prompt; an operator's answer completes the task (paper, section 4.1)."""
+    """Open the prompt of a user task; an answer completes it (paper, section 4.1)."""
     node = token.node
     assert isinstance(node, UserTask)
     assert node.prompt is not None
@@ -57,12 +57,12 @@ def user_task(x: Execution, token: Token) -> None:
 
 
 def prompt_timed_out(x: Execution, token: Token) -> None:
-    """Nobody answered in time: error PROMPT_TIMEOUT."""
+    """Throw error PROMPT_TIMEOUT: no operator answered in time."""
     throw_error(x, token, "PROMPT_TIMEOUT", f"no answer to {token.node.label!r} in time")
 
 
-def answered(x: Execution, token: Token, decision: str) -> None:
-    """An operator has decided."""
+def answer_user_task(x: Execution, token: Token, decision: str) -> None:
+    """Store an operator's decision and complete the task."""
     node = token.node
     assert isinstance(node, UserTask)
     assert node.prompt is not None
@@ -71,7 +71,7 @@ def answered(x: Execution, token: Token, decision: str) -> None:
 
 
 def script_task(x: Execution, token: Token) -> None:
-    """Command a behavior (paper, section 4.2), or run assignments."""
+    """Request a behavior (paper, section 4.2), or run the assignments of a script."""
     node = token.node
     assert isinstance(node, ScriptTask)
     if node.behavior is not None:
@@ -96,7 +96,7 @@ def _run_script(x: Execution, token: Token, node: ScriptTask) -> None:
 
 
 def service_task(x: Execution, token: Token) -> None:
-    """Run a registered service (paper, section 4.1), or command a behavior."""
+    """Run a registered service (paper, section 4.1), or request a behavior."""
     node = token.node
     assert isinstance(node, ServiceTask)
     if node.behavior is not None:
@@ -140,7 +140,7 @@ def _request_service(x: Execution, token: Token, call: ServiceCall) -> None:
 
 
 def send_task(x: Execution, token: Token) -> None:
-    """Throw a message, or command a behavior."""
+    """Throw a message, or request a behavior."""
     node = token.node
     assert isinstance(node, SendTask)
     if node.behavior is not None:
@@ -154,11 +154,11 @@ def send_task(x: Execution, token: Token) -> None:
 
 
 def receive_task(x: Execution, token: Token) -> None:
-    """Wait for a message; without one, there is nothing to wait for."""
+    """Wait for a message; a receive task without one completes at once."""
     node = token.node
     assert isinstance(node, ReceiveTask)
     if node.message is None:
         complete(x, token)
         return
     await_event(x, token, node, Trigger.MESSAGE, node.message.id)
-    collect_letters(x, token)
+    take_kept_messages(x, token)

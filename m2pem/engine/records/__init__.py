@@ -1,10 +1,10 @@
-"""Records: facts about a run, in the order they came to be. They are the journal and the state.
+"""Records: the events of a run in their order, as in event sourcing. The journal stores them.
 
 `m2pem.engine.apply` folds them into `RunState`, and nothing else changes it. Names and fields are
-an interface (docs/records.md): records are only ever added to. As JSON, a record is an object with
-its name under "record"; the journal adds "run", "seq" and "t" (mission time, seconds).
+an interface (docs/records.md): fields and records are only added. As JSON, a record is an object
+with its name under "record"; the journal adds "run", "seq" and "t" (mission time, seconds).
 
-`token` is an entity's id, `scope` the id of the scope it is in, `process` the id of the process
+`token` is the id of a token, `scope` the id of the scope it is in, `process` the id of the process
 that contains `element`.
 """
 

@@ -1,4 +1,4 @@
-"""What all records share, and the words that several of them use."""
+"""The base of all records, and the enumerations that several of them use."""
 
 from enum import StrEnum
 
@@ -13,7 +13,7 @@ class TokenOutcome(StrEnum):
     TERMINATED = "terminated"
     FAILED = "failed"
     CONSUMED = "consumed"
-    """With other tokens it began one execution of an activity (`startQuantity`)."""
+    """Together with other tokens it began one execution of an activity (`startQuantity`)."""
 
 
 class RunOutcome(StrEnum):

@@ -4,7 +4,7 @@ from m2pem.engine.records.base import BaseRecord
 
 
 class CompensationEnabled(BaseRecord, frozen=True):
-    """An activity, or an instance of one, has completed and can be undone from here."""
+    """An activity, or an instance of one, has completed and can be compensated."""
 
     token: int
     process: str
@@ -15,10 +15,11 @@ class CompensationEnabled(BaseRecord, frozen=True):
 
 
 class CompensationTriggered(BaseRecord, frozen=True):
-    """`completions` of the scope `target` will be undone, in this order; none: there are none.
+    """`completions` of the scope `target` will be compensated, in this order; empty: there are
+    none.
 
-    By a compensation event, a cancel end event, or an activity that is undone by undoing what was
-    done in it. `waits`: the event waits until all of them are.
+    The cause is a compensation event, a cancel end event, or an activity that is compensated by
+    what was done in it. `waits`: the event waits until all are compensated.
     """
 
     token: int
@@ -32,7 +33,8 @@ class CompensationTriggered(BaseRecord, frozen=True):
 
 
 class CompensationBegan(BaseRecord, frozen=True):
-    """`activity` is being undone: a token enters its compensation activity, or itself again."""
+    """The compensation of `activity` begins: a token enters its compensation activity, or
+    itself."""
 
     token: int
     process: str
@@ -44,14 +46,14 @@ class CompensationBegan(BaseRecord, frozen=True):
 
 
 class CompensationEnded(BaseRecord, frozen=True):
-    """All that it was triggered for has been undone."""
+    """All activities of a compensation have been compensated."""
 
     compensation: int
     scope: int
 
 
 class ScopeReopened(BaseRecord, frozen=True):
-    """A scope that was kept is there again, with its data, to be undone. `token` sits on it."""
+    """A kept scope is open again, with its data, to be compensated. `token` is on its activity."""
 
     scope: int
     process: str

@@ -1,4 +1,4 @@
-"""Records about data, and about what is awaited and thrown."""
+"""Records about data, and about events that are awaited and thrown."""
 
 import msgspec
 
@@ -7,7 +7,7 @@ from m2pem.mission.values import Value
 
 
 class DataWritten(BaseRecord, frozen=True):
-    """`store` is the scope that holds the key; `scope`, `element` say who wrote it.
+    """`store` is the scope that holds the key; `scope` and `element` say where it was written.
 
     `own`: the token whose activity holds it instead (an item variable, a data input); 0: none.
     """
@@ -30,7 +30,7 @@ class EventAwaited(BaseRecord, frozen=True):
     condition becomes true or a timer is due, and `scope` waits. `spent`: the condition has fired,
     and must be seen false (`ConditionReset`) before it can again.
 
-    A duration or cycle is due at a mission time (microseconds from the start, which stands during
+    A duration or cycle is due at a mission time (microseconds from the start, which stops during
     a pause); a date (`calendar`) at a time since the Unix epoch. `left`: how often a cycle still
     fires after this one (-1: for ever); `cycle`: its period or cron text.
     """
@@ -50,9 +50,9 @@ class EventAwaited(BaseRecord, frozen=True):
 
 
 class EventTriggered(BaseRecord, frozen=True):
-    """The awaited event came; the wait is over.
+    """An awaited event has occurred; the wait is over.
 
-    `kept`: it took a message that was kept, the `letter`-th (from 0) of that message.
+    `kept`: it took a kept message, the `letter`-th (from 0) of that message id.
     """
 
     wait: int
@@ -61,13 +61,13 @@ class EventTriggered(BaseRecord, frozen=True):
 
 
 class ConditionReset(BaseRecord, frozen=True):
-    """A condition that had fired was seen false: it can fire again."""
+    """A condition that had fired has become false: it can fire again."""
 
     wait: int
 
 
 class SignalThrown(BaseRecord, frozen=True):
-    """By an element, or by an operator (`by`)."""
+    """A signal was thrown by an element, or by an operator (`by`)."""
 
     signal: str
     token: int = 0
@@ -78,8 +78,11 @@ class SignalThrown(BaseRecord, frozen=True):
 
 
 class MessageThrown(BaseRecord, frozen=True):
-    """By an element, or by an operator (`by`). `kept`: nobody waits for it yet, so its `data` is
-    kept for whoever waits next. `keys`: what it is matched by (clause 8.4.2)."""
+    """A message was thrown by an element, or by an operator (`by`).
+
+    `kept`: no receiver waits for it yet, so its `data` is kept for the next one. `keys`: its
+    correlation keys (clause 8.4.2).
+    """
 
     message: str
     token: int = 0
@@ -93,7 +96,8 @@ class MessageThrown(BaseRecord, frozen=True):
 
 
 class EscalationThrown(BaseRecord, frozen=True):
-    """`caught_by`: the element that catches it, "" when none does (nothing else happens then)."""
+    """An escalation was thrown. `caught_by`: the event that catches it, "": none, and the run goes
+    on."""
 
     token: int
     process: str
@@ -105,7 +109,7 @@ class EscalationThrown(BaseRecord, frozen=True):
 
 
 class ErrorThrown(BaseRecord, frozen=True):
-    """`caught_by`: the element that catches it, "" when none does (the run fails then)."""
+    """An error was thrown. `caught_by`: the event that catches it, "": none, and the run fails."""
 
     token: int
     process: str

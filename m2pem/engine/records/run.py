@@ -6,7 +6,7 @@ from m2pem.mission.values import Value
 
 
 class RunStarted(BaseRecord, frozen=True):
-    """`started_us`: microseconds since the Unix epoch; mission time counts from it."""
+    """The run began. `started_us`: microseconds since the Unix epoch, the zero of mission time."""
 
     process: str
     started_us: int
@@ -14,9 +14,9 @@ class RunStarted(BaseRecord, frozen=True):
 
 
 class RunClaimed(BaseRecord, frozen=True):
-    """Another executive, or the same after a restart, drives the run from here.
+    """Another executive, or the same after a restart, has claimed the run.
 
-    `lost`: how many records the journal had lost; so many ids are left out.
+    `lost`: number of records that the journal had lost; so many ids are left out.
     """
 
     epoch: int
@@ -25,7 +25,7 @@ class RunClaimed(BaseRecord, frozen=True):
 
 
 class RunPaused(BaseRecord, frozen=True):
-    """No token moves, and mission time stands, until `RunResumed`."""
+    """The run was paused: no token moves and mission time stops until `RunResumed`."""
 
     at_us: int
     by: str = ""
@@ -37,7 +37,7 @@ class RunResumed(BaseRecord, frozen=True):
 
 
 class RunEnded(BaseRecord, frozen=True):
-    """Nothing follows but reports of behaviors that were still being cancelled."""
+    """The run ended. Only the ends of behaviors that were being cancelled may follow."""
 
     outcome: RunOutcome
     detail: str
@@ -46,46 +46,46 @@ class RunEnded(BaseRecord, frozen=True):
 class RunYielded(BaseRecord, frozen=True):
     """One input caused more steps than a batch; these are left, in order, for `Continue`.
 
-    A positive number is a token to execute, a negative one a scope to look at.
+    A positive number is a token to execute, a negative one a scope to check.
     """
 
     steps: tuple[int, ...]
 
 
 class InputIgnored(BaseRecord, frozen=True):
-    """A redundant or late input; it changed nothing else."""
+    """An input was redundant or late; it changed nothing else."""
 
     reason: str
 
 
 class InputDeferred(BaseRecord, frozen=True):
-    """An input that came during a pause; it is decided at resume."""
+    """An input came during a pause; it is decided at resume."""
 
     input: Input
 
 
 class InputSeen(BaseRecord, frozen=True):
-    """An input that carried an id was taken; another with the same id will be ignored."""
+    """An input with an id was taken; another one with the same id will be ignored."""
 
     id: str
 
 
 class OperatorTookControl(BaseRecord, frozen=True):
-    """`resource` is with an operator: it gets no behavior until it is given back."""
+    """An operator has control of `resource`: it gets no behavior until control is released."""
 
     resource: str
     by: str
 
 
 class OperatorGaveControlBack(BaseRecord, frozen=True):
-    """`resource` is the missions' again."""
+    """The operator has released control of `resource` to the missions."""
 
     resource: str
     by: str
 
 
 class GeometryReceived(BaseRecord, frozen=True):
-    """A route, area or point that an OCU handed over (GeoJSON geometry)."""
+    """An OCU sent a route, area or point (GeoJSON geometry)."""
 
     name: str
     geometry: dict[str, Value]

@@ -1,4 +1,4 @@
-"""Records about what activities do: behaviors, prompts and services."""
+"""Records about the work of tasks: behaviors, prompts and services."""
 
 from m2pem.engine.records.base import BaseRecord
 from m2pem.mission.catalogue import BehaviorState
@@ -26,7 +26,7 @@ class BehaviorRequested(BaseRecord, frozen=True):
 
 
 class BehaviorProgressed(BaseRecord, frozen=True):
-    """ACCEPTED or RUNNING, with the arbiter's own reference for finding it again."""
+    """A behavior is ACCEPTED or RUNNING; `native_ref`: the arbiter's own reference to it."""
 
     behavior: str
     number: int
@@ -35,7 +35,7 @@ class BehaviorProgressed(BaseRecord, frozen=True):
 
 
 class BehaviorCancelRequested(BaseRecord, frozen=True):
-    """Nobody waits for it any more; its resources are released when it has ended."""
+    """A behavior is to be cancelled; its resources are released when it has ended."""
 
     behavior: str
     code: str = ""
@@ -43,7 +43,8 @@ class BehaviorCancelRequested(BaseRecord, frozen=True):
 
 
 class BehaviorUnsettled(BaseRecord, frozen=True):
-    """After a restart nobody knows how it stands; its vehicle is held until an operator says."""
+    """The state of a behavior is not known after a restart; its vehicle is held until an operator
+    decides."""
 
     behavior: str
     state: BehaviorState
@@ -51,14 +52,14 @@ class BehaviorUnsettled(BaseRecord, frozen=True):
 
 
 class BehaviorContinued(BaseRecord, frozen=True):
-    """An operator lets it go on after a restart: its arbiter still has it."""
+    """An operator lets a behavior go on after a restart: its arbiter still has it."""
 
     behavior: str
     by: str = ""
 
 
 class BehaviorRestarted(BaseRecord, frozen=True):
-    """It is requested again under the same id, by decision of an operator or its resume policy."""
+    """A behavior is requested again under the same id, by an operator or its resume policy."""
 
     behavior: str
     epoch: int
@@ -66,7 +67,7 @@ class BehaviorRestarted(BaseRecord, frozen=True):
 
 
 class BehaviorEnded(BaseRecord, frozen=True):
-    """It has ended and released its resources. `code`: the error code, "" when it succeeded."""
+    """A behavior has ended and released its resources. `code`: its error, "" if it succeeded."""
 
     token: int
     process: str
@@ -79,7 +80,7 @@ class BehaviorEnded(BaseRecord, frozen=True):
 
 
 class PromptOpened(BaseRecord, frozen=True):
-    """An operator is asked. `behavior`: the behavior that a recovery prompt is about."""
+    """A prompt is open. `behavior`: the behavior that a recovery prompt is about."""
 
     token: int
     process: str
@@ -103,7 +104,7 @@ class PromptAnswered(BaseRecord, frozen=True):
 
 
 class PromptWithdrawn(BaseRecord, frozen=True):
-    """The question no longer stands: its task was interrupted, or it timed out."""
+    """A prompt is no longer open: its task was interrupted, or it timed out."""
 
     prompt: str
 
@@ -120,7 +121,7 @@ class ServiceRequested(BaseRecord, frozen=True):
 
 
 class ServiceEnded(BaseRecord, frozen=True):
-    """`code`: "" when it completed, else the error that its task throws."""
+    """A service has ended. `code`: "" if it completed, else the error that its task throws."""
 
     token: int
     process: str
@@ -132,6 +133,6 @@ class ServiceEnded(BaseRecord, frozen=True):
 
 
 class ServiceWithdrawn(BaseRecord, frozen=True):
-    """Nobody waits for the service any more."""
+    """A service is no longer needed: its task was interrupted."""
 
     service: str

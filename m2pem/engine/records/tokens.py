@@ -1,15 +1,15 @@
-"""Records about scopes and tokens: the game itself."""
+"""Records about scopes and tokens."""
 
 from m2pem.engine.records.base import BaseRecord, TokenOutcome
 from m2pem.mission.values import Value
 
 
 class ScopeOpened(BaseRecord, frozen=True):
-    """An instance of a container has begun. `token` sits on its activity in scope `parent`.
+    """An instance of a container has begun. `token` is on its activity in scope `parent`.
 
-    `instances`: the scope is that of the instances of a loop or multi-instance activity; how many
-    there will be, -1 when nobody knows (a standard loop). `items`: what they come from, if from a
-    collection; the nth instance has the nth.
+    `instances`: the scope holds the instances of a loop or multi-instance activity; their number,
+    -1 if not known (a standard loop). `items`: the collection that they come from; the nth instance
+    has the nth item.
     """
 
     scope: int
@@ -22,9 +22,9 @@ class ScopeOpened(BaseRecord, frozen=True):
 
 
 class ScopeClosed(BaseRecord, frozen=True):
-    """The instance has ended and its data is gone.
+    """An instance of a container has ended and its data is gone.
 
-    `kept`: it and its data are kept, because something that was done in it can be undone.
+    `kept`: it and its data are kept, because something that was done in it can be compensated.
     """
 
     scope: int
@@ -35,7 +35,7 @@ class ScopeClosed(BaseRecord, frozen=True):
 
 
 class TokenEntered(BaseRecord, frozen=True):
-    """A token is on an element. `flow`: the sequence flow that it came by.
+    """A token has entered an element. `flow`: the sequence flow that it came by.
 
     `instance`: which instance of a loop or multi-instance activity it is, from 0; absent: none.
     """
@@ -49,7 +49,7 @@ class TokenEntered(BaseRecord, frozen=True):
 
 
 class TokenLeft(BaseRecord, frozen=True):
-    """It is there no more. Without a later `TokenEntered` it was consumed. `instance` likewise."""
+    """A token has left an element. Without a later `TokenEntered` it was consumed."""
 
     token: int
     process: str
@@ -60,7 +60,7 @@ class TokenLeft(BaseRecord, frozen=True):
 
 
 class InstanceOutput(BaseRecord, frozen=True):
-    """What an instance of a multi-instance activity has given, to be collected."""
+    """The output of an instance of a multi-instance activity, for the output collection."""
 
     token: int
     process: str
@@ -71,7 +71,7 @@ class InstanceOutput(BaseRecord, frozen=True):
 
 
 class FlowTaken(BaseRecord, frozen=True):
-    """`element` is where the flow begins."""
+    """A token takes a sequence flow; `element` is its source."""
 
     token: int
     process: str
@@ -89,7 +89,7 @@ class ScopeInterrupted(BaseRecord, frozen=True):
 
 
 class ScopeCompleting(BaseRecord, frozen=True):
-    """Only event subprocesses are active in the scope any more: no other one can begin."""
+    """Only event subprocesses are still active in the scope: no other one can begin."""
 
     scope: int
     process: str
@@ -97,7 +97,7 @@ class ScopeCompleting(BaseRecord, frozen=True):
 
 
 class ActivitiesChosen(BaseRecord, frozen=True):
-    """An ad-hoc subprocess has begun whose own expression chooses what is done in it, in order."""
+    """The expression of an ad-hoc subprocess has chosen its activities, in this order."""
 
     token: int
     process: str
@@ -107,7 +107,7 @@ class ActivitiesChosen(BaseRecord, frozen=True):
 
 
 class TokensGathered(BaseRecord, frozen=True):
-    """As many tokens have come to an activity as begin it; `token` does so, the others left."""
+    """Enough tokens have arrived at an activity (`startQuantity`); `token` begins it."""
 
     token: int
     process: str

@@ -14,7 +14,7 @@ boundary events and other event subprocesses catch nothing then.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from m2pem.engine.scopes import compensates_around, compensator
+from m2pem.engine.scopes import compensation_handler, is_compensation_handler
 from m2pem.mission import elements as e
 from m2pem.mission.events import CancelEventDefinition, CompensateEventDefinition
 from m2pem.mission.loops import MultiInstance
@@ -34,7 +34,7 @@ def way_back(making: Making, node: e.Activity) -> Way | None:
 
 
 def _way_back(making: Making, node: e.Activity) -> Way | None:
-    if node.for_compensation or compensates_around(node):
+    if node.for_compensation or is_compensation_handler(node):
         return None
     if node.compensation is not None:
         return Way.ACTIVITY
@@ -42,7 +42,9 @@ def _way_back(making: Making, node: e.Activity) -> Way | None:
     if inside is None:
         return None
     activities = [each for each in inside.nodes if isinstance(each, e.Activity)]
-    if compensator(inside) is not None or any(way_back(making, each) for each in activities):
+    if compensation_handler(inside) is not None or any(
+        way_back(making, each) for each in activities
+    ):
         return Way.INSIDE
     return None
 
@@ -164,7 +166,7 @@ def ended(making: Making, host: Host, area: Area, over: list[Effect]) -> list[Ef
     interrupts = container is not None and any(
         start.interrupting
         for each in container.event_subprocesses
-        if not compensates_around(each)
+        if not is_compensation_handler(each)
         for start in each.starts
     )
     cut = cut_short(making, area) if interrupts else ()
@@ -372,7 +374,7 @@ def _undone(making: Making, area: Area, point: _Point) -> tuple[list[Effect], Ef
     if inner is None:  # a process that calls itself: the inner call is not seen
         return [Effect()], Effect()
     container = container_of(inner)
-    by_itself = compensator(container) if container is not None else None
+    by_itself = compensation_handler(container) if container is not None else None
     if by_itself is not None:
         begun = begin_event_subprocess(making, inner, by_itself, by_itself.starts)
         forgotten = forget(making, handler_host(making, inner, by_itself).inside, by_itself)
