@@ -1,20 +1,25 @@
-"""Draws BPMN diagrams as SVG, with marks on them: a run's path, what is stuck, what is unreached.
+"""Draws BPMN diagrams as SVG, with overlays: a run's path, what is stuck, what is unreached.
 
-    svg = draw(Path("mission.bpmn").read_bytes(), Marks(stuck={"Join": "waits for ever"}))
+    svg = draw(Path("mission.bpmn").read_bytes(), Overlays(stuck={"Join": "waits for ever"}))
 
 A diagram is drawn as its author set it; a file without one is laid out. Nothing but the file's
 bytes is looked at: a file need not be a mission that can be executed.
 """
 
-from m2pem.diagram.marks import Marks
+from m2pem.diagram.overlays import Overlays
 from m2pem.diagram.painter import paint
 from m2pem.diagram.planes import pictures_of
 
-__all__ = ["Marks", "draw"]
+__all__ = ["Overlays", "draw"]
 
 
 def draw(
-    source: bytes, marks: Marks | None = None, *, title: str = "", note: str = "", about: str = ""
+    source: bytes,
+    overlays: Overlays | None = None,
+    *,
+    title: str = "",
+    note: str = "",
+    about: str = "",
 ) -> str:
     """A BPMN file as SVG: all that its diagrams show, plane by plane.
 
@@ -25,4 +30,4 @@ def draw(
         m2pem.bpmn.xml.XmlError: the bytes are no XML that m2pem reads.
         ValueError: the file has no diagram, and cannot be laid out; the message tells why.
     """
-    return paint(pictures_of(source), marks or Marks(), title=title, note=note, about=about)
+    return paint(pictures_of(source), overlays or Overlays(), title=title, note=note, about=about)

@@ -10,12 +10,12 @@ from dataclasses import replace
 
 from lxml import etree
 
-from m2pem.diagram.labels import has_label, label_of, label_of_line
-from m2pem.diagram.layout.block import Block
-from m2pem.diagram.layout.loose import add_loose
+from m2pem.diagram.edges import has_label, label_of, label_of_line
+from m2pem.diagram.layout.file import add_loose, keep_sound, lay_out_pools
 from m2pem.diagram.layout.model import (
     BPMN,
     SUBPROCESSES,
+    Block,
     Element,
     children,
     is_node,
@@ -23,11 +23,9 @@ from m2pem.diagram.layout.model import (
     name_of,
     tag,
 )
-from m2pem.diagram.layout.place import lay_out
-from m2pem.diagram.layout.pools import lay_out_pools
-from m2pem.diagram.layout.sound import keep_sound
+from m2pem.diagram.layout.process import lay_out
 from m2pem.diagram.picture import Bounds, Line, Shape
-from m2pem.diagram.symbols import name_of_symbol
+from m2pem.diagram.planes import name_of_symbol
 
 NAMESPACES = {
     "bpmndi": "http://www.omg.org/spec/BPMN/20100524/DI",

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 
 from m2pem.api.control import StampedRecord
+from m2pem.diagram.style import cut, width_of
+from m2pem.diagram.svg import Drawing, Group
 from m2pem.fleet.fleet import Fleet
-from m2pem.rehearsal.svg import Canvas, cut, text_width
 from m2pem.rehearsal.timeline import Mark, Outcome, Span, Timeline, read_timeline
 
 WIDTH, LEFT, RIGHT, MARGIN = 1200.0, 150.0, 1170.0, 16.0
@@ -14,7 +15,10 @@ TOP, LANE, EMPTY_ROW, MARK_LANE, PADDING = 66.0, 34.0, 26.0, 18.0, 5.0
 NARROWEST = 3.0
 """Width of the bar of what took no time."""
 
-INK, FAINT, RULE, STRIPE, PAPER = "#1f2933", "#5f6b77", "#d9dee3", "#f4f6f8", "#ffffff"
+TEXT, FAINT, RULE, STRIPE = "#1f2933", "#5f6b77", "#d9dee3", "#f4f6f8"
+SIZE, SMALL = 11.0, 10.0
+"""Of texts."""
+
 BARS = {
     Outcome.SUCCEEDED: ("#cfe8d5", "#3b8a55"),
     Outcome.ANSWERED: ("#cfe0f5", "#2f6cb3"),
@@ -75,17 +79,16 @@ class _Chart:
             row.free = _free(bars, row.lanes)
 
     def draw(self) -> str:
-        canvas = Canvas()
+        canvas = Drawing()
         marks, top = self._placed_marks()
         tops = [top]
         for row in self._rows:
             tops.append(tops[-1] + row.height)
         bottom = tops[-1]
-        canvas.rectangle(0, 0, WIDTH, bottom + 60, PAPER)
         self._title(canvas)
         for place, row in enumerate(self._rows):
             if place % 2 == 0:
-                canvas.rectangle(0, tops[place], WIDTH, tops[place + 1] - tops[place], STRIPE)
+                canvas.rectangle(0, tops[place], WIDTH, tops[place + 1] - tops[place], fill=STRIPE)
             self._label(canvas, row, tops[place])
         self._axis(canvas, top, bottom)
         for mark, y in marks:
@@ -98,49 +101,51 @@ class _Chart:
 
     # --- parts ----------------------------------------------------------------------------------
 
-    def _title(self, canvas: Canvas) -> None:
+    def _title(self, canvas: Group) -> None:
         line = self._line
         began = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=line.started_us)
         ended = f"{line.outcome} after {_time(line.ended_s)}" if line.ended_s is not None else ""
-        canvas.text(MARGIN, 28, line.process or "no run", INK, size=18, bold=True)
+        canvas.text_line(line.process or "no run", MARGIN, 28, 18, fill=TEXT, font_weight="600")
         about = f"{ended or 'not ended'}, started {began:%Y-%m-%d %H:%M:%S} UTC"
         if line.detail:
             about = f"{about}: {line.detail}"
-        canvas.text(MARGIN, 48, cut(about, WIDTH - 2 * MARGIN, 12), FAINT, size=12)
+        canvas.text_line(_fit(about, WIDTH - 2 * MARGIN, 12), MARGIN, 48, 12, fill=FAINT)
 
-    def _label(self, canvas: Canvas, row: _Row, top: float) -> None:
+    def _label(self, canvas: Group, row: _Row, top: float) -> None:
         y = top + min(PADDING + LANE / 2, row.height / 2) + 4
         indent = MARGIN + (14 if "/" in row.label else 0)
         label = row.label.partition("/")[2] or row.label
         room = LEFT - indent - 12 - (50 if row.manned else 0)
-        canvas.text(indent, y, cut(label, room, 12), INK, size=12, bold="/" not in row.label)
+        weight = "400" if "/" in row.label else "600"
+        canvas.text_line(_fit(label, room, 12), indent, y, 12, fill=TEXT, font_weight=weight)
         if row.manned:
-            canvas.text(LEFT - 12, y, "manned", FAINT, anchor="end")
+            canvas.text_line("manned", LEFT - 12, y, SIZE, fill=FAINT, text_anchor="end")
 
-    def _axis(self, canvas: Canvas, top: float, bottom: float) -> None:
+    def _axis(self, canvas: Group, top: float, bottom: float) -> None:
         for t_s in _ticks(self._line.end_s):
             x = self._x(t_s)
-            canvas.line((x, top), (x, bottom), RULE)
-            canvas.text(x, bottom + 16, _time(t_s), FAINT, anchor="middle")
-        canvas.line((LEFT, bottom), (RIGHT, bottom), FAINT)
+            canvas.line((x, top), (x, bottom), stroke=RULE)
+            canvas.text_line(_time(t_s), x, bottom + 16, SIZE, fill=FAINT, text_anchor="middle")
+        canvas.line((LEFT, bottom), (RIGHT, bottom), stroke=FAINT)
         if self._line.ended_s is not None:
             x = self._x(self._line.ended_s)
-            canvas.line((x, top), (x, bottom), INK)
+            canvas.line((x, top), (x, bottom), stroke=TEXT)
 
-    def _bar(self, canvas: Canvas, row: _Row, place: int, top: float) -> None:
+    def _bar(self, canvas: Group, row: _Row, place: int, top: float) -> None:
         span, lane = row.spans[place], row.lanes[place]
         x, end = self._x(span.start_s), self._bar_end(span)
         y = top + lane * LANE
-        group = Canvas(canvas, _about(span))
-        group.rectangle(x, y + 2, end - x, LANE - 4, *BARS[span.outcome])
+        group = canvas.group(title=_about(span))
+        fill, edge = BARS[span.outcome]
+        group.rectangle(x, y + 2, end - x, LANE - 4, fill=fill, stroke=edge, rx=3)
         main, below = span.what or span.element, span.element if span.what else ""
         why = f"{main}: {span.note}"
-        if span.outcome is Outcome.FAILED and text_width(why) + 8 <= end - x:
+        if span.outcome is Outcome.FAILED and width_of(why, SIZE) + 8 <= end - x:
             main = why
-        needed = max(text_width(main), text_width(below, 10)) + 8
+        needed = max(width_of(main, SIZE), width_of(below, SMALL)) + 8
         inside, (left, right) = end - x, row.free[place]
         left = min(left, x - row.labelled.get(lane, LEFT))
-        anchor = ""
+        anchor = "start"
         if needed <= inside or inside >= max(right, left):
             at, room = x + 5, inside
         elif needed <= right or right >= left:
@@ -148,15 +153,16 @@ class _Chart:
             row.labelled[lane] = end + min(needed, right)
         else:
             at, room, anchor = x - 4, left, "end"
-        group.text(at, y + 15, cut(main, room - 8), INK, anchor=anchor)
-        group.text(at, y + 27, cut(below, room - 8, 10), FAINT, size=10, anchor=anchor)
+        for text, dy, size, fill in ((main, 15, SIZE, TEXT), (below, 27, SMALL, FAINT)):
+            shown = _fit(text, room - 8, size)
+            group.text_line(shown, at, y + dy, size, fill=fill, text_anchor=anchor)
 
     def _placed_marks(self) -> tuple[list[tuple[Mark, float]], float]:
         """The marks with their heights, and where the rows begin."""
         marks = self._line.marks
         if not marks:
             return [], TOP
-        lanes = _lanes((x - 10, x + 14 + text_width(mark.label)) for mark, x in self._at(marks))
+        lanes = _lanes((x - 10, x + 14 + width_of(mark.label, SIZE)) for mark, x in self._at(marks))
         placed = [
             (mark, TOP + PADDING + (lane + 0.5) * MARK_LANE)
             for mark, lane in zip(marks, lanes, strict=True)
@@ -166,31 +172,32 @@ class _Chart:
     def _at(self, marks: Sequence[Mark]) -> Iterator[tuple[Mark, float]]:
         return ((mark, self._x(mark.t_s)) for mark in marks)
 
-    def _mark(self, canvas: Canvas, mark: Mark, y: float, bottom: float) -> None:
+    def _mark(self, canvas: Group, mark: Mark, y: float, bottom: float) -> None:
         x, colour = self._x(mark.t_s), MARKS[mark.kind]
         note = f": {mark.note}" if mark.note else ""
-        group = Canvas(canvas, f"{mark.kind} {mark.label} at {_time(mark.t_s)}{note}")
-        group.line((x, y + 6), (x, bottom), colour, dashes="2 3")
-        group.shape([(x + dx, y + dy) for dx, dy in SYMBOLS[mark.kind]], colour)
-        if x + 10 + text_width(mark.label) > WIDTH:
-            group.text(x - 10, y + 4, mark.label, colour, anchor="end")
+        group = canvas.group(title=f"{mark.kind} {mark.label} at {_time(mark.t_s)}{note}")
+        group.line((x, y + 6), (x, bottom), stroke=colour, stroke_dasharray="2 3")
+        group.polygon([(x + dx, y + dy) for dx, dy in SYMBOLS[mark.kind]], fill=colour)
+        if x + 10 + width_of(mark.label, SIZE) > WIDTH:
+            group.text_line(mark.label, x - 10, y + 4, SIZE, fill=colour, text_anchor="end")
         else:
-            group.text(x + 10, y + 4, mark.label, colour)
+            group.text_line(mark.label, x + 10, y + 4, SIZE, fill=colour)
 
-    def _legend(self, canvas: Canvas, y: float) -> None:
+    def _legend(self, canvas: Group, y: float) -> None:
         outcomes = {span.outcome for row in self._rows for span in row.spans}
         kinds = {mark.kind for mark in self._line.marks}
         x = LEFT
-        for outcome, colours in BARS.items():
+        for outcome, (fill, edge) in BARS.items():
             if outcome in outcomes:
-                canvas.rectangle(x, y - 9, 14, 11, *colours)
-                canvas.text(x + 20, y, outcome.value, FAINT)
-                x += 40 + text_width(outcome.value)
+                canvas.rectangle(x, y - 9, 14, 11, fill=fill, stroke=edge, rx=3)
+                canvas.text_line(outcome.value, x + 20, y, SIZE, fill=FAINT)
+                x += 40 + width_of(outcome.value, SIZE)
         for kind, colour in MARKS.items():
             if kind in kinds:
-                canvas.shape([(x + 7 + dx, y - 4 + dy) for dx, dy in SYMBOLS[kind]], colour)
-                canvas.text(x + 20, y, kind, FAINT)
-                x += 40 + text_width(kind)
+                corners = [(x + 7 + dx, y - 4 + dy) for dx, dy in SYMBOLS[kind]]
+                canvas.polygon(corners, fill=colour)
+                canvas.text_line(kind, x + 20, y, SIZE, fill=FAINT)
+                x += 40 + width_of(kind, SIZE)
 
     # --- places ---------------------------------------------------------------------------------
 
@@ -199,6 +206,12 @@ class _Chart:
 
     def _bar_end(self, span: Span) -> float:
         return max(self._x(span.end_s), self._x(span.start_s) + NARROWEST)
+
+
+def _fit(text: str, width: float, size: float) -> str:
+    """Cut a text to a width; "" where not even a letter fits."""
+    shown = cut(text, width, size)
+    return "" if shown == "\u2026" else shown
 
 
 def _resources(line: Timeline, fleet: Fleet | None) -> Iterator[_Row]:

@@ -3,9 +3,8 @@
 from lxml import etree
 
 from m2pem.diagram.layout import model
-from m2pem.diagram.layout.block import Block
-from m2pem.diagram.layout.model import BPMN, Element, name_of, tag
-from m2pem.diagram.layout.pools import lay_out_file
+from m2pem.diagram.layout.file import lay_out_file
+from m2pem.diagram.layout.model import BPMN, Block, Element, name_of, tag
 
 DI = {
     "bpmndi": "http://www.omg.org/spec/BPMN/20100524/DI",

@@ -7,9 +7,8 @@ import pytest
 from lxml import etree
 
 from m2pem.bpmn import parse_mission
-from m2pem.diagram import Marks, draw
-from m2pem.diagram.ink import FAINT, PATH, STUCK, WAITING
-from m2pem.diagram.text import width_of, wrapped
+from m2pem.diagram import Overlays, draw
+from m2pem.diagram.style import FAINT, PATH, STUCK, WAITING, width_of, wrapped
 from m2pem.errors import MissionError
 
 REPOSITORY = Path(__file__).parents[2]
@@ -59,7 +58,7 @@ def test_names_are_shown_as_they_are() -> None:
 
 
 def test_the_steps_of_a_run_are_coloured_and_numbered() -> None:
-    svg = draw(fork(), Marks(steps=[["f1", "S", "Fork"], ["f2", "A"], ["f4"], ["f2"]]))
+    svg = draw(fork(), Overlays(steps=[["f1", "S", "Fork"], ["f2", "A"], ["f4"], ["f2"]]))
     shown = groups(svg)
     for name in ("f1", "S", "Fork", "f2", "A", "f4"):
         assert PATH in strokes(shown[name]), name
@@ -68,8 +67,8 @@ def test_the_steps_of_a_run_are_coloured_and_numbered() -> None:
 
 
 def test_what_is_stuck_is_red_and_says_why() -> None:
-    marks = Marks(stuck={"Join": "waits for B"}, missing=frozenset({"f5"}))
-    shown = groups(draw(fork(), marks))
+    overlays = Overlays(stuck={"Join": "waits for B"}, missing=frozenset({"f5"}))
+    shown = groups(draw(fork(), overlays))
     assert STUCK in strokes(shown["Join"])
     assert STUCK in strokes(shown["f5"])
     assert shown["Join"].findtext(f"{SVG}title") == "waits for B"
@@ -79,7 +78,7 @@ def test_other_tokens_and_what_is_never_reached_look_different() -> None:
     shown = groups(
         draw(
             fork(),
-            Marks(
+            Overlays(
                 waiting={"A": "works"}, tokens=frozenset({"A"}), unreached=frozenset({"E", "f6"})
             ),
         )
@@ -95,15 +94,15 @@ def test_an_element_that_is_not_drawn_is_marked_at_what_contains_it() -> None:
     <bpmndi:BPMNShape bpmnElement="B" isExpanded="false"><dc:Bounds x="5" y="5" width="100"
      height="80"/></bpmndi:BPMNShape></bpmndi:BPMNPlane></bpmndi:BPMNDiagram></definitions>"""
     svg = draw(
-        FORK_XML.replace("</definitions>", diagram).encode(), Marks(stuck={"Inner": "hangs"})
+        FORK_XML.replace("</definitions>", diagram).encode(), Overlays(stuck={"Inner": "hangs"})
     )
     assert groups(svg)["B"].findtext(f"{SVG}title") == "hangs"
     assert STUCK in strokes(groups(svg)["B"])
 
 
 def test_a_legend_explains_only_the_marks_that_there_are() -> None:
-    assert "never reached" not in texts(draw(fork(), Marks(stuck={"Join": ""})))
-    assert "never reached" in texts(draw(fork(), Marks(unreached=frozenset({"E"}))))
+    assert "never reached" not in texts(draw(fork(), Overlays(stuck={"Join": ""})))
+    assert "never reached" in texts(draw(fork(), Overlays(unreached=frozenset({"E"}))))
     assert not {"never reached", "not in this run"} & {*texts(draw(fork()))}
 
 

@@ -9,14 +9,14 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from m2pem.api.control import StampedRecord
+from m2pem.diagram.style import width_of
 from m2pem.engine import records as r
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.plugins import PluginManager
-from m2pem.rehearsal.gantt import BARS, LEFT, RIGHT, WIDTH, gantt_svg
+from m2pem.rehearsal.gantt import BARS, LEFT, RIGHT, SIZE, WIDTH, gantt_svg
 from m2pem.rehearsal.rehearsal import rehearse
-from m2pem.rehearsal.svg import text_width
 from m2pem.rehearsal.timeline import Outcome
 
 REPOSITORY = Path(__file__).parents[2]
@@ -130,7 +130,7 @@ def test_labels_stay_inside_and_apart() -> None:
     for text in svg.iter(f"{SVG}text"):
         shown = text.text or ""
         if shown.startswith("go"):
-            x, width = float(text.get("x", "")), text_width(shown)
+            x, width = float(text.get("x", "")), width_of(shown, SIZE)
             extents.append((x - width, x) if text.get("text-anchor") == "end" else (x, x + width))
     extents.sort()
     assert len(extents) >= 4

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from m2pem.diagram import Marks
+from m2pem.diagram import Overlays
 from m2pem.mission import elements as e
 from m2pem.mission.events import CompensateEventDefinition
 from m2pem.mission.mission import Mission
@@ -139,7 +139,7 @@ def _unreached(mission: Mission, report: Report) -> frozenset[str]:
     return frozenset(nodes | flows) - reached - undoing
 
 
-def marks_of(violation: Violated, unreached: frozenset[str] = frozenset()) -> Marks:
+def marks_of(violation: Violated, unreached: frozenset[str] = frozenset()) -> Overlays:
     """What a drawing shows of it."""
     steps: Sequence[Sequence[str]] = [told.passes for told in (*violation.story, *violation.loop)]
     wrong = dict.fromkeys(violation.found.elements, violation.found.message)
@@ -149,7 +149,7 @@ def marks_of(violation: Violated, unreached: frozenset[str] = frozenset()) -> Ma
         if token.element not in wrong and not token.flow
     }
     tokens = frozenset(token.flow or token.element for token in violation.tokens)
-    return Marks(steps, wrong, waiting, tokens, frozenset(violation.missing), unreached)
+    return Overlays(steps, wrong, waiting, tokens, frozenset(violation.missing), unreached)
 
 
 def _told(system: System, words: Words, answer: Result, found: Violation) -> Violated:

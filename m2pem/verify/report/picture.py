@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from m2pem.diagram import Marks, draw
+from m2pem.diagram import Overlays, draw
 from m2pem.mission.elements import Element
 from m2pem.mission.mission import Mission
 from m2pem.verify.report.findings import Findings, Violated, marks_of
@@ -32,14 +32,14 @@ class _File:
         """Those that are in it, by what they are called there."""
         return [self.local(each) for each in elements if self.has(each)]
 
-    def marks(self, marks: Marks) -> Marks:
+    def marks(self, marks: Overlays) -> Overlays:
         """What is marked in it. A step keeps its number."""
 
         def mine(marked: Mapping[str, str]) -> dict[str, str]:
             return {self.local(each): why for each, why in marked.items() if self.has(each)}
 
         steps: Sequence[Sequence[str]] = [self.some(step) for step in marks.steps]
-        return Marks(
+        return Overlays(
             steps,
             mine(marks.stuck),
             mine(marks.waiting),
@@ -63,7 +63,7 @@ def pictures(
     files = _files(findings.mission)
     if violation is None:
         title = f"{findings.mission.file}: {findings.verdict.value}"
-        marks = Marks(unreached=findings.unreached)
+        marks = Overlays(unreached=findings.unreached)
         return {"": draw(files[""].source, files[""].marks(marks), title=title, about=about)}
     marks = marks_of(violation, findings.unreached)
     title = f"Violated: {violation.answer.text.rstrip('.')}"
@@ -85,7 +85,7 @@ def picture(findings: Findings, violation: Violated | None = None, *, about: str
     return pictures(findings, violation, about=about)[""]
 
 
-def _passed(file: _File, marks: Marks) -> bool:
+def _passed(file: _File, marks: Overlays) -> bool:
     """Whether a run passes a file, or something is wrong there."""
     shown = (*(each for step in marks.steps for each in step), *marks.stuck)
     return any(file.has(each) for each in shown)

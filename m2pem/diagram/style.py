@@ -1,6 +1,35 @@
-"""How wide texts are, and how they are broken into lines."""
+"""Colours, strokes and fonts of drawings, and how wide texts are."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+
+FOREGROUND = "#22242a"
+BACKGROUND = "#ffffff"
+FAINT = "#b4b8bf"
+PATH = "#1261b5"
+PATH_FILL = "#e6f0fb"
+STUCK = "#c62828"
+STUCK_FILL = "#fdeaea"
+WAITING = "#b26a00"
+WAITING_FILL = "#fff4e0"
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """What lines, areas and texts are drawn in; `weight` is added to the width of strokes."""
+
+    stroke: str = FOREGROUND
+    fill: str = BACKGROUND
+    text: str = FOREGROUND
+    weight: float = 0.0
+
+
+PLAIN = Style()
+UNREACHED = Style(FAINT, BACKGROUND, "#8a8f98")
+ON_PATH = Style(PATH, PATH_FILL, FOREGROUND, 0.5)
+WAITS = Style(WAITING, WAITING_FILL, FOREGROUND, 0.5)
+IS_STUCK = Style(STUCK, STUCK_FILL, FOREGROUND, 1.0)
+
 
 FONT = "Arial, 'Liberation Sans', Helvetica, sans-serif"
 LINE_HEIGHT = 1.2

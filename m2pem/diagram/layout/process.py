@@ -1,10 +1,9 @@
 """Lays out one container: its grid becomes boxes, its flows become lines between them."""
 
 from m2pem.diagram.layout import model
-from m2pem.diagram.layout.block import Block, Box
 from m2pem.diagram.layout.grid import Link, arrange
-from m2pem.diagram.layout.model import Element, LaneTree, name_of, tag
-from m2pem.diagram.layout.route import Router
+from m2pem.diagram.layout.model import Block, Box, Element, LaneTree, name_of, tag
+from m2pem.diagram.layout.routing import Router
 
 _EVENT = 36
 _SIZES = {"Event": (36, 36), "Gateway": (50, 50)}

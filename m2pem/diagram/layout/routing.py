@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from m2pem.diagram.layout.block import Box, Point
 from m2pem.diagram.layout.grid import Grid, Link
+from m2pem.diagram.layout.model import Box, Point
 
 _TRACK = 10
 _GAP = 40  # a gap without a line

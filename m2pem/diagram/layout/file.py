@@ -1,9 +1,24 @@
 """Lays out a whole file: one process, or a collaboration's pools one below the other."""
 
+from collections.abc import Iterator
+
+from lxml import etree
+
 from m2pem.diagram.layout import model
-from m2pem.diagram.layout.block import Block, Box, Point
-from m2pem.diagram.layout.model import Element, local, name_of, tag
-from m2pem.diagram.layout.place import lay_out
+from m2pem.diagram.layout.model import (
+    Block,
+    Box,
+    Element,
+    Point,
+    children,
+    data_lines,
+    flow_nodes,
+    is_node,
+    local,
+    name_of,
+    tag,
+)
+from m2pem.diagram.layout.process import lay_out
 
 _HEADER = 30
 _CLOSED = 60  # the height of a pool that shows no process
@@ -100,3 +115,85 @@ def _message(flow: Element, number: int, block: Block, pools: list[Element]) -> 
     if x1 == x2:
         return [(x1, start), (x2, end_y)]
     return [(x1, start), (x1, level), (x2, level), (x2, end_y)]
+
+
+_GAP = 20
+_NOTE = (100, 50)
+
+
+def add_loose(within: Element, block: Block) -> None:
+    """Add to `block` what the layout of `within`, a process or collaboration, has left out."""
+    for note in children(within, "textAnnotation"):
+        if name_of(note) not in block.boxes:
+            block.boxes[name_of(note)] = Box(0, block.height + _GAP, *_NOTE)
+            block.height += _GAP + _NOTE[1]
+    for name, source, target in _lines(within):
+        if name not in block.lines and source != target:
+            start, end = _middle(block, source), _middle(block, target)
+            if start is not None and end is not None:
+                block.lines[name] = [_edge(block, source, end), _edge(block, target, start)]
+
+
+def _lines(within: Element) -> Iterator[tuple[str, str, str]]:
+    yield from data_lines(within)
+    for line in children(within, "association"):
+        yield name_of(line), local(line.get("sourceRef")), local(line.get("targetRef"))
+    for inner in within:
+        if is_node(inner) and tag(inner).lower().endswith(("process", "transaction")):
+            yield from _lines(inner)
+
+
+def _middle(block: Block, name: str) -> Point | None:
+    if name in block.boxes:
+        return block.boxes[name].middle
+    points = block.lines.get(name)
+    if not points:
+        return None
+    (x1, y1), (x2, y2) = points[(len(points) - 1) // 2 : (len(points) - 1) // 2 + 2]
+    return (x1 + x2) / 2, (y1 + y2) / 2
+
+
+def _edge(block: Block, name: str, towards: Point) -> Point:
+    """Where a straight line from the middle leaves a symbol; of a line, its middle."""
+    x, y = _middle(block, name) or towards
+    box = block.boxes.get(name)
+    if box is None:
+        return x, y
+    dx, dy = towards[0] - x, towards[1] - y
+    part = min(box.width / 2 / abs(dx) if dx else 1.0, box.height / 2 / abs(dy) if dy else 1.0, 1.0)
+    return x + dx * part, y + dy * part
+
+
+def keep_sound(definitions: Element) -> None:
+    """Remove flows between what is not beside each other, and what hangs on nothing."""
+    for container in [*definitions.iter(etree.Element)]:
+        if tag(container) == "collaboration":
+            _keep_flows_between_pools(container, definitions)
+        elif tag(container):
+            _keep_within(container)
+
+
+def _keep_within(container: Element) -> None:
+    nodes = {name_of(each) for each in flow_nodes(container)}
+    for event in [*children(container, "boundaryEvent")]:
+        if local(event.get("attachedToRef")) in nodes:
+            nodes.add(name_of(event))
+        else:
+            container.remove(event)
+    events = {name_of(each) for each in children(container, "boundaryEvent")}
+    for flow in [*children(container, "sequenceFlow")]:
+        ends = local(flow.get("sourceRef")), local(flow.get("targetRef"))
+        if ends[0] not in nodes or ends[1] not in nodes - events:
+            container.remove(flow)
+
+
+def _keep_flows_between_pools(collaboration: Element, definitions: Element) -> None:
+    pools = [*children(collaboration, "participant")]
+    known = {name_of(each) for each in pools}
+    shown = {local(each.get("processRef")) for each in pools}
+    for process in children(definitions, "process"):
+        if name_of(process) in shown:
+            known |= {name_of(each) for each in process.iter(etree.Element) if is_node(each)}
+    for flow in [*children(collaboration, "messageFlow")]:
+        if not {local(flow.get("sourceRef")), local(flow.get("targetRef"))} <= known:
+            collaboration.remove(flow)
