@@ -1,13 +1,16 @@
 """Suggestions for a name that is not known: what the person may have meant."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 MAX_LISTED = 12
 
+_MOST_CANDIDATES = 5_000  # difflib compares with each; past this a typo costs seconds
+_LONGEST_NAME = 200
+
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """ "did you mean 'x' or 'y'?", or "" when nothing known is near."""
+    """Return "did you mean 'x' or 'y'?", or "" when no known name is like it."""
     exact = {candidate.lower(): candidate for candidate in known}
     near = difflib.get_close_matches(name.lower(), exact, n=2, cutoff=0.6)
     if not near:
@@ -25,3 +28,20 @@ def suggest(name: str, known: Iterable[str], what: str) -> str:
         return f"there are no {what}"
     listed = ", ".join(names[:MAX_LISTED]) + (", ..." if len(names) > MAX_LISTED else "")
     return f"known {what}: {listed}"
+
+
+def nearest(name: str, candidates: Collection[str]) -> str:
+    """Return the candidate that is spelled most like `name`, or "".
+
+    Much stricter than `did_you_mean`, and quick for names from files of any size.
+    """
+    if len(candidates) > _MOST_CANDIDATES or len(name) > _LONGEST_NAME:
+        return ""
+    found = difflib.get_close_matches(name, candidates, n=1, cutoff=0.75)
+    return found[0] if found else ""
+
+
+def suggest_or(name: str, candidates: Collection[str], otherwise: str) -> str:
+    """Return "did you mean ...?" for the `nearest` candidate, else `otherwise`."""
+    match = nearest(name, candidates)
+    return f"did you mean '{match}'?" if match else otherwise

@@ -8,7 +8,7 @@ from m2pem.bpmn.context import ReadingContext, text_of
 from m2pem.bpmn.rules.attributes import ELEMENT_ORDER, UNKNOWN_ELEMENT
 from m2pem.bpmn.schema import SHAPES, Shape
 from m2pem.bpmn.xml import BPMN, M2PEM, a, kind, local
-from m2pem.mission.near import did_you_mean
+from m2pem.suggestions import suggest_or
 
 DOCUMENTATION = BPMN + "documentation"
 EXTENSIONS = BPMN + "extensionElements"
@@ -83,7 +83,7 @@ class ChildOrder:
                     identifier or child.get("id", ""),
                     UNKNOWN_ELEMENT,
                     f"BPMN has no '{local(name)}' in {a(kind(parent.tag))}; it is ignored",
-                    did_you_mean(local(name), [local(each) for each in shape.ranks], "delete it"),
+                    suggest_or(local(name), [local(each) for each in shape.ranks], "delete it"),
                 )
         elif rank >= self.reached:
             self.reached = rank

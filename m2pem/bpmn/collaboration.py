@@ -25,7 +25,7 @@ from m2pem.mission.elements import Element, Process, ReceiveTask
 from m2pem.mission.events import CorrelationProperty, Message, MessageEventDefinition
 from m2pem.mission.expression import Expression
 from m2pem.mission.mission import Lane, MessageFlow, Participant
-from m2pem.mission.near import did_you_mean
+from m2pem.suggestions import suggest_or
 
 
 def read_collaboration(context: ReadingContext, collaboration: etree._Element) -> None:
@@ -95,7 +95,7 @@ def _warn(
         element.id,
         DANGLING_REFERENCE,
         f"{attribute} names '{name}', which does not exist" if name else f"it has no {attribute}",
-        did_you_mean(name, known, "correct it, or delete it; it has no effect on execution"),
+        suggest_or(name, known, "correct it, or delete it; it has no effect on execution"),
     )
 
 
@@ -205,7 +205,7 @@ def _dangling(
         identifier,
         rule,
         f"{attribute} names '{name}', which does not exist" if name else f"it has no {attribute}",
-        did_you_mean(name, known, "name one that stands in definitions"),
+        suggest_or(name, known, "name one that stands in definitions"),
     )
 
 

@@ -21,7 +21,7 @@ from m2pem.bpmn.xml import BPMN, local
 from m2pem.mission.behavior import Mapping, Mappings
 from m2pem.mission.elements import Activity, Container, DataObject, Event
 from m2pem.mission.expression import parse
-from m2pem.mission.near import did_you_mean
+from m2pem.suggestions import suggest_or
 
 
 def read_data(context: ReadingContext, element: etree._Element, container: Container) -> None:
@@ -58,7 +58,7 @@ def resolve_data(context: ReadingContext) -> None:
                 identifier,
                 DANGLING_REFERENCE,
                 f"it refers to '{end.refers_to}', which is no data object or data store",
-                did_you_mean(end.refers_to, context.data, "correct it, or delete it"),
+                suggest_or(end.refers_to, context.data, "correct it, or delete it"),
             )
         if target is None or target.declared is None:
             continue

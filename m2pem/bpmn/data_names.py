@@ -28,7 +28,7 @@ from m2pem.mission.events import ConditionalEventDefinition, TimerEventDefinitio
 from m2pem.mission.expression import Expression
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
 from m2pem.mission.mission import Mission
-from m2pem.mission.near import did_you_mean
+from m2pem.suggestions import suggest_or
 
 
 class Read(NamedTuple):
@@ -123,7 +123,7 @@ def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Fin
                 read.element,
                 f"'{name}' is read, but nothing in process '{process.id}' writes it; unless "
                 "--data or an operator does, it is null",
-                did_you_mean(name, store.written, "write it in a task before, or pass it in"),
+                suggest_or(name, store.written, "write it in a task before, or pass it in"),
             )
 
 

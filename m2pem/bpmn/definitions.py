@@ -11,7 +11,7 @@ from m2pem.bpmn.rules.files import NOT_EXECUTED
 from m2pem.bpmn.schema import ROOT_NAMES, SHAPES
 from m2pem.bpmn.xml import BPMN, M2PEM, a, kind, local
 from m2pem.mission.events import Error, Escalation, Message, Signal
-from m2pem.mission.near import did_you_mean
+from m2pem.suggestions import suggest_or
 
 PROCESS = BPMN + "process"
 _DI = frozenset({"BPMNDiagram", "import", "extension", "relationship"})
@@ -59,7 +59,7 @@ def read_roots(context: ReadingContext, definitions: etree._Element) -> list[etr
                 element.get("id", ""),
                 UNKNOWN_ELEMENT,
                 f"BPMN has no '{name}' in definitions; it is ignored",
-                did_you_mean(name, ROOT_NAMES, "delete it"),
+                suggest_or(name, ROOT_NAMES, "delete it"),
             )
             continue
         order.check(context, definitions, element, shape, definitions.get("id", ""))

@@ -67,8 +67,8 @@ from m2pem.mission.events import (
     TimerEventDefinition,
     TimerKind,
 )
-from m2pem.mission.near import did_you_mean
 from m2pem.mission.values import Value
+from m2pem.suggestions import suggest_or
 
 Root = TypeVar("Root", bound=RootElement)
 
@@ -138,7 +138,7 @@ def look_up(
         stand_in.id,
         DANGLING_REFERENCE,
         f"{what}Ref names '{name}', but {because}",
-        did_you_mean(name, table, f'put <{what} id="{name}"/> into definitions, or name another'),
+        suggest_or(name, table, f'put <{what} id="{name}"/> into definitions, or name another'),
     )
     return stand_in
 
@@ -387,7 +387,7 @@ def referred_definition(
             identifier,
             DANGLING_REFERENCE,
             f"{attribute} names '{name}', which is no event definition of this file",
-            did_you_mean(name, context.event_definitions, "name one that stands in definitions"),
+            suggest_or(name, context.event_definitions, "name one that stands in definitions"),
         )
     return target
 
@@ -480,7 +480,7 @@ def _no_target(
     link: LinkEventDefinition,
     targets: dict[tuple[Container, str], IntermediateCatchEvent],
 ) -> None:
-    near = [name for container, name in targets if container is node.container]
+    here = [name for container, name in targets if container is node.container]
     elsewhere = [each.id for (_, name), each in targets.items() if name == link.name]
     rule, message = DANGLING_LINK, f"the link '{link.name}' has no target"
     remedy = f'add <intermediateCatchEvent> with <linkEventDefinition name="{link.name}"/>'
@@ -488,7 +488,7 @@ def _no_target(
         rule = LINK_CROSSES_BORDER
         message += f" here: '{elsewhere[0]}' is in another process or subprocess"
         remedy = "links join places of one container: let a sequence flow leave the subprocess"
-    _say(context, node, rule, message, did_you_mean(link.name, near, remedy))
+    _say(context, node, rule, message, suggest_or(link.name, here, remedy))
 
 
 def _say(context: ReadingContext, node: FlowNode, rule: Rule, message: str, remedy: str) -> None:

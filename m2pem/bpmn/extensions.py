@@ -13,7 +13,7 @@ from functools import lru_cache
 from lxml import etree
 
 from m2pem.bpmn.xml import BPMN, M2PEM, a, attribute_names, kind, local
-from m2pem.mission.near import did_you_mean, near
+from m2pem.suggestions import nearest, suggest_or
 
 
 class Type(StrEnum):
@@ -259,7 +259,7 @@ def strangers(element: etree._Element) -> Iterator[tuple[etree._Element, str, st
                 yield (
                     child,
                     f"'{name}' has no element '{inner}'",
-                    did_you_mean(inner, schema.children, otherwise),
+                    suggest_or(inner, schema.children, otherwise),
                 )
 
 
@@ -278,7 +278,7 @@ def _unknown_attributes(
             yield (
                 element,
                 f"'{schema.name}' has no attribute '{name}'",
-                did_you_mean(name, known, otherwise),
+                suggest_or(name, known, otherwise),
             )
 
 
@@ -298,7 +298,7 @@ def stranger_attribute(tag: str, name: str) -> tuple[bool, str, str] | None:
     if name in ALL_ATTRIBUTES:
         places = [kind(place) for place, names in ATTRIBUTES.items() if name in names]
         return True, f"m2pem:{name} has no effect on {noun}", f"it is for: {', '.join(places)}"
-    remedy = did_you_mean(name, known or ALL_ATTRIBUTES, "delete it")
+    remedy = suggest_or(name, known or ALL_ATTRIBUTES, "delete it")
     return False, f"m2pem has no attribute 'm2pem:{name}' for {noun}", remedy
 
 
@@ -309,4 +309,4 @@ def looks_like_own(prefix: str, namespace: str) -> bool:
         return False
     host = re.sub(r"^[a-z]+:/*(www\.)?", "", namespace.strip().lower()).split("/")[0]
     labels = [label for label in re.split(r"[.:]", host) if label]
-    return any(near(name.lower(), ["m2pem"]) for name in (prefix, *labels) if name)
+    return any(nearest(name.lower(), ["m2pem"]) for name in (prefix, *labels) if name)

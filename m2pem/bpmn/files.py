@@ -41,7 +41,7 @@ from m2pem.mission.elements import (
 from m2pem.mission.events import CorrelationProperty, Message, RootElement, Signal
 from m2pem.mission.library import Library, LibraryError, Question, Source
 from m2pem.mission.mission import Mission
-from m2pem.mission.near import did_you_mean
+from m2pem.suggestions import suggest_or
 
 _SUFFIX = re.compile(r"\.(bpmn20\.xml|bpmn2?|xml)$", re.IGNORECASE)
 _MODEL = BPMN[1:-1]
@@ -338,7 +338,7 @@ def _existing(files: Files, part: Part, name: str) -> str:
     remedy = f"name a process of this file: {listed}"
     if files.library is not None:
         remedy += "; or name the folder of its file with --path"
-    return did_you_mean(name, known, remedy) if name else remedy
+    return suggest_or(name, known, remedy) if name else remedy
 
 
 def _namespace(part: Part, pending: PendingCall) -> str:

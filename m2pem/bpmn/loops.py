@@ -42,7 +42,7 @@ from m2pem.mission.elements import Activity, SubProcess
 from m2pem.mission.events import EventDefinition, Signal, SignalEventDefinition
 from m2pem.mission.expression import Expression
 from m2pem.mission.loops import ComplexBehavior, InstanceBehavior, MultiInstance, StandardLoop
-from m2pem.mission.near import did_you_mean
+from m2pem.suggestions import suggest_or
 
 _STANDARD = BPMN + "standardLoopCharacteristics"
 _MULTI_INSTANCE = BPMN + "multiInstanceLoopCharacteristics"
@@ -265,7 +265,7 @@ def _behavior(context: ReadingContext, element: etree._Element, node: Activity) 
         return InstanceBehavior(text)
     except ValueError:
         known = list(InstanceBehavior)
-        remedy = did_you_mean(text, known, f"write one of: {', '.join(known)}")
+        remedy = suggest_or(text, known, f"write one of: {', '.join(known)}")
         what = f"behavior='{text}' is no behavior of a multi-instance activity"
         _error(context, element, node, INSTANCES_BEHAVIOR, what, remedy)
         return InstanceBehavior.ALL
@@ -382,7 +382,7 @@ def _named(context: ReadingContext, pending: PendingLoop, attribute: str, ref: s
     """Some editors write a name of the data store where BPMN has a reference."""
     where, identifier = pending.element, pending.node.id
     if not KEY.fullmatch(ref):
-        remedy = did_you_mean(ref, context.data, "name a data object")
+        remedy = suggest_or(ref, context.data, "name a data object")
         what = f"{attribute} names '{ref}', which is no data object"
         context.findings.error(where, identifier, DANGLING_REFERENCE, what, remedy)
         return ""
@@ -392,7 +392,7 @@ def _named(context: ReadingContext, pending: PendingLoop, attribute: str, ref: s
         DANGLING_REFERENCE,
         f"{attribute} names '{ref}', which is no data object, data input or data output here; it "
         "is taken for a name of the data store",
-        did_you_mean(ref, context.data, 'name a data object, or write m2pem:collection="..."'),
+        suggest_or(ref, context.data, 'name a data object, or write m2pem:collection="..."'),
     )
     return ref
 

@@ -43,8 +43,8 @@ from m2pem.mission.elements import (
 )
 from m2pem.mission.events import LinkEventDefinition
 from m2pem.mission.expression import Expression
-from m2pem.mission.near import did_you_mean
 from m2pem.mission.reach import begins_by_itself, instantiates, unreached
+from m2pem.suggestions import suggest_or
 
 SEQUENCE_FLOW = BPMN + "sequenceFlow"
 _CONDITION = BPMN + "conditionExpression"
@@ -162,7 +162,7 @@ def _dangling_end(
         ends.flow.id,
         DANGLING_REFERENCE,
         message,
-        did_you_mean(name, nodes, "name an activity, gateway or event, or delete the flow"),
+        suggest_or(name, nodes, "name an activity, gateway or event, or delete the flow"),
     )
 
 
@@ -273,7 +273,7 @@ def _link_defaults(context: ReadingContext) -> None:
                 node.id,
                 DANGLING_REFERENCE,
                 f"default names '{ref}', but no sequence flow has that id",
-                did_you_mean(
+                suggest_or(
                     ref,
                     [flow.id for flow in node.outgoing],
                     "name one of its own outgoing sequence flows, or delete it",
@@ -296,7 +296,7 @@ def _link_boundary(context: ReadingContext, nodes: dict[str, FlowNode]) -> None:
         elif host is None:
             rule = DANGLING_REFERENCE
             message = f"attachedToRef names '{ref}', but no flow node has that id"
-            remedy = did_you_mean(ref, nodes, remedy)
+            remedy = suggest_or(ref, nodes, remedy)
         elif isinstance(host, Activity):
             message = f"attachedToRef names '{ref}', which is in {_called(host.container)}"
         else:

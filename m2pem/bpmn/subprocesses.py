@@ -34,7 +34,7 @@ from m2pem.mission.elements import (
     Transaction,
 )
 from m2pem.mission.expression import Expression
-from m2pem.mission.near import did_you_mean
+from m2pem.suggestions import suggest_or
 
 SUBPROCESSES = frozenset(BPMN + name for name in ("subProcess", "transaction", "adHocSubProcess"))
 
@@ -237,7 +237,7 @@ def _refuse_unknown(context: ReadingContext, frame: _Frame, child: etree._Elemen
         child.get("id", "") or frame.container.id,
         UNKNOWN_ELEMENT,
         f"BPMN has no '{name}' in {a(kind(frame.element.tag))}",
-        did_you_mean(name, FLOW_ELEMENT_NAMES, "delete it"),
+        suggest_or(name, FLOW_ELEMENT_NAMES, "delete it"),
     )
 
 

@@ -23,7 +23,7 @@ from m2pem.fleet.check import check_mission, check_named
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.elements import ServiceTask
 from m2pem.mission.mission import Mission
-from m2pem.mission.near import did_you_mean
+from m2pem.suggestions import suggest_or
 
 if TYPE_CHECKING:
     from m2pem.plugins import PluginManager
@@ -155,7 +155,7 @@ def _unprovided(mission: Mission, services: Collection[str]) -> list[Finding]:
             task.id,
             "unknown-service",
             f"no plugin provides the service {task.call.service!r}; in a run it fails",
-            did_you_mean(task.call.service, services, "install the plugin that does"),
+            suggest_or(task.call.service, services, "install the plugin that does"),
         )
         for task in mission.activities()
         if isinstance(task, ServiceTask) and task.call and task.call.service not in services

@@ -9,7 +9,7 @@ from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import Check, Checks, Tree, is_true, name_of, parent
 from m2pem.bpmn.schema import Shape, shape
 from m2pem.bpmn.xml import BPMN, a, attribute_names, kind, local
-from m2pem.mission.near import did_you_mean, near
+from m2pem.suggestions import nearest, suggest_or
 
 BAD_EXPRESSION = Rule(
     201,
@@ -129,8 +129,8 @@ def unknown_attribute(
     """
     message = f"BPMN has no attribute '{name}' for {a(kind(element.tag))}; it is ignored"
     own = ATTRIBUTES.get(local(element.tag), frozenset())
-    match = f"m2pem:{name}" if name in own else near(name, known)
-    if not match and (owned := near(name, own)):
+    match = f"m2pem:{name}" if name in own else nearest(name, known)
+    if not match and (owned := nearest(name, own)):
         match = f"m2pem:{owned}"
     if match:
         return MISSPELLED_ATTRIBUTE, message, f"did you mean '{match}'?"
@@ -294,7 +294,7 @@ def _children(tree: Tree, element: etree._Element, expected: Shape) -> None:
                     UNKNOWN_ELEMENT,
                     child,
                     f"'{local(child.tag)}' in {a(kind(element.tag))}; it is ignored",
-                    did_you_mean(
+                    suggest_or(
                         local(child.tag),
                         [local(each) for each in expected.ranks],
                         UNKNOWN_ELEMENT.right,

@@ -6,7 +6,7 @@ from m2pem.bpmn.extensions import ELEMENTS, PLACES, looks_like_own, strangers
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import Checks, Tree, parent
 from m2pem.bpmn.xml import BPMN, CAMUNDA, M2PEM, ZEEBE, a, kind, local
-from m2pem.mission.near import did_you_mean
+from m2pem.suggestions import suggest_or
 
 WRONG_NAMESPACE = Rule(
     218,
@@ -120,7 +120,7 @@ def _own(tree: Tree, element: etree._Element, owner: etree._Element) -> None:
     name = local(element.tag)
     schema = ELEMENTS.get(name)
     if schema is None:
-        right = did_you_mean(name, ELEMENTS, "delete it")
+        right = suggest_or(name, ELEMENTS, "delete it")
         tree.report(UNKNOWN_EXTENSION, element, f"m2pem:{name}", right)
         return
     if local(owner.tag) not in schema.places:
