@@ -24,7 +24,7 @@ from m2pem.api import (
     VehicleState,
 )
 from m2pem_plugin_mavlink.catalogue import offered
-from m2pem_plugin_mavlink.native_ref import Kept, native_ref, read_native_ref
+from m2pem_plugin_mavlink.checkpoint import Checkpoint, decode_checkpoint, encode_checkpoint
 from m2pem_plugin_mavlink.protocol.url import chooses_port, parse_url
 from m2pem_plugin_mavlink.settings import Settings, read_settings
 
@@ -260,11 +260,11 @@ class MavlinkArbiter:
         known = self._tracker.last(behavior)
         if known.state is not BehaviorState.UNKNOWN:
             return known
-        kept = read_native_ref(native_ref) if native_ref else None
-        if kept is None or kept.resource not in self._controllers:
+        checkpoint = decode_checkpoint(native_ref) if native_ref else None
+        if checkpoint is None or checkpoint.resource not in self._controllers:
             self._queried.add(behavior)
             return known
-        return await self._reattach(behavior, kept, native_ref or "")
+        return await self._reattach(behavior, checkpoint, native_ref or "")
 
     # --- streams --------------------------------------------------------------------------------
 
@@ -292,73 +292,79 @@ class MavlinkArbiter:
             return f"the fleet does not allow {resource} the behavior '{request.behavior}'"
         if resource not in self._controllers:
             return "the arbiter is not connected"
-        kept = Kept(resource, request.behavior, request.parameters, {})
+        checkpoint = Checkpoint(resource, request.behavior, request.parameters, {})
         try:
-            behavior = self._make(kept)
+            behavior = self._make(checkpoint)
             self._pending[request.id] = behavior
             return behavior.refusal()
         except BehaviorFailedError as error:
             return error.reason
 
-    def _make(self, kept: Kept) -> "Behavior":
+    def _make(self, checkpoint: Checkpoint) -> "Behavior":
         from m2pem_plugin_mavlink.behaviors import BEHAVIORS  # noqa: PLC0415
         from m2pem_plugin_mavlink.behaviors.behavior import BehaviorContext  # noqa: PLC0415
 
-        controller, clock = self._controllers[kept.resource], self._context.clock
+        controller, clock = self._controllers[checkpoint.resource], self._context.clock
         context = BehaviorContext(
             controller.vehicle,
-            kept.parameters,
+            checkpoint.parameters,
             self._context.bus,
             self._context.origin,
             lambda: clock.now_us() / 1e6,
-            self._fences.get(kept.resource),
+            self._fences.get(checkpoint.resource),
             controller.cruise_m_s,
-            self._settings[kept.resource].actuators,
+            self._settings[checkpoint.resource].actuators,
         )
-        return BEHAVIORS[kept.behavior](context)
+        return BEHAVIORS[checkpoint.behavior](context)
 
     def _native_ref(self, request: BehaviorRequest) -> str:
-        from m2pem_plugin_mavlink.beginning import before  # noqa: PLC0415
+        from m2pem_plugin_mavlink.reattachment import take_snapshot  # noqa: PLC0415
 
-        memory = self._pending[request.id].checkpoint()
+        state = self._pending[request.id].checkpoint()
         resource = _vehicles(request)[0]
-        was = before(self._controllers[resource].vehicle, self._context.clock.now_us() / 1e6)
-        return native_ref(Kept(resource, request.behavior, request.parameters, memory, was))
+        before = take_snapshot(
+            self._controllers[resource].vehicle, self._context.clock.now_us() / 1e6
+        )
+        return encode_checkpoint(
+            Checkpoint(resource, request.behavior, request.parameters, state, before)
+        )
 
-    async def _reattach(self, id_: BehaviorId, kept: Kept, reference: str) -> BehaviorReport:
-        from m2pem_plugin_mavlink.beginning import has_not_begun  # noqa: PLC0415
+    async def _reattach(
+        self, id_: BehaviorId, checkpoint: Checkpoint, reference: str
+    ) -> BehaviorReport:
         from m2pem_plugin_mavlink.behaviors import BEHAVIORS  # noqa: PLC0415
         from m2pem_plugin_mavlink.behaviors.behavior import (  # noqa: PLC0415
             BehaviorFailedError,
         )
         from m2pem_plugin_mavlink.protocol.transaction import ExchangeError  # noqa: PLC0415
+        from m2pem_plugin_mavlink.reattachment import shows_not_begun  # noqa: PLC0415
 
-        controller = self._controllers[kept.resource]
+        controller = self._controllers[checkpoint.resource]
         vehicle = controller.vehicle
         unknown = BehaviorReport(id_, 0, BehaviorState.UNKNOWN, native_ref=reference)
-        if kept.behavior not in BEHAVIORS:
-            return replace(unknown, reason=f"there is no behavior '{kept.behavior}' any more")
+        if checkpoint.behavior not in BEHAVIORS:
+            return replace(unknown, reason=f"there is no behavior '{checkpoint.behavior}' any more")
         if not await controller.wait_until_known(HEARD_WITHIN_S):
             controller.mark_commanded()
-            return replace(unknown, reason=f"where {kept.resource} is was not heard")
+            return replace(unknown, reason=f"where {checkpoint.resource} is was not heard")
         try:
-            behavior = self._make(kept)
-            behavior.restore(kept.memory)
+            behavior = self._make(checkpoint)
+            behavior.restore(checkpoint.state)
             state = await behavior.reattach()
         except (BehaviorFailedError, ExchangeError) as error:
             return replace(unknown, reason=str(error))
         if state is BehaviorState.RUNNING:
-            self._tracker.adopt(id_, [kept.resource], reference)
+            self._tracker.adopt(id_, [checkpoint.resource], reference)
             controller.adopt(id_, behavior)
             return self._tracker.last(id_)
         if state is BehaviorState.SUCCEEDED:
             return replace(unknown, number=3, state=state)
-        if has_not_begun(behavior, kept.before, self._context.clock.now_us() / 1e6):
+        if shows_not_begun(behavior, checkpoint.before, self._context.clock.now_us() / 1e6):
             self._queried.add(id_)
-            reason = f"{kept.resource} is as it was before, and has not begun it"
+            reason = f"{checkpoint.resource} is as it was before, and has not begun it"
             return replace(unknown, reason=reason, not_begun=True)
         mode = vehicle.telemetry().mode or "an unknown mode"
-        return replace(unknown, reason=f"{kept.resource} is in {mode}, and does not do it")
+        return replace(unknown, reason=f"{checkpoint.resource} is in {mode}, and does not do it")
 
     async def _check(self, vehicle: "Vehicle") -> None:
         """Tell where the fleet and the vehicle disagree about failsafes, once it is heard."""

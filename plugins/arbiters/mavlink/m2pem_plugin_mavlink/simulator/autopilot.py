@@ -20,7 +20,6 @@ from m2pem_plugin_mavlink.simulator.fence import Fence
 from m2pem_plugin_mavlink.simulator.firmware import Tuning, firmware_of
 from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Point
 from m2pem_plugin_mavlink.simulator.gimbal import Gimbal
-from m2pem_plugin_mavlink.simulator.guided import GuidedSetpoints
 from m2pem_plugin_mavlink.simulator.home import Home
 from m2pem_plugin_mavlink.simulator.identity import Identity
 from m2pem_plugin_mavlink.simulator.interfaces import (
@@ -35,7 +34,7 @@ from m2pem_plugin_mavlink.simulator.missions.plan import PlanStore
 from m2pem_plugin_mavlink.simulator.missions.progress import MissionProgress
 from m2pem_plugin_mavlink.simulator.missions.protocol import MissionServer
 from m2pem_plugin_mavlink.simulator.modes import ModeSwitch
-from m2pem_plugin_mavlink.simulator.motion_commands import MotionCommands
+from m2pem_plugin_mavlink.simulator.motion_commands import GuidedSetpoints, MotionCommands
 from m2pem_plugin_mavlink.simulator.parameters import ParameterServer
 from m2pem_plugin_mavlink.simulator.reports import Reports, Texts
 from m2pem_plugin_mavlink.simulator.sensors import Battery, Estimator

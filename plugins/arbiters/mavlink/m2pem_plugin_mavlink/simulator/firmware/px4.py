@@ -39,7 +39,7 @@ from m2pem_plugin_mavlink.simulator.interfaces import (
     Tuning,
 )
 from m2pem_plugin_mavlink.simulator.maneuvers import Descend, HoldPosition, Land, Stop
-from m2pem_plugin_mavlink.simulator.missions.px4_mission import MissionAvailability, Px4AutoMission
+from m2pem_plugin_mavlink.simulator.missions.execution import MissionAvailability, Px4AutoMission
 from m2pem_plugin_mavlink.simulator.px4_maneuvers import Hold, Offboard, Orbit, Px4Return, TakeOff
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 

@@ -21,7 +21,7 @@ from m2pem_plugin_mavlink.simulator.firmware.px4_modes import (
 from m2pem_plugin_mavlink.simulator.geometry import Location, Point, wrapped_rad
 from m2pem_plugin_mavlink.simulator.interfaces import CommandHandler, Component
 from m2pem_plugin_mavlink.simulator.messages import Command, Result
-from m2pem_plugin_mavlink.simulator.missions.px4_mission import MissionAvailability
+from m2pem_plugin_mavlink.simulator.missions.execution import MissionAvailability
 from m2pem_plugin_mavlink.simulator.px4_maneuvers import Hold, Orbit, TakeOff
 from m2pem_plugin_mavlink.simulator.specification import Kind
 

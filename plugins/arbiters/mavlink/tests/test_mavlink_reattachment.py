@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
-from m2pem_plugin_mavlink.beginning import SOON_S
-from m2pem_plugin_mavlink.native_ref import read_native_ref
+from m2pem_plugin_mavlink.checkpoint import decode_checkpoint
+from m2pem_plugin_mavlink.reattachment import SOON_S
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from mavlink_double import Body, DoubleStation, at, connections
 from mavlink_play import START_US, Bench, V
@@ -129,7 +129,7 @@ def test_an_actuator_leaves_nothing_to_see() -> None:
 
 
 def test_a_reference_of_an_earlier_release_is_read() -> None:
-    kept = read_native_ref(
+    kept = decode_checkpoint(
         '{"v":1,"vehicle":"v","behavior":"takeoff","parameters":{"altitude":20.0},"memory":{}}'
     )
     assert kept is not None

@@ -1,8 +1,8 @@
-"""What is kept of a behavior outside of this process: enough to recognise it on the vehicle.
+"""What is stored of a behavior outside of this process, to reattach to it after a restart.
 
-A short text of JSON: which vehicle, which behavior, its parameters but for routes and areas, what
-the behavior itself wants to remember, such as the fingerprint of its mission, and how the vehicle
-was before it.
+A checkpoint is a short JSON text, the `native_ref` of a report. It has the vehicle, the behavior,
+its parameters except routes and areas, the behavior's own state (such as the fingerprint of its
+mission), and a snapshot of the vehicle when the behavior was accepted.
 """
 
 import json
@@ -16,10 +16,10 @@ _VERSION = 1
 
 
 @dataclass(frozen=True, slots=True)
-class Before:
-    """How a vehicle was when a behavior was accepted: it shows later whether that has begun.
+class VehicleSnapshot:
+    """A vehicle at the moment at which a behavior was accepted. Degrees; metres above home.
 
-    `at_s`: by the arbiter's clock, which goes on over a restart. Degrees; metres above home.
+    `at_s`: by the arbiter's clock, which continues over a restart.
     """
 
     at_s: float
@@ -32,45 +32,47 @@ class Before:
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
-    """What a reference says. `memory`: as the behavior said it. `before`: None if something of it
-    was not received yet, or the reference is of a release that did not keep it."""
+class Checkpoint:
+    """`state`: as returned by `Behavior.checkpoint`. `before`: None if the vehicle had not reported
+    all of it, or if an older release wrote the checkpoint."""
 
     resource: ResourceId
     behavior: str
     parameters: Mapping[str, ResolvedValue]
-    memory: Mapping[str, Any]
-    before: Before | None = None
+    state: Mapping[str, Any]
+    before: VehicleSnapshot | None = None
 
 
-def native_ref(kept: Kept) -> str:
-    """The text."""
+def encode_checkpoint(checkpoint: Checkpoint) -> str:
+    """Return the checkpoint as a JSON text."""
     parameters = {
         name: _encoded(value)
-        for name, value in kept.parameters.items()
+        for name, value in checkpoint.parameters.items()
         if isinstance(value, float | int | str | Point | VehiclePosition)
     }
     whole = {
         "v": _VERSION,
-        "vehicle": kept.resource,
-        "behavior": kept.behavior,
+        "vehicle": checkpoint.resource,
+        "behavior": checkpoint.behavior,
         "parameters": parameters,
-        "memory": dict(kept.memory),
-        "before": asdict(kept.before) if kept.before is not None else None,
+        "memory": dict(checkpoint.state),
+        "before": asdict(checkpoint.before) if checkpoint.before is not None else None,
     }
     return json.dumps(whole, separators=(",", ":"))
 
 
-def read_native_ref(text: str) -> Kept | None:
-    """What a text says; None: it was not made by `native_ref`."""
+def decode_checkpoint(text: str) -> Checkpoint | None:
+    """Return the checkpoint in a text; None if `encode_checkpoint` has not made the text."""
     try:
         whole = json.loads(text)
         if whole["v"] != _VERSION:
             return None
         parameters = {name: _decoded(value) for name, value in whole["parameters"].items()}
         resource = ResourceId(str(whole["vehicle"]))
-        before = Before(**whole["before"]) if whole.get("before") else None
-        return Kept(resource, str(whole["behavior"]), parameters, dict(whole["memory"]), before)
+        before = VehicleSnapshot(**whole["before"]) if whole.get("before") else None
+        return Checkpoint(
+            resource, str(whole["behavior"]), parameters, dict(whole["memory"]), before
+        )
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None
 

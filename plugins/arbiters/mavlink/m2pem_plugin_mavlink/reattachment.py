@@ -1,13 +1,13 @@
-"""After a restart: does a vehicle show that it has not begun what was accepted for it?
+"""After a restart: does the vehicle show that it has not begun an accepted behavior?
 
-The vehicle shows it when it stands at the same place a short time later, in the same state or in
-the state into which m2pem brings it before the start: in the behavior's mode and armed. Another
-mode, disarmed motors or another place may be what a person has intended: an operator is asked.
+It does if it stands at the same place a short time later, in the same state or in the state into
+which m2pem brings it before the start: in the behavior's mode and armed. Another mode, disarmed
+motors or another place may be a person's intention; then an operator is asked.
 """
 
 from m2pem_plugin_mavlink.behaviors.arrival import accepts_mode, distance_to_m, is_still
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior
-from m2pem_plugin_mavlink.native_ref import Before
+from m2pem_plugin_mavlink.checkpoint import VehicleSnapshot
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 SOON_S = 60.0
@@ -17,8 +17,8 @@ SAME_PLACE_M = 3.0
 """Positions of a vehicle that stands drift so far within that time."""
 
 
-def before(vehicle: Vehicle, now_s: float) -> Before | None:
-    """How a vehicle is now; None if something of it was not received yet."""
+def take_snapshot(vehicle: Vehicle, now_s: float) -> VehicleSnapshot | None:
+    """Return the present snapshot; None if the vehicle has not reported all of it yet."""
     state = vehicle.state
     position, height_m = state.position, state.altitude_above_home_m
     if state.armed is None or state.landed is None or state.custom_mode is None:
@@ -26,14 +26,14 @@ def before(vehicle: Vehicle, now_s: float) -> Before | None:
     if position is None or height_m is None:
         return None
     place = (position.latitude_deg, position.longitude_deg)
-    return Before(now_s, state.armed, state.landed, state.custom_mode, *place, height_m)
+    return VehicleSnapshot(now_s, state.armed, state.landed, state.custom_mode, *place, height_m)
 
 
-def has_not_begun(behavior: Behavior, was: Before | None, now_s: float) -> bool:
-    """Whether its vehicle shows that it has not begun it. What moves nothing, such as an actuator's
-    work, leaves nothing to see."""
+def shows_not_begun(behavior: Behavior, was: VehicleSnapshot | None, now_s: float) -> bool:
+    """Return whether the vehicle shows that it has not begun the behavior. A behavior that moves
+    nothing, such as `deploy`, shows nothing."""
     vehicle = behavior.vehicle
-    now = before(vehicle, now_s)
+    now = take_snapshot(vehicle, now_s)
     if was is None or now is None or not behavior.moves_vehicle:
         return False
     as_it_was = (now.armed, now.custom_mode) == (was.armed, was.custom_mode)
