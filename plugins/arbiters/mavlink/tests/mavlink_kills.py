@@ -23,7 +23,7 @@ from m2pem_plugin_mavlink.simulator.specification import Kind
 from m2pem_plugin_mavlink.sitl.launch import Launch, Start, ardupilot_launch, running
 from m2pem_plugin_mavlink.sitl.programs import FRAMES, ardupilot_program
 from mavlink_sitl import SPEED, free_port
-from mavlink_station import VehicleConnections
+from mavlink_station import Station
 from mavlink_wires import UdpWire
 from pymavlink import DFReader
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -212,9 +212,7 @@ def fly(programs: dict[str, Path], seed: int, kills: int, folder: Path) -> Fligh
         for wire in wires.values():
             opened.callback(wire.close)
         opened.enter_context(running(launches, folder))
-        stations = {
-            name: VehicleConnections(wire, 1 + n) for n, (name, wire) in enumerate(wires.items())
-        }
+        stations = {name: Station(wire, 1 + n) for n, (name, wire) in enumerate(wires.items())}
         for station in stations.values():
             station.beats = False
             station.connect()
@@ -263,7 +261,7 @@ def _write_geometry(file: Path, kind: str, coordinates: Any) -> None:
 def _play(
     flight: Flight,
     executive: Executive,
-    stations: dict[str, VehicleConnections],
+    stations: dict[str, Station],
     chance: random.Random,
     kills: int,
 ) -> None:
@@ -301,12 +299,12 @@ def _play(
     flight.faults.append(f"the run has not ended: {executive.lines[-8:]}")
 
 
-def _look(stations: dict[str, VehicleConnections]) -> None:
+def _look(stations: dict[str, Station]) -> None:
     for station in stations.values():
         station.pump()
 
 
-def _answer(text: str, stations: dict[str, VehicleConnections], patient: bool) -> Answer | None:
+def _answer(text: str, stations: dict[str, Station], patient: bool) -> Answer | None:
     """A patient operator lets an aircraft that returns or lands by itself come down, and then
     aborts; others have the vehicle go on."""
     (name,) = (name for name in stations if name in text)

@@ -57,7 +57,7 @@ def test_a_reverse_out_of_the_fence_is_rejected() -> None:
     async def main(bench) -> None:
         end = await bench.do("reverse", distance=20.0)
         assert end.state is BehaviorState.REJECTED
-        assert "10.0 m outside" in end.reason
+        assert "10 m outside" in end.reason
         assert bench.told == []
 
     play(Body("ground", east=10.0, north=10.0), main, fence=FIELD)
