@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         SearchLimits,
         SearchProgress,
     )
+    from m2pem.api.behavior_parameters import BehaviorParameters
     from m2pem.api.behavior_tracker import BehaviorTracker
     from m2pem.api.bus import FleetBus
     from m2pem.api.clock import Clock
@@ -107,6 +108,7 @@ _MODULES = {
         " SimulationResult StampedRecord TelemetrySample"
     ),
     "m2pem.api.goals": "GoalArbiter",
+    "m2pem.api.behavior_parameters": "BehaviorParameters",
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
     "m2pem.api.ocu": "Ocu",
@@ -145,6 +147,7 @@ __all__ = [
     "ArbiterContext",
     "Area",
     "BehaviorId",
+    "BehaviorParameters",
     "BehaviorReport",
     "BehaviorRequest",
     "BehaviorSpec",

@@ -4,7 +4,7 @@ import logging
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from m2pem.api import refusal as parameters
+from m2pem.api import behavior_parameters
 from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.async_queue import AsyncQueue
 from m2pem.api.epoch_fence import EpochFence
@@ -196,7 +196,7 @@ class BehaviorTracker:
                 known = suggest(request.behavior, offered, "behaviors")
                 return f"{resource} has no behavior '{request.behavior}'; {known}"
             spec = offered[request.behavior]
-            if reason := parameters.refusal(spec, request.parameters):
+            if reason := behavior_parameters.refusal(spec, request.parameters):
                 return reason
         return ""
 

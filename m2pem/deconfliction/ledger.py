@@ -10,9 +10,9 @@ from m2pem.api.arbiter import BehaviorId, BehaviorRequest
 from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.deconfliction.craft import Craft, Span, craft_of, flies
 from m2pem.deconfliction.crews import member_volume
+from m2pem.deconfliction.flight_parameters import FlightParameters
 from m2pem.deconfliction.planning import volume_of
 from m2pem.deconfliction.volume import Piece, Separation, Volume, too_near
-from m2pem.deconfliction.wishes import Wishes
 from m2pem.deconfliction.words import Conflict, Occupant, refusal
 from m2pem.fleet.fleet import Domain, Fleet
 from m2pem.geo.local_frame import EastNorth, LocalFrame
@@ -197,12 +197,12 @@ class Airspace:
             if from_m is not None and craft.home_m is not None:
                 there_m = craft.home_m + from_m
                 craft = replace(craft, span=Span(there_m, there_m), flies=True)
-            wishes = Wishes(craft, request.parameters, self._frame, self._height_m)
+            parameters = FlightParameters(request.parameters, craft, self._frame, self._height_m)
             start_s, timed = now_us / US_PER_S, self._policy.time_s is not None
             if kind is BehaviorType.TEAM:
-                volume = member_volume(request.behavior, wishes, lead, index, start_s)
+                volume = member_volume(request.behavior, parameters, lead, index, start_s)
             else:
-                volume = volume_of(request.behavior, wishes, start_s, timed=timed)
+                volume = volume_of(request.behavior, parameters, start_s, timed=timed)
             volumes[vehicle] = volume
         return volumes
 

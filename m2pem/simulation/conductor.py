@@ -14,9 +14,9 @@ from m2pem.simulation.effects import Effect, EffectKind
 from m2pem.simulation.executions import Body, Execution, Outcome, Part, Strike
 from m2pem.simulation.launch import Assignment, Launcher
 from m2pem.simulation.links import Links
+from m2pem.simulation.local_parameters import RefusedError
 from m2pem.simulation.memory import Memory
 from m2pem.simulation.vehicles import SimVehicle
-from m2pem.simulation.wishes import RefusedError
 
 LONGEST_CATCH_UP_US = 3_600_000_000
 """A pursuit that nobody watched for longer begins again where it was so long ago."""

@@ -5,12 +5,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from m2pem.simulation.corners import turned
+from m2pem.simulation.local_parameters import LocalParameters, RefusedError
 from m2pem.simulation.manoeuvres import nearest_edge, yaw_of
 from m2pem.simulation.phases import Look, Pose, Slew, Vector
 from m2pem.simulation.settings import Gimbal
 from m2pem.simulation.shots import Shots
 from m2pem.simulation.track import Plan
-from m2pem.simulation.wishes import RefusedError, Wishes
 
 DEFAULT_OVERLAP = 0.2
 MAST_M = 2.0
@@ -121,11 +121,11 @@ def aimed(gimbal: Gimbal, look: Look, carrier: Pose, place: Vector) -> Slew:
     )
 
 
-def _target(mount: Mount, wishes: Wishes) -> tuple[str | Vector, Vector]:
-    vehicle = wishes.target_vehicle()
+def _target(mount: Mount, parameters: LocalParameters) -> tuple[str | Vector, Vector]:
+    vehicle = parameters.target_vehicle
     if vehicle is not None:
-        return vehicle, wishes.pose_of(vehicle).place
-    place = wishes.point(mount.ground_up_m)
+        return vehicle, parameters.pose_of(vehicle).place
+    place = parameters.target_point(mount.ground_up_m)
     return place, place
 
 
@@ -137,19 +137,19 @@ def _looking(mount: Mount, pan: float, tilt: float) -> Look:
     return Look(pan, tilt, mount.look.zoom)
 
 
-def _point_at(mount: Mount, wishes: Wishes) -> Gaze:
-    bearing, elevation = wishes.number("bearing"), wishes.number("elevation")
+def _point_at(mount: Mount, parameters: LocalParameters) -> Gaze:
+    bearing, elevation = parameters.bearing_rad, parameters.elevation_rad
     if bearing is not None and elevation is not None:
         return Gaze(_Looks(mount).to(_looking(mount, bearing, elevation)).plan())
-    _, place = _target(mount, wishes)
+    _, place = _target(mount, parameters)
     pan, tilt = direction(mount.pose(), place)
     return Gaze(_Looks(mount).to(_looking(mount, pan, tilt)).plan())
 
 
-def _scan_sector(mount: Mount, wishes: Wishes) -> Gaze:
-    middle = turned(yaw_of(wishes.number("heading") or 0.0), mount.pose().yaw)
-    half = (wishes.number("sector") or 0.0) / 2
-    tilt = wishes.number("elevation")
+def _scan_sector(mount: Mount, parameters: LocalParameters) -> Gaze:
+    middle = turned(yaw_of(parameters.heading_rad or 0.0), mount.pose().yaw)
+    half = (parameters.number("sector") or 0.0) / 2
+    tilt = parameters.elevation_rad
     tilt = mount.look.tilt if tilt is None else tilt
     limit = mount.gimbal.pan_limit_rad
     for pan in (middle - half, middle + half):
@@ -158,24 +158,24 @@ def _scan_sector(mount: Mount, wishes: Wishes) -> Gaze:
             _looking(mount, pan, tilt)
     _looking(mount, middle, tilt)
     looks = _Looks(mount).to(Look(middle - half, tilt, mount.look.zoom))
-    looks.to(Look(middle + half, tilt, mount.look.zoom), wishes.number("speed"))
+    looks.to(Look(middle + half, tilt, mount.look.zoom), parameters.speed_m_s)
     return Gaze(looks.plan())
 
 
-def _scan_polygon(mount: Mount, wishes: Wishes) -> Gaze:
+def _scan_polygon(mount: Mount, parameters: LocalParameters) -> Gaze:
     """Rows of pan across the area as it is seen from the vehicle, from the far edge to the near."""
-    area = wishes.area()
+    area = parameters.area
     if area is None:
         raise RefusedError("parameter 'area': there is none")
     carrier = mount.pose()
-    ring = wishes.rings(area)[0]
+    ring = parameters.rings(area)[0]
     # The steepest look down is to the nearest point, which need not be a corner.
     points = [*ring, nearest_edge(ring, carrier.place)]
     seen = [direction(carrier, (east, north, mount.ground_up_m)) for east, north in points]
     middle = seen[0][0]
     pans = [middle + turned(middle, pan) for pan, _ in seen]
     tilts = [tilt for _, tilt in seen]
-    overlap = wishes.number("overlap")
+    overlap = parameters.number("overlap")
     row = mount.gimbal.view_rad / mount.look.zoom
     row *= 1 - (DEFAULT_OVERLAP if overlap is None else overlap)
     rows = max(1, math.ceil((max(tilts) - min(tilts)) / row - 1e-9))
@@ -189,41 +189,37 @@ def _scan_polygon(mount: Mount, wishes: Wishes) -> Gaze:
             _looking(mount, first, tilt)
         _looking(mount, last, tilt)
         looks.to(Look(first, tilt, mount.look.zoom))
-        looks.to(Look(last, tilt, mount.look.zoom), wishes.number("speed"))
+        looks.to(Look(last, tilt, mount.look.zoom), parameters.speed_m_s)
     return Gaze(looks.plan())
 
 
-def _track(mount: Mount, wishes: Wishes) -> Gaze:
-    aim, _ = _target(mount, wishes)
+def _track(mount: Mount, parameters: LocalParameters) -> Gaze:
+    aim, _ = _target(mount, parameters)
     mount.pose()
-    return Gaze(_Looks(mount).plan(), aim, wishes.number("duration"))
+    return Gaze(_Looks(mount).plan(), aim, parameters.duration_s)
 
 
-def _zoom(mount: Mount, wishes: Wishes) -> Gaze:
-    level = wishes.number("level")
-    level = 1.0 if level is None else level
+def _zoom(mount: Mount, parameters: LocalParameters) -> Gaze:
+    level = parameters.zoom
     if not 1.0 <= level <= mount.gimbal.zoom_max:
         raise RefusedError(f"parameter 'level': {level:g} is not in 1 to {mount.gimbal.zoom_max:g}")
     return Gaze(_Looks(mount).to(Look(mount.look.pan, mount.look.tilt, level)).plan())
 
 
-def _take_picture(mount: Mount, wishes: Wishes) -> Gaze:
-    count, interval = wishes.number("count"), wishes.number("interval")
-    count = 1.0 if count is None else count
-    interval = 1.0 if interval is None else interval
+def _take_picture(mount: Mount, parameters: LocalParameters) -> Gaze:
     shutter = mount.gimbal.shutter_s
-    shots = Shots(int(count), max(interval, shutter), shutter)
+    shots = Shots(parameters.count, max(parameters.interval_s, shutter), shutter)
     plan = _Looks(mount).stare((shots.count - 1) * shots.every_s + shutter).plan()
     return Gaze(plan, shots=shots)
 
 
-def _record(mount: Mount, wishes: Wishes) -> Gaze:
-    seconds = wishes.number("duration")
+def _record(mount: Mount, parameters: LocalParameters) -> Gaze:
+    seconds = parameters.duration_s
     plan = _Looks(mount).stare(math.inf if seconds is None else seconds).plan()
     return Gaze(plan, shots=Shots())
 
 
-GAZES: Mapping[str, Callable[[Mount, Wishes], Gaze]] = {
+GAZES: Mapping[str, Callable[[Mount, LocalParameters], Gaze]] = {
     "ptz_point_at": _point_at,
     "ptz_scan_sector": _scan_sector,
     "ptz_scan_polygon": _scan_polygon,

@@ -7,7 +7,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from m2pem.api.arbiter import ArbiterContext, BehaviorRequest, Connection
-from m2pem.api.refusal import refusal
+from m2pem.api.behavior_parameters import refusal
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
@@ -15,13 +15,13 @@ from m2pem.simulation.abilities import payload_behaviors, vehicle_behaviors
 from m2pem.simulation.executions import Aim, Body, Chase
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.gimbals import GAZES, MAST_M
+from m2pem.simulation.local_parameters import LocalParameters, RefusedError
 from m2pem.simulation.manoeuvres import MANOEUVRES, Manoeuvre
 from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.phases import Pose
 from m2pem.simulation.shots import Shots
 from m2pem.simulation.track import Plan
 from m2pem.simulation.vehicles import SimVehicle, carrier_of
-from m2pem.simulation.wishes import RefusedError, Wishes
 from m2pem.suggestions import suggest
 
 
@@ -95,19 +95,19 @@ class Launcher:
             problem = refusal(self._spec(body, request.behavior, type_), request.parameters)
             if problem:
                 raise RefusedError(problem)
-        wishes = Wishes(
+        parameters = LocalParameters(
             request.parameters, self._frame, lambda vehicle: self.whereabouts(vehicle, now_us)
         )
         idle = [Assignment(body) for body in bodies if body not in acting]
         if type_ is BehaviorType.PAYLOAD:
-            return [self._gaze(body, request, wishes, now_us) for body in payloads] + idle
+            return [self._gaze(body, request, parameters, now_us) for body in payloads] + idle
         crafts = [vehicle.craft(now_us) for vehicle in vehicles]
         for craft, vehicle in zip(crafts, vehicles, strict=True):
             if vehicle.battery_at(now_us) <= 0:
                 raise RefusedError(f"the battery of {craft.name} is empty", "BATTERY_LOW")
         manoeuvre: Callable[..., Manoeuvre] = MANOEUVRES[request.behavior]
         return [
-            _assignment(vehicle, manoeuvre(craft, wishes))
+            _assignment(vehicle, manoeuvre(craft, parameters))
             for vehicle, craft in zip(vehicles, crafts, strict=True)
         ] + idle
 
@@ -137,12 +137,12 @@ class Launcher:
         raise RefusedError(f"{body.id} has no behavior '{behavior}'; {hint}")
 
     def _gaze(
-        self, body: SimPayload, request: BehaviorRequest, wishes: Wishes, now_us: int
+        self, body: SimPayload, request: BehaviorRequest, parameters: LocalParameters, now_us: int
     ) -> Assignment:
         carrier = self._bodies.get(body.carrier)
         pose = self.whereabouts(body.carrier, now_us)
         ground = carrier.home[2] if isinstance(carrier, SimVehicle) else 0.0
-        gaze = GAZES[request.behavior](body.mount(now_us, pose, ground), wishes)
+        gaze = GAZES[request.behavior](body.mount(now_us, pose, ground), parameters)
         chase = None
         if isinstance(gaze.aim, str):
             chase = Aim(gaze.aim)

@@ -8,16 +8,15 @@ from itertools import pairwise
 from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
 from m2pem.mission.geometry import Area
 from m2pem.simulation.course import Course, Craft
+from m2pem.simulation.local_parameters import LocalParameters, RefusedError
 from m2pem.simulation.phases import Pose, Vector
 from m2pem.simulation.pursuit import Pursuit
 from m2pem.simulation.track import Plan
-from m2pem.simulation.wishes import RefusedError, Wishes
 
 SURVEY_SPACING_M = 20.0
 ORBIT_RADIUS_M = 30.0
 STANDOFF_M = 20.0
 FOLLOW_OFFSET_M = 15.0
-REVERSE_M = 5.0
 ACTUATOR_S = 2.0
 """What a behavior's parameters are when nobody says."""
 
@@ -49,9 +48,9 @@ def under_way(craft: Craft, up_m: float | None) -> Course:
     return course
 
 
-def flying_height(craft: Craft, wishes: Wishes) -> float:
+def flying_height(craft: Craft, parameters: LocalParameters) -> float:
     """The height to move at: as wished, else the present one, else that of a take-off."""
-    wished = wishes.height(craft)
+    wished = parameters.up_m(craft)
     if wished is not None:
         return wished
     if craft.flies and not craft.aloft:
@@ -59,15 +58,15 @@ def flying_height(craft: Craft, wishes: Wishes) -> float:
     return craft.pose.place[2]
 
 
-def _route(craft: Craft, wishes: Wishes) -> Manoeuvre:
-    route = wishes.route()
+def _route(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
+    route = parameters.route
     if route is None:
         raise RefusedError("parameter 'route': there is none")
-    up = flying_height(craft, wishes)
-    places = wishes.places(craft, route, up)
-    speed = wishes.number("speed")
+    up = flying_height(craft, parameters)
+    places = parameters.places(craft, route, up)
+    speed = parameters.speed_m_s
     course = under_way(craft, places[0][2]).through(places, speed)
-    if not wishes.flag("loop"):
+    if not parameters.loop:
         return Manoeuvre(course.plan())
     first_leg = next((p for p in places if math.dist(p[:2], places[0][:2]) > 0.1), None)
     if first_leg is None:
@@ -80,28 +79,28 @@ def _route(craft: Craft, wishes: Wishes) -> Manoeuvre:
     return Manoeuvre(course.plan(cycle_from=lap))
 
 
-def _goto(craft: Craft, wishes: Wishes) -> Manoeuvre:
-    target = wishes.target(craft, flying_height(craft, wishes))
-    course = under_way(craft, target[2]).through([target], wishes.number("speed"))
-    heading = wishes.number("heading")
+def _goto(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
+    target = parameters.target_place(craft, flying_height(craft, parameters))
+    course = under_way(craft, target[2]).through([target], parameters.speed_m_s)
+    heading = parameters.heading_rad
     if heading is not None:
         course.turn_to(yaw_of(heading))
     return Manoeuvre(course.plan())
 
 
-def _hold(craft: Craft, wishes: Wishes) -> Manoeuvre:
-    return Manoeuvre(Course(craft).stand(wishes.number("duration") or 0.0).plan())
+def _hold(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
+    return Manoeuvre(Course(craft).stand(parameters.duration_s or 0.0).plan())
 
 
-def _stop(craft: Craft, _: Wishes) -> Manoeuvre:
+def _stop(craft: Craft, _: LocalParameters) -> Manoeuvre:
     return Manoeuvre(Course(craft).plan())
 
 
-def _land(craft: Craft, _: Wishes) -> Manoeuvre:
+def _land(craft: Craft, _: LocalParameters) -> Manoeuvre:
     return Manoeuvre(Course(craft).climb_to(craft.home[2]).plan())
 
 
-def _return(craft: Craft, _: Wishes) -> Manoeuvre:
+def _return(craft: Craft, _: LocalParameters) -> Manoeuvre:
     course = Course(craft)
     if not craft.flies:
         return Manoeuvre(course.through([craft.home]).plan())
@@ -112,45 +111,43 @@ def _return(craft: Craft, _: Wishes) -> Manoeuvre:
     return Manoeuvre(course.climb_to(ground).plan())
 
 
-def _reverse(craft: Craft, wishes: Wishes) -> Manoeuvre:
-    distance = wishes.number("distance")
-    distance = REVERSE_M if distance is None else distance
-    return Manoeuvre(Course(craft).back_up(distance, wishes.number("speed")).plan())
+def _reverse(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
+    return Manoeuvre(Course(craft).back_up(parameters.distance_m, parameters.speed_m_s).plan())
 
 
-def _climb(craft: Craft, wishes: Wishes) -> Manoeuvre:
-    return Manoeuvre(Course(craft).climb_to(flying_height(craft, wishes)).plan())
+def _climb(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
+    return Manoeuvre(Course(craft).climb_to(flying_height(craft, parameters)).plan())
 
 
-def _survey(craft: Craft, wishes: Wishes) -> Manoeuvre:
+def _survey(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
     """Drive or fly the passes over an area; each is driven to its very end."""
-    area = wishes.area()
+    area = parameters.area
     if area is None:
         raise RefusedError("parameter 'area': there is none")
-    rings = wishes.rings(area)
-    heading = wishes.number("heading")
+    rings = parameters.rings(area)
+    heading = parameters.heading_rad
     yaw = longest_edge_yaw(rings[0]) if heading is None else yaw_of(heading)
     try:
         tracks = lawn_mower(
             rings,
-            wishes.number("spacing") or SURVEY_SPACING_M,
+            parameters.spacing_m or SURVEY_SPACING_M,
             yaw,
-            wishes.number("overshoot") or 0.0,
+            parameters.overshoot_m,
         )
     except ValueError as error:
         raise RefusedError(f"parameter 'spacing': {error}") from None
-    up = flying_height(craft, wishes)
+    up = flying_height(craft, parameters)
     places: list[Vector] = [(east, north, up) for east, north in tracks]
-    course = under_way(craft, up).through(places, wishes.number("speed"), radius_m=0.0)
+    course = under_way(craft, up).through(places, parameters.speed_m_s, radius_m=0.0)
     return Manoeuvre(course.plan())
 
 
-def _orbit(craft: Craft, wishes: Wishes) -> Manoeuvre:
-    centre = wishes.target(craft, flying_height(craft, wishes))
-    radius = wishes.number("radius") or ORBIT_RADIUS_M
-    speed = wishes.number("speed")
+def _orbit(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
+    centre = parameters.target_place(craft, flying_height(craft, parameters))
+    radius = parameters.radius_m or ORBIT_RADIUS_M
+    speed = parameters.speed_m_s
     course = _onto_circle(craft, centre, radius, speed)
-    turns, seconds = wishes.number("turns"), wishes.number("duration")
+    turns, seconds = parameters.turns, parameters.duration_s
     if turns is None and seconds is not None:
         course.circle(centre[:2], speed, seconds=seconds)
     else:
@@ -167,12 +164,14 @@ def _onto_circle(craft: Craft, centre: Vector, radius_m: float, speed_m_s: float
     return course.through([(east, north, centre[2])], speed_m_s)
 
 
-def _observe(craft: Craft, wishes: Wishes) -> Manoeuvre:
+def _observe(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
     """Watch an area: from a circle above it when flying, else standing at its edge."""
-    up = flying_height(craft, wishes)
-    area = wishes.area()
-    seconds = wishes.number("duration")
-    centre = wishes.target(craft, up) if area is None else (*_middle(wishes, area), up)
+    up = flying_height(craft, parameters)
+    area = parameters.area
+    seconds = parameters.duration_s
+    centre = (
+        parameters.target_place(craft, up) if area is None else (*_middle(parameters, area), up)
+    )
     if craft.flies:
         course = _onto_circle(craft, centre, ORBIT_RADIUS_M, None)
         course.circle(centre[:2], seconds=seconds)
@@ -181,13 +180,13 @@ def _observe(craft: Craft, wishes: Wishes) -> Manoeuvre:
         course = _onto_circle(craft, centre, STANDOFF_M, None)
     else:
         course = Course(craft)
-        course.through([(*nearest_edge(wishes.rings(area)[0], course.place), up)])
+        course.through([(*nearest_edge(parameters.rings(area)[0], course.place), up)])
     course.turn_to(math.atan2(centre[1] - course.place[1], centre[0] - course.place[0]))
     return Manoeuvre(course.stand(math.inf if seconds is None else seconds).plan())
 
 
-def _middle(wishes: Wishes, area: Area) -> tuple[float, float]:
-    corners = wishes.rings(area)[0][:-1]
+def _middle(parameters: LocalParameters, area: Area) -> tuple[float, float]:
+    corners = parameters.rings(area)[0][:-1]
     return (
         sum(east for east, _ in corners) / len(corners),
         sum(north for _, north in corners) / len(corners),
@@ -206,13 +205,13 @@ def nearest_edge(ring: list[tuple[float, float]], place: Vector) -> tuple[float,
     return min(candidates, key=lambda point: math.dist(point, place[:2]))
 
 
-def _follow(craft: Craft, wishes: Wishes) -> Manoeuvre:
-    vehicle = wishes.target_vehicle()
+def _follow(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
+    vehicle = parameters.target_vehicle
     if vehicle is None or vehicle == craft.name:
         raise RefusedError("parameter 'target': another vehicle is expected")
-    offset, bearing = wishes.number("offset"), wishes.number("bearing")
-    up = flying_height(craft, wishes)
-    wishes.pose_of(vehicle)  # refused here if nobody knows where it is
+    offset, bearing = parameters.offset_m, parameters.bearing_rad
+    up = flying_height(craft, parameters)
+    parameters.pose_of(vehicle)  # refused here if nobody knows where it is
     pursuit = Pursuit(
         vehicle,
         FOLLOW_OFFSET_M if offset is None else offset,
@@ -225,21 +224,21 @@ def _follow(craft: Craft, wishes: Wishes) -> Manoeuvre:
     return Manoeuvre(under_way(craft, up).plan() if landed else None, pursuit)
 
 
-def _teleop(craft: Craft, wishes: Wishes) -> Manoeuvre:
-    timeout = wishes.number("timeout")
+def _teleop(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
+    timeout = parameters.timeout_s
     return Manoeuvre(Course(craft).stand(math.inf if timeout is None else timeout).plan())
 
 
-def _set_speed(craft: Craft, wishes: Wishes) -> Manoeuvre:
-    speed = min(wishes.number("speed") or math.inf, craft.kinematics.max_speed_m_s)
+def _set_speed(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
+    speed = min(parameters.speed_m_s or math.inf, craft.kinematics.max_speed_m_s)
     return Manoeuvre(Course(craft).plan(), cruise_m_s=speed)
 
 
-def _deploy(craft: Craft, _: Wishes) -> Manoeuvre:
+def _deploy(craft: Craft, _: LocalParameters) -> Manoeuvre:
     return Manoeuvre(Course(craft).stand(ACTUATOR_S).plan())
 
 
-MANOEUVRES: Mapping[str, Callable[[Craft, Wishes], Manoeuvre]] = {
+MANOEUVRES: Mapping[str, Callable[[Craft, LocalParameters], Manoeuvre]] = {
     "single_vehicle_routing": _route,
     "goto": _goto,
     "hold": _hold,

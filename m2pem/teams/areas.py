@@ -25,18 +25,18 @@ def survey(setting: Setting) -> Plan:
     Where all can survey an area themselves, with cameras that their arbiters trigger perhaps, each
     is given the area of its band; else each moves along the passes.
     """
-    area = setting.area()
+    area = setting.parameters.area
     if area is None:
         raise TeamRefusedError("parameter 'area': there is none")
     rings = [[setting.level(corner) for corner in ring] for ring in area.rings]
-    heading = setting.number("heading")
+    heading = setting.parameters.heading_rad
     yaw = longest_edge_yaw(rings[0]) if heading is None else math.pi / 2 - heading
-    spacing = setting.number("spacing") or SURVEY_SPACING_M
+    spacing = setting.parameters.spacing_m or SURVEY_SPACING_M
     try:
-        tracks = lawn_mower(rings, spacing, yaw, setting.number("overshoot") or 0.0)
+        tracks = lawn_mower(rings, spacing, yaw, setting.parameters.overshoot_m)
     except ValueError as error:
         raise TeamRefusedError(f"parameter 'spacing': {error}") from None
-    wished = setting.number("speed")
+    wished = setting.parameters.speed_m_s
     passes = [tracks[index : index + 2] for index in range(0, len(tracks), 2)]
     shares = setting.split or _shares(setting, rings[0], passes, wished)
     themselves = all("area_survey" in setting.offered[member] for member in setting.members)
@@ -47,7 +47,7 @@ def survey(setting: Setting) -> Plan:
         for member, ring in zip(setting.members, parts, strict=True):
             if ring:
                 own = {
-                    **{name: setting.parameters.get(name) for name in ("speed", "overshoot")},
+                    **setting.parameters.only("speed", "overshoot"),
                     "area": _band_area(setting, area, ring),
                     "heading": (math.pi / 2 - yaw) % math.tau,
                     "spacing": spacing,
@@ -109,7 +109,7 @@ def _band_area(setting: Setting, area: Area, rings: Sequence[Pass]) -> Area:
 
 def observe(setting: Setting) -> Plan:
     """Each goes to a place of its own around the area or target, looks at it, and stays."""
-    area = setting.area()
+    area = setting.parameters.area
     legs = []
     for index, member in enumerate(setting.members):
         angle = math.tau * index / len(setting.members)
@@ -128,7 +128,7 @@ def observe(setting: Setting) -> Plan:
         place = (centre[0] + reach * math.cos(angle), centre[1] + reach * math.sin(angle))
         heading = (math.pi / 2 - (angle + math.pi)) % math.tau
         legs.append(setting.to_place(member, place, heading))
-    return Plan(tuple(legs), stays=True, duration_s=setting.number("duration"))
+    return Plan(tuple(legs), stays=True, duration_s=setting.parameters.duration_s)
 
 
 def _reach(
@@ -145,8 +145,8 @@ def _reach(
 
 def escort(setting: Setting) -> Plan:
     """Each keeps to a place of its own around the target, the first one ahead of it."""
-    spacing = setting.number("spacing") or SPACING_M
-    target = setting.parameters.get("target")
+    spacing = setting.parameters.spacing_m or SPACING_M
+    target = setting.parameters.target
     legs = []
     for index, member in enumerate(setting.members):
         angle = math.tau * index / len(setting.members)

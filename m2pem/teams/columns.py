@@ -23,9 +23,9 @@ _SAME_PLACE_M = 0.01
 def march(setting: Setting, default_shape: str) -> Plan:
     """All move together and keep their places; without a route they form up on the lead."""
     shape, spacing = _shape(setting, default_shape)
-    route = setting.route()
+    route = setting.parameters.route
     places = _places(setting, shape, spacing)
-    if setting.text("offsets", ""):
+    if setting.parameters.text("offsets"):
         shape, spacing = "", min(math.dist(a, b) for a, b in combinations(places, 2))
     if route is None:
         return Plan(_forming_up(setting, places, chained=False))
@@ -43,13 +43,13 @@ def march(setting: Setting, default_shape: str) -> Plan:
 def one_by_one(setting: Setting) -> Plan:
     """Each sets off when the one before it has arrived, and stops behind it."""
     shape, spacing = _shape(setting, "column")
-    route = setting.route()
+    route = setting.parameters.route
     places = _places(setting, shape, spacing)
     if route is None:
         return Plan(_forming_up(setting, places, chained=True))
     ways = _ways(setting, route, places)
     befores: list[ResourceId | None] = [None, *(way.member for way in ways)]
-    wished = setting.number("speed")
+    wished = setting.parameters.speed_m_s
     return Plan(
         tuple(way.leg(setting, wished, after) for way, after in zip(ways, befores, strict=False))
     )
@@ -90,7 +90,7 @@ class _Way:
         self.path = Path(kept, marks)
 
     def leg(self, setting: Setting, speed_m_s: float | None, after: ResourceId | None) -> Leg:
-        route = setting.route()
+        route = setting.parameters.route
         if len(self.places) < 2 or route is None:
             return setting.to_place(self.member, self.places[0], after=after)
         ups = [waypoint[2] for waypoint in _apart(setting, route)]
@@ -103,12 +103,12 @@ class _Way:
 
 
 def _shape(setting: Setting, default: str) -> tuple[str, float]:
-    return setting.text("shape", default), setting.number("spacing") or SPACING_M
+    return setting.parameters.text("shape") or default, setting.parameters.spacing_m or SPACING_M
 
 
 def _places(setting: Setting, shape: str, spacing_m: float) -> list[tuple[float, float]]:
     """Where each member is to be, in metres behind the lead and to its left."""
-    text = setting.text("offsets", "")
+    text = setting.parameters.text("offsets")
     if not text:
         slots = (slot(shape, index) for index in range(len(setting.members)))
         return [(back * spacing_m, left * spacing_m) for back, left in slots]

@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from m2pem.api.arbiter import ResolvedValue
+from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.fleet.parameters import accepted
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
-from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
+from m2pem.mission.geometry import Coordinate, Point, Route, VehiclePosition
 from m2pem.teams.motion import MOTIONS, Motion
 from m2pem.teams.path import Path
 from m2pem.teams.shapes import Vector
@@ -92,7 +93,7 @@ class Setting:
     members: tuple[ResourceId, ...]
     domains: Mapping[ResourceId, str]
     offered: Mapping[ResourceId, Mapping[str, BehaviorSpec]]
-    parameters: Mapping[str, ResolvedValue]
+    parameters: BehaviorParameters
     frame: LocalFrame
     stands: Mapping[ResourceId, Stand] = field(default_factory=dict)
     target: Stand | None = None
@@ -101,33 +102,13 @@ class Setting:
     lasts_s: Mapping[ResourceId, float] = field(default_factory=dict)
     split: tuple[float, ...] = ()
 
-    def number(self, name: str) -> float | None:
-        """A parameter in SI; None if it is not given."""
-        value = self.parameters.get(name)
-        return float(value) if isinstance(value, int | float) else None
-
-    def text(self, name: str, default: str) -> str:
-        """A parameter that is a text."""
-        value = self.parameters.get(name)
-        return value if isinstance(value, str) else default
-
-    def route(self) -> Route | None:
-        """The parameter `route`."""
-        value = self.parameters.get("route")
-        return value if isinstance(value, Route) else None
-
-    def area(self) -> Area | None:
-        """The parameter `area`."""
-        value = self.parameters.get("area")
-        return value if isinstance(value, Area) else None
-
     def target_place(self) -> tuple[float, float]:
         """Where `target` is now.
 
         Raises:
             TeamRefusedError: nobody knows.
         """
-        value = self.parameters.get("target")
+        value = self.parameters.target
         if isinstance(value, Point):
             return self.level(value.position)
         if self.target is not None:
@@ -162,7 +143,7 @@ class Setting:
 
         Not above what the arbiter of a member allows.
         """
-        wished = self.number("speed")
+        wished = self.parameters.speed_m_s
         bounds = [self.motion(member).nominal_m_s for member in self.members]
         speed = min(bounds) if wished is None else wished
         for member in self.members:
@@ -184,8 +165,7 @@ class Setting:
             raise TeamRefusedError(f"{member} has no behavior '{behavior}'")
         given = dict(wished)
         if self.domains[member] in _FLYING_OR_DIVING:
-            for name in ("altitude", "altitude_frame"):
-                given.setdefault(name, self.parameters.get(name))
+            given = {**self.parameters.only("altitude", "altitude_frame"), **given}
         taken = {
             name: value
             for name, value in given.items()
@@ -202,7 +182,7 @@ class Setting:
     ) -> Leg:
         """A member's way to a place: `goto`, or a route of two points where it has none."""
         there = self.coordinate(place, None)
-        speed = self.number("speed")
+        speed = self.parameters.speed_m_s
         if "goto" in self.offered[member]:
             wished = {"target": Point(there), "speed": speed, "heading": heading_rad}
             return self.leg(member, "goto", wished, after)

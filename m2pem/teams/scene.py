@@ -4,13 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from m2pem.api.arbiter import Arbiter, BehaviorRequest, SightedArbiter
+from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.api.bus import FleetBus
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import VehicleState
 from m2pem.fleet.fleet import Fleet
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.geometry import VehiclePosition
 from m2pem.teams.offers import Offers
 from m2pem.teams.plan import Plan, Setting, Stand, TeamRefusedError
 from m2pem.teams.planning import PLANS, alike
@@ -69,16 +69,16 @@ class Scene:
         if first is None or first.position is None:
             raise TeamRefusedError(f"the position of {request.resources[0]} is not known")
         frame = LocalFrame(first.position.latlon)
-        target = request.parameters.get("target")
+        parameters = BehaviorParameters(request.parameters)
         seen = None
-        if isinstance(target, VehiclePosition):
-            seen = self.look(ResourceId(target.vehicle), frame)
+        if parameters.target_vehicle is not None:
+            seen = self.look(ResourceId(parameters.target_vehicle), frame)
         vehicles = {each: self._fleet.vehicles[each] for each in request.resources}
         setting = Setting(
             request.resources,
             {each: vehicle.domain.value for each, vehicle in vehicles.items()},
             {each: self._offers.alone(each) for each in request.resources},
-            request.parameters,
+            parameters,
             frame,
             {each: stand_of(frame, state) for each, state in states.items() if state is not None},
             seen,

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.fleet.behaviors import SHARED
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.behavior import BehaviorType
@@ -44,7 +45,9 @@ class Field:
             tuple(names),
             dict.fromkeys(names, "ground"),
             {name: {"single_vehicle_routing": ROUTING} for name in names},
-            {"route": route(*places), "shape": shape, "spacing": spacing_m, "speed": speed_m_s},
+            BehaviorParameters(
+                {"route": route(*places), "shape": shape, "spacing": spacing_m, "speed": speed_m_s}
+            ),
             _FRAME,
             stands,
         )

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.parameters import accepted
 from m2pem.fleet.team_needs import TEAM_NEEDS
@@ -39,7 +40,7 @@ def setting(
         tuple(names),
         dict(zip(names, domains, strict=True)),
         {name: specs for name in names},  # noqa: C420
-        parameters,
+        BehaviorParameters(parameters),
         FRAME,
         {name: Stand((-20.0 * index, 0.0), yaw) for index, name in enumerate(names)},
     )

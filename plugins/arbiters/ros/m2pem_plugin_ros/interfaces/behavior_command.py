@@ -7,7 +7,7 @@ from typing import Any
 from uuid import UUID
 
 from m2pem.api import BehaviorRequest, BehaviorSpec, ResolvedValue, ResourceId
-from m2pem.api.refusal import refusal
+from m2pem.api.behavior_parameters import refusal
 from m2pem_plugin_ros.drivers.driver import Order
 from m2pem_plugin_ros.interfaces import set_stamp
 from m2pem_plugin_ros.interfaces.key_values import WireError, decode_parameters, encode_parameters

@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 from m2pem.api.arbiter import ResolvedValue
+from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.deconfliction.craft import Craft, Span
 from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
@@ -12,72 +12,58 @@ from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePositi
 ANY_HEIGHT = Span(-math.inf, math.inf)
 
 
-@dataclass(slots=True)
-class Wishes:
-    """`height_of`: the height of another vehicle now. `unknown`: is set to why something that was
-    asked for is boundless."""
+class FlightParameters(BehaviorParameters):
+    """The parameters of a behavior of one aircraft.
 
-    craft: Craft
-    parameters: Mapping[str, ResolvedValue]
-    frame: LocalFrame
-    height_of: Callable[[str], float | None]
-    unknown: str = ""
+    `height_of`: the height of another vehicle now. `unknown`: is set to why something that was
+    asked for is boundless.
+    """
 
-    def number(self, name: str) -> float | None:
-        """A parameter in SI; None if it is not given."""
-        value = self.parameters.get(name)
-        return float(value) if isinstance(value, int | float) else None
+    def __init__(
+        self,
+        values: Mapping[str, ResolvedValue],
+        craft: Craft,
+        frame: LocalFrame,
+        height_of: Callable[[str], float | None],
+    ) -> None:
+        super().__init__(values)
+        self.craft = craft
+        self.frame = frame
+        self.unknown = ""
+        self._height_of = height_of
 
-    @property
-    def route(self) -> Route | None:
-        """The parameter `route`."""
-        value = self.parameters.get("route")
-        return value if isinstance(value, Route) else None
-
-    @property
-    def area(self) -> Area | None:
-        """The parameter `area`."""
-        value = self.parameters.get("area")
-        return value if isinstance(value, Area) else None
-
-    @property
-    def target_vehicle(self) -> str | None:
-        """The vehicle that `target` names, if it names one."""
-        value = self.parameters.get("target")
-        return value.vehicle if isinstance(value, VehiclePosition) else None
-
-    def level(self, place: Coordinate) -> EastNorth:
+    def to_local(self, place: Coordinate) -> EastNorth:
         """A coordinate in the frame."""
         return self.frame.to_local(place[:2])
 
     def ring(self, area: Area) -> list[EastNorth]:
         """The corners of an area's outer ring, each once."""
-        return [self.level(corner) for corner in area.rings[0][:-1]]
+        return [self.to_local(corner) for corner in area.rings[0][:-1]]
 
     def waypoint_spans(self, route: Route) -> list[Span]:
         """The height at each waypoint of a route."""
         return [self.span(each[2], route.altitude_frame) for each in route.waypoints]
 
-    def target(self) -> tuple[EastNorth | None, Span]:
+    def target_place(self) -> tuple[EastNorth | None, Span]:
         """Where `target` is, None if that is wherever a vehicle goes; and the height to be at."""
-        value = self.parameters.get("target")
+        value = self.target
         if isinstance(value, Point):
-            return self.level(value.position), self.span(value.position[2], value.altitude_frame)
+            return self.to_local(value.position), self.span(value.position[2], value.altitude_frame)
         if not isinstance(value, VehiclePosition):
             self.unknown = "it has no target that is known"
             return None, ANY_HEIGHT
         self.unknown = f"it goes wherever {value.vehicle} goes"
         span = self.span()
-        target_m = self.height_of(value.vehicle)
-        if self.number("altitude") is None and target_m is not None and target_m > span.low_m:
+        target_m = self._height_of(value.vehicle)
+        if self.altitude_m is None and target_m is not None and target_m > span.low_m:
             span = span.to(Span(target_m, target_m))
         return None, span
 
     def span(self, own_m: float | None = None, own_frame: str = "relative") -> Span:
         """The height to move at: as the parameters say, else as a place does, else as it is."""
-        altitude_m, frame = self.number("altitude"), self.parameters.get("altitude_frame")
+        altitude_m = self.altitude_m
         if altitude_m is not None:
-            return self._lifted(altitude_m, str(frame or "relative"))
+            return self._lifted(altitude_m, self.altitude_frame)
         if own_m is not None:
             return self._lifted(own_m, own_frame)
         if self.craft.flies:

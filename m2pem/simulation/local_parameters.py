@@ -1,9 +1,9 @@
-"""A request's parameters, and places on the ground, as a manoeuvre asks for them."""
+"""The parameters of a behavior in the local frame of a simulation."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 from m2pem.api.arbiter import ResolvedValue
+from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
 from m2pem.simulation.course import Craft
 from m2pem.simulation.frame import FlatFrame
@@ -19,45 +19,21 @@ class RefusedError(Exception):
         super().__init__(reason)
 
 
-@dataclass(frozen=True, slots=True)
-class Wishes:
-    """Parameters that were checked, in the local frame.
+class LocalParameters(BehaviorParameters):
+    """Parameters that were checked, in the local frame of a simulation.
 
-    `whereabouts`: how a vehicle stands and moves now, None if it was never heard.
+    `pose_of_vehicle`: how a vehicle stands and moves now, None if it was never received.
     """
 
-    values: Mapping[str, ResolvedValue]
-    frame: FlatFrame
-    whereabouts: Callable[[str], Pose | None]
-
-    def number(self, name: str) -> float | None:
-        """A number in SI, None if not given."""
-        value = self.values.get(name)
-        return float(value) if isinstance(value, int | float) else None
-
-    def flag(self, name: str) -> bool:
-        """Whether something is wished."""
-        return self.values.get(name) is True
-
-    def text(self, name: str, default: str) -> str:
-        """A text."""
-        value = self.values.get(name)
-        return value if isinstance(value, str) else default
-
-    def route(self) -> Route | None:
-        """The parameter `route`."""
-        value = self.values.get("route")
-        return value if isinstance(value, Route) else None
-
-    def area(self) -> Area | None:
-        """The parameter `area`."""
-        value = self.values.get("area")
-        return value if isinstance(value, Area) else None
-
-    def target_vehicle(self) -> str | None:
-        """The vehicle that `target` names, if it names one."""
-        value = self.values.get("target")
-        return value.vehicle if isinstance(value, VehiclePosition) else None
+    def __init__(
+        self,
+        values: Mapping[str, ResolvedValue],
+        frame: FlatFrame,
+        pose_of_vehicle: Callable[[str], Pose | None],
+    ) -> None:
+        super().__init__(values)
+        self.frame = frame
+        self._pose_of_vehicle = pose_of_vehicle
 
     def rings(self, area: Area) -> list[list[tuple[float, float]]]:
         """An area's rings on the map."""
@@ -70,22 +46,22 @@ class Wishes:
             for waypoint in route.waypoints
         ]
 
-    def target(self, craft: Craft, up_m: float) -> Vector:
+    def target_place(self, craft: Craft, up_m: float) -> Vector:
         """Where `target` is now, at the height that it says, or else at `up_m`."""
-        value = self.values.get("target")
+        value = self.target
         if isinstance(value, Point):
             level = self._level("target", value.position)
             return (*level, self._up(craft, value.position, value.altitude_frame, up_m))
         if isinstance(value, VehiclePosition):
             east, north, up = self.pose_of(value.vehicle).place
-            if craft.flies and self.height(craft) is None:
+            if craft.flies and self.up_m(craft) is None:
                 up_m = max(up, up_m)
             return (east, north, up_m)
         raise RefusedError("it has no target")
 
-    def point(self, ground_up_m: float) -> Vector:
+    def target_point(self, ground_up_m: float) -> Vector:
         """The point that `target` says, seen from a payload over ground of that height."""
-        value = self.values.get("target")
+        value = self.target
         if not isinstance(value, Point):
             raise RefusedError("it has no target")
         altitude = value.position[2] or 0.0
@@ -101,20 +77,20 @@ class Wishes:
         Raises:
             RefusedError: it was never heard.
         """
-        pose = self.whereabouts(vehicle)
+        pose = self._pose_of_vehicle(vehicle)
         if pose is None:
             raise RefusedError(f"parameter 'target': the position of {vehicle} is not known")
         return pose
 
-    def height(self, craft: Craft) -> float | None:
+    def up_m(self, craft: Craft) -> float | None:
         """`up` of the parameter `altitude`, None if not given or nothing to this craft."""
-        altitude = self.number("altitude")
+        altitude = self.altitude_m
         if altitude is None:
             return None
-        return self._lifted(craft, altitude, self.text("altitude_frame", "relative"))
+        return self._lifted(craft, altitude, self.altitude_frame)
 
     def _up(self, craft: Craft, place: Coordinate, frame: str, up_m: float) -> float:
-        wished = self.height(craft)
+        wished = self.up_m(craft)
         if wished is not None:
             return wished
         return up_m if place[2] is None else self._lifted(craft, place[2], frame)

@@ -3,10 +3,10 @@ import math
 import pytest
 
 from m2pem.api.arbiter import ResolvedValue
-from m2pem.api.refusal import refusal
+from m2pem.api.behavior_parameters import BehaviorParameters, refusal
 from m2pem.fleet.behaviors import SHARED
 from m2pem.mission.behavior import BehaviorType
-from m2pem.mission.geometry import Point, Route
+from m2pem.mission.geometry import Point, Route, VehiclePosition
 
 ROUTE = Route(((0.0, 0.0, None), (0.0, 1.0, None)))
 PLACE = Point((0.0, 0.0, None))
@@ -59,3 +59,58 @@ def test_every_problem_is_said_at_once() -> None:
     spec = SHARED["goto", BehaviorType.VEHICLE]
     problems = refusal(spec, {"speed": -1.0, "colour": "red"})
     assert all(word in problems for word in ("'speed'", "'colour'", "'target'"))
+
+
+def test_parameters_are_read_in_the_units_that_their_names_say() -> None:
+    parameters = BehaviorParameters(
+        {
+            "route": ROUTE,
+            "target": PLACE,
+            "speed": 2,
+            "heading": 0.0,
+            "altitude": 30.0,
+            "loop": True,
+        }
+    )
+    assert parameters.route == ROUTE
+    assert parameters.target == PLACE
+    assert parameters.target_vehicle is None
+    assert parameters.speed_m_s == 2.0
+    assert parameters.yaw_rad == pytest.approx(math.pi / 2)
+    assert (parameters.altitude_m, parameters.altitude_frame) == (30.0, "relative")
+    assert parameters.loop
+    assert BehaviorParameters({"target": VehiclePosition("usv")}).target_vehicle == "usv"
+
+
+def test_what_is_not_given_is_the_default_of_the_shared_catalogue_or_none() -> None:
+    parameters = BehaviorParameters({"count": None})
+    assert parameters.distance_m == 5.0
+    assert (parameters.zoom, parameters.count, parameters.interval_s) == (1.0, 1, 1.0)
+    assert parameters.overshoot_m == 0.0
+    assert parameters.area is None
+    assert parameters.duration_s is None
+    assert parameters.yaw_rad is None
+    assert parameters.text("shape") == ""
+    assert not parameters.loop
+
+
+def test_what_is_of_another_kind_is_not_read_as_a_number_or_geometry() -> None:
+    parameters = BehaviorParameters({"speed": True, "area": ROUTE, "route": "alpha"})
+    assert parameters.speed_m_s is None
+    assert parameters.area is None
+    assert parameters.route is None
+
+
+def test_an_adjustment_replaces_values_of_the_same_names() -> None:
+    parameters = BehaviorParameters({"speed": 1.0, "spacing": 8.0})
+    parameters.update({"speed": 3.0})
+    assert (parameters.speed_m_s, parameters.spacing_m) == (3.0, 8.0)
+
+
+def test_the_shared_catalogue_gives_a_name_one_default() -> None:
+    given: dict[str, set[object]] = {}
+    for spec in SHARED.values():
+        for parameter in spec.parameters:
+            if parameter.default is not None:
+                given.setdefault(parameter.name, set()).add(parameter.default)
+    assert all(len(defaults) == 1 for defaults in given.values())
