@@ -96,7 +96,7 @@ def _between(a: EastNorth, b: EastNorth, part: float) -> EastNorth:
 
 
 def _by(metres: float) -> str:
-    return f"{metres:.1f} m" if metres < 10 else f"{metres:.0f} m"
+    return f"{metres:.1f} m" if metres < 9.95 else f"{metres:.0f} m"
 
 
 def _text(place: LatLon) -> str:

@@ -9,6 +9,7 @@ from m2pem.api import (
     ArbiterContext,
     AsyncQueue,
     BehaviorId,
+    BehaviorParameters,
     BehaviorReport,
     BehaviorRequest,
     BehaviorSpec,
@@ -196,7 +197,7 @@ class PtzArbiter:
         from m2pem_plugin_ptz.behaviors.behavior import Job  # noqa: PLC0415
 
         sight = self._cameras[kept.resource].sight
-        return BEHAVIORS[kept.behavior](Job(id_, kept.parameters, sight))
+        return BEHAVIORS[kept.behavior](Job(id_, BehaviorParameters(kept.parameters), sight))
 
     def _kept(self, request: BehaviorRequest) -> Kept:
         now_us = self._context.clock.now_us()

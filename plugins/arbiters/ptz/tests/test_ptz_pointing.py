@@ -11,7 +11,7 @@ from m2pem_plugin_ptz.behaviors.pointing import PointAt
 from ptz_fake_camera import ORIGIN, Head, rad
 from ptz_world import CAMERA, play, point
 
-from m2pem.api import BehaviorState, VehiclePosition
+from m2pem.api import BehaviorParameters, BehaviorState, VehiclePosition
 
 
 def on_ground(target):
@@ -275,7 +275,7 @@ def test_a_late_camera_is_told_ahead():
 
 
 def test_a_moment_in_which_nobody_looked_does_not_count_as_a_stuck_motor():
-    behavior = PointAt(Job("r1.b1", {}, SimpleNamespace(driver=None)))
+    behavior = PointAt(Job("r1.b1", BehaviorParameters({}), SimpleNamespace(driver=None)))
     behavior.check_turning(1.0, 0.05, 0.01)
     behavior.check_turning(1.0, 30.0, 0.01)
     with pytest.raises(BehaviorFailedError, match="no nearer for 10 s"):

@@ -6,7 +6,15 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from uuid import UUID
 
-from m2pem_plugin_ros.behaviors import Ending, Pilot, Seen, Step, Target, Wishes, make_motion
+from m2pem_plugin_ros.behaviors import (
+    Ending,
+    LocalParameters,
+    Pilot,
+    Seen,
+    Step,
+    Target,
+    make_motion,
+)
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.settings import Bounds
 
@@ -79,10 +87,10 @@ class Road:
 
     def begin(self, behavior: str, **parameters: ResolvedValue) -> None:
         self.ending = None
-        self.pilot.begin(GOAL, make_motion(behavior, self.wishes(parameters), self.bounds))
+        self.pilot.begin(GOAL, make_motion(behavior, self.local(parameters), self.bounds))
 
-    def wishes(self, parameters: Mapping[str, ResolvedValue]) -> Wishes:
-        return Wishes(parameters, lambda east, north: (east, north), "self")
+    def local(self, parameters: Mapping[str, ResolvedValue]) -> LocalParameters:
+        return LocalParameters(parameters, lambda east, north: (east, north), "self")
 
     def step(self) -> Step:
         self.now_s += DT_S

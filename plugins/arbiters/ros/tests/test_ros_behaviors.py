@@ -288,7 +288,7 @@ def test_follow_abeam_by_bearing_and_the_station_can_be_changed() -> None:
     target = road.target(road.now_s)
     assert target is not None
     assert road.away((target.pose.east_m, -6.0)) < 0.8
-    road.pilot.adjust(road.wishes({"offset": 10.0}))
+    road.pilot.adjust(road.local({"offset": 10.0}))
     road.drive(60.0)
     assert road.body.pose.north_m == pytest.approx(-10.0, abs=0.8)
 

@@ -41,7 +41,7 @@ def take_up(places: list[Place], here: Place, *, loop: bool = False) -> Road:
     """A base that stands there takes up a route."""
     road = Road(body=Body(Pose(*here, math.pi / 2)))
     parameters = {"route": route(places), **({"loop": True} if loop else {})}
-    motion = make_motion("single_vehicle_routing", road.wishes(parameters), TURNS_ON_THE_SPOT)
+    motion = make_motion("single_vehicle_routing", road.local(parameters), TURNS_ON_THE_SPOT)
     motion.take_up()
     road.pilot.begin(GOAL, motion)
     return road

@@ -171,10 +171,10 @@ def test_speed_is_kept_and_can_be_changed_on_the_way() -> None:
     road.begin("single_vehicle_routing", route=route([(60.0, 0.0)]), speed=0.7)
     road.drive(10.0)
     assert road.commands[-1].forward_m_s == pytest.approx(0.7)
-    road.pilot.adjust(road.wishes({"speed": 1.2}))
+    road.pilot.adjust(road.local({"speed": 1.2}))
     road.drive(3.0)
     assert road.commands[-1].forward_m_s == pytest.approx(1.2)
-    road.pilot.adjust(road.wishes({"speed": 99.0}))
+    road.pilot.adjust(road.local({"speed": 99.0}))
     road.drive(3.0)
     assert road.commands[-1].forward_m_s == pytest.approx(road.bounds.speed_m_s)
 

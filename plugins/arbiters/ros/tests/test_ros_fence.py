@@ -36,7 +36,7 @@ def bodies(**other: float) -> dict:
     ("behavior", "parameters", "said"),
     [
         ("goto", {"target": at(130, 10)}, ("the target, [", "30 m outside")),
-        ("goto", {"target": at(90, 50)}, ("the way to the target leaves", "by 10.0 m")),
+        ("goto", {"target": at(90, 50)}, ("the way to the target leaves", "by 10 m")),
         (
             "single_vehicle_routing",
             {"route": route((20, 10), (20, 130))},

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from m2pem_plugin_ros.behaviors import Pilot, Seen, Wishes, make_motion
+from m2pem_plugin_ros.behaviors import LocalParameters, Pilot, Seen, make_motion
 from m2pem_plugin_ros.behaviors.monitors import IGNORED
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.settings import Bounds
@@ -85,9 +85,9 @@ def test_whatever_is_seen_commands_are_numbers_within_the_bounds(
     bounds: Bounds,
 ) -> None:
     parameters = {"route": route([(9.0, 3.0), (0.0, 9.0)]), "target": point((5.0, -5.0))}
-    wishes = Wishes(parameters, lambda east, north: (east, north), "self")
+    local = LocalParameters(parameters, lambda east, north: (east, north), "self")
     pilot = Pilot(bounds)
-    pilot.begin(GOAL, make_motion(behavior, wishes, bounds))
+    pilot.begin(GOAL, make_motion(behavior, local, bounds))
     for number, (pose, twist, stick, age_s, stick_age_s) in enumerate(seen):
         step = pilot.step(Seen(number * DT_S, pose, twist, age_s, None, stick, stick_age_s))
         command = step.twist or Twist()

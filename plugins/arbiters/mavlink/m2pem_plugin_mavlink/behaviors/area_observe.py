@@ -28,7 +28,7 @@ class ObserveFromAbove(Orbit):
 
     def circle(self) -> tuple[Place, float]:
         """Over the middle of the area, or the target."""
-        area = self.wishes.area
+        area = self.parameters.area
         if area is None:
             return super().circle()
         center, radius = middle(area)
@@ -44,26 +44,26 @@ class ObserveFromTheEdge(Goto):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        self._seconds = self.wishes.number("duration")
+        self._seconds = self.parameters.duration_s
         self._stand: Place | None = None
         self._since_s: float | None = None
 
     def target(self) -> Place:
         """Where it stands and looks; chosen once."""
         if self._stand is None:
-            self._stand = Place(*self._edge(), *self.wishes.altitude())
+            self._stand = Place(*self._edge(), *self.parameters.altitude())
         return self._stand
 
     def _edge(self) -> LatLon:
         here = position_of(self.vehicle)
         if here is None:
             raise BehaviorFailedError("its position is not known yet")
-        area = self.wishes.area
+        area = self.parameters.area
         if area is not None:
             frame = LocalFrame(area.rings[0][0][:2])
             ring = [frame.to_local(corner[:2]) for corner in area.rings[0]]
             return frame.to_latlon(_nearest(ring, frame.to_local(here)))
-        target = self.wishes.target()
+        target = self.parameters.target_place()
         frame = LocalFrame((target.latitude_deg, target.longitude_deg))
         east, north = frame.to_local(here)
         away = math.hypot(east, north)
@@ -118,7 +118,7 @@ class ObserveFromTheEdge(Goto):
         """The same."""
         stand = checkpoint.get("stand")
         if isinstance(stand, list):
-            self._stand = Place(stand[0], stand[1], *self.wishes.altitude())
+            self._stand = Place(stand[0], stand[1], *self.parameters.altitude())
 
 
 def middle(area: Area) -> tuple[LatLon, float]:

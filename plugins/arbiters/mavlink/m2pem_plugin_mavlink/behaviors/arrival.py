@@ -4,7 +4,7 @@ import math
 
 from m2pem.api import LatLon, LocalFrame, distance_m
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorContext
-from m2pem_plugin_mavlink.behaviors.wishes import AMSL, RELATIVE
+from m2pem_plugin_mavlink.behaviors.parameters import AMSL, RELATIVE
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 from m2pem_plugin_mavlink.vehicle.exchanges import position_target

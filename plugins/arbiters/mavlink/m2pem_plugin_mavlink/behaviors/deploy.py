@@ -6,7 +6,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import BehaviorState
 from m2pem_plugin_mavlink.behaviors.behavior import ANY_MODE, Behavior, BehaviorContext
-from m2pem_plugin_mavlink.behaviors.wishes import Wishes
+from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
 
 KINDS = "'servo N', 'relay N', 'actuator N', 'gripper' or 'gripper N'"
 
@@ -23,12 +23,12 @@ class Deploy(Behavior):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        wishes = Wishes(context)
-        self._called = wishes.text("actuator")
+        parameters = VehicleParameters(context)
+        self._called = parameters.text("actuator")
         meant = context.actuators.get(self._called, self._called)
         words = meant.replace(":", " ").lower().split()
         self._kind, self._number = _read(words)
-        self._value = wishes.number("value")
+        self._value = parameters.number("value")
 
     def refusal(self) -> str:
         """There must be such an actuator, and it must take the value."""

@@ -5,7 +5,7 @@ import math
 from m2pem.api import BehaviorState, LatLon, LinkState, VehicleState, distance_m, offset
 from m2pem_plugin_mavlink.behaviors.arrival import accepts_mode, position_of, takeoff_required
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorContext, BehaviorFailedError
-from m2pem_plugin_mavlink.behaviors.wishes import Wishes, state_of
+from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters, state_of
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 
 OFFSET_M = 15.0
@@ -29,9 +29,9 @@ class Follow(Behavior):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        self._wishes = Wishes(context)
-        self._target = self._wishes.target_vehicle or ""
-        distance, bearing = self._wishes.number("offset"), self._wishes.number("bearing")
+        self._parameters = VehicleParameters(context)
+        self._target = self._parameters.target_vehicle or ""
+        distance, bearing = self._parameters.offset_m, self._parameters.bearing_rad
         self._offset_m = OFFSET_M if distance is None else distance
         self._bearing_rad = BEHIND_RAD if bearing is None else bearing
         self._told: LatLon | None = None
@@ -47,7 +47,7 @@ class Follow(Behavior):
 
     async def begin(self) -> None:
         """Send it to its station."""
-        await self._wishes.hear_target()
+        await self._parameters.hear_target()
         self._told = None
         await self._tell()
 
@@ -73,8 +73,8 @@ class Follow(Behavior):
             await self._stop(reason)
         if self._told is None or distance_m(self._told, station) > MOVED_M:
             self._told = station
-            place = Place(*station, *self._wishes.altitude())
-            await self.vehicle.driver.go_to(place, self._wishes.speed_m_s)
+            place = Place(*station, *self._parameters.altitude())
+            await self.vehicle.driver.go_to(place, self._parameters.speed_m_s)
 
     async def _stop(self, reason: str) -> None:
         await self.vehicle.driver.stop()

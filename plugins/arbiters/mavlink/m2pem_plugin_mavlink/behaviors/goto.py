@@ -27,7 +27,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
     BehaviorFailedError,
     CheckpointState,
 )
-from m2pem_plugin_mavlink.behaviors.wishes import Wishes
+from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 
 TOLERANCES_M = {"air": 2.0, "ground": 2.5, "surface": 5.0, "subsurface": 3.0}
@@ -59,23 +59,23 @@ class Goto(Behavior):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        self.wishes = Wishes(context)
+        self.parameters = VehicleParameters(context)
         self._place: Place | None = None
         self._stillness = StillnessTimer(context)
-        tolerance = self.wishes.number("tolerance")
+        tolerance = self.parameters.tolerance_m
         self._said = tolerance is not None
         usual_m = TOLERANCES_M.get(self.vehicle.domain, 2.5)
         self._tolerance_m = usual_m if tolerance is None else max(tolerance, NEAREST_M)
 
     def target(self) -> Place:
         """Where to go now."""
-        return replace(self.wishes.target(), heading_rad=self.wishes.number("heading"))
+        return replace(self.parameters.target_place(), heading_rad=self.parameters.heading_rad)
 
     def refusal(self) -> str:
         """What flies must be in the air, and the way within the fence."""
         if reason := takeoff_required(self.vehicle):
             return reason
-        return "" if self.wishes.target_is_unheard else self._breach(self.target())
+        return "" if self.parameters.target_is_unheard else self._breach(self.target())
 
     def _breach(self, place: Place) -> str:
         if self.context.fence is None:
@@ -86,12 +86,12 @@ class Goto(Behavior):
     async def begin(self) -> None:
         """Send it there."""
         self._stillness.forget()
-        if self.wishes.target_is_unheard:
-            await self.wishes.hear_target()
+        if self.parameters.target_is_unheard:
+            await self.parameters.hear_target()
             if reason := self._breach(self.target()):
                 raise BehaviorFailedError(reason)
         self._place = self.target()
-        await self.vehicle.driver.go_to(self._place, self.wishes.speed_m_s)
+        await self.vehicle.driver.go_to(self._place, self.parameters.speed_m_s)
 
     async def resume(self) -> None:
         """Send it there again."""
@@ -99,12 +99,12 @@ class Goto(Behavior):
 
     def adjust(self, speed_m_s: float) -> bool:
         """It can."""
-        self.wishes.adjusted_m_s = speed_m_s
+        self.parameters.adjusted_m_s = speed_m_s
         return True
 
     async def run_in_background(self) -> None:
         """Go after a target that moves."""
-        while self.wishes.target_vehicle is not None:
+        while self.parameters.target_vehicle is not None:
             await self.vehicle.sleep(REPEAT_S)
             new, old = self.target(), self._place
             at = (new.latitude_deg, new.longitude_deg)
@@ -112,10 +112,10 @@ class Goto(Behavior):
                 if self.context.fence is not None and self.context.fence.outside_m(at) > 0:
                     await self.vehicle.driver.stop()
                     raise BehaviorFailedError(
-                        f"{self.wishes.target_vehicle} has left the fleet's fence"
+                        f"{self.parameters.target_vehicle} has left the fleet's fence"
                     )
                 self._place = new
-                await self.vehicle.driver.go_to(new, self.wishes.speed_m_s)
+                await self.vehicle.driver.go_to(new, self.parameters.speed_m_s)
 
     def finished(self) -> bool:
         """Within the tolerance and turned; or it stands, as near as its autopilot goes. What cannot
@@ -172,7 +172,7 @@ class Hold(Behavior):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        self._left_s = Wishes(context).number("duration") or 0.0
+        self._left_s = VehicleParameters(context).duration_s or 0.0
         self._since_s: float | None = None
         self._at: LatLon | None = None
 

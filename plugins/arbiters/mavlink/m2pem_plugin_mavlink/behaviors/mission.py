@@ -24,7 +24,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
     CheckpointState,
 )
 from m2pem_plugin_mavlink.behaviors.goto import TOLERANCES_M
-from m2pem_plugin_mavlink.behaviors.wishes import AMSL, RELATIVE, TERRAIN, Wishes
+from m2pem_plugin_mavlink.behaviors.parameters import AMSL, RELATIVE, TERRAIN, VehicleParameters
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.fixed_wing import without_landing
@@ -112,7 +112,7 @@ class MissionFlight(Behavior):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        self.wishes = Wishes(context)
+        self.parameters = VehicleParameters(context)
         self.loop = False
         self._items: tuple[MissionItem, ...] | None = None
         self._kept: Fingerprint | None = None
@@ -137,7 +137,7 @@ class MissionFlight(Behavior):
         a circle at the last of them."""
         if self._items is None:
             way = tuple(self.way())
-            speed = self.wishes.speed_m_s
+            speed = self.parameters.speed_m_s
             items = way if speed is None else (speed_item(speed), *way)
             last = items[-1]
             self._end = (len(items) - 1, (last.latitude_deg, last.longitude_deg))
@@ -150,7 +150,7 @@ class MissionFlight(Behavior):
         """What flies must be in the air, and the way within the fence; a loop's way back, too."""
         if reason := takeoff_required(self.vehicle):
             return reason
-        speeds = 0 if self.wishes.speed_m_s is None else 1
+        speeds = 0 if self.parameters.speed_m_s is None else 1
         items = self.items
         if self.context.fence is None or self._end is None:
             return ""
@@ -177,12 +177,12 @@ class MissionFlight(Behavior):
         last = self._end[0] if self._end else 0
         current = self.vehicle.driver.current_item or 0
         await self.vehicle.driver.start_mission(min(current, last))
-        if (speed := self.wishes.speed_m_s) is not None:
+        if (speed := self.parameters.speed_m_s) is not None:
             await self.vehicle.driver.set_speed(speed)
 
     def adjust(self, speed_m_s: float) -> bool:
         """It can; what was uploaded stays as it is."""
-        self.wishes.adjusted_m_s = speed_m_s
+        self.parameters.adjusted_m_s = speed_m_s
         return True
 
     async def run_in_background(self) -> None:
@@ -191,8 +191,8 @@ class MissionFlight(Behavior):
             await self.vehicle.until(self.at_the_end)
             self._stillness.forget()
             await self.vehicle.driver.start_mission(0)
-            if self.wishes.adjusted_m_s is not None:  # the mission begins with the speed before
-                await self.vehicle.driver.set_speed(self.wishes.adjusted_m_s)
+            if self.parameters.adjusted_m_s is not None:  # the mission begins with the speed before
+                await self.vehicle.driver.set_speed(self.parameters.adjusted_m_s)
             await self.vehicle.until(lambda: not self.at_the_end())
 
     def at_the_end(self) -> bool:
@@ -260,15 +260,17 @@ class Routing(MissionFlight):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        self.loop = self.wishes.flag("loop")
+        self.loop = self.parameters.loop
 
     def way(self) -> Sequence[MissionItem]:
         """The waypoints of the route."""
-        route = self.wishes.route
+        route = self.parameters.route
         if route is None or not route.waypoints:
             raise BehaviorFailedError("parameter 'route': it has no waypoints")
         return [
-            waypoint((latitude, longitude), *self.wishes.altitude_to_fly(own, route.altitude_frame))
+            waypoint(
+                (latitude, longitude), *self.parameters.altitude_to_fly(own, route.altitude_frame)
+            )
             for latitude, longitude, own in route.waypoints
         ]
 
@@ -287,26 +289,26 @@ class Survey(MissionFlight):
 
     def way(self) -> Sequence[MissionItem]:
         """The ends of the passes."""
-        area = self.wishes.area
+        area = self.parameters.area
         if area is None:
             raise BehaviorFailedError("parameter 'area': there is none")
         frame = LocalFrame(area.rings[0][0][:2])
         rings = [[frame.to_local(corner[:2]) for corner in ring] for ring in area.rings]
-        heading = self.wishes.number("heading")
+        heading = self.parameters.heading_rad
         yaw = longest_edge_yaw(rings[0]) if heading is None else math.pi / 2 - heading
         try:
             points = lawn_mower(
                 rings,
-                self.wishes.number("spacing") or SPACING_M,
+                self.parameters.spacing_m or SPACING_M,
                 yaw,
-                self.wishes.number("overshoot") or 0.0,
+                self.parameters.overshoot_m,
             )
         except ValueError as error:
             raise BehaviorFailedError(f"parameter 'spacing': {error}") from None
         places = [frame.to_latlon(point) for point in points]
         if distance_to_m(self.vehicle, places[-1]) < distance_to_m(self.vehicle, places[0]):
             places.reverse()
-        height = self.wishes.altitude_to_fly(area.rings[0][0][2], area.altitude_frame)
+        height = self.parameters.altitude_to_fly(area.rings[0][0][2], area.altitude_frame)
         return [waypoint(place, *height) for place in places]
 
     def named(self, index: int) -> str:
@@ -322,7 +324,7 @@ class RunOnboardMission(Behavior):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        self._first = int(Wishes(context).number("first") or 0)
+        self._first = int(VehicleParameters(context).number("first") or 0)
         self._last: int | None = None
         self._flew = False
 

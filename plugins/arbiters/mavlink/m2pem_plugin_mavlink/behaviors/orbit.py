@@ -37,9 +37,9 @@ class Orbit(MissionFlight):
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
         self._center: Place | None = None
-        self._radius_m = self.wishes.number("radius") or RADIUS_M
-        self._seconds = self.wishes.number("duration")
-        self._turns = self.wishes.number("turns")
+        self._radius_m = self.parameters.radius_m or RADIUS_M
+        self._seconds = self.parameters.duration_s
+        self._turns = self.parameters.turns
         if self._turns is None and self._seconds is None and self.ends:
             self._turns = 1.0
         self._by_command = False
@@ -56,14 +56,14 @@ class Orbit(MissionFlight):
 
     def circle(self) -> tuple[Place, float]:
         """The centre, and the radius in metres."""
-        return self.wishes.target(), self._radius_m
+        return self.parameters.target_place(), self._radius_m
 
     @property
     def center(self) -> Place:
         """Its height is known."""
         if self._center is None:
             place, self._radius_m = self.circle()
-            height = self.wishes.altitude_to_fly(place.altitude_m, place.altitude_frame)
+            height = self.parameters.altitude_to_fly(place.altitude_m, place.altitude_frame)
             self._center = Place(place.latitude_deg, place.longitude_deg, *height)
         return self._center
 
@@ -113,7 +113,7 @@ class Orbit(MissionFlight):
         if self._done:
             return
         self._bearing_rad = None
-        speed = self.wishes.speed_m_s
+        speed = self.parameters.speed_m_s
         self._by_command = await self.vehicle.driver.orbit(self.center, self._radius_m, speed)
         if not self._by_command:
             await super().begin()

@@ -13,7 +13,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
     BehaviorFailedError,
     CheckpointState,
 )
-from m2pem_plugin_mavlink.behaviors.wishes import Wishes
+from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 
 SPEED_M_S = 1.0
@@ -33,10 +33,9 @@ class Reverse(Behavior):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        wishes = Wishes(context)
-        distance = wishes.number("distance")
-        self._distance_m = 5.0 if distance is None else distance
-        self._speed_m_s = wishes.speed_m_s or SPEED_M_S
+        parameters = VehicleParameters(context)
+        self._distance_m = parameters.distance_m
+        self._speed_m_s = parameters.speed_m_s or SPEED_M_S
         self._from = position_of(self.vehicle)
         self._yaw_rad = self.vehicle.state.yaw_rad
         self._done = False

@@ -28,7 +28,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
     BehaviorFailedError,
 )
 from m2pem_plugin_mavlink.behaviors.goto import TOLERANCES_M
-from m2pem_plugin_mavlink.behaviors.wishes import AMSL, Wishes
+from m2pem_plugin_mavlink.behaviors.parameters import AMSL, VehicleParameters
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
 from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_begins
@@ -59,8 +59,8 @@ class ChangeAltitude(Behavior):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        wishes = Wishes(context)
-        altitude, self._frame = wishes.altitude()
+        parameters = VehicleParameters(context)
+        altitude, self._frame = parameters.altitude()
         self._altitude_m = altitude or 0.0
 
     def refusal(self) -> str:
@@ -333,7 +333,7 @@ class SetSpeed(Behavior):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        self.speed_m_s = Wishes(context).number("speed") or 0.0
+        self.speed_m_s = VehicleParameters(context).speed_m_s or 0.0
 
     async def begin(self) -> None:
         """Tell it the speed. A mode in which it goes nowhere may refuse it (BRAKE, HOLD); what

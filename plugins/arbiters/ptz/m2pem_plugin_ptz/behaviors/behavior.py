@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from m2pem.api import BehaviorId, BehaviorState, ResolvedValue, Value
+from m2pem.api import BehaviorId, BehaviorParameters, BehaviorState, Value
 from m2pem_plugin_ptz.camera_model.model import Sight
 
 TICK_S = 0.05
@@ -26,13 +26,8 @@ class Job:
     """What is to be done, with which camera."""
 
     id: BehaviorId
-    parameters: Mapping[str, ResolvedValue]
+    parameters: BehaviorParameters
     sight: Sight
-
-    def number(self, name: str) -> float | None:
-        """A number in SI; None if it is not given."""
-        value = self.parameters.get(name)
-        return float(value) if isinstance(value, int | float) else None
 
 
 class Behavior(ABC):

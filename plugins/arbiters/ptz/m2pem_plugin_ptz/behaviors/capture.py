@@ -9,8 +9,6 @@ from m2pem_plugin_ptz.camera_model.model import iso
 from m2pem_plugin_ptz.drivers.driver import CameraError
 from m2pem_plugin_ptz.image_files import Caption, stored
 
-_INTERVAL_S = 1.0
-
 
 class TakePicture(Behavior):
     """So many, one after the other, each stored before the next one is taken."""
@@ -25,8 +23,7 @@ class TakePicture(Behavior):
 
     async def step(self, elapsed_s: float) -> bool:
         """Done when the last one is stored."""
-        interval_s = self.job.number("interval")
-        interval_s = _INTERVAL_S if interval_s is None else interval_s
+        interval_s = self.job.parameters.interval_s
         taken = len(self._files)
         if elapsed_s >= taken * interval_s:
             # Where it looked when it was told to; that is nearer to the truth than afterwards.
@@ -41,7 +38,7 @@ class TakePicture(Behavior):
                 raise BehaviorFailedError(reason) from error
             self._files.append(file)
             self._last = caption
-        return len(self._files) >= (self.job.number("count") or 1)
+        return len(self._files) >= self.job.parameters.count
 
     def outputs(self) -> Mapping[str, Value]:
         """The pictures, and where and when the last one was taken."""
@@ -75,7 +72,7 @@ class RecordVideo(Behavior):
 
     async def step(self, elapsed_s: float) -> bool:
         """Done after the duration."""
-        duration_s = self.job.number("duration")
+        duration_s = self.job.parameters.duration_s
         return duration_s is not None and elapsed_s >= duration_s
 
     async def leave(self) -> None:

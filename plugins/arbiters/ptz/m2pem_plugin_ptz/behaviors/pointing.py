@@ -3,7 +3,7 @@
 import math
 from abc import abstractmethod
 
-from m2pem.api import BehaviorState, Point, VehiclePosition
+from m2pem.api import BehaviorState, VehiclePosition
 from m2pem_plugin_ptz.behaviors.behavior import TICK_S, Behavior, BehaviorFailedError, Job
 from m2pem_plugin_ptz.camera_model.frames import between
 from m2pem_plugin_ptz.camera_model.limits import Turn
@@ -105,8 +105,8 @@ class _AtTarget(Aiming):
 
     def wanted(self, at_us: int) -> tuple[float, float]:
         """Where the target is then, from where the vehicle is then."""
-        target = self.job.parameters.get("target")
-        if not isinstance(target, Point | VehiclePosition):
+        target = self.job.parameters.target
+        if target is None:
             return self._direction(at_us)
         place = self.sight.place(target, at_us)
         if place is None:
@@ -122,7 +122,7 @@ class _AtTarget(Aiming):
         return self.unreachable()
 
     def _direction(self, at_us: int) -> tuple[float, float]:
-        bearing, elevation = self.job.number("bearing"), self.job.number("elevation")
+        bearing, elevation = self.job.parameters.bearing_rad, self.job.parameters.elevation_rad
         assert bearing is not None  # the catalogue asks for both where there is no target
         assert elevation is not None
         # Headings are from north, clockwise; yaw is from east, counter-clockwise.
@@ -170,7 +170,7 @@ class Track(_AtTarget):
 
     async def step(self, elapsed_s: float) -> bool:
         """Done after the duration."""
-        duration_s = self.job.number("duration")
+        duration_s = self.job.parameters.duration_s
         if duration_s is not None and elapsed_s >= duration_s:
             return True
         if self.check_reach(self.aim(_SLACK_RAD), elapsed_s, self._in_view_rad()):
@@ -227,8 +227,7 @@ class Zoom(Behavior):
         return BehaviorState.SUCCEEDED if self._there() else BehaviorState.RUNNING
 
     def _level(self) -> float:
-        level = self.job.number("level")
-        return 1.0 if level is None else level
+        return self.job.parameters.zoom
 
     def _there(self) -> bool:
         look = self.driver.look

@@ -49,7 +49,7 @@ class Sweeping(Aiming):
 
     def speed_rad_s(self) -> float:
         """Of the sweep."""
-        wished = self.job.number("speed") or _VIEWS_PER_S * self.view.width_rad
+        wished = self.job.parameters.turn_rate_rad_s or _VIEWS_PER_S * self.view.width_rad
         return min(wished, self.driver.reach.rate_rad_s)
 
     def set_out(self, start_rad: float, end_rad: float, elevation_rad: float) -> None:
@@ -133,11 +133,12 @@ class ScanSector(Sweeping):
         return self.sweep(elapsed_s)
 
     def _sector(self) -> tuple[float, float]:
-        return self.job.number("heading") or 0.0, (self.job.number("sector") or 0.0) / 2
+        parameters = self.job.parameters
+        return parameters.heading_rad or 0.0, (parameters.number("sector") or 0.0) / 2
 
     def _elevation(self) -> float:
         """As the mission says, else as it looks."""
-        wished = self.job.number("elevation")
+        wished = self.job.parameters.elevation_rad
         if wished is not None or self.driver.look is None:
             return wished or 0.0
         return self.heading()[1]
@@ -224,7 +225,7 @@ class ScanPolygon(Sweeping):
         return eye
 
     def _survey(self) -> None:
-        area = self.job.parameters["area"]
+        area = self.job.parameters.area
         assert isinstance(area, Area)  # the catalogue asks for one
         ground_m = self.sight.carrier.ground_m()
         self._places = places_of(area, self._eye(), self.view, ground_m)
@@ -232,7 +233,7 @@ class ScanPolygon(Sweeping):
         self._given_up = self._seen.copy()
 
     def _overlap(self) -> float:
-        overlap = self.job.number("overlap")
+        overlap = self.job.parameters.number("overlap")
         return max(OVERLAP if overlap is None else overlap, 1.0 - _ROW)
 
     def _reached(self, eye: Eye) -> NDArray[np.bool_]:

@@ -7,7 +7,7 @@ from m2pem_plugin_ros.behaviors.goto import Goto
 from m2pem_plugin_ros.behaviors.hold_and_teleop import DriveStop, Hold, Teleop
 from m2pem_plugin_ros.behaviors.motion import Motion
 from m2pem_plugin_ros.behaviors.motion_state import Ending, RefusedError, Seen, Step, Target
-from m2pem_plugin_ros.behaviors.parameters import Wishes
+from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.behaviors.pilot import STALE_S, STANDING, Pilot
 from m2pem_plugin_ros.behaviors.reverse import Reverse
 from m2pem_plugin_ros.behaviors.route import SingleVehicleRouting
@@ -25,7 +25,7 @@ __all__ = [
     "Step",
     "Target",
     "Teleop",
-    "Wishes",
+    "LocalParameters",
     "make_motion",
 ]
 
@@ -36,7 +36,7 @@ MOTIONS: Mapping[str, type[Motion]] = {
 }
 
 
-def make_motion(behavior: str, wishes: Wishes, bounds: Bounds) -> Motion:
+def make_motion(behavior: str, parameters: LocalParameters, bounds: Bounds) -> Motion:
     """The motion for a behavior.
 
     Raises:
@@ -46,4 +46,4 @@ def make_motion(behavior: str, wishes: Wishes, bounds: Bounds) -> Motion:
         raise RefusedError(
             f"a plain base cannot do '{behavior}', only {', '.join(sorted(MOTIONS))}"
         )
-    return MOTIONS[behavior](wishes, bounds)
+    return MOTIONS[behavior](parameters, bounds)

@@ -19,7 +19,7 @@ from m2pem_plugin_ros.behaviors.motion_state import (
     turned,
     yaw_towards,
 )
-from m2pem_plugin_ros.behaviors.parameters import Wishes
+from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.behaviors.path_following import Approach
 from m2pem_plugin_ros.behaviors.steering import Steering, braking_speed, lookahead
 from m2pem_plugin_ros.catalogue import BEHIND_RAD, OFFSET_M
@@ -42,14 +42,14 @@ class Follow(Motion):
 
     name = "follow"
 
-    def __init__(self, wishes: Wishes, bounds: Bounds) -> None:
-        super().__init__(wishes, bounds)
-        self.target = wishes.vehicle()
+    def __init__(self, parameters: LocalParameters, bounds: Bounds) -> None:
+        super().__init__(parameters, bounds)
+        self.target = parameters.other_vehicle()
         if not self.target:
             raise RefusedError("parameter 'target': another vehicle is expected")
         self._offset_m = OFFSET_M
         self._bearing_rad = BEHIND_RAD
-        self._take_station(wishes)
+        self._take_station(parameters)
         self._steering = Steering()
         self._approach: Approach | None = None
         self._at_station = False
@@ -85,13 +85,13 @@ class Follow(Motion):
         allowed = braking_speed(self.bounds, room, speed if room > 0 else 0.0)
         return replace(wish, speed_m_s=min(wish.speed_m_s, allowed))
 
-    def adjust(self, wishes: Wishes) -> None:
+    def adjust(self, parameters: LocalParameters) -> None:
         """Speed and station."""
-        super().adjust(wishes)
-        self._take_station(wishes)
+        super().adjust(parameters)
+        self._take_station(parameters)
 
-    def _take_station(self, wishes: Wishes) -> None:
-        offset, bearing = wishes.number("offset"), wishes.number("bearing")
+    def _take_station(self, parameters: LocalParameters) -> None:
+        offset, bearing = parameters.offset_m, parameters.bearing_rad
         self._offset_m = self._offset_m if offset is None else offset
         self._bearing_rad = self._bearing_rad if bearing is None else bearing
 

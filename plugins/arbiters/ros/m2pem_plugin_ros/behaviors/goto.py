@@ -14,7 +14,7 @@ from m2pem_plugin_ros.behaviors.motion_state import (
     place_of,
     turned,
 )
-from m2pem_plugin_ros.behaviors.parameters import Wishes
+from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.behaviors.path import Path
 from m2pem_plugin_ros.behaviors.path_following import Approach, Tour
 from m2pem_plugin_ros.behaviors.steering import turn
@@ -41,13 +41,13 @@ class Goto(Motion):
 
     name = "goto"
 
-    def __init__(self, wishes: Wishes, bounds: Bounds) -> None:
-        super().__init__(wishes, bounds)
-        self.target = wishes.vehicle()
-        self.places = () if self.target else (wishes.point(),)
-        heading = wishes.number("heading")
+    def __init__(self, parameters: LocalParameters, bounds: Bounds) -> None:
+        super().__init__(parameters, bounds)
+        self.target = parameters.other_vehicle()
+        self.places = () if self.target else (parameters.target_place(),)
+        heading = parameters.heading_rad
         self._yaw_rad = None if heading is None else math.pi / 2 - heading
-        tolerance = wishes.number("tolerance")
+        tolerance = parameters.tolerance_m
         if tolerance is None:
             tolerance = CLEARANCE_M if self.target else TOLERANCE_M
         self._approach = Approach(tolerance, moves=bool(self.target))
@@ -84,10 +84,10 @@ class Goto(Motion):
         if self._run_up is not None:
             self._run_up.found_at(place, moved_m, self.bounds)
 
-    def adjust(self, wishes: Wishes) -> None:
+    def adjust(self, parameters: LocalParameters) -> None:
         """Speed and tolerance."""
-        super().adjust(wishes)
-        tolerance = wishes.number("tolerance")
+        super().adjust(parameters)
+        tolerance = parameters.tolerance_m
         if tolerance is not None and not self._arrived:
             self._approach = Approach(tolerance, moves=bool(self.target))
 

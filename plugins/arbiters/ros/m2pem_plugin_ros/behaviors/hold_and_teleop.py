@@ -2,7 +2,7 @@
 
 from m2pem_plugin_ros.behaviors.motion import Motion
 from m2pem_plugin_ros.behaviors.motion_state import STAND, Ending, Scene, Wish
-from m2pem_plugin_ros.behaviors.parameters import Wishes
+from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.settings import Bounds
 
@@ -13,9 +13,9 @@ class Hold(Motion):
     name = "hold"
     steered = False
 
-    def __init__(self, wishes: Wishes, bounds: Bounds) -> None:
-        super().__init__(wishes, bounds)
-        self._duration_s = wishes.number("duration") or 0.0
+    def __init__(self, parameters: LocalParameters, bounds: Bounds) -> None:
+        super().__init__(parameters, bounds)
+        self._duration_s = parameters.duration_s or 0.0
         self._stood_s: float | None = None
 
     def step(self, scene: Scene) -> Wish | Ending:
@@ -50,9 +50,9 @@ class Teleop(Motion):
     name = "teleop"
     steered = False
 
-    def __init__(self, wishes: Wishes, bounds: Bounds) -> None:
-        super().__init__(wishes, bounds)
-        self._timeout_s = wishes.number("timeout")
+    def __init__(self, parameters: LocalParameters, bounds: Bounds) -> None:
+        super().__init__(parameters, bounds)
+        self._timeout_s = parameters.timeout_s
         self._driven_s = 0.0
 
     def step(self, scene: Scene) -> Wish | Ending:

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 from m2pem_plugin_ros.behaviors.motion_state import Ending, Place, Scene, Wish
-from m2pem_plugin_ros.behaviors.parameters import Wishes
+from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.settings import Bounds
 
@@ -19,12 +19,12 @@ class Motion(ABC):
     name: ClassVar[str]
     steered: ClassVar[bool] = True
 
-    def __init__(self, wishes: Wishes, bounds: Bounds) -> None:
+    def __init__(self, parameters: LocalParameters, bounds: Bounds) -> None:
         self.bounds = bounds
         self.target = ""
         self.places: tuple[Place, ...] = ()
         self.speed_m_s = bounds.speed_m_s
-        self._take_speed(wishes)
+        self._take_speed(parameters)
 
     @abstractmethod
     def step(self, scene: Scene) -> Wish | Ending:
@@ -36,15 +36,15 @@ class Motion(ABC):
     def take_up(self) -> None:  # noqa: B027  # most begin anew
         """A part of it was done before: go on from where the base stands, if that can be told."""
 
-    def adjust(self, wishes: Wishes) -> None:
+    def adjust(self, parameters: LocalParameters) -> None:
         """Go on with these; what is not given, or cannot be changed, stays as it is."""
-        self._take_speed(wishes)
+        self._take_speed(parameters)
 
     def ends_at(self, pose: Pose) -> bool:
         """Whether who stands so has surely done it, or need not do it."""
         return False
 
-    def _take_speed(self, wishes: Wishes) -> None:
-        speed = wishes.number("speed")
+    def _take_speed(self, parameters: LocalParameters) -> None:
+        speed = parameters.speed_m_s
         if speed is not None:
             self.speed_m_s = min(speed, self.bounds.speed_m_s)

@@ -3,63 +3,52 @@
 import math
 from collections.abc import Callable, Mapping
 
-from m2pem.api import Point, ResolvedValue, Route, VehiclePosition
+from m2pem.api import BehaviorParameters, Point, ResolvedValue, VehiclePosition
 from m2pem_plugin_ros.behaviors.motion_state import Place, RefusedError
 
 Level = Callable[[float, float], Place]
 """The local place of a latitude and a longitude, in degrees."""
 
 
-class Wishes:
-    """Parameters that were checked against the catalogue."""
+class LocalParameters(BehaviorParameters):
+    """Parameters that were checked against the catalogue, in the local frame."""
 
     def __init__(self, values: Mapping[str, ResolvedValue], level: Level, own_name: str) -> None:
-        self._values = values
+        super().__init__(values)
         self._level = level
         self._own_name = own_name
 
-    def number(self, name: str) -> float | None:
-        """A number in SI; None if not given."""
-        value = self._values.get(name)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            return None
-        return float(value)
-
-    def flag(self, name: str) -> bool:
-        """Whether something is wished."""
-        return self._values.get(name) is True
-
-    def route(self) -> tuple[Place, ...]:
+    def route_places(self) -> tuple[Place, ...]:
         """The places of `route`.
 
         Raises:
             RefusedError: there are none.
         """
-        route = self._values.get("route")
-        if not isinstance(route, Route) or not route.waypoints:
+        route = self.route
+        if route is None or not route.waypoints:
             raise RefusedError("parameter 'route': there is no waypoint in it")
         return tuple(self._place("route", each[0], each[1]) for each in route.waypoints)
 
-    def vehicle(self) -> str:
+    def other_vehicle(self) -> str:
         """The vehicle that `target` names, or "".
 
         Raises:
             RefusedError: it is the one that is to move.
         """
-        target = self._values.get("target")
+        target = self.target
         if not isinstance(target, VehiclePosition):
             return ""
         if target.vehicle == self._own_name:
             raise RefusedError("parameter 'target': another vehicle is expected")
         return target.vehicle
 
-    def point(self) -> Place:
+    def target_place(self) -> Place:
         """The point that `target` says.
 
         Raises:
             RefusedError: it says none.
         """
-        target = self._values.get("target")
+        target = self.target
         if not isinstance(target, Point):
             raise RefusedError("parameter 'target': there is none")
         return self._place("target", target.position[0], target.position[1])

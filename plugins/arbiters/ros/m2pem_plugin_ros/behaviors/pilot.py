@@ -22,7 +22,7 @@ from m2pem_plugin_ros.behaviors.motion_state import (
     place_of,
     sane_twist,
 )
-from m2pem_plugin_ros.behaviors.parameters import Wishes
+from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.behaviors.steering import Governor
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.settings import Bounds
@@ -133,10 +133,10 @@ class Pilot:
         self._held = False
         self._speak()
 
-    def adjust(self, wishes: Wishes) -> None:
+    def adjust(self, parameters: LocalParameters) -> None:
         """Go on with other parameters."""
         if self._motion is not None:
-            self._motion.adjust(wishes)
+            self._motion.adjust(parameters)
 
     def drop(self) -> None:
         """Nothing is sent any more, and nothing told."""

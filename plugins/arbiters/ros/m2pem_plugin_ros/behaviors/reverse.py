@@ -4,7 +4,7 @@ import math
 
 from m2pem_plugin_ros.behaviors.motion import Motion
 from m2pem_plugin_ros.behaviors.motion_state import STAND, Ending, Scene, Wish, place_of
-from m2pem_plugin_ros.behaviors.parameters import Wishes
+from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.behaviors.path import Leg
 from m2pem_plugin_ros.behaviors.steering import (
     braking_speed,
@@ -13,7 +13,6 @@ from m2pem_plugin_ros.behaviors.steering import (
     lookahead,
     sharpest,
 )
-from m2pem_plugin_ros.catalogue import REVERSE_M
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.settings import Bounds
 
@@ -26,10 +25,9 @@ class Reverse(Motion):
 
     name = "reverse"
 
-    def __init__(self, wishes: Wishes, bounds: Bounds) -> None:
-        super().__init__(wishes, bounds)
-        distance = wishes.number("distance")
-        self._distance_m = REVERSE_M if distance is None else distance
+    def __init__(self, parameters: LocalParameters, bounds: Bounds) -> None:
+        super().__init__(parameters, bounds)
+        self._distance_m = parameters.distance_m
         self._line: Leg | None = None
         self._over = False
 

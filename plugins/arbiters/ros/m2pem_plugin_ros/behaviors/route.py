@@ -11,7 +11,7 @@ from m2pem_plugin_ros.behaviors.motion_state import (
     Wish,
     place_of,
 )
-from m2pem_plugin_ros.behaviors.parameters import Wishes
+from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.behaviors.path import SHORTEST_M, Path, next_waypoint
 from m2pem_plugin_ros.behaviors.path_following import Approach, Tour
 from m2pem_plugin_ros.pose import Pose
@@ -30,10 +30,10 @@ class SingleVehicleRouting(Motion):
 
     name = "single_vehicle_routing"
 
-    def __init__(self, wishes: Wishes, bounds: Bounds) -> None:
-        super().__init__(wishes, bounds)
-        self.places = wishes.route()
-        self._loop = wishes.flag("loop")
+    def __init__(self, parameters: LocalParameters, bounds: Bounds) -> None:
+        super().__init__(parameters, bounds)
+        self.places = parameters.route_places()
+        self._loop = parameters.loop
         self._taken_up = False
         self._tour: Tour | None = None
         self._ends: Approach | None = None

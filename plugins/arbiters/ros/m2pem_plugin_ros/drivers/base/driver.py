@@ -27,6 +27,7 @@ from m2pem.api import (
 from m2pem_plugin_ros.behaviors import (
     STALE_S,
     STANDING,
+    LocalParameters,
     Motion,
     Pilot,
     RefusedError,
@@ -34,7 +35,6 @@ from m2pem_plugin_ros.behaviors import (
     Step,
     Target,
     Teleop,
-    Wishes,
     make_motion,
 )
 from m2pem_plugin_ros.behaviors.motion_state import Place
@@ -148,7 +148,7 @@ class BaseDriver:
     def adjust(self, goal: UUID, parameters: Mapping[str, ResolvedValue]) -> None:
         """Speed; `tolerance` of goto; `offset` and `bearing` of follow."""
         if goal == self._pilot.goal:
-            self._pilot.adjust(self._wishes(parameters))
+            self._pilot.adjust(self._local(parameters))
 
     def hold(self) -> None:
         """Stand, and keep the goal."""
@@ -277,10 +277,10 @@ class BaseDriver:
         return "manual" if self._pilot.motion.name == Teleop.name else "auto"
 
     def _motion(self, request: BehaviorRequest) -> Motion:
-        return make_motion(request.behavior, self._wishes(request.parameters), self._bounds)
+        return make_motion(request.behavior, self._local(request.parameters), self._bounds)
 
-    def _wishes(self, parameters: Mapping[str, ResolvedValue]) -> Wishes:
-        return Wishes(parameters, self._surroundings.level, self._name)
+    def _local(self, parameters: Mapping[str, ResolvedValue]) -> LocalParameters:
+        return LocalParameters(parameters, self._surroundings.level, self._name)
 
 
 def _stands(twist: Twist | None) -> bool:

@@ -2,18 +2,17 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import pairwise
 
 from m2pem.api import (
     ArbiterContext,
+    BehaviorParameters,
     GeoPosition,
     LinkState,
     Point,
     ResolvedValue,
     ResourceId,
-    Route,
-    VehiclePosition,
     VehicleState,
 )
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError
@@ -26,48 +25,25 @@ STALE_S = 3.0
 SAME_PLACE_M = 0.1
 
 
-@dataclass(slots=True)
-class Wishes:
-    """What was asked for; it may change on the way."""
+class LocalParameters(BehaviorParameters):
+    """What was requested, in the fleet's local frame; it may change on the way."""
 
-    context: ArbiterContext
-    values: dict[str, ResolvedValue] = field(default_factory=dict)
+    def __init__(self, values: Mapping[str, ResolvedValue], context: ArbiterContext) -> None:
+        super().__init__(values)
+        self.context = context
 
-    def change(self, parameters: Mapping[str, ResolvedValue]) -> None:
-        """Take these in place of those of the same names."""
-        self.values.update(parameters)
-
-    def number(self, name: str, default: float | None = None) -> float | None:
-        """A number in SI; `default` if not given."""
-        value = self.values.get(name)
-        return float(value) if isinstance(value, int | float) else default
-
-    def flag(self, name: str) -> bool:
-        """Whether something is wished."""
-        return self.values.get(name) is True
-
-    def yaw_rad(self) -> float | None:
-        """`heading`, as yaw: from east, counter-clockwise."""
-        heading = self.number("heading")
-        return None if heading is None else math.pi / 2 - heading
-
-    def target_vehicle(self) -> ResourceId | None:
-        """The vehicle that `target` names, if it names one."""
-        value = self.values.get("target")
-        return ResourceId(value.vehicle) if isinstance(value, VehiclePosition) else None
-
-    def target(self) -> Pose:
+    def target_pose(self) -> Pose:
         """Where `target` is now, and where it points if it is a vehicle.
 
         Raises:
             NavigationError: it is a vehicle that is not heard.
         """
-        value = self.values.get("target")
+        value = self.target
         if isinstance(value, Point):
             return self._at(value.position[0], value.position[1])
-        vehicle = self.target_vehicle()
-        if vehicle is None:
+        if self.target_vehicle is None:
             raise NavigationError("it has no target")
+        vehicle = ResourceId(self.target_vehicle)
         state = self.context.bus.latest(vehicle)
         now_us = self.context.clock.now_us()
         if (
@@ -81,12 +57,11 @@ class Wishes:
         place = self._at(position.latitude_deg, position.longitude_deg)
         return replace(place, yaw_rad=bow_rad(state))
 
-    def way(self) -> list[Pose]:
+    def route_poses(self) -> list[Pose]:
         """`route`, each pose in the direction of the next."""
-        value = self.values.get("route")
-        if not isinstance(value, Route):
+        if self.route is None:
             raise NavigationError("it has no route")
-        return along([self._at(latitude, longitude) for latitude, longitude, _ in value.waypoints])
+        return along([self._at(each[0], each[1]) for each in self.route.waypoints])
 
     def _at(self, latitude_deg: float, longitude_deg: float) -> Pose:
         position = GeoPosition(latitude_deg, longitude_deg, self.context.origin[2])

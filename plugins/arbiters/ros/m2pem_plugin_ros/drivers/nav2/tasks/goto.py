@@ -110,7 +110,7 @@ class Goto(Pursuit):
 
     def refusal(self) -> str:
         """The target must be known."""
-        if self.wishes.target_vehicle() == self.job.seat.connection.resource:
+        if self.parameters.target_vehicle == self.job.seat.connection.resource:
             return "parameter 'target': another vehicle is expected"
         try:
             self.aim()
@@ -120,24 +120,24 @@ class Goto(Pursuit):
 
     def aim(self) -> Pose:
         """The target, and its bow as asked for; otherwise it arrives as it comes."""
-        place, yaw = self.wishes.target(), self.wishes.yaw_rad()
+        place, yaw = self.parameters.target_pose(), self.parameters.yaw_rad
         return replace(place, yaw_rad=self._from_here(place) if yaw is None else yaw)
 
     def arrived(self) -> bool:
         """Within the tolerance, if one was asked for."""
-        expect_there(self._away_m(), self.wishes.number("tolerance"))
+        expect_there(self._away_m(), self.parameters.tolerance_m)
         return True
 
     def after_success(self, result: Any) -> Outcome:
         """It is there, unless its target has gone on since."""
         del result
-        if self.wishes.target_vehicle() is not None and self._away_m() > MOVED_M:
+        if self.parameters.target_vehicle is not None and self._away_m() > MOVED_M:
             return Outcome(BehaviorState.UNKNOWN, reason="its target has gone on")
         return Outcome(BehaviorState.SUCCEEDED)
 
     def _away_m(self) -> float:
         here = self.job.seat.localization.pose
-        return math.inf if here is None else apart_m(here, self.wishes.target())
+        return math.inf if here is None else apart_m(here, self.parameters.target_pose())
 
 
 class Follow(Pursuit):
@@ -145,7 +145,7 @@ class Follow(Pursuit):
 
     def refusal(self) -> str:
         """Another vehicle is needed, and must be heard."""
-        vehicle = self.wishes.target_vehicle()
+        vehicle = self.parameters.target_vehicle
         if vehicle is None or vehicle == self.job.seat.connection.resource:
             return "parameter 'target': another vehicle is expected"
         try:
@@ -156,9 +156,10 @@ class Follow(Pursuit):
 
     def aim(self) -> Pose:
         """The station, in the direction in which its vehicle points."""
-        at = self.wishes.target()
-        offset_m = self.wishes.number("offset", OFFSET_M) or 0.0
-        bearing_rad = self.wishes.number("bearing", BEHIND_RAD) or 0.0
+        at = self.parameters.target_pose()
+        offset_m, bearing_rad = self.parameters.offset_m, self.parameters.bearing_rad
+        offset_m = OFFSET_M if offset_m is None else offset_m
+        bearing_rad = BEHIND_RAD if bearing_rad is None else bearing_rad
         yaw_rad = at.yaw_rad - bearing_rad
         east_m = at.east_m + offset_m * math.cos(yaw_rad)
         north_m = at.north_m + offset_m * math.sin(yaw_rad)

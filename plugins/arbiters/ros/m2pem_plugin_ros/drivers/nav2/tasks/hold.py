@@ -19,7 +19,7 @@ class Hold(Errand):
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
-        self._left_s = self.wishes.number("duration") or 0.0
+        self._left_s = self.parameters.duration_s or 0.0
 
     async def run(self) -> None:
         """Stop it, and see that it stands for as long as is left."""
@@ -57,7 +57,7 @@ class Teleop(Errand):
         """Stop Nav2; how the vehicle moves then is nobody's business here."""
         await self.nav2.stop()
         self.job.begun()
-        timeout_s = self.wishes.number("timeout")
+        timeout_s = self.parameters.timeout_s
         if timeout_s is not None:
             await self.clock.sleep(timeout_s)
             return

@@ -6,7 +6,6 @@ from typing import Any
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import Point
 
-from m2pem_plugin_ros.catalogue import REVERSE_M
 from m2pem_plugin_ros.drivers.nav2.goal_client import GoalClient
 from m2pem_plugin_ros.drivers.nav2.tasks.task import GoalErrand, Job
 
@@ -22,7 +21,7 @@ class Reverse(GoalErrand):
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
-        distance_m = self.wishes.number("distance", REVERSE_M) or 0.0
+        distance_m = self.parameters.distance_m
         self._left_m = self._goal_m = distance_m
 
     @property
@@ -46,7 +45,7 @@ class Reverse(GoalErrand):
 
     def _goal(self) -> Any:
         fastest_m_s = self.job.seat.settings.bounds.reverse_m_s
-        speed_m_s = min(self.wishes.number("speed") or SPEED_M_S, fastest_m_s)
+        speed_m_s = min(self.parameters.speed_m_s or SPEED_M_S, fastest_m_s)
         allowed_s = ALLOWED * self._left_m / speed_m_s + ALLOWED_MORE_S
         return self.client.action.Goal(
             target=Point(x=self._left_m),

@@ -26,8 +26,8 @@ class Route(GoalErrand):
     def __init__(self, job: Job) -> None:
         self._follows = job.seat.settings.route_action is RouteAction.WAYPOINTS
         super().__init__(job)
-        self._loops = self.wishes.flag("loop")
-        self._lap = self.wishes.way()
+        self._loops = self.parameters.loop
+        self._lap = self.parameters.route_poses()
         if self._loops:
             self._lap = along([*self._lap, self._lap[0]])
         self._next = 0

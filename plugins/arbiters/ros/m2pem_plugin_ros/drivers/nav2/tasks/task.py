@@ -14,7 +14,7 @@ from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
 from m2pem_plugin_ros.drivers.nav2.client import Nav2
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError
 from m2pem_plugin_ros.drivers.nav2.goal_client import ACTIVE, Ended, GoalClient, number_of, numbered
-from m2pem_plugin_ros.drivers.nav2.parameters import Wishes
+from m2pem_plugin_ros.drivers.nav2.parameters import LocalParameters
 from m2pem_plugin_ros.frames import quaternion_of_yaw
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.runtime import RosTimeoutError
@@ -46,7 +46,7 @@ class Errand(ABC):
         self.job = job
         self.nav2 = job.nav2
         self.clock = job.seat.context.clock
-        self.wishes = Wishes(job.seat.context, dict(job.order.request.parameters))
+        self.parameters = LocalParameters(job.order.request.parameters, job.seat.context)
 
     def refusal(self) -> str:
         """Why it cannot be done; "" if it can."""
@@ -66,7 +66,7 @@ class Errand(ABC):
 
     def adjust(self, parameters: Mapping[str, ResolvedValue]) -> None:
         """Go on with these."""
-        self.wishes.change(parameters)
+        self.parameters.update(parameters)
 
     @abstractmethod
     async def look(self) -> Outcome:
@@ -105,7 +105,7 @@ class GoalErrand(Errand):
             self._current, self._found = self._found, None
             self.job.begun()
             return await self.nav2.finish(self.client, self._current)
-        self.nav2.limit_speed(self.wishes.number("speed"))
+        self.nav2.limit_speed(self.parameters.speed_m_s)
         self._current = numbered(self.job.order.goal, self._goals)
         self._goals += 1
         return await self.nav2.drive(self.client, self._current, goal, self.job.begun)
@@ -118,7 +118,7 @@ class GoalErrand(Errand):
         """Of most, the speed alone can change on the way."""
         super().adjust(parameters)
         if "speed" in parameters:
-            self.nav2.limit_speed(self.wishes.number("speed"))
+            self.nav2.limit_speed(self.parameters.speed_m_s)
 
     def fed_back(self, feedback: Any) -> None:
         """What Nav2 says of the last goal while it carries it out."""

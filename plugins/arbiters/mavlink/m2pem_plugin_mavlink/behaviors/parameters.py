@@ -1,6 +1,6 @@
-"""A request's parameters, as behaviors ask for them."""
+"""The parameters of a behavior of one vehicle, with the altitudes that its autopilot needs."""
 
-from m2pem.api import Area, LatLon, Point, ResourceId, Route, VehiclePosition, VehicleState
+from m2pem.api import BehaviorParameters, LatLon, Point, ResourceId, VehiclePosition, VehicleState
 from m2pem_plugin_mavlink.behaviors.behavior import BehaviorContext, BehaviorFailedError
 from m2pem_plugin_mavlink.vehicle.driver import Place
 
@@ -11,52 +11,22 @@ HEARD_WITHIN_S = 5.0
 _WITH_HEIGHT = frozenset({"air", "subsurface"})
 
 
-class Wishes:
-    """What was asked for; what the vehicle's domain has no use for is left out. `adjusted_m_s`: the
-    speed that it was told on its way; None: none."""
+class VehicleParameters(BehaviorParameters):
+    """What a vehicle is to do; its domain may have no use for an altitude.
+
+    `adjusted_m_s`: the speed that replaces the requested one on the way; None: none.
+    """
 
     def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context.parameters)
         self.adjusted_m_s: float | None = None
         self._job = context
-        self._values = context.parameters
         self.has_height = context.vehicle.domain in _WITH_HEIGHT
-
-    def number(self, name: str) -> float | None:
-        """A number in SI, None if not given."""
-        value = self._values.get(name)
-        return float(value) if isinstance(value, int | float) else None
-
-    def flag(self, name: str) -> bool:
-        """Whether something is wished."""
-        return self._values.get(name) is True
-
-    def text(self, name: str) -> str:
-        """A text, "" if not given."""
-        value = self._values.get(name)
-        return value if isinstance(value, str) else ""
 
     @property
     def speed_m_s(self) -> float | None:
         """As adjusted or asked for, or else as `set_speed` has set it; None: the vehicle's own."""
-        return self.adjusted_m_s or self.number("speed") or self._job.cruise_m_s
-
-    @property
-    def route(self) -> Route | None:
-        """The parameter `route`."""
-        value = self._values.get("route")
-        return value if isinstance(value, Route) else None
-
-    @property
-    def area(self) -> Area | None:
-        """The parameter `area`."""
-        value = self._values.get("area")
-        return value if isinstance(value, Area) else None
-
-    @property
-    def target_vehicle(self) -> str | None:
-        """The vehicle that `target` names, if it names one."""
-        value = self._values.get("target")
-        return value.vehicle if isinstance(value, VehiclePosition) else None
+        return self.adjusted_m_s or super().speed_m_s or self._job.cruise_m_s
 
     def altitude(
         self, own_m: float | None = None, own_frame: str = RELATIVE
@@ -67,9 +37,9 @@ class Wishes:
         """
         if not self.has_height:
             return None, RELATIVE
-        wished = self.number("altitude")
+        wished = self.altitude_m
         if wished is not None:
-            return wished, self.text("altitude_frame") or RELATIVE
+            return wished, self.altitude_frame
         return own_m, own_frame if own_m is not None else RELATIVE
 
     def altitude_to_fly(
@@ -90,13 +60,13 @@ class Wishes:
             raise BehaviorFailedError("its height is not known yet: say the altitude to move at")
         return present_m, RELATIVE
 
-    def target(self) -> Place:
+    def target_place(self) -> Place:
         """Where `target` is now.
 
         Raises:
             BehaviorFailedError: it is a vehicle that was never heard.
         """
-        value = self._values.get("target")
+        value = self.target
         if isinstance(value, Point):
             latitude, longitude, own_m = value.position
             return Place(latitude, longitude, *self.altitude(own_m, value.altitude_frame))
