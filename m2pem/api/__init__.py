@@ -53,8 +53,11 @@ if TYPE_CHECKING:
         StampedRecord,
         TelemetrySample,
     )
+    from m2pem.api.description import Description, Importance, Kind, describe
+    from m2pem.api.follower import Follower, Listener, follow
     from m2pem.api.goals import GoalArbiter
     from m2pem.api.ocu import Ocu
+    from m2pem.api.run_view import RunView
     from m2pem.api.service import Service, ServiceContext, ServiceError
     from m2pem.api.telemetry import (
         Detection,
@@ -107,11 +110,14 @@ _MODULES = {
         "Alert HandedOver MissionControl Notice OpenPrompt PromptClosed RunId RunStatus RunSummary"
         " SimulationResult StampedRecord TelemetrySample"
     ),
+    "m2pem.api.description": "Description Importance Kind describe",
+    "m2pem.api.follower": "Follower Listener follow",
     "m2pem.api.goals": "GoalArbiter",
     "m2pem.api.behavior_parameters": "BehaviorParameters",
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
     "m2pem.api.ocu": "Ocu",
+    "m2pem.api.run_view": "RunView",
     "m2pem.api.service": "Service ServiceContext ServiceError",
     "m2pem.api.telemetry": (
         "Detection GeoPosition LinkState PayloadState TeamMemberState TeamState Telemetry"
@@ -157,6 +163,7 @@ __all__ = [
     "Connection",
     "DataName",
     "Decision",
+    "Description",
     "DetectingArbiter",
     "Detection",
     "Dimension",
@@ -167,13 +174,17 @@ __all__ = [
     "Finding",
     "Fleet",
     "FleetBus",
+    "Follower",
     "GeoPosition",
     "GoalArbiter",
     "HandedOver",
     "BehaviorTracker",
+    "Importance",
+    "Kind",
     "LatLon",
     "Limits",
     "LinkState",
+    "Listener",
     "LocalFrame",
     "AsyncQueue",
     "Mission",
@@ -201,6 +212,7 @@ __all__ = [
     "RunId",
     "RunStatus",
     "RunSummary",
+    "RunView",
     "SearchLimits",
     "SearchProgress",
     "Service",
@@ -219,7 +231,9 @@ __all__ = [
     "VehiclePosition",
     "VehicleState",
     "as_geojson",
+    "describe",
     "distance_m",
+    "follow",
     "lawn_mower",
     "longest_edge_yaw",
     "offset",

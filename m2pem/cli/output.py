@@ -8,8 +8,9 @@ from contextlib import contextmanager
 from typing import TextIO
 
 from m2pem.api.control import LOGGED, Alert, Notice, RunId, StampedRecord
+from m2pem.api.description import printable
+from m2pem.cli.line_formatter import LineFormatter
 from m2pem.cli.standard_streams import LineWriter, writer_for
-from m2pem.cli.story import Story, printable
 from m2pem.engine.records import RunEnded
 from m2pem.journal.codec import record_line
 from m2pem.mission.mission import Mission
@@ -29,16 +30,18 @@ class Output:
     """Standard output, for records. Made by `output_of`."""
 
     def __init__(self, stream: TextIO, *, as_json: bool) -> None:
-        self.story: Story | None = None
+        self.lines: LineFormatter | None = None
         self._stream = stream
         self._as_json = as_json
         self._covered = False
         self._ends: list[str] = []
         self.writer: LineWriter = writer_for(stream)
 
-    def tell_by(self, mission: Callable[[RunId], Mission | None], *, one: bool, asks: bool) -> None:
-        """Say where the diagrams are, and the rest of `Story`; then records can be printed."""
-        self.story = Story(mission, colour=wants_colour(self._stream), one=one, asks=asks)
+    def format_with(
+        self, mission: Callable[[RunId], Mission | None], *, one: bool, asks: bool
+    ) -> None:
+        """Set how records become lines, as for `LineFormatter`; then they can be printed."""
+        self.lines = LineFormatter(mission, colour=wants_colour(self._stream), one=one, asks=asks)
 
     def cover(self) -> None:
         """An operator's screen covers the terminal: only how runs end is kept, for `uncover`."""
@@ -65,8 +68,8 @@ class Output:
         if self._as_json:
             t_us = round(stamped.t_s * US_PER_S)
             return record_line(stamped.run, stamped.seq, t_us, stamped.record).decode()
-        assert self.story is not None
-        return self.story.tell(stamped)
+        assert self.lines is not None
+        return self.lines.format(stamped)
 
     async def follow(self, notices: AsyncIterator[Notice]) -> None:
         """Print every record that is told, until there will be no more."""

@@ -15,8 +15,8 @@ from m2pem.api.control import (
     RunStatus,
     StampedRecord,
 )
+from m2pem.api.description import printable
 from m2pem.cli.standard_streams import Lines, writer_for
-from m2pem.cli.story import printable
 from m2pem.engine.records import RunClaimed, RunEnded, RunStarted
 from m2pem.errors import BusyError, M2pemError, OperatorError
 from m2pem.mission.behavior import Decision

@@ -25,7 +25,7 @@ from m2pem.journal.base import Entry, RunInfo
 from m2pem.journal.codec import record_line
 
 if TYPE_CHECKING:
-    from m2pem.cli.story import Story
+    from m2pem.cli.line_formatter import LineFormatter
     from m2pem.engine.run import Step
     from m2pem.journal.base import Journal
     from m2pem.mission.mission import Mission
@@ -105,13 +105,13 @@ async def _print(
     journal: "Journal", line: "RunInfo", state_only: bool, output: str, done: "Progress"
 ) -> int:
     from m2pem.api.control import StampedRecord
+    from m2pem.cli.line_formatter import LineFormatter
     from m2pem.cli.output import US_PER_S, wants_colour
     from m2pem.cli.status import Standing
-    from m2pem.cli.story import Story
     from m2pem.journal.codec import record_line
 
     standing = Standing(line)
-    story = Story(lambda _: standing.mission, colour=wants_colour(sys.stdout))
+    lines = LineFormatter(lambda _: standing.mission, colour=wants_colour(sys.stdout))
     async for entry in journal.read(line.run):
         for seq, record in enumerate(entry.records, entry.seq):
             standing.take(record)
@@ -119,8 +119,10 @@ async def _print(
                 continue
             if output == "json":
                 print(record_line(line.run, seq, entry.t_us, record).decode())
-            elif told := story.tell(StampedRecord(line.run, seq, entry.t_us / US_PER_S, record)):
-                print(told)
+            elif formatted := lines.format(
+                StampedRecord(line.run, seq, entry.t_us / US_PER_S, record)
+            ):
+                print(formatted)
         done(len(entry.records))
     if output == "text":
         print(standing.as_text())
@@ -151,8 +153,8 @@ def replay_counterexample(
 ) -> int:
     """Play violation `number` (from 1) of a JSON report. 0: the engine did all of the run."""
     from m2pem.cli.arguments import get_fleet
+    from m2pem.cli.line_formatter import LineFormatter
     from m2pem.cli.output import wants_colour
-    from m2pem.cli.story import Story
     from m2pem.verify.conformance_run import NotPlayableError, Player
 
     report = _read(file)
@@ -160,14 +162,14 @@ def replay_counterexample(
     mission = _mission(file, report, mission_file)
     fleet = get_fleet(fleet_file or "sim", mission)
     player = Player(mission, fleet, report["process"], report["data"])
-    story = Story(lambda _: mission, colour=wants_colour(sys.stdout))
+    lines = LineFormatter(lambda _: mission, colour=wants_colour(sys.stdout))
     _say(output, f"{violation['property']}: {violation['text']}")
-    _show(player.steps, story, output)
+    _show(player.steps, lines, output)
     problem = ""
     for step in [*violation["steps"], *violation["loop"]]:
         _say(output, f"step {step['step']}: {step['text']}")
         try:
-            _show(player.play(step), story, output)
+            _show(player.play(step), lines, output)
         except NotPlayableError as error:
             problem = str(error)
             break
@@ -182,13 +184,13 @@ def replay_counterexample(
 
 
 def _say(output: str, text: str) -> None:
-    from m2pem.cli.story import printable
+    from m2pem.api.description import printable
 
     if output == "text":
         click.echo(printable(text))
 
 
-def _show(steps: "Sequence[Step]", story: "Story", output: str) -> None:
+def _show(steps: "Sequence[Step]", lines: "LineFormatter", output: str) -> None:
     from m2pem.api.control import StampedRecord
     from m2pem.cli.output import US_PER_S
     from m2pem.journal.codec import record_line
@@ -197,8 +199,8 @@ def _show(steps: "Sequence[Step]", story: "Story", output: str) -> None:
         for seq, record in enumerate(step.records, step.seq):
             if output == "json":
                 click.echo(record_line("r1", seq, step.t_us, record).decode())
-            elif told := story.tell(StampedRecord("r1", seq, step.t_us / US_PER_S, record)):
-                click.echo(told)
+            elif formatted := lines.format(StampedRecord("r1", seq, step.t_us / US_PER_S, record)):
+                click.echo(formatted)
 
 
 def _read(file: Path) -> dict[str, Any]:

@@ -91,8 +91,8 @@ async def _resume(
                     reason = "stopped after an interruption"
                     await executive.control.stop(run_id, by=operator_name(), reason=reason)
                 state = executive.runner(run_id).run.state
-                if out.story is not None:
-                    out.story.know(state)
+                if out.lines is not None:
+                    out.lines.restore(state)
                 if state.status is RunStatus.PAUSED:
                     click.echo(f"m2pem: {run_id} is paused: an operator lets it go on", err=True)
                 return run_id

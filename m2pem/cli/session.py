@@ -67,7 +67,7 @@ async def driving(
         return runner.run.state.mission if runner is not None else None
 
     log_from_a_thread()
-    output.tell_by(mission, one=one, asks=PLAIN not in operators.names)
+    output.format_with(mission, one=one, asks=PLAIN not in operators.names)
     loop = asyncio.get_running_loop()
     with Interruption(executive) as interruption:
 

@@ -95,7 +95,7 @@ def simulate(
     script = get_answers(answers, loaded)
     kept: list[StampedRecord] = []
     with output_of(output) as out:
-        out.tell_by(lambda _: loaded, one=True, asks=True)
+        out.format_with(lambda _: loaded, one=True, asks=True)
 
         def show(stamped: "StampedRecord") -> None:
             out.show(stamped)

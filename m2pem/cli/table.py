@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from m2pem.cli.story import printable
+from m2pem.api.description import printable
 
 GAP = "  "
 

@@ -190,7 +190,7 @@ def test_a_run_killed_during_a_pause_is_paused_when_it_is_resumed(
     resumed = m2pem.start("resume", "r1")
     resumed.until_text("r1 taken up again")
     resumed.type("resume")
-    resumed.until_text("r1 goes on by plain")
+    resumed.until_text("r1 resumed by plain")
     resumed.type("stop")
     status, errors = resumed.rest()
     assert status == 130

@@ -7,10 +7,9 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from m2pem_plugin_ros import RosRuntime
 
-from m2pem.api import MissionControl, TeamState
+from m2pem.api import Follower, MissionControl, RunId, TeamState
 from m2pem.errors import M2pemError
 from m2pem_plugin_mocu.diagnostics import Health, Vehicles, diagnostics
-from m2pem_plugin_mocu.feed import Feed
 from m2pem_plugin_mocu.services import Services
 from m2pem_plugin_mocu.topics import Topics, now_us
 
@@ -29,13 +28,14 @@ class Examiner:
         self,
         ros: RosRuntime,
         control: MissionControl,
-        feed: Feed,
+        follower: Follower,
         topics: Topics,
         services: Services,
     ) -> None:
         self._node = ros.node
         self._control = control
-        self._feed = feed
+        self._follower = follower
+        self._latest_run: RunId | None = None
         self._topics = topics
         self._services = services
         self._vehicles = Vehicles(control.fleet())
@@ -77,8 +77,8 @@ class Examiner:
             name=self._control.fleet().name,
             late_s=max(0.0, late_s),
             servers=servers,
-            runs=sum(not each.summary.status.ended for each in self._feed.pictures.values()),
-            prompts=len(self._feed.prompts),
+            runs=sum(not each.status.ended for each in self._follower.views.values()),
+            prompts=len(self._follower.prompts),
             listeners=self._topics.listeners(),
             refused=sum(gate.refused for gate in self._services.gates.values()),
             left_out=self._topics.left_out,
@@ -89,8 +89,10 @@ class Examiner:
     async def _journal_error(self) -> str:
         try:
             async with asyncio.timeout(JOURNAL_WITHIN_S):
-                if (run := next(iter(self._feed.pictures), self._feed.latest_run)) is None:
-                    await self._control.runs()
+                if (run := next(iter(self._follower.views), self._latest_run)) is None:
+                    self._latest_run = next(
+                        (each.run for each in reversed(await self._control.runs())), None
+                    )
                 else:
                     await self._control.records(run, BEYOND_ALL, 1)
         except TimeoutError:

@@ -8,10 +8,17 @@ import msgspec
 from builtin_interfaces.msg import Time
 from m2pem_interfaces import msg
 
-from m2pem.api import Finding, OpenPrompt, RunStatus, RunSummary, Severity, StampedRecord
-from m2pem_plugin_mocu.picture import Picture
+from m2pem.api import (
+    Finding,
+    OpenPrompt,
+    RunStatus,
+    RunSummary,
+    RunView,
+    Severity,
+    StampedRecord,
+    describe,
+)
 from m2pem_plugin_mocu.texts import sendable
-from m2pem_plugin_mocu.words import told
 
 _STATUS = {
     RunStatus.RUNNING: msg.RunStatus.RUNNING,
@@ -48,7 +55,7 @@ def run_status(summary: RunSummary, mission_time_s: float = math.nan) -> Any:
 
 
 def open_prompt(prompt: OpenPrompt, since_us: int) -> Any:
-    """A prompt that stands since then."""
+    """A prompt that is open since then."""
     return msg.Prompt(
         stamp=time_of(since_us),
         run=prompt.run,
@@ -65,40 +72,41 @@ def open_prompt(prompt: OpenPrompt, since_us: int) -> Any:
 
 
 def closed_prompt(prompt: OpenPrompt, decision: str, by: str, at_us: int) -> Any:
-    """A prompt that no longer stands: it was answered, or withdrawn if there is no decision."""
+    """A prompt that was answered, or withdrawn if there is no decision."""
     message = open_prompt(prompt, at_us)
     message.state = msg.Prompt.ANSWERED if decision else msg.Prompt.WITHDRAWN
     message.decision, message.answered_by = sendable(decision), sendable(by)
     return message
 
 
-def active_elements(pictures: Iterable[Picture], now_us: int) -> Any:
-    """The elements of all runs in which tokens are."""
+def active_elements(views: Iterable[RunView], now_us: int) -> Any:
+    """The elements with tokens, of all runs that an executive drives."""
     elements = [
         msg.ActiveElement(
-            run=picture.summary.run,
+            run=view.run,
             element=sendable(active.element),
-            name=sendable(picture.label(active.element)),
-            type=_type_of(picture, active.element),
+            name=sendable(view.label(active.element)),
+            type=_type_of(view, active.element),
             tokens=active.tokens,
             since=time_of(active.since_us),
-            behaviors=[sendable(work.name) for work in active.work],
-            resources=list(dict.fromkeys(each for work in active.work for each in work.resources)),
+            behaviors=[sendable(each.name) for each in active.behaviors],
+            resources=list(dict.fromkeys(each for b in active.behaviors for each in b.resources)),
         )
-        for picture in pictures
-        for active in picture.active()
+        for view in views
+        if view.status is not RunStatus.INTERRUPTED
+        for active in view.active()
     ]
     return msg.ActiveElements(stamp=time_of(now_us), elements=elements)
 
 
-def _type_of(picture: Picture, element: str) -> str:
+def _type_of(view: RunView, element: str) -> str:
     """As BPMN writes it: "scriptTask"; "" if that is not known."""
-    found = picture.mission.elements.get(element) if picture.mission is not None else None
+    found = view.mission.elements.get(element) if view.mission is not None else None
     name = type(found).__name__ if found is not None else ""
     return name[:1].lower() + name[1:]
 
 
-def event(picture: Picture, stamped: StampedRecord, at_us: int) -> Any:
+def event(view: RunView, stamped: StampedRecord, at_us: int) -> Any:
     """A record of a journal, and when it came to be."""
     fields = msgspec.to_builtins(stamped.record)
     name = fields.pop("record")
@@ -109,7 +117,7 @@ def event(picture: Picture, stamped: StampedRecord, at_us: int) -> Any:
         mission_time_s=stamped.t_s,
         type=name,
         element=sendable(getattr(stamped.record, "element", "")),
-        text=told(picture, stamped.record),
+        text=sendable(describe(stamped, view).text),
         data=msgspec.json.encode(fields).decode(),
     )
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from m2pem_plugin_ros import keep_on_loopback, require_interfaces
 
+from m2pem.api import follow
 from m2pem.errors import M2pemError
 from m2pem_plugin_mocu import settings
-from m2pem_plugin_mocu.feed import Feed
 
 if TYPE_CHECKING:
     from m2pem.api import MissionControl
@@ -50,7 +50,7 @@ class MocuOcu:
         if settings.stays_on_loopback(environment, simulated=control.simulated()):
             keep_on_loopback()
         require_interfaces("m2pem_interfaces")
-        self._feed = Feed(control)
+        self._follower = follow(control)
 
     async def serve(self) -> None:
         """Tell operators what happens, and do what they ask, until cancelled.
@@ -65,11 +65,12 @@ class MocuOcu:
         from m2pem_plugin_mocu.topics import Topics, now_us  # noqa: PLC0415
 
         async with RosRuntime(NODE, namespace=self.namespace, domain_id=self._domain_id) as ros:
-            topics = Topics(ros, self._control, self._feed)
-            services = Services(ros, self._control, self._feed, topics)
-            examiner = Examiner(ros, self._control, self._feed, topics, services)
+            topics = Topics(ros, self._control, self._follower)
+            self._follower.listener = topics
+            services = Services(ros, self._control, topics)
+            examiner = Examiner(ros, self._control, self._follower, topics, services)
             fleet = FleetView(ros, self._control, now_us)
-            following = asyncio.create_task(self._feed.follow(topics, now_us))
+            following = asyncio.create_task(self._follower.run())
             speaking = [
                 asyncio.create_task(topics.run()),
                 asyncio.create_task(examiner.run()),
@@ -110,10 +111,10 @@ class MocuOcu:
 
     async def _settle(self, following: "asyncio.Task[None]") -> None:
         """Wait until what was committed is known here, unless it never ends."""
-        taken, turns = self._feed.taken, 0
+        taken, turns = self._follower.notices_taken, 0
         with suppress(TimeoutError):
             async with asyncio.timeout(SETTLE_S):
                 while turns < SETTLE_TURNS and not following.done():
                     await asyncio.sleep(0)
-                    turns = turns + 1 if self._feed.taken == taken else 0
-                    taken = self._feed.taken
+                    turns = turns + 1 if self._follower.notices_taken == taken else 0
+                    taken = self._follower.notices_taken

@@ -9,7 +9,6 @@ from m2pem_plugin_ros import RosRuntime
 from m2pem.api import MissionControl
 from m2pem.errors import M2pemError, OperatorError
 from m2pem_plugin_mocu import messages, requests
-from m2pem_plugin_mocu.feed import Feed
 from m2pem_plugin_mocu.gate import Gate
 from m2pem_plugin_mocu.starting import start_mission
 from m2pem_plugin_mocu.texts import sendable
@@ -31,12 +30,9 @@ STOPPING = 100
 class Services:
     """Offers them while the runtime is there."""
 
-    def __init__(
-        self, ros: RosRuntime, control: MissionControl, feed: Feed, topics: Topics
-    ) -> None:
+    def __init__(self, ros: RosRuntime, control: MissionControl, topics: Topics) -> None:
         self._ros = ros
         self._control = control
-        self._feed = feed
         self._topics = topics
         self.gates: dict[str, Gate] = {}
         self._offer(srv.StartMission, "start_mission", start_mission, STARTING)
@@ -89,7 +85,7 @@ class Services:
             await requests.answer_prompt(control, request, response)
         except OperatorError as refusal:
             # A run that has ended since cannot say who was first.
-            closed = self._feed.closed.get((request.run, request.prompt))
+            closed = self._topics.closed_prompts.get((request.run, request.prompt))
             if closed is None or not closed.decision or closed.by in str(refusal):
                 raise
             raise OperatorError(

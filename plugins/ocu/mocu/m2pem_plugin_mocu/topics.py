@@ -12,12 +12,23 @@ from m2pem_plugin_ros import RosRuntime, qos
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from m2pem.api import MissionControl, PromptClosed, RunStatus, RunSummary, StampedRecord
+from m2pem.api import (
+    Alert,
+    Follower,
+    Listener,
+    MissionControl,
+    OpenPrompt,
+    PromptClosed,
+    RunId,
+    RunStatus,
+    RunSummary,
+    RunView,
+    StampedRecord,
+)
+from m2pem.api import records as r
 from m2pem.errors import M2pemError
 from m2pem_plugin_mocu import messages
-from m2pem_plugin_mocu.feed import Asked, Feed
 from m2pem_plugin_mocu.pacing import Paced
-from m2pem_plugin_mocu.picture import Picture
 
 PROMPT_EVENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 
@@ -28,6 +39,13 @@ several thousand a second, and may hesitate for one."""
 
 EVENTS_WAITING = 10_000
 """Beyond that the oldest are left out, which their readers see by `seq`."""
+
+CLOSED_PROMPTS = 1000
+"""Closed prompts that are remembered: a late answer is refused with the name of the first."""
+
+TOKEN_RECORDS = frozenset(
+    (r.TokenEntered, r.TokenLeft, r.ScopeOpened, r.BehaviorRequested, r.BehaviorEnded, r.RunEnded)
+)
 
 FLUSH_S = 1.0
 """At the end, so long may take what has not been sent, or not been confirmed by its readers."""
@@ -40,19 +58,22 @@ def now_us() -> int:
     return time.time_ns() // 1000
 
 
-class Topics:
-    """A `Listener` of the feed."""
+class Topics(Listener):
+    """Publishes what a follower reports."""
 
-    def __init__(self, ros: RosRuntime, control: MissionControl, feed: Feed) -> None:
+    def __init__(self, ros: RosRuntime, control: MissionControl, follower: Follower) -> None:
         publisher = ros.node.create_publisher
         self._control = control
-        self._feed = feed
+        self._follower = follower
+        self._opened_us: dict[tuple[RunId, str], int] = {}
+        """When each open prompt became known here."""
+        self.closed_prompts: dict[tuple[RunId, str], PromptClosed] = {}
         self._prompts = publisher(msg.OpenPrompts, "prompts", qos.STATUS)
         self._prompt_events = publisher(msg.Prompt, "prompt_events", PROMPT_EVENTS)
         self._status = publisher(msg.MissionStatus, "status", qos.STATUS)
         self._active = publisher(msg.ActiveElements, "active_elements", qos.STATUS)
         self._events = publisher(msg.MissionEvent, "events", qos.EVENTS)
-        self._waiting: deque[tuple[Picture, StampedRecord, int]] = deque()
+        self._waiting: deque[tuple[RunView, StampedRecord, int]] = deque()
         self._some_wait = asyncio.Event()
         self.left_out = 0
         self._paced_prompts = Paced(self._say_prompts)
@@ -93,52 +114,68 @@ class Topics:
         except TimeoutError:
             log.warning("some operators may not have heard how it ended")
 
-    # --- what the feed tells --------------------------------------------------------------------
+    # --- what the follower reports --------------------------------------------------------------
 
-    def recorded(self, picture: Picture, stamped: StampedRecord) -> None:
-        """To be sent in its turn."""
+    def run_added(self, view: RunView) -> None:
+        """Publish the new run soon."""
+        self._paced_status.change()
+        self._paced_active.change()
+
+    def recorded(self, view: RunView, stamped: StampedRecord, *, is_new: bool) -> None:
+        """Queue an event for a new record."""
+        if not is_new:
+            return
         if len(self._waiting) >= EVENTS_WAITING:
             self._waiting.popleft()
             self.left_out += 1
-        self._waiting.append((picture, stamped, picture.at_us(stamped.t_s)))
+        self._waiting.append((view, stamped, view.at_us(stamped.t_s)))
         self._some_wait.set()
+        if type(stamped.record) in TOKEN_RECORDS:
+            self._paced_active.change()
 
-    def runs_changed(self) -> None:
-        """To be said soon."""
+    def status_changed(self, view: RunView) -> None:
+        """Publish the status soon."""
         self._paced_status.change()
-
-    def tokens_changed(self) -> None:
-        """To be said soon."""
         self._paced_active.change()
 
-    def asked(self, asked: Asked) -> None:
-        """Said at once, as an event, and soon among all that stand."""
-        self._prompt_events.publish(messages.open_prompt(asked.prompt, asked.since_us))
+    def prompt_opened(self, prompt: OpenPrompt) -> None:
+        """Publish it at once as an event, and soon among all open prompts."""
+        opened_us = self._opened_us[prompt.run, prompt.prompt] = now_us()
+        self._prompt_events.publish(messages.open_prompt(prompt, opened_us))
         self._paced_prompts.change()
 
-    def closed(self, asked: Asked, closed: PromptClosed) -> None:
-        """Said at once, as an event, and soon by its absence."""
+    def prompt_closed(self, prompt: OpenPrompt, closed: PromptClosed) -> None:
+        """Publish it at once as an event, and soon all prompts that are still open."""
+        key = (closed.run, closed.prompt)
+        self._opened_us.pop(key, None)
+        self.closed_prompts[key] = closed
+        if len(self.closed_prompts) > CLOSED_PROMPTS:
+            del self.closed_prompts[next(iter(self.closed_prompts))]
         self._prompt_events.publish(
-            messages.closed_prompt(asked.prompt, closed.decision, closed.by, now_us())
+            messages.closed_prompt(prompt, closed.decision, closed.by, now_us())
         )
         self._paced_prompts.change()
+
+    def alerted(self, alert: Alert) -> None:
+        """Log it, which ROS shows to operators."""
+        log.error("%s", f"{alert.run}: {alert.text}" if alert.run else alert.text)
 
     # --- speaking -------------------------------------------------------------------------------
 
     async def _say_prompts(self) -> None:
-        standing = [
-            messages.open_prompt(asked.prompt, asked.since_us)
-            for asked in self._feed.prompts.values()
+        prompts = [
+            messages.open_prompt(prompt, self._opened_us.get(key, 0))
+            for key, prompt in self._follower.prompts.items()
         ]
-        self._prompts.publish(msg.OpenPrompts(stamp=messages.time_of(now_us()), prompts=standing))
+        self._prompts.publish(msg.OpenPrompts(stamp=messages.time_of(now_us()), prompts=prompts))
 
     async def _say_active(self) -> None:
-        self._active.publish(messages.active_elements(self._feed.pictures.values(), now_us()))
+        self._active.publish(messages.active_elements(self._follower.views.values(), now_us()))
 
     async def _say_status(self) -> None:
         runs: list[Any] = []
-        for picture in list(self._feed.pictures.values()):
-            summary = picture.summary
+        for view in list(self._follower.views.values()):
+            summary = view.summary
             runs.append(messages.run_status(summary, await self.mission_time_s(summary)))
         self._status.publish(msg.MissionStatus(stamp=messages.time_of(now_us()), runs=runs))
 
@@ -163,8 +200,8 @@ class Topics:
         if not self._events.get_subscription_count():
             self._waiting.clear()  # what nobody hears is not kept: the journal has it
         for _ in range(min(EVENTS_AT_ONCE, len(self._waiting))):
-            picture, stamped, at_us = self._waiting.popleft()
+            view, stamped, at_us = self._waiting.popleft()
             try:
-                self._events.publish(messages.event(picture, stamped, at_us))
+                self._events.publish(messages.event(view, stamped, at_us))
             except Exception:  # one that no message can carry must not silence the others
                 log.exception("%s: record %d cannot be sent", stamped.run, stamped.seq)

@@ -1,31 +1,21 @@
-"""The parts that need no DDS: pace, settings, what diagnostics say, and catching up."""
+"""The parts that need no DDS: pace, settings, and what diagnostics say."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
-from m2pem_plugin_mocu import feed as feeds
 from m2pem_plugin_mocu.diagnostics import SILENT_AFTER_S, Health, Vehicles, diagnostics
-from m2pem_plugin_mocu.feed import Asked, Feed
 from m2pem_plugin_mocu.pacing import LEAST_S, MOST_S, Paced
-from m2pem_plugin_mocu.picture import Picture
 from m2pem_plugin_mocu.settings import SettingError, namespace, stays_on_loopback
 from m2pem_plugin_mocu.texts import one_line, sendable
-from mocu_world import fleet, until
+from mocu_world import fleet
 
 from m2pem.api import (
     LinkState,
-    PromptClosed,
     ResourceId,
-    RunStatus,
-    RunSummary,
-    StampedRecord,
     VehicleState,
 )
-from m2pem.api import records as r
-from m2pem.testing import scenarios
-from m2pem.testing.stage import stage
 
 OK, WARN, ERROR, STALE = b"\0", b"\1", b"\2", b"\3"
 UGV1 = ResourceId("ugv1")
@@ -104,88 +94,6 @@ def test_dds_stays_where_nothing_real_moves(said: str, simulated: bool, stays: b
 def test_texts_are_made_fit_for_messages() -> None:
     assert sendable("a\0b\ud800") == "a\N{REPLACEMENT CHARACTER}b?"
     assert one_line(" two\n lines \x1b[31m") == "two lines ?[31m"
-
-
-# --- runs -----------------------------------------------------------------------------------------
-
-
-def picture(*records: tuple[float, r.Record]) -> Picture:
-    made = Picture(RunSummary("r1", "", "", RunStatus.RUNNING, 0), None)
-    for seq, (t_s, record) in enumerate(records, 1):
-        assert made.apply(StampedRecord("r1", seq, t_s, record))
-    return made
-
-
-def test_pauses_are_counted_into_times_of_the_clock() -> None:
-    second = 1_000_000
-    made = picture(
-        (0.0, r.RunStarted("P", 100 * second)),
-        (10.0, r.RunPaused(110 * second)),
-        (10.0, r.RunResumed(140 * second)),
-        (15.0, r.TokenEntered(1, "P", "Task", 0)),
-        (20.0, r.RunEnded(r.RunOutcome.STOPPED, "enough")),
-    )
-    assert made.summary.ended_us == 150 * second
-    assert (made.summary.status, made.summary.detail) == (RunStatus.STOPPED, "enough")
-    assert made.active() == []
-
-
-def test_instances_are_counted_and_the_activity_itself_is_not() -> None:
-    entered = [r.TokenEntered(1, "P", "Task", 0)]
-    entered += [r.TokenEntered(2 + n, "P", "Task", 1, instance=n) for n in range(3)]
-    made = picture(*((float(n), record) for n, record in enumerate(entered)))
-    (active,) = made.active()
-    assert (active.element, active.tokens, active.since_us) == ("Task", 3, 0)
-
-
-def test_a_record_that_is_known_changes_nothing() -> None:
-    made = picture((0.0, r.RunStarted("P", 1)))
-    assert not made.apply(StampedRecord("r1", 1, 0.0, r.TokenEntered(1, "P", "Task", 0)))
-    assert made.active() == []
-
-
-class Heard:
-    """A listener that keeps what it is told."""
-
-    def __init__(self) -> None:
-        self.records: list[tuple[str, int]] = []
-        self.opened: list[str] = []
-        self.answered: list[str] = []
-
-    def recorded(self, _: Picture, stamped: StampedRecord) -> None:
-        self.records.append((stamped.run, stamped.seq))
-
-    def runs_changed(self) -> None: ...
-
-    def tokens_changed(self) -> None: ...
-
-    def asked(self, asked: Asked) -> None:
-        self.opened.append(asked.prompt.text)
-
-    def closed(self, _: Asked, closed: PromptClosed) -> None:
-        self.answered.append(closed.by)
-
-
-async def test_a_unit_that_fell_behind_reads_what_it_has_missed(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(feeds, "BACKLOG", 5)
-    monkeypatch.setattr(feeds, "AGAIN_S", 0.0)
-    heard = Heard()
-    async with stage(fleet()) as control:
-        feed = Feed(control)
-        following = asyncio.create_task(feed.follow(heard, lambda: 0))
-        await control.start(scenarios.question("Road?"))
-        await until(lambda: heard.opened == ["Road?"])
-        (prompt,) = control.prompts()
-        await control.answer("r1", prompt.prompt, "continue", by="anna")
-        await control.wait("r1")
-        last = (await control.records("r1"))[-1].seq
-        await until(lambda: len(heard.records) >= last)
-    await following
-    assert heard.records == [("r1", seq) for seq in range(1, last + 1)]
-    assert heard.answered == ["anna"]
-    assert "fell 5 notices behind" in caplog.text
 
 
 # --- diagnostics ----------------------------------------------------------------------------------

@@ -8,11 +8,10 @@ from rich.text import Text
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 
-from m2pem.api import ResourceId
+from m2pem.api import ResourceId, RunView
 from m2pem.api.control import MissionControl, RunId, RunStatus
 from m2pem.api.operator import operator_name
 from m2pem.errors import M2pemError, OperatorError
-from m2pem_plugin_terminal.board import Board
 from m2pem_plugin_terminal.dialogs import Choice, Choose, Confirm, Read, help_text
 from m2pem_plugin_terminal.display import Display
 from m2pem_plugin_terminal.handover import (
@@ -23,7 +22,7 @@ from m2pem_plugin_terminal.handover import (
     effects_text,
     with_operator,
 )
-from m2pem_plugin_terminal.stop import STOP_ALL
+from m2pem_plugin_terminal.status_lines import STOP_ALL
 
 
 class TerminalApp(Display):
@@ -36,7 +35,7 @@ class TerminalApp(Display):
         Binding("ctrl+c", "interrupt", priority=True),
         Binding("escape", "disarm", priority=True),
         *(Binding(str(number), f"answer({number})") for number in range(1, 10)),
-        Binding("tab", "next_question", priority=True),
+        Binding("tab", "next_prompt", priority=True),
         Binding("p", "pause"),
         Binding("s", "signals"),
         Binding("t", "take"),
@@ -65,8 +64,8 @@ class TerminalApp(Display):
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Escape and Tab are left to dialogs and fields unless they are needed here."""
         if action == "disarm":
-            return self.trigger.armed or (not self._in_dialog and self.log_pane.filtering)
-        if action == "next_question":
+            return self.stop_press.armed or (not self._in_dialog and self.log_pane.filtering)
+        if action == "next_prompt":
             return not self._in_dialog
         return True
 
@@ -85,27 +84,27 @@ class TerminalApp(Display):
 
         self.run_worker(asked(), exit_on_error=False)
 
-    def _active_board(self) -> Board | None:
-        board = self.board
-        if board is None or board.status.ended:
+    def _active_run(self) -> RunView | None:
+        view = self.view
+        if view is None or view.status.ended:
             self.say("No mission is running here")
             return None
-        return board
+        return view
 
     def action_stop(self) -> None:
         """STOP, at the second press."""
-        board = self._active_board()
-        if board is not None and self.trigger.press(f"STOP {board.run}"):
-            self.say(f"Stopping {board.run} ...", alarm=True)
+        view = self._active_run()
+        if view is not None and self.stop_press.press(f"STOP {view.run}"):
+            self.say(f"Stopping {view.run} ...", alarm=True)
             while self._in_dialog:
                 self.pop_screen()
             reason = f"by {self.by}"
-            self._carry_out("Stop", self.control.stop(board.run, by=self.by, reason=reason))
+            self._carry_out("Stop", self.control.stop(view.run, by=self.by, reason=reason))
         self.show()
 
     def action_stop_all(self) -> None:
         """STOP of every run, at the second press."""
-        if self.trigger.press(STOP_ALL):
+        if self.stop_press.press(STOP_ALL):
             self.say("Stopping all runs ...", alarm=True)
             while self._in_dialog:
                 self.pop_screen()
@@ -114,27 +113,27 @@ class TerminalApp(Display):
 
     def action_interrupt(self) -> None:
         """Ctrl-C: STOP; when nothing runs, leave."""
-        board = self.board
-        if board is not None and not board.status.ended:
+        view = self.view
+        if view is not None and not view.status.ended:
             self.action_stop()
-        elif self.trigger.press("Quit"):
+        elif self.stop_press.press("Quit"):
             self.exit()
         self.show()
 
     def action_disarm(self) -> None:
         """Not STOP after all; or the whole log again."""
-        if self.trigger.armed:
-            self.trigger.disarm()
+        if self.stop_press.armed:
+            self.stop_press.disarm()
         else:
             self.log_pane.clear_filter()
         self.show()
 
     def action_answer(self, number: int) -> None:
         """Answer the question that is shown."""
-        prompt, decision = self.questions.current, self.questions.decide(number)
+        prompt, decision = self.prompt_pane.current, self.prompt_pane.decision_on(number)
         if prompt is None or decision is None:
             return
-        if not self.questions.settled:
+        if not self.prompt_pane.settled:
             self.say("Not taken: the question has only just appeared. Read it, then press again")
             return
         self.own_answers.add((prompt.run, prompt.prompt))
@@ -148,27 +147,27 @@ class TerminalApp(Display):
 
         self._carry_out("Not taken", answer())
 
-    def action_next_question(self) -> None:
+    def action_next_prompt(self) -> None:
         """Tab."""
-        self.questions.turn()
+        self.prompt_pane.show_next()
         self.show()
 
     def action_pause(self) -> None:
         """Pause, or go on."""
-        board = self._active_board()
-        if board is None:
+        view = self._active_run()
+        if view is None:
             return
-        if board.status is RunStatus.PAUSED:
-            self._carry_out("Go on", self.control.resume(board.run, by=self.by))
+        if view.status is RunStatus.PAUSED:
+            self._carry_out("Go on", self.control.resume(view.run, by=self.by))
         else:
-            self._carry_out("Pause", self.control.pause(board.run, by=self.by))
+            self._carry_out("Pause", self.control.pause(view.run, by=self.by))
 
     async def action_signals(self) -> None:
         """Choose a signal by its name; those that are awaited come first."""
-        board = self._active_board()
-        if board is None:
+        view = self._active_run()
+        if view is None:
             return
-        signals = sorted(board.signals().items(), key=lambda item: not item[1][1])
+        signals = sorted(view.signals().items(), key=lambda item: not item[1][1])
         if not signals:
             self.say("This mission has no signals")
             return
@@ -179,7 +178,7 @@ class TerminalApp(Display):
 
         def send(signal: str | None) -> None:
             if signal is not None:
-                self._carry_out("Signal", self.control.signal(signal, run=board.run, by=self.by))
+                self._carry_out("Signal", self.control.signal(signal, run=view.run, by=self.by))
 
         await self.push_screen(Choose("Send a signal", choices), send)
         self.show()
@@ -246,8 +245,10 @@ class TerminalApp(Display):
         await self.control.give_back(resource, by=self.by)
 
     def _task_label(self, behavior: str) -> str:
-        tasks = (board.task(behavior) for board in self.feed.boards.values())
-        return next((task for task in tasks if task), behavior)
+        found = self._behavior(behavior)
+        if found is None:
+            return behavior
+        return self.follower.views[behavior.rpartition(".")[0]].label(found.element)
 
     async def action_runs(self) -> None:
         """Choose the run to look at."""
@@ -268,7 +269,7 @@ class TerminalApp(Display):
 
     async def _load_and_look(self, run: RunId) -> None:
         try:
-            await self.feed.load(run)
+            await self.follower.load(run)
         except M2pemError as error:
             self.say(str(error), alarm=True)
         else:
@@ -285,8 +286,8 @@ class TerminalApp(Display):
 
     async def action_leave(self) -> None:
         """Leave; what becomes of a mission that runs is asked."""
-        board = self.board
-        if board is None or board.status.ended:
+        view = self.view
+        if view is None or view.status.ended:
             self.exit()
             return
 
@@ -295,7 +296,7 @@ class TerminalApp(Display):
                 self.exit()
 
         choices = [Choice("leave", "Quit, and let the mission go on"), Choice("stay", "Stay")]
-        text = f"{board.run} is running. To stop it, press ^X twice."
+        text = f"{view.run} is running. To stop it, press ^X twice."
         await self.push_screen(Choose("Quit", choices, text), done)
         self.show()
 

@@ -13,8 +13,8 @@ from textual.screen import ModalScreen
 from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
-from m2pem_plugin_terminal.stop import StopBar
-from m2pem_plugin_terminal.words import shortened
+from m2pem_plugin_terminal.formatting import shortened
+from m2pem_plugin_terminal.status_lines import StopBar
 
 WIDTH = 60
 

@@ -1,33 +1,87 @@
 """The screen of the operator control unit: its panes, and how they are kept up to date."""
 
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 
 from textual import work
 from textual.app import App, ComposeResult
 from textual.containers import Horizontal, VerticalScroll
+from textual.theme import Theme
 from textual.widgets import Static
 
-from m2pem.api import ResourceId
-from m2pem.api.control import Alert, MissionControl, OpenPrompt, PromptClosed, RunId, RunStatus
+from m2pem.api import (
+    Alert,
+    Listener,
+    MissionControl,
+    OpenPrompt,
+    PromptClosed,
+    ResourceId,
+    RunId,
+    RunStatus,
+    RunView,
+    StampedRecord,
+    follow,
+)
+from m2pem.api.control import LOGGED
+from m2pem.api.run_view import Behavior, FinishedToken
 from m2pem.errors import M2pemError
-from m2pem_plugin_terminal.board import Board
-from m2pem_plugin_terminal.feed import Feed
 from m2pem_plugin_terminal.handover import taken
-from m2pem_plugin_terminal.header import header
-from m2pem_plugin_terminal.log_pane import LogPane
-from m2pem_plugin_terminal.notice import NoticeLine
-from m2pem_plugin_terminal.questions import Questions
-from m2pem_plugin_terminal.stop import StopBar, Trigger
-from m2pem_plugin_terminal.story import Line
-from m2pem_plugin_terminal.theme import THEME
-from m2pem_plugin_terminal.tree import mission_tree
-from m2pem_plugin_terminal.vehicles import Vehicles
+from m2pem_plugin_terminal.log_pane import Line, LogPane, line_of
+from m2pem_plugin_terminal.mission_pane import FADES_FOR_S, Done, mission_tree, shown_when_done
+from m2pem_plugin_terminal.prompt_pane import PromptPane
+from m2pem_plugin_terminal.status_lines import DoublePress, NoticeLine, StopBar, header
+from m2pem_plugin_terminal.vehicles_pane import Vehicles
 
 REFRESH_S = 0.25
 
+LOG_LINES = 2000
 
-class Display(App[None], inherit_bindings=False):
+DONE_TOKENS = 20
+
+THEME = Theme(
+    name="m2pem",
+    primary="#8ab4d8",
+    secondary="#7fc8a9",
+    accent="#e8c468",
+    warning="#e8c468",
+    error="#e07a6a",
+    success="#7fc8a9",
+    foreground="#c8d0d9",
+    background="#1b2129",
+    surface="#222a33",
+    panel="#2a333e",
+    dark=True,
+)
+"""Slate, with green for work, amber for what waits for the operator, red for STOP."""
+
+
+class RunLog:
+    """The log of a run, and its tokens that left lately."""
+
+    def __init__(self) -> None:
+        self.lines: deque[Line] = deque(maxlen=LOG_LINES)
+        self.done: deque[Done] = deque(maxlen=DONE_TOKENS)
+        self._seq = 0
+        self._last_finished: FinishedToken | None = None
+
+    def add(self, view: RunView, stamped: StampedRecord, at: float) -> Line | None:
+        """Add a record that the view has applied; return its line, if it has one and is new."""
+        if stamped.seq <= self._seq:
+            return None
+        self._seq = stamped.seq
+        last = view.finished[-1] if view.finished else None
+        if last is not None and last is not self._last_finished:
+            self._last_finished = last
+            if shown_when_done(view, last):
+                self.done.append(Done(last, at))
+        line = line_of(view, stamped)
+        if line is not None:
+            self.lines.append(line)
+        return line
+
+
+class Display(App[None], Listener, inherit_bindings=False):
     """Shows one run at a time. `now`: the operator's clock, in seconds."""
 
     CSS_PATH = "terminal.tcss"
@@ -44,9 +98,10 @@ class Display(App[None], inherit_bindings=False):
         super().__init__()
         self.control = control
         self.now = now
-        self.feed = Feed(control, self, now)
+        self.follower = follow(control, self)
+        self.logs: dict[RunId, RunLog] = {}
         self.run_shown: RunId = ""
-        self.trigger = Trigger(now)
+        self.stop_press = DoublePress(now)
         self._vehicles = Vehicles(control.fleet())
         self._time_s = 0.0
         self._asking_time = False
@@ -60,7 +115,7 @@ class Display(App[None], inherit_bindings=False):
         self._fleet = Static(id="fleet")
         self._around = VerticalScroll(self._fleet, id="vehicles", can_focus=False)
         self._notice = NoticeLine(now)
-        self.questions = Questions(now)
+        self.prompt_pane = PromptPane(now)
         self.log_pane = LogPane()
 
     # --- life -----------------------------------------------------------------------------------
@@ -69,7 +124,7 @@ class Display(App[None], inherit_bindings=False):
         """From top to bottom."""
         yield self._header
         yield Horizontal(self._mission, self._around, id="middle")
-        yield self.questions
+        yield self.prompt_pane
         yield self.log_pane
         yield self._notice
         yield StopBar()
@@ -81,64 +136,62 @@ class Display(App[None], inherit_bindings=False):
         self._mission.border_title = "Mission"
         self._around.border_title = "Vehicles"
         self.run_worker(self._follow())
-        self.run_worker(self._hear())
+        self.run_worker(self._follow_telemetry())
         self.set_interval(REFRESH_S, self.show)
 
     async def _follow(self) -> None:
         try:
-            await self.feed.follow()
+            await self.follower.run()
             self.say("The executive has ended.", alarm=True)
         except M2pemError as error:
             self.say(f"The executive cannot be followed any more: {error}", alarm=True)
 
-    async def _hear(self) -> None:
+    async def _follow_telemetry(self) -> None:
         try:
             async for state in self.control.telemetry():
-                self._vehicles.hear(state, self.now())
+                self._vehicles.update(state, self.now())
         except M2pemError as error:
             self.say(f"No telemetry any more: {error}", alarm=True)
 
     # --- what is shown --------------------------------------------------------------------------
 
     @property
-    def board(self) -> Board | None:
+    def view(self) -> RunView | None:
         """The run that is shown."""
-        return self.feed.boards.get(self.run_shown)
+        return self.follower.views.get(self.run_shown)
 
     def show(self) -> None:
         """Bring everything up to date."""
-        board, now = self.board, self.now()
-        if board is not None and not board.status.ended and not self._asking_time:
+        view, now = self.view, self.now()
+        if view is not None and not view.status.ended and not self._asking_time:
             self._asking_time = True
-            self.run_worker(self._ask_time(board), exit_on_error=False)
-        time_s = (
-            self._time_s if board and not board.status.ended else board.time_s if board else 0.0
-        )
+            self.run_worker(self._ask_time(view), exit_on_error=False)
+        time_s = self._time_s if view and not view.status.ended else view.t_s if view else 0.0
         if not self._asking_holders:
             self._asking_holders = True
             self._ask_holders()
-        active = [b for b in self.feed.boards.values() if not b.status.ended]
-        others = sum(1 for each in active if each is not board)
-        self._header.update(header(board, others, time_s, self.size.width))
-        if board is not None:
+        active = [b for b in self.follower.views.values() if not b.status.ended]
+        others = sum(1 for each in active if each is not view)
+        self._header.update(header(view, others, time_s, self.size.width))
+        if view is not None:
             width = self._mission.scrollable_content_region.width
-            self._tree.update(mission_tree(board, now, time_s, width))
+            self._tree.update(mission_tree(view, self.logs[view.run].done, now, time_s, width))
         width = self._around.scrollable_content_region.width
         self._fleet.update(
             self._vehicles.table(now, width, self._behavior_name, taken(self._holders))
         )
-        self.questions.show(self.feed.prompts, self._label, self.run_shown)
+        self.prompt_pane.show(self.follower.prompts, self._label, self.run_shown)
         self._notice.show()
-        paused = board is not None and board.status is RunStatus.PAUSED
+        paused = view is not None and view.status is RunStatus.PAUSED
         for each in self.screen_stack:
             for bar in each.query(StopBar):
-                bar.show(self.trigger, paused)
+                bar.show(self.stop_press, paused)
 
-    async def _ask_time(self, board: Board) -> None:
+    async def _ask_time(self, view: RunView) -> None:
         try:
-            self._time_s = await self.control.mission_time_s(board.run)
+            self._time_s = await self.control.mission_time_s(view.run)
         except M2pemError:
-            self._time_s = board.time_s
+            self._time_s = view.t_s
         finally:
             self._asking_time = False
 
@@ -153,64 +206,77 @@ class Display(App[None], inherit_bindings=False):
             self._asking_holders = False
 
     def _behavior_name(self, behavior: str) -> str:
-        names = (board.behavior_name(behavior) for board in self.feed.boards.values())
-        return next((name for name in names if name), behavior)
+        found = self._behavior(behavior)
+        return found.name if found is not None else behavior
+
+    def _behavior(self, id_: str) -> Behavior | None:
+        """Return a behavior of any run that has not ended."""
+        run = id_.rpartition(".")[0]
+        view = self.follower.views.get(run)
+        return view.behaviors.get(id_) if view is not None else None
 
     def _label(self, prompt: OpenPrompt) -> str:
-        board = self.feed.boards.get(prompt.run)
-        return board.label(prompt.element) if board is not None else prompt.element
+        view = self.follower.views.get(prompt.run)
+        return view.label(prompt.element) if view is not None else prompt.element
 
     def look_at(self, run: RunId) -> None:
         """Show another run."""
         self.run_shown = run
-        board = self.feed.boards[run]
-        self._time_s = board.time_s
-        self.log_pane.show(self.feed.logs[run])
+        view = self.follower.views[run]
+        self._time_s = view.t_s
+        self.log_pane.show(self.logs[run].lines)
         self.show()
 
     def say(self, text: str, *, alarm: bool = False) -> None:
         """Tell the operator something, for some seconds."""
         self._notice.say(text, alarm=alarm)
 
-    # --- what the feed tells --------------------------------------------------------------------
+    # --- what happens ---------------------------------------------------------------------------
 
-    def logged(self, run: RunId, line: Line) -> None:
-        """One more line."""
-        if run == self.run_shown:
+    def run_added(self, view: RunView) -> None:
+        """Show a new run, unless one that has not ended is shown."""
+        self._run_log(view.run)
+        shown = self.view
+        if shown is None or shown.status.ended:
+            self.look_at(view.run)
+        elif not view.status.ended:
+            self.say(f"{view.run} has begun; press r to look at it")
+
+    def recorded(self, view: RunView, stamped: StampedRecord, *, is_new: bool) -> None:
+        """Log a record."""
+        at = self.now() if is_new else self.now() - FADES_FOR_S
+        line = self._run_log(view.run).add(view, stamped, at)
+        if line is not None and is_new and view.run == self.run_shown:
             self.log_pane.add(line)
 
-    def alerted(self, alert: Alert) -> None:
-        """Show it as an alarm."""
-        self.say(f"{alert.run}: {alert.text}" if alert.run else alert.text, alarm=True)
+    def _run_log(self, run: RunId) -> RunLog:
+        return self.logs.setdefault(run, RunLog())
 
-    def asked(self, prompt: OpenPrompt) -> None:
+    def status_changed(self, view: RunView) -> None:
+        """Say how a run ended."""
+        if view.status.ended:
+            detail = f": {view.summary.detail}" if view.summary.detail else ""
+            bad = view.status in (RunStatus.FAILED, RunStatus.STOPPED)
+            self.say(f"{view.run} {view.status.value}{detail}", alarm=bad)
+
+    def prompt_opened(self, prompt: OpenPrompt) -> None:
         """Show it at once."""
         self.show()
 
-    def answered(self, prompt: OpenPrompt, closed: PromptClosed) -> None:
-        """Tell who answered, unless it was this operator here."""
+    def prompt_closed(self, prompt: OpenPrompt, closed: PromptClosed) -> None:
+        """Say who answered, unless it was the operator here."""
         key = (prompt.run, prompt.prompt)
         if key in self.own_answers:
             self.own_answers.discard(key)
         elif closed.by or closed.decision:
             label = {d.value: d.label for d in prompt.decisions}.get(closed.decision)
-            who = closed.by or "Somebody"
+            who = closed.by or "Another operator"
             self.say(f"{who} answered {self._label(prompt)}: {label or closed.decision}")
-        elif not self.feed.boards[prompt.run].status.ended:
+        elif not self.follower.views[prompt.run].status.ended:
             self.say(f"{self._label(prompt)} is no longer asked")
         self.show()
 
-    def began(self, run: RunId) -> None:
-        """Look at a new run, unless one that still runs is looked at."""
-        board = self.board
-        if board is None or board.status.ended:
-            self.look_at(run)
-        elif not self.feed.boards[run].status.ended:
-            self.say(f"{run} has begun; press r to look at it")
-
-    def ended(self, run: RunId) -> None:
-        """Tell how it ended."""
-        board = self.feed.boards[run]
-        detail = f": {board.outcome_detail}" if board.outcome_detail else ""
-        bad = board.status in (RunStatus.FAILED, RunStatus.STOPPED)
-        self.say(f"{run} {board.status.value}{detail}", alarm=bad)
+    def alerted(self, alert: Alert) -> None:
+        """Show it as an alarm, unless the log is shown as one, too."""
+        if alert.code != LOGGED:
+            self.say(f"{alert.run}: {alert.text}" if alert.run else alert.text, alarm=True)

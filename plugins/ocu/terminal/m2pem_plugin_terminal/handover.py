@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from m2pem_plugin_terminal.dialogs import Choice
-from m2pem_plugin_terminal.words import shortened
+from m2pem_plugin_terminal.formatting import shortened
 
 if TYPE_CHECKING:
     from m2pem.api import ResourceId

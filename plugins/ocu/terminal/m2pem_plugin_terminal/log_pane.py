@@ -1,6 +1,7 @@
-"""The log: what happened in the run that is looked at, all of it or the lines with some text."""
+"""The log: what happened in the run that is shown, all of it or the lines with some text."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from textwrap import wrap
 
 from rich.text import Text
@@ -8,16 +9,64 @@ from textual.app import ComposeResult
 from textual.containers import Vertical
 from textual.widgets import Input, RichLog
 
-from m2pem_plugin_terminal.story import Line, Weight
+from m2pem.api import Importance, RunView, StampedRecord, describe
+from m2pem.api import records as r
+from m2pem_plugin_terminal.formatting import clock_time
+
+LOGGED = frozenset(
+    (
+        r.RunStarted,
+        r.RunClaimed,
+        r.RunPaused,
+        r.RunResumed,
+        r.RunEnded,
+        r.OperatorTookControl,
+        r.OperatorGaveControlBack,
+        r.GeometryReceived,
+        r.BehaviorRequested,
+        r.BehaviorUnsettled,
+        r.BehaviorEnded,
+        r.PromptOpened,
+        r.PromptAnswered,
+        r.PromptWithdrawn,
+        r.ServiceEnded,
+        r.DataWritten,
+        r.SignalThrown,
+        r.MessageThrown,
+        r.EscalationThrown,
+        r.ErrorThrown,
+    )
+)
+"""Records that are logged; what tokens do is in the mission pane."""
 
 TIME_CELLS = 9
 
 STYLES = {
-    Weight.QUIET: "#747c86",
-    Weight.PLAIN: "#c8d0d9",
-    Weight.GOOD: "#8fb89a",
-    Weight.ALARM: "bold #e07a6a",
+    Importance.DETAIL: "#747c86",
+    Importance.NORMAL: "#c8d0d9",
+    Importance.GOOD: "#8fb89a",
+    Importance.ATTENTION: "#c8d0d9",
+    Importance.WARNING: "bold #e07a6a",
+    Importance.ERROR: "bold #e07a6a",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line of the log. `time`: mission time."""
+
+    time: str
+    text: str
+    importance: Importance = Importance.NORMAL
+
+
+def line_of(view: RunView, stamped: StampedRecord) -> Line | None:
+    """Return the line of a record; None for one that is not logged."""
+    record = stamped.record
+    if type(record) not in LOGGED or (isinstance(record, r.ServiceEnded) and not record.code):
+        return None
+    description = describe(stamped, view)
+    return Line(clock_time(stamped.t_s), description.text, description.importance)
 
 
 class LogPane(Vertical):
@@ -113,5 +162,5 @@ def _styled(line: Line, width: int) -> Text:
     parts = wrap(" ".join(line.text.split()), max(20, width - TIME_CELLS)) or [""]
     text = Text(f"{line.time:>{TIME_CELLS - 2}}  ", "#747c86")
     for place, part in enumerate(parts):
-        text.append(("\n" + " " * TIME_CELLS if place else "") + part, STYLES[line.weight])
+        text.append(("\n" + " " * TIME_CELLS if place else "") + part, STYLES[line.importance])
     return text

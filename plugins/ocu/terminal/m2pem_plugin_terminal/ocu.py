@@ -50,7 +50,7 @@ class TerminalOcu:
             try:
                 await asyncio.shield(serving)
             except asyncio.CancelledError:
-                if app.board is not None and app.board.status.ended:
+                if app.view is not None and app.view.status.ended:
                     await asyncio.wait([serving], timeout=LINGERS_FOR_S)
                 app.exit()
                 await serving

@@ -1,6 +1,6 @@
 """What the other keys do, and what the screen shows of missions."""
 
-from m2pem_plugin_terminal.tree import mission_tree
+from m2pem_plugin_terminal.mission_pane import mission_tree
 from terminal_world import MISSION, World, scout
 
 from m2pem.api.telemetry import (
@@ -35,14 +35,14 @@ async def test_what_is_done_fades_and_goes(world: World) -> None:
         await world.fake.until_called("start", "r1.b1")
         for state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING, BehaviorState.SUCCEEDED):
             world.fake.report("r1.b1", state)
-        await terminal.until_shown("✓ DRIVE", "DRIVE: succeeded", "1/4 tasks")
+        await terminal.until_shown("✓ DRIVE", "scout ends drive_stop: succeeded", "1/4 tasks")
         fresh = terminal.app.export_screenshot()
         world.hand.now_s += 5
         await terminal.until(lambda: terminal.app.export_screenshot() != fresh)
         assert terminal.shows("✓ DRIVE")
         world.hand.now_s += 6
         await terminal.until_gone("✓ DRIVE")
-        assert terminal.shows("DRIVE: succeeded")
+        assert terminal.shows("scout ends drive_stop: succeeded")
 
 
 async def test_pause_and_go_on(world: World) -> None:
@@ -52,7 +52,7 @@ async def test_pause_and_go_on(world: World) -> None:
         await terminal.press("p")
         await terminal.until_shown("PAUSED", "by anna@gcs1", "p Go on")
         await terminal.press("p")
-        await terminal.until_shown("RUNNING", "resumed by anna@gcs1")
+        await terminal.until_shown("RUNNING", "r1 resumed by anna@gcs1")
 
 
 async def test_a_signal_is_chosen_by_its_name(world: World) -> None:
@@ -62,7 +62,7 @@ async def test_a_signal_is_chosen_by_its_name(world: World) -> None:
         await terminal.press("s")
         await terminal.until_shown("1 Come home  awaited", "2 Take a photo")
         await terminal.press("1")
-        await terminal.until_shown("signal Come home by anna@gcs1", "- DRIVE")
+        await terminal.until_shown("anna@gcs1: signal 'Come home'", "- DRIVE")
         assert not terminal.shows("Send a signal")
 
 
@@ -92,7 +92,7 @@ async def test_digits_in_a_dialog_answer_no_question(world: World) -> None:
 async def test_the_filter_leaves_out_other_lines(world: World) -> None:
     async with world.terminal() as terminal:
         await world.start()
-        await terminal.until_shown("GATE asks", "mission started")
+        await terminal.until_shown("GATE asks", "of PATROL started")
         await terminal.press("slash", *"bridge", "enter")
         await terminal.until_shown("Log: bridge", "BRIDGE asks")
         assert not terminal.shows("GATE asks")
@@ -187,8 +187,8 @@ async def test_the_end_can_be_drawn_on_a_screen_without_width(world: World) -> N
         await terminal.until_shown("RUNNING")
         await world.control.stop(run)
         await terminal.until_shown("STOPPED")
-        assert terminal.app.board is not None
-        assert mission_tree(terminal.app.board, 0.0, 0.0, 0).plain.startswith("s\nt\no")
+        assert terminal.app.view is not None
+        assert mission_tree(terminal.app.view, (), 0.0, 0.0, 0).plain.startswith("s\nt\no")
 
 
 async def test_quitting_while_a_mission_runs_is_asked_about(world: World) -> None:
@@ -236,7 +236,7 @@ async def test_the_log_follows_unless_looked_back(world: World) -> None:
         await terminal.press("pageup")
         await terminal.until_gone("g7 received")
         await world.control.set_geometry("g8", POINT, run=run, by="anna")
-        await terminal.until(lambda: len(terminal.app.feed.logs[run]) == 13)
+        await terminal.until(lambda: len(terminal.app.logs[run].lines) == 13)
         assert not terminal.shows("g8 received")
         await terminal.press("pagedown", "pagedown")
         await terminal.until_shown("g8 received")

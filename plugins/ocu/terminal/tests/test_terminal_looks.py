@@ -72,5 +72,5 @@ async def test_stop_over_a_dialog(world: World, terminal: Terminal) -> None:
 async def test_somebody_else_answered_and_things_are_done(world: World, terminal: Terminal) -> None:
     for state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING, BehaviorState.FAILED):
         world.fake.report("r1.b1", state, "ROUTE_BLOCKED" if state == "FAILED" else "")
-    await terminal.until_shown("FAILED", "mission failed", "drive_stop ended FAILED")
+    await terminal.until_shown("FAILED", "r1 failed", "drive_stop ended FAILED")
     await compare(terminal, "failed")

@@ -151,9 +151,9 @@ def test_scripts_pause_signal_and_stop(tmux: Tmux) -> None:
     assert tmux.m2pem("pause r1").returncode == 0
     anna.until_shown("PAUSED", "by script@here")
     assert tmux.m2pem("continue r1 --by carol@gcs3").returncode == 0
-    anna.until_shown("RUNNING", "resumed by carol@gcs3")
+    anna.until_shown("RUNNING", "r1 resumed by carol@gcs3")
     assert tmux.m2pem("signal r1 'Stop driving'").returncode == 0
-    anna.until_shown("signal Stop driving by script@here")
+    anna.until_shown("script@here: signal 'Stop driving'")
     assert tmux.m2pem("stop r1 --reason 'people on the road'").returncode == 0
     anna.until_shown("r1 stopped: people on the road", "status 130")
 

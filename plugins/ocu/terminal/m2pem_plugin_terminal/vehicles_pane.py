@@ -1,4 +1,4 @@
-"""The vehicles pane: the latest of every vehicle, greyed when nothing is heard of it any more."""
+"""The vehicles pane: the latest state of every vehicle and payload, grey when it is silent."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -15,8 +15,7 @@ from m2pem.api.telemetry import (
     Telemetry,
     VehicleState,
 )
-from m2pem_plugin_terminal.payloads import payload_words
-from m2pem_plugin_terminal.words import shortened
+from m2pem_plugin_terminal.formatting import shortened
 
 if TYPE_CHECKING:
     from m2pem.fleet.fleet import Fleet
@@ -33,14 +32,16 @@ LINKS = {
 }
 NAME_CELLS = 9
 MARCH_FOR_S = 2.0
-"""What was told of a march is shown for so long."""
+"""The latest state of a march is shown for so long."""
 
 AT_ITS_PLACE_M = 1.0
 LOW_BATTERY = 0.2
+ASIDE_DEG, ZOOMED = 0.5, 1.05
+"""Nearer to straight ahead and to the widest view, nothing is shown."""
 
 
 @dataclass(slots=True)
-class _Heard:
+class _Latest:
     state: VehicleState | PayloadState
     at: float
 
@@ -50,15 +51,15 @@ class Vehicles:
 
     def __init__(self, fleet: "Fleet") -> None:
         self._fleet = fleet
-        self._heard: dict[str, _Heard] = {}
+        self._latest: dict[str, _Latest] = {}
         self._marching: dict[str, tuple[TeamMemberState, float]] = {}
 
-    def hear(self, state: Telemetry, now: float) -> None:
-        """Take telemetry in; `now` is the operator's clock, in seconds."""
+    def update(self, state: Telemetry, now: float) -> None:
+        """Keep a state as the latest; `now` is the operator's clock, in seconds."""
         if isinstance(state, TeamState):
             self._marching.update({each.resource: (each, now) for each in state.members})
             return
-        self._heard[state.resource] = _Heard(state, now)
+        self._latest[state.resource] = _Latest(state, now)
 
     def table(
         self, now: float, width: int, named: Callable[[str], str], taken: Mapping[str, str]
@@ -71,23 +72,23 @@ class Vehicles:
         lines: list[Text] = []
         for vehicle in self._fleet.vehicles.values():
             silent_s = vehicle.lost_after_s or SILENT_AFTER_S
-            heard = self._heard.get(vehicle.id)
+            latest = self._latest.get(vehicle.id)
             holders = _taken((vehicle.id, *vehicle.payloads), taken, width)
-            if heard is None or not isinstance(heard.state, VehicleState):
+            if latest is None or not isinstance(latest.state, VehicleState):
                 lines += [Text(f"○ {_name(vehicle.id)} not heard of yet", GREY), *holders]
                 continue
-            age_s = now - heard.at
-            payloads = [self._heard[p].state for p in vehicle.payloads if p in self._heard]
-            if age_s > silent_s or heard.state.link is LinkState.LOST:
-                lines += _silent(heard.state, age_s)
+            age_s = now - latest.at
+            payloads = [self._latest[p].state for p in vehicle.payloads if p in self._latest]
+            if age_s > silent_s or latest.state.link is LinkState.LOST:
+                lines += _silent(latest.state, age_s)
             else:
-                lines += _vehicle(heard.state, payloads, width, named)
+                lines += _vehicle(latest.state, payloads, width, named)
                 lines += self._place(vehicle.id, now)
             lines += holders
         return Text("\n").join(lines)
 
     def _place(self, vehicle: str, now: float) -> list[Text]:
-        """How well a member of a march keeps its place, as long as that is told."""
+        """Return how well a member of a march keeps its place, while its state is recent."""
         member, at = self._marching.get(vehicle, (None, 0.0))
         if member is None or member.along_m is None or now - at > MARCH_FOR_S:
             return []
@@ -142,11 +143,11 @@ def _vehicle(
     doing = [named(state.behavior)] if state.behavior else []
     looking: list[Text] = []
     for payload in payloads:
-        words = payload_words(payload, named) if isinstance(payload, PayloadState) else ""
-        if isinstance(payload, PayloadState) and payload.pan_rad is not None and words:
-            looking.append(Text(f"  {shortened(words, width - 2)}", "#7fc8a9"))
-        elif words:
-            doing.append(words)
+        shown = payload_text(payload, named) if isinstance(payload, PayloadState) else ""
+        if isinstance(payload, PayloadState) and payload.pan_rad is not None and shown:
+            looking.append(Text(f"  {shortened(shown, width - 2)}", "#7fc8a9"))
+        elif shown:
+            doing.append(shown)
     if doing:
         lines.append(Text(shortened(f"{', '.join(doing)}", width - 2), "#7fc8a9"))
         lines[-1] = Text("  ").append_text(lines[-1])
@@ -162,3 +163,36 @@ def _position(state: VehicleState) -> str:
     text = f"{position.latitude_deg:.5f} {position.longitude_deg:.5f}"
     above = state.altitude_above_home_m
     return f"{text} {above:+.0f} m" if above is not None and abs(above) >= 1 else text
+
+
+def payload_text(state: PayloadState, named: Callable[[str], str]) -> str:
+    """Such as "ptz: 30°→ 10°↓ x4 ptz_track"; "" if there is nothing to say.
+
+    `named` gives the name of a behavior by its id. Pan is from the vehicle's heading; "→" is
+    clockwise.
+    """
+    if state.link is LinkState.LOST:
+        parts = ["not heard"]
+    else:
+        parts = _look(state)
+        if state.behavior:
+            parts.append(named(state.behavior))
+    return f"{state.resource.rpartition('/')[2]}: {' '.join(parts)}" if parts else ""
+
+
+def _look(state: PayloadState) -> list[str]:
+    pan_rad = state.pan_rad
+    if pan_rad is not None and math.isfinite(pan_rad):
+        pan_rad = math.remainder(pan_rad, math.tau)
+    zoom = f"x{state.zoom:.2g}" if state.zoom is not None and state.zoom >= ZOOMED else ""
+    return [each for each in (_turned(pan_rad, "→←"), _turned(state.tilt_rad, "↑↓"), zoom) if each]
+
+
+def _turned(angle_rad: float | None, arrows: str) -> str:
+    """`arrows`: for an angle above 0, and below."""
+    if angle_rad is None or not math.isfinite(angle_rad):
+        return ""
+    angle_deg = math.degrees(angle_rad)
+    if abs(angle_deg) < ASIDE_DEG:
+        return ""
+    return f"{abs(angle_deg):.0f}°{arrows[angle_deg < 0]}"

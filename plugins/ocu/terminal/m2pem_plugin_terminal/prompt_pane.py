@@ -1,4 +1,4 @@
-"""The questions that stand, one of them shown, with its decisions on the keys 1 to 9."""
+"""The prompt pane: one of the open prompts, with its decisions on the keys 1 to 9."""
 
 from collections.abc import Callable, Mapping
 
@@ -10,20 +10,20 @@ from textual.widgets import Static
 from m2pem.api.control import OpenPrompt, RunId
 
 SETTLES_IN_S = 0.7
-"""A question that has just appeared takes no key: it may have been meant for the one before."""
+"""A prompt that has just appeared takes no key: it may have been meant for the one before."""
 
 MOST_DECISIONS = 9
 
 
-class Questions(Vertical):
-    """Hidden while there is none. `show` says what stands; `decide` what a key means."""
+class PromptPane(Vertical):
+    """Hidden while no prompt is open. `show` sets the open prompts; `decision_on` reads a key."""
 
     def __init__(self, now: Callable[[], float]) -> None:
         super().__init__(id="questions")
         self._text = Static(id="question")
         self._decisions = Static(id="decisions")
         self._now = now
-        self._standing: dict[tuple[RunId, str], OpenPrompt] = {}
+        self._open: dict[tuple[RunId, str], OpenPrompt] = {}
         self._current: tuple[RunId, str] | None = None
         self._since = 0.0
 
@@ -34,52 +34,52 @@ class Questions(Vertical):
 
     @property
     def current(self) -> OpenPrompt | None:
-        """The question that is shown."""
-        return None if self._current is None else self._standing.get(self._current)
+        """The prompt that is shown."""
+        return None if self._current is None else self._open.get(self._current)
 
     @property
     def settled(self) -> bool:
-        """Whether the question has been there long enough to be answered."""
+        """Whether the prompt has been shown long enough to be answered."""
         return self._now() - self._since >= SETTLES_IN_S
 
     def show(
         self,
-        standing: Mapping[tuple[RunId, str], OpenPrompt],
+        prompts: Mapping[tuple[RunId, str], OpenPrompt],
         label: Callable[[OpenPrompt], str],
         run: RunId,
     ) -> None:
-        """Show what stands; `label` names the element, `run` is the run that is looked at."""
-        self._standing = dict(standing)
-        if self._current not in self._standing:
-            self._turn_to(next(iter(self._standing), None))
+        """Show the open prompts; `label` names the element, `run` is the run that is shown."""
+        self._open = dict(prompts)
+        if self._current not in self._open:
+            self._show_prompt(next(iter(self._open), None))
         self.display = self._current is not None
         prompt = self.current
         if prompt is None:
             return
-        place = list(self._standing).index((prompt.run, prompt.prompt)) + 1
-        several = len(self._standing) > 1
-        count = f"Question {place} of {len(self._standing)}" if several else "Question"
+        place = list(self._open).index((prompt.run, prompt.prompt)) + 1
+        several = len(self._open) > 1
+        count = f"Question {place} of {len(self._open)}" if several else "Question"
         address = prompt.prompt if prompt.run == run else f"{prompt.run} {prompt.prompt}"
         role = f" for {prompt.role}" if prompt.role else ""
-        turn = "   (Tab: next)" if several else ""
-        self.border_title = Text(f"{count}{role}: {label(prompt)} ({address}){turn}")
+        hint = "   (Tab: next)" if several else ""
+        self.border_title = Text(f"{count}{role}: {label(prompt)} ({address}){hint}")
         self._text.update(Text(prompt.text))
         self._decisions.update(_decisions(prompt))
 
-    def turn(self) -> None:
-        """Show the next one."""
-        keys = list(self._standing)
+    def show_next(self) -> None:
+        """Show the next prompt."""
+        keys = list(self._open)
         if self._current in keys and len(keys) > 1:
-            self._turn_to(keys[(keys.index(self._current) + 1) % len(keys)])
+            self._show_prompt(keys[(keys.index(self._current) + 1) % len(keys)])
 
-    def decide(self, number: int) -> str | None:
-        """The decision on a key, from 1; None when there is none."""
+    def decision_on(self, number: int) -> str | None:
+        """Return the decision on a key, from 1; None when there is none."""
         prompt = self.current
         if prompt is None or not 1 <= number <= min(len(prompt.decisions), MOST_DECISIONS):
             return None
         return prompt.decisions[number - 1].value
 
-    def _turn_to(self, key: tuple[RunId, str] | None) -> None:
+    def _show_prompt(self, key: tuple[RunId, str] | None) -> None:
         self._current = key
         self._since = self._now()
 

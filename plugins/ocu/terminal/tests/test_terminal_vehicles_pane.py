@@ -1,10 +1,10 @@
-"""What is said of payloads, in words."""
+"""Payloads in the vehicles pane."""
 
 import math
 from typing import Any
 
 import pytest
-from m2pem_plugin_terminal.payloads import payload_words
+from m2pem_plugin_terminal.vehicles_pane import payload_text
 
 from m2pem.api.telemetry import LinkState, PayloadState
 from m2pem.mission.catalogue import ResourceId
@@ -31,4 +31,4 @@ from m2pem.mission.catalogue import ResourceId
 )
 def test_where_it_looks_is_told_if_that_matters(said: dict[str, Any], words: str) -> None:
     state = PayloadState(ResourceId("evsg2/ptz"), 0, **said)
-    assert payload_words(state, lambda _: "track") == words
+    assert payload_text(state, lambda _: "track") == words

@@ -9,7 +9,7 @@ async def test_a_key_answers_the_question_that_is_shown(world: World) -> None:
         await terminal.until_shown("Question 1 of 2: GATE (", "Is the gate open?")
         assert terminal.line("It is open") == "  1  It is open    2  It is closed"
         await terminal.press("2")
-        await terminal.until_shown("GATE: no by anna@gcs1", "Question: BRIDGE")
+        await terminal.until_shown("GATE: no, answered by anna@gcs1", "Question: BRIDGE")
     written = [str(each.record) for each in await world.control.records(run)]
     assert any("PromptAnswered" in text and "anna@gcs1" in text for text in written)
 
@@ -21,7 +21,7 @@ async def test_tab_turns_to_the_next_question_and_back(world: World) -> None:
         await terminal.press("tab")
         await terminal.until_shown("Question 2 of 2: BRIDGE", "Can the bridge be crossed?")
         await terminal.press("1")
-        await terminal.until_shown("BRIDGE: cross by anna@gcs1", "Question: GATE")
+        await terminal.until_shown("BRIDGE: cross, answered by anna@gcs1", "Question: GATE")
 
 
 async def test_a_key_without_a_decision_does_nothing(world: World) -> None:
@@ -55,7 +55,7 @@ async def test_the_first_of_two_operators_wins_and_the_other_is_told(world: Worl
         await bob.until_shown("Question 1 of 2: GATE (")
         await bob.press("2")
         await anna.until_shown("bob@gcs2 answered GATE: It is closed", "Question: BRIDGE")
-        await bob.until_shown("GATE: no by bob@gcs2", "Question: BRIDGE")
+        await bob.until_shown("GATE: no, answered by bob@gcs2", "Question: BRIDGE")
         assert not bob.shows("answered GATE")
 
 
@@ -63,16 +63,16 @@ async def test_an_answer_that_comes_too_late_is_told(world: World) -> None:
     async with world.terminal("anna@gcs1") as anna:
         run = await world.start()
         await anna.until_shown("Question 1 of 2: GATE (")
-        prompt = anna.app.questions.current
+        prompt = anna.app.prompt_pane.current
         assert prompt is not None
         world.hand.now_s += 1
-        anna.app.action_answer(1)  # and, before it is sent, somebody else does
+        anna.app.action_answer(1)  # and, before it is sent, another operator does
         await world.control.answer(run, prompt.prompt, "no", by="bob@gcs2")
-        await anna.until_shown("GATE: no by bob@gcs2")
+        await anna.until_shown("GATE: no, answered by bob@gcs2")
         await anna.until(lambda: anna.shows("Not taken") or anna.shows("bob@gcs2 answered"))
 
 
-async def test_a_question_that_stood_before_is_shown(world: World) -> None:
+async def test_a_question_that_was_open_before_is_shown(world: World) -> None:
     await world.start()
     async with world.terminal() as terminal:
         await terminal.until_shown("Question 1 of 2: GATE (", "GATE asks: Is the gate open?")

@@ -2,7 +2,7 @@ import pytest
 
 from m2pem.api.control import StampedRecord
 from m2pem.bpmn import parse_mission
-from m2pem.cli.story import Story, printable
+from m2pem.cli.line_formatter import LineFormatter
 from m2pem.engine import records as r
 from m2pem.engine.records import Record, RunOutcome, TokenOutcome
 from m2pem.mission.catalogue import BehaviorState
@@ -16,10 +16,12 @@ REQUESTED = r.BehaviorRequested(
 STOP = "dc45ff2b-ef6b-45bd-96e6-c7ac8ef055c2"
 
 
-def tell(*records: Record, run: str = "r1") -> str | None:
-    """What is said of the last of these."""
-    story = Story(lambda _: VIGNETTE)
-    said = [story.tell(StampedRecord(run, n, 12.34, record)) for n, record in enumerate(records)]
+def formatted(*records: Record, run: str = "r1") -> str | None:
+    """The line about the last of these."""
+    lines = LineFormatter(lambda _: VIGNETTE)
+    said = [
+        lines.format(StampedRecord(run, n, 12.34, record)) for n, record in enumerate(records, 1)
+    ]
     return said[-1] if said[-1] is None else said[-1].removeprefix("     12.3 s  ")
 
 
@@ -29,7 +31,7 @@ def tell(*records: Record, run: str = "r1") -> str | None:
         (r.RunStarted("VIGNETTE1", 0, "ann"), "r1 of VIGNETTE1 started by ann"),
         (r.RunClaimed(2), "r1 taken up again"),
         (r.RunPaused(0, "ann"), "r1 paused by ann"),
-        (r.RunResumed(0, "ann"), "r1 goes on by ann"),
+        (r.RunResumed(0, "ann"), "r1 resumed by ann"),
         (r.RunEnded(RunOutcome.FAILED, "stuck"), "r1 failed: stuck"),
         (r.TokenEntered(*ON_ROUTE), "DRIVE ROUTE"),
         (r.TokenLeft(*ON_ROUTE, TokenOutcome.INTERRUPTED), "DRIVE ROUTE: interrupted"),
@@ -75,7 +77,7 @@ def tell(*records: Record, run: str = "r1") -> str | None:
     ],
 )
 def test_a_record_that_matters_is_a_line(record: Record, said: str) -> None:
-    assert tell(record) == said
+    assert formatted(record) == said
 
 
 @pytest.mark.parametrize(
@@ -89,7 +91,7 @@ def test_a_record_that_matters_is_a_line(record: Record, said: str) -> None:
     ],
 )
 def test_what_matters_to_programs_only_is_no_line(record: Record) -> None:
-    assert tell(record) is None
+    assert formatted(record) is None
 
 
 @pytest.mark.parametrize(
@@ -104,45 +106,43 @@ def test_the_end_of_a_behavior_names_who_did_what(
     state: BehaviorState, code: str, reason: str, how: str
 ) -> None:
     ended = r.BehaviorEnded(*ON_ROUTE, "r1.b1", state, code, reason)
-    assert tell(REQUESTED, ended) == f"DRIVE ROUTE: evsg1 ends single_vehicle_routing: {how}"
+    assert formatted(REQUESTED, ended) == f"DRIVE ROUTE: evsg1 ends single_vehicle_routing: {how}"
 
 
 def test_a_held_behavior_names_who_does_what() -> None:
     held = r.BehaviorUnsettled("r1.b1", BehaviorState.UNKNOWN, "not known any more")
-    assert tell(REQUESTED, held) == "evsg1: single_vehicle_routing: held, not known any more"
+    assert formatted(REQUESTED, held) == "evsg1: single_vehicle_routing: held, not known any more"
 
 
 def test_a_second_run_is_named() -> None:
-    story = Story(lambda _: VIGNETTE)
-    first = story.tell(StampedRecord("r1", 1, 0.0, r.RunPaused(0)))
-    second = story.tell(StampedRecord("r2", 1, 0.0, r.RunPaused(0)))
+    lines = LineFormatter(lambda _: VIGNETTE)
+    first = lines.format(StampedRecord("r1", 1, 0.0, r.RunPaused(0)))
+    second = lines.format(StampedRecord("r2", 1, 0.0, r.RunPaused(0)))
     assert (first, second) == ("      0.0 s  r1 paused", "      0.0 s  r2   r2 paused")
 
 
 def test_every_run_is_named_when_there_are_several() -> None:
-    story = Story(lambda _: VIGNETTE, one=False)
-    assert story.tell(StampedRecord("r1", 1, 0.0, r.RunPaused(0))) == "      0.0 s  r1   r1 paused"
+    lines = LineFormatter(lambda _: VIGNETTE, one=False)
+    assert (
+        lines.format(StampedRecord("r1", 1, 0.0, r.RunPaused(0))) == "      0.0 s  r1   r1 paused"
+    )
 
 
-def test_a_run_whose_diagram_is_not_known_is_told_by_ids() -> None:
-    story = Story(lambda _: None)
+def test_a_run_whose_diagram_is_not_known_is_described_with_ids() -> None:
+    lines = LineFormatter(lambda _: None)
     entered = r.TokenEntered(1, "P", "Unknown", 1)
-    assert story.tell(StampedRecord("r1", 1, 0.0, entered)) == "      0.0 s  Unknown"
+    assert lines.format(StampedRecord("r1", 1, 0.0, entered)) == "      0.0 s  Unknown"
 
 
 def test_an_instance_says_which_it_is() -> None:
-    story = Story(lambda _: None)
+    lines = LineFormatter(lambda _: None)
     entered = r.TokenEntered(2, "P", "Survey", 2, instance=0)
-    told = story.tell(StampedRecord("r1", 1, 0.0, entered))
+    told = lines.format(StampedRecord("r1", 1, 0.0, entered))
     assert told == "      0.0 s  Survey, instance 0"
 
 
 def test_colour_is_for_terminals() -> None:
-    story = Story(lambda _: VIGNETTE, colour=True)
-    line = story.tell(StampedRecord("r1", 1, 0.0, r.RunPaused(0)))
+    lines = LineFormatter(lambda _: VIGNETTE, colour=True)
+    line = lines.format(StampedRecord("r1", 1, 0.0, r.RunPaused(0)))
     assert line is not None
     assert line.startswith("\x1b[33m")
-
-
-def test_names_cannot_steer_a_terminal() -> None:
-    assert printable("a\x1b[2J\nb\tc\u202e") == "a?[2J b c?"

@@ -1,0 +1,409 @@
+"""Records as sentences for people, with the names of the diagram.
+
+`describe` is the one place that words records: the log of a terminal, the lines of `m2pem run`,
+the event list of the page and the events over ROS all show its sentences. A unit chooses which
+records it shows, and how `kind` and `importance` look.
+"""
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+from m2pem.api import records as r
+from m2pem.api.control import StampedRecord
+from m2pem.api.run_view import RunView
+from m2pem.mission.catalogue import BehaviorState
+
+VALUE_CHARACTERS = 200
+"""A sentence has so many characters of a value at most; the record has all of it."""
+
+
+class Kind(StrEnum):
+    """What a record is about; units filter and colour by it."""
+
+    RUN = "run"
+    TOKENS = "tokens"
+    BEHAVIORS = "behaviors"
+    PROMPTS = "prompts"
+    EVENTS = "events"
+    DATA = "data"
+    OPERATORS = "operators"
+
+
+class Importance(StrEnum):
+    """How much an operator needs to see a record.
+
+    ATTENTION: it is expected, and needs a look, as a prompt does. WARNING: something may be wrong.
+    ERROR: something has failed.
+    """
+
+    DETAIL = "detail"
+    NORMAL = "normal"
+    GOOD = "good"
+    ATTENTION = "attention"
+    WARNING = "warning"
+    ERROR = "error"
+
+    @property
+    def is_urgent(self) -> bool:
+        """Whether it is at least ATTENTION."""
+        return self in (Importance.ATTENTION, Importance.WARNING, Importance.ERROR)
+
+
+class Description(NamedTuple):
+    """A sentence about a record, on one line."""
+
+    text: str
+    kind: Kind
+    importance: Importance
+
+
+def describe(stamped: StampedRecord, view: RunView) -> Description:
+    """Describe a record of a run. `view` gives names, and may be of any time after the record.
+
+    Behaviors and prompts that ended long before have their ids in place of their names.
+    """
+    record = stamped.record
+    sentence = _SENTENCES.get(type(record))
+    text, importance = sentence(view, record) if sentence else _unknown(view, record)
+    return Description(printable(text), kind_of(record), importance)
+
+
+def kind_of(record: r.Record) -> Kind:
+    """Return what a record is about."""
+    return _KINDS.get(type(record), Kind.TOKENS)
+
+
+def printable(text: str) -> str:
+    """Return a text on one line, with "?" for control characters.
+
+    Names come from files and networks; they must not control a terminal.
+    """
+    line = " ".join(text.split())
+    return line if line.isprintable() else "".join(c if c.isprintable() else "?" for c in line)
+
+
+def _by(record: Any) -> str:
+    return f" by {record.by}" if record.by else ""
+
+
+def _in_brackets(text: str) -> str:
+    return f" ({text})" if text else ""
+
+
+def _after_colon(text: str) -> str:
+    return f": {text}" if text else ""
+
+
+def _caught(view: RunView, record: r.EscalationThrown | r.ErrorThrown) -> str:
+    return f"caught by {view.label(record.caught_by)}" if record.caught_by else "not caught"
+
+
+def _behavior(view: RunView, id_: str) -> str:
+    behavior = view.behavior(id_)
+    return f"{', '.join(behavior.resources)}: {behavior.name}" if behavior is not None else id_
+
+
+_Sentence = tuple[str, Importance]
+
+
+def _unknown(view: RunView, record: Any) -> _Sentence:
+    element = getattr(record, "element", "")
+    name = type(record).__name__
+    return f"{name}: {view.label(element)}" if element else name, Importance.DETAIL
+
+
+# --- the run --------------------------------------------------------------------------------------
+
+
+def _run_started(view: RunView, record: r.RunStarted) -> _Sentence:
+    return f"{view.run} of {view.label(record.process)} started{_by(record)}", Importance.GOOD
+
+
+def _run_claimed(view: RunView, record: r.RunClaimed) -> _Sentence:
+    return f"{view.run} taken up again{_by(record)}", Importance.GOOD
+
+
+def _run_paused(view: RunView, record: r.RunPaused) -> _Sentence:
+    return f"{view.run} paused{_by(record)}", Importance.WARNING
+
+
+def _run_resumed(view: RunView, record: r.RunResumed) -> _Sentence:
+    return f"{view.run} resumed{_by(record)}", Importance.NORMAL
+
+
+def _run_ended(view: RunView, record: r.RunEnded) -> _Sentence:
+    good = record.outcome in (r.RunOutcome.COMPLETED, r.RunOutcome.TERMINATED)
+    text = f"{view.run} {record.outcome.value}{_after_colon(record.detail)}"
+    return text, Importance.GOOD if good else Importance.ERROR
+
+
+def _input_ignored(_: RunView, record: r.InputIgnored) -> _Sentence:
+    return f"ignored: {record.reason}", Importance.DETAIL
+
+
+def _input_deferred(_: RunView, __: r.InputDeferred) -> _Sentence:
+    return "an input came during the pause, and waits for its end", Importance.DETAIL
+
+
+def _input_seen(_: RunView, record: r.InputSeen) -> _Sentence:
+    return f"input {record.id} accepted", Importance.DETAIL
+
+
+def _operator_took(_: RunView, record: r.OperatorTookControl) -> _Sentence:
+    return f"{record.resource} taken{_by(record)}", Importance.WARNING
+
+
+def _operator_gave_back(_: RunView, record: r.OperatorGaveControlBack) -> _Sentence:
+    return f"{record.resource} given back{_by(record)}", Importance.NORMAL
+
+
+def _geometry_received(_: RunView, record: r.GeometryReceived) -> _Sentence:
+    return f"{record.name} received{_by(record)}", Importance.NORMAL
+
+
+# --- tokens and scopes ----------------------------------------------------------------------------
+
+
+def _token_entered(view: RunView, record: r.TokenEntered) -> _Sentence:
+    instance = f", instance {record.instance}" if record.instance is not None else ""
+    return f"{view.label(record.element)}{instance}", Importance.NORMAL
+
+
+def _token_left(view: RunView, record: r.TokenLeft) -> _Sentence:
+    failed = record.outcome is r.TokenOutcome.FAILED
+    text = f"{view.label(record.element)}: {record.outcome.value}"
+    return text, Importance.ATTENTION if failed else Importance.NORMAL
+
+
+def _flow_taken(view: RunView, record: r.FlowTaken) -> _Sentence:
+    return f"{view.label(record.element)}: flow {record.flow}", Importance.DETAIL
+
+
+def _scope_opened(view: RunView, record: r.ScopeOpened) -> _Sentence:
+    return f"{view.label(record.element)}: scope opened", Importance.DETAIL
+
+
+def _scope_closed(view: RunView, record: r.ScopeClosed) -> _Sentence:
+    return f"{view.label(record.element)}: scope {record.outcome.value}", Importance.DETAIL
+
+
+# --- behaviors, prompts, services -----------------------------------------------------------------
+
+
+def _behavior_requested(view: RunView, record: r.BehaviorRequested) -> _Sentence:
+    resources = ", ".join(record.resources)
+    return f"{view.label(record.element)}: {resources} begins {record.name}", Importance.NORMAL
+
+
+def _behavior_progressed(view: RunView, record: r.BehaviorProgressed) -> _Sentence:
+    text = f"{_behavior(view, record.behavior)}: {record.state.value.lower()}"
+    return text, Importance.DETAIL
+
+
+def _behavior_cancel_requested(view: RunView, record: r.BehaviorCancelRequested) -> _Sentence:
+    why = f", {record.code}" if record.code else ""
+    text = f"{_behavior(view, record.behavior)}: being cancelled{why}{_in_brackets(record.reason)}"
+    return text, Importance.DETAIL
+
+
+def _behavior_unsettled(view: RunView, record: r.BehaviorUnsettled) -> _Sentence:
+    return f"{_behavior(view, record.behavior)}: held, {record.reason}", Importance.WARNING
+
+
+def _behavior_continued(view: RunView, record: r.BehaviorContinued) -> _Sentence:
+    return f"{_behavior(view, record.behavior)}: goes on{_by(record)}", Importance.NORMAL
+
+
+def _behavior_restarted(view: RunView, record: r.BehaviorRestarted) -> _Sentence:
+    return f"{_behavior(view, record.behavior)}: started again{_by(record)}", Importance.NORMAL
+
+
+def _behavior_ended(view: RunView, record: r.BehaviorEnded) -> _Sentence:
+    how = record.state.value.lower()
+    if record.state is not BehaviorState.CANCELLED and record.code:
+        how = f"{how}, {record.code}{_in_brackets(record.reason)}"
+    behavior = view.behavior(record.behavior)
+    name = behavior.name if behavior is not None else record.behavior
+    resources = f"{', '.join(behavior.resources)} ends " if behavior is not None else ""
+    text = f"{view.label(record.element)}: {resources}{name}: {how}"
+    if record.state is BehaviorState.SUCCEEDED:
+        return text, Importance.GOOD
+    cancelled = record.state is BehaviorState.CANCELLED
+    return text, Importance.DETAIL if cancelled else Importance.WARNING
+
+
+def _prompt_opened(view: RunView, record: r.PromptOpened) -> _Sentence:
+    return f"{view.label(record.element)} asks: {record.text}", Importance.ATTENTION
+
+
+def _prompt_answered(view: RunView, record: r.PromptAnswered) -> _Sentence:
+    text = f"{view.label(record.element)}: {record.decision}, answered{_by(record)}"
+    return text, Importance.NORMAL
+
+
+def _prompt_withdrawn(view: RunView, record: r.PromptWithdrawn) -> _Sentence:
+    prompt = view.prompt(record.prompt)
+    element = view.label(prompt.element) if prompt is not None else record.prompt
+    return f"{element}: no longer asked", Importance.DETAIL
+
+
+def _service_requested(view: RunView, record: r.ServiceRequested) -> _Sentence:
+    return f"{view.label(record.element)}: runs {record.name}", Importance.NORMAL
+
+
+def _service_ended(view: RunView, record: r.ServiceEnded) -> _Sentence:
+    label = view.label(record.element)
+    if not record.code:
+        return f"{label}: done", Importance.NORMAL
+    return f"{label}: failed, {record.code}{_in_brackets(record.reason)}", Importance.ERROR
+
+
+def _service_withdrawn(view: RunView, record: r.ServiceWithdrawn) -> _Sentence:
+    return f"service {record.service} withdrawn", Importance.NORMAL
+
+
+# --- data and events ------------------------------------------------------------------------------
+
+
+def _data_written(_: RunView, record: r.DataWritten) -> _Sentence:
+    return f"{record.key} = {str(record.value)[:VALUE_CHARACTERS]}", Importance.DETAIL
+
+
+def _event_awaited(view: RunView, record: r.EventAwaited) -> _Sentence:
+    trigger = record.trigger.value
+    what = f" {view.reference(record.ref)}" if record.ref else ""
+    return f"{view.label(record.element)}: waits for {trigger}{what}", Importance.NORMAL
+
+
+def _event_triggered(_: RunView, record: r.EventTriggered) -> _Sentence:
+    return f"awaited event {record.wait} occurred", Importance.DETAIL
+
+
+def _signal_thrown(view: RunView, record: r.SignalThrown) -> _Sentence:
+    origin = view.label(record.element) if record.element else record.by or "outside"
+    return f"{origin}: signal '{view.reference(record.signal)}'", Importance.NORMAL
+
+
+def _message_thrown(view: RunView, record: r.MessageThrown) -> _Sentence:
+    origin = view.label(record.element) if record.element else record.by or "outside"
+    return f"{origin}: message '{view.reference(record.message)}'", Importance.NORMAL
+
+
+def _escalation_thrown(view: RunView, record: r.EscalationThrown) -> _Sentence:
+    what = record.code or record.escalation
+    text = f"{view.label(record.element)}: escalation {what}, {_caught(view, record)}"
+    return text, Importance.NORMAL
+
+
+def _error_thrown(view: RunView, record: r.ErrorThrown) -> _Sentence:
+    reason = _in_brackets(record.reason)
+    text = f"{view.label(record.element)}: error {record.code}{reason}, {_caught(view, record)}"
+    return text, Importance.ATTENTION if record.caught_by else Importance.ERROR
+
+
+# --- compensation and transactions ----------------------------------------------------------------
+
+
+def _compensation_triggered(view: RunView, record: r.CompensationTriggered) -> _Sentence:
+    what = "undoes what was done" if record.completions else "there is nothing to undo"
+    return f"{view.label(record.element)}: {what}", Importance.NORMAL
+
+
+def _compensation_began(view: RunView, record: r.CompensationBegan) -> _Sentence:
+    return f"{view.label(record.activity)}: is undone", Importance.NORMAL
+
+
+def _transaction_cancelled(view: RunView, record: r.TransactionCancelled) -> _Sentence:
+    return f"{view.label(record.element)}: the transaction is cancelled", Importance.NORMAL
+
+
+_SENTENCES: dict[type, Callable[[RunView, Any], _Sentence]] = {
+    r.RunStarted: _run_started,
+    r.RunClaimed: _run_claimed,
+    r.RunPaused: _run_paused,
+    r.RunResumed: _run_resumed,
+    r.RunEnded: _run_ended,
+    r.InputIgnored: _input_ignored,
+    r.InputDeferred: _input_deferred,
+    r.InputSeen: _input_seen,
+    r.OperatorTookControl: _operator_took,
+    r.OperatorGaveControlBack: _operator_gave_back,
+    r.GeometryReceived: _geometry_received,
+    r.TokenEntered: _token_entered,
+    r.TokenLeft: _token_left,
+    r.FlowTaken: _flow_taken,
+    r.ScopeOpened: _scope_opened,
+    r.ScopeClosed: _scope_closed,
+    r.BehaviorRequested: _behavior_requested,
+    r.BehaviorProgressed: _behavior_progressed,
+    r.BehaviorCancelRequested: _behavior_cancel_requested,
+    r.BehaviorUnsettled: _behavior_unsettled,
+    r.BehaviorContinued: _behavior_continued,
+    r.BehaviorRestarted: _behavior_restarted,
+    r.BehaviorEnded: _behavior_ended,
+    r.PromptOpened: _prompt_opened,
+    r.PromptAnswered: _prompt_answered,
+    r.PromptWithdrawn: _prompt_withdrawn,
+    r.ServiceRequested: _service_requested,
+    r.ServiceEnded: _service_ended,
+    r.ServiceWithdrawn: _service_withdrawn,
+    r.DataWritten: _data_written,
+    r.EventAwaited: _event_awaited,
+    r.EventTriggered: _event_triggered,
+    r.SignalThrown: _signal_thrown,
+    r.MessageThrown: _message_thrown,
+    r.EscalationThrown: _escalation_thrown,
+    r.ErrorThrown: _error_thrown,
+    r.CompensationTriggered: _compensation_triggered,
+    r.CompensationBegan: _compensation_began,
+    r.TransactionCancelled: _transaction_cancelled,
+}
+
+_KINDS: dict[type, Kind] = {
+    record: kind
+    for kind, records in {
+        Kind.RUN: (
+            r.RunStarted,
+            r.RunClaimed,
+            r.RunPaused,
+            r.RunResumed,
+            r.RunEnded,
+            r.RunYielded,
+            r.InputIgnored,
+            r.InputDeferred,
+            r.InputSeen,
+        ),
+        Kind.OPERATORS: (r.OperatorTookControl, r.OperatorGaveControlBack, r.GeometryReceived),
+        Kind.BEHAVIORS: (
+            r.BehaviorRequested,
+            r.BehaviorProgressed,
+            r.BehaviorCancelRequested,
+            r.BehaviorUnsettled,
+            r.BehaviorContinued,
+            r.BehaviorRestarted,
+            r.BehaviorEnded,
+            r.ServiceRequested,
+            r.ServiceEnded,
+            r.ServiceWithdrawn,
+        ),
+        Kind.PROMPTS: (r.PromptOpened, r.PromptAnswered, r.PromptWithdrawn),
+        Kind.DATA: (r.DataWritten, r.InstanceOutput),
+        Kind.EVENTS: (
+            r.SignalThrown,
+            r.MessageThrown,
+            r.EscalationThrown,
+            r.ErrorThrown,
+            r.EventAwaited,
+            r.EventTriggered,
+            r.ConditionReset,
+            r.CompensationEnabled,
+            r.CompensationTriggered,
+            r.CompensationBegan,
+            r.CompensationEnded,
+            r.TransactionCancelled,
+        ),
+    }.items()
+    for record in records
+}
+"""All other records are about tokens."""

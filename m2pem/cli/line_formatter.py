@@ -1,0 +1,134 @@
+"""A run's records as lines for people: mission time, the run if there are several, a sentence."""
+
+from collections.abc import Callable
+
+import click
+
+from m2pem.api import records as r
+from m2pem.api.control import RunId, RunStatus, RunSummary, StampedRecord
+from m2pem.api.description import Description, Importance, Kind, describe
+from m2pem.api.run_view import Behavior, RunView
+from m2pem.engine.state import RunState
+from m2pem.mission.elements import Activity, Event
+from m2pem.mission.mission import Mission
+
+SHOWN = frozenset(
+    (
+        r.RunStarted,
+        r.RunClaimed,
+        r.RunPaused,
+        r.RunResumed,
+        r.RunEnded,
+        r.TokenEntered,
+        r.TokenLeft,
+        r.BehaviorRequested,
+        r.BehaviorEnded,
+        r.BehaviorUnsettled,
+        r.BehaviorContinued,
+        r.BehaviorRestarted,
+        r.PromptOpened,
+        r.PromptAnswered,
+        r.ServiceRequested,
+        r.ServiceEnded,
+        r.SignalThrown,
+        r.MessageThrown,
+        r.EscalationThrown,
+        r.ErrorThrown,
+        r.CompensationTriggered,
+        r.CompensationBegan,
+        r.TransactionCancelled,
+        r.GeometryReceived,
+    )
+)
+"""Records that are printed; the others matter to programs only."""
+
+REMEMBERED_RUNS = 1000
+"""Runs of which names are known; the oldest are forgotten."""
+
+_COLOURS_BY_IMPORTANCE = {
+    Importance.GOOD: "green",
+    Importance.WARNING: "yellow",
+    Importance.ERROR: "red",
+}
+_COLOURS_BY_KIND = {Kind.BEHAVIORS: "cyan", Kind.PROMPTS: "green", Kind.EVENTS: "magenta"}
+
+
+class LineFormatter:
+    """Formats records as lines. `mission` returns the diagram of a run.
+
+    `colour`: for a terminal. `one`: lines of the first run do not name it. `asks`: whether prompts
+    are printed, which an operator's own unit may show better.
+    """
+
+    def __init__(
+        self,
+        mission: Callable[[RunId], Mission | None],
+        *,
+        colour: bool = False,
+        one: bool = True,
+        asks: bool = True,
+    ) -> None:
+        self._main: RunId | None = None if one else ""
+        self._asks = asks
+        self._mission = mission
+        self._colour = colour
+        self._views: dict[RunId, RunView] = {}
+
+    def restore(self, state: RunState) -> None:
+        """Add the behaviors of a run that was begun before."""
+        view = self._view(state.run)
+        for each in state.behaviors.values():
+            view.behaviors[each.id] = Behavior(
+                each.id, each.name, each.resources, each.process, each.element, each.token, 0.0
+            )
+
+    def format(self, stamped: StampedRecord) -> str | None:
+        """Return one line for a record; None for one that is not shown."""
+        if self._main is None:
+            self._main = stamped.run
+        view = self._view(stamped.run)
+        view.apply(stamped)
+        if not self._is_shown(view, stamped.record):
+            return None
+        description = describe(stamped, view)
+        run = "" if stamped.run == self._main else f"{stamped.run:<4} "
+        line = f"{stamped.t_s:9.1f} s  {run}{description.text}"
+        colour = _colour(description) if self._colour else None
+        return click.style(line, fg=colour) if colour else line
+
+    def _view(self, run: RunId) -> RunView:
+        view = self._views.get(run)
+        if view is None:
+            view = self._views[run] = RunView(RunSummary(run, "", "", RunStatus.RUNNING, 0))
+            if len(self._views) > REMEMBERED_RUNS:
+                del self._views[next(iter(self._views))]
+        if view.mission is None:
+            view.mission = self._mission(run)
+        return view
+
+    def _is_shown(self, view: RunView, record: r.Record) -> bool:
+        if type(record) not in SHOWN:
+            return False
+        match record:
+            case r.PromptOpened():
+                return self._asks
+            case r.TokenEntered(element=element):
+                return _is_activity_or_event(view, element)
+            case r.TokenLeft(element=element, outcome=r.TokenOutcome.INTERRUPTED):
+                return _is_activity_or_event(view, element)
+            case r.TokenLeft():
+                return False
+        return True
+
+
+def _is_activity_or_event(view: RunView, element: str) -> bool:
+    mission = view.mission
+    return mission is None or isinstance(mission.elements.get(element), (Activity, Event))
+
+
+def _colour(description: Description) -> str | None:
+    if description.importance in _COLOURS_BY_IMPORTANCE and not (
+        description.kind is Kind.BEHAVIORS and description.importance is Importance.GOOD
+    ):
+        return _COLOURS_BY_IMPORTANCE[description.importance]
+    return _COLOURS_BY_KIND.get(description.kind)
