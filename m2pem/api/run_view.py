@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 US_PER_S = 1_000_000
 
 FINISHED = 20
-"""Tokens that left last, as many as `RunView.finished` keeps."""
+"""The last tokens that left an element, as many as `RunView.finished` keeps."""
+
+NEWEST = 200
+"""The last records, as many as `RunView.newest` keeps."""
 
 NAMED = 1000
 """Behaviors and prompts that were closed last, of which the names are kept for `describe`."""
@@ -156,17 +159,25 @@ class Changes:
 class RunView:
     """Status, tokens, prompts, behaviors and waits of one run.
 
-    `mission` gives names; None if its diagram cannot be read. `changes` is filled for readers that
+    `mission` gives names; None if its diagram cannot be read. `names`: names by id, used without a
+    mission. `changes` is filled for readers that
     set it, and clear it when they have shown what changed.
     """
 
-    def __init__(self, summary: RunSummary, mission: "Mission | None" = None) -> None:
+    def __init__(
+        self,
+        summary: RunSummary,
+        mission: "Mission | None" = None,
+        names: Mapping[str, str] | None = None,
+    ) -> None:
         self.summary = summary
         self.mission = mission
+        self._names = names or {}
         self.seq = 0
         """Number of the last record that was applied; they count from 1 without a gap."""
         self.t_s = 0.0
         """Mission time of the last record."""
+        self.newest: deque[StampedRecord] = deque(maxlen=NEWEST)
         self.paused_by = ""
         self.elements: dict[Place, ElementState] = {}
         self.scopes: dict[int, Scope] = {}
@@ -192,6 +203,7 @@ class RunView:
             return False
         self.seq = stamped.seq
         self.t_s = stamped.t_s
+        self.newest.append(stamped)
         fold = _FOLDS.get(type(stamped.record))
         if fold is not None:
             fold(self, stamped.record)
@@ -216,12 +228,12 @@ class RunView:
     def label(self, element: str) -> str:
         """Return the name of an element in the diagram; its id, if it has none."""
         found = self.mission.elements.get(element) if self.mission is not None else None
-        return found.label if found is not None else element
+        return found.label if found is not None else self._names.get(element) or element
 
     def reference(self, id_: str) -> str:
         """Return the name of a signal or message of the mission, given its id."""
         if self.mission is None:
-            return id_
+            return self._names.get(id_) or id_
         found = self.mission.signals.get(id_) or self.mission.messages.get(id_)
         return found.name if found is not None and found.name else id_
 

@@ -7,7 +7,7 @@ import pytest
 
 from m2pem.api import BehaviorState, RunStatus, RunSummary, RunView, StampedRecord, parse_mission
 from m2pem.api import records as r
-from m2pem.api.run_view import Changes
+from m2pem.api.run_view import NEWEST, Changes
 from m2pem.engine.inputs import PromptAnswer, SignalReceived, StartRun
 from m2pem.engine.run import MissionRun
 
@@ -135,6 +135,13 @@ def test_an_interrupted_run_goes_on_when_it_is_claimed() -> None:
     assert view.summary.status is RunStatus.INTERRUPTED
     apply(view, [r.RunClaimed(epoch=2)])
     assert view.summary.status is RunStatus.RUNNING
+
+
+@pytest.mark.parametrize("count", [1, NEWEST, NEWEST * 2])
+def test_only_the_newest_records_are_kept(count: int) -> None:
+    view = folded(*[r.RunYielded(steps=())] * count)
+    assert len(view.newest) == min(count, NEWEST)
+    assert view.newest[-1].seq == view.seq == count
 
 
 def test_pauses_are_counted_into_times_of_the_clock() -> None:

@@ -34,8 +34,8 @@ class WebOcu:
         from m2pem_plugin_web.live.hub import Hub  # noqa: PLC0415
         from m2pem_plugin_web.server import Server  # noqa: PLC0415
         from m2pem_plugin_web.services import services_of  # noqa: PLC0415
-        from m2pem_plugin_web.tracks.places import place_beside  # noqa: PLC0415
         from m2pem_plugin_web.tracks.recorder import Recorder  # noqa: PLC0415
+        from m2pem_plugin_web.tracks.stores import place_beside  # noqa: PLC0415
 
         settings = read_settings(environment)
         self._where = places.folder(environment)
@@ -46,7 +46,7 @@ class WebOcu:
             entry = self._entry(settings)
             self.hub = Hub(control)
             place = place_beside(control.journal_file())
-            self._recorder = Recorder(control, self.hub.feed.pictures, self.hub.fleet, place)
+            self._recorder = Recorder(control, self.hub.follower.views, self.hub.fleet, place)
             self._services = services_of(control, settings.missions)
 
             def app() -> "ASGIApp":

@@ -4,7 +4,6 @@ import asyncio
 from typing import Any
 
 import pytest
-from m2pem_plugin_web.live import feed
 from m2pem_plugin_web.live.hub import FRAME_S, MOST_VIEWERS
 from m2pem_plugin_web.live.socket import FULL, SILENT, _converse
 from m2pem_plugin_web.live.viewer import URGENT, WINDOW, Viewer
@@ -12,7 +11,7 @@ from starlette.types import Message
 from starlette.websockets import WebSocket
 from web_world import VEHICLE, Live, MakeWorld, World, serving
 
-from m2pem.api import RunId, RunStatus, StampedRecord
+from m2pem.api import RunId, RunStatus, StampedRecord, follower
 from m2pem.api.records import TokenEntered
 from m2pem.testing import scenarios
 from m2pem.testing.contracts.ocu_bench import until
@@ -225,20 +224,20 @@ async def test_a_frame_shows_all_that_it_counts(world: MakeWorld) -> None:
     async with world() as here:
         prompt = await here.asked(QUESTION)
         hub = here.ocu.hub
-        picture = await hub.feed.load(prompt.run)
         viewer = Viewer()
         hub.viewers.add(viewer)
-        viewer.watch(picture)
+        await hub.watch(viewer, prompt.run)
+        view = hub.runs[prompt.run].view
         hub.next_messages(viewer, 0.0)
         viewer.acknowledge(1)
         # A frame is due, and before it is made, a record comes.
         viewer.frame_due = True
-        place = next(iter(picture.elements))
+        place = next(iter(view.elements))
         entered = TokenEntered(token=99, process=place[0], element=place[1], scope=1)
-        picture.apply(StampedRecord(prompt.run, picture.seq + 1, 1.0, entered))
+        view.apply(StampedRecord(prompt.run, view.seq + 1, 1.0, entered))
         told = next(each for each in hub.next_messages(viewer, 0.0) if each["type"] == "frame")
         hub.viewers.discard(viewer)
-        assert told["events"] == picture.seq
+        assert told["events"] == view.seq
         assert f'"{place[1]}"' in bytes(told["elements"]).decode()
 
 
@@ -325,8 +324,8 @@ async def test_who_comes_again_has_what_was_missed(world: MakeWorld) -> None:
 async def test_what_came_too_fast_is_counted_from_the_journal(
     world: MakeWorld, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(feed, "BACKLOG", 5)
-    monkeypatch.setattr(feed, "AGAIN_S", 0.01)
+    monkeypatch.setattr(follower, "BACKLOG", 5)
+    monkeypatch.setattr(follower, "RETRY_S", 0.01)
     async with world() as here:
         run = await here.control.start(LAPS)
         live = await (await here.browser()).live()

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from m2pem_plugin_web.tracks.places import Folder
+from m2pem_plugin_web.tracks.stores import Folder
 from m2pem_plugin_web.tracks.thinning import SPACING_S
 from m2pem_plugin_web.tracks.track import Head, Track
 from test_web_restart import left_by_a_crash

@@ -12,8 +12,8 @@ import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from m2pem_plugin_web.tracks.places import Folder, HeldError, Memory, Place
 from m2pem_plugin_web.tracks.reading import page_of
+from m2pem_plugin_web.tracks.stores import Folder, HeldError, Memory, Place
 from m2pem_plugin_web.tracks.thinning import Sample, Thinner, differs, thinned
 from m2pem_plugin_web.tracks.track import Head, Track
 

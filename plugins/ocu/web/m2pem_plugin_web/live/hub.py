@@ -1,10 +1,11 @@
-"""Tells every browser what is new, at a pace that it keeps up with; the engine waits for none.
+"""Sends every browser what is new, at a pace that it keeps up with; the engine waits for none.
 
-Records are folded into pictures as they come. 25 times a second, names of what changed are
-handed to those who watch; what they are told is made when they are ready for it.
+Records are applied to views as they come. 25 times a second, the names of what changed are added to
+each viewer that watches; its message is made when the browser is ready for it.
 """
 
 import asyncio
+import logging
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
@@ -14,20 +15,27 @@ import msgspec
 
 from m2pem.api import (
     Alert,
+    BehaviorState,
+    Listener,
     MissionControl,
     OpenPrompt,
     PromptClosed,
     ResourceId,
     RunId,
     RunStatus,
+    RunView,
+    StampedRecord,
+    describe,
+    follow,
 )
+from m2pem.api import records as r
+from m2pem.api.run_view import Place
 from m2pem.errors import M2pemError
 from m2pem_plugin_web.access.lateness import now_s
-from m2pem_plugin_web.live import words
-from m2pem_plugin_web.live.feed import Feed
-from m2pem_plugin_web.live.fleet import FleetPicture, Heard
-from m2pem_plugin_web.live.picture import Picture, Place
-from m2pem_plugin_web.live.viewer import Changes, Viewer
+from m2pem_plugin_web.live import messages
+from m2pem_plugin_web.live.latest_states import FleetStates, LatestStates
+from m2pem_plugin_web.live.live_run import LiveRun, command
+from m2pem_plugin_web.live.viewer import Unsent, Viewer
 
 FRAME_S = 0.04
 
@@ -35,73 +43,108 @@ HOLDERS_EVERY_S = 0.5
 
 MOST_VIEWERS = 64
 
+RETRY_S = 1.0
+
+FAULT_RECORDS = frozenset((r.BehaviorEnded, r.ErrorThrown, r.RunEnded))
+
+log = logging.getLogger("m2pem.ocu.web")
+
 _encode = msgspec.json.Encoder().encode
 
 
-class Hub:
+class Hub(Listener):
     """All browsers, and what they look at. Made before the executive runs, so nothing is missed."""
 
     def __init__(self, control: MissionControl) -> None:
         self.viewers: set[Viewer] = set()
-        self.feed = Feed(control, self)
-        self.fleet = FleetPicture(control, self._lost)
+        self.runs: dict[RunId, LiveRun] = {}
+        self.follower = follow(control, self)
+        self.fleet = FleetStates(control, self._lost)
         self._control = control
         self._holders: dict[str, str] = {}
-        self._looked_at = 0.0
+        self._holders_at = 0.0
         self._times: dict[RunId, float] = {}
-        self._asked: tuple[RunId, int, set[Place]] = ("", 0, set())
-        self._told = msgspec.Raw(b"{}")
+        self._changed_status: set[RunId] = set()
+        self._encoded_for: tuple[RunId, int, set[Place]] = ("", 0, set())
+        self._encoded_elements = msgspec.Raw(b"{}")
 
     async def run(self) -> None:
         """Go on until cancelled."""
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self.feed.follow(), name="web: records")
+            tasks.create_task(self._follow(), name="web: records")
             tasks.create_task(self.fleet.follow(), name="web: telemetry")
             tasks.create_task(self._pace(), name="web: frames")
 
+    async def _follow(self) -> None:
+        while True:
+            try:
+                return await self.follower.run()
+            except M2pemError as error:
+                log.warning("%s", error)
+                await asyncio.sleep(RETRY_S)
+
     async def watch(self, viewer: Viewer, run: RunId | None) -> None:
-        """Have a viewer see a run, from a snapshot on.
+        """Have a viewer watch a run, from a snapshot on.
 
         Raises:
             M2pemError: there is no such run.
         """
-        picture = await self.feed.load(run) if run is not None else None
-        viewer.changes = Changes()
-        viewer.watch(picture)
+        live = None
+        if run is not None:
+            await self.follower.load(run)
+            live = self.runs[run]
+            live.begin_changes()
+        viewer.unsent = Unsent()
+        viewer.watch(live)
 
     # --- at once --------------------------------------------------------------------------------
 
-    def asked(self, prompt: OpenPrompt) -> None:
-        """A prompt opened."""
-        self._tell_all(words.asked(prompt, self.place(prompt)))
+    def run_added(self, view: RunView) -> None:
+        """Keep a run; forget those that the follower has forgotten."""
+        for run in self.runs.keys() - self.follower.views.keys():
+            del self.runs[run]
+        self.runs[view.run] = LiveRun(view)
 
-    def closed(self, closed: PromptClosed) -> None:
-        """It was answered or withdrawn."""
-        self._tell_all(words.closed(closed))
+    def recorded(self, view: RunView, stamped: StampedRecord, *, is_new: bool) -> None:
+        """Send what the mission does not handle to every page."""
+        if is_new and type(stamped.record) in FAULT_RECORDS and _is_fault(stamped.record):
+            text = describe(stamped, view).text
+            own = text.startswith(f"{view.run} ")
+            self._send_to_all(messages.fault(text if own else f"{view.run}: {text}"))
+
+    def status_changed(self, view: RunView) -> None:
+        """Send it with the next frame."""
+        self._changed_status.add(view.run)
+
+    def prompt_opened(self, prompt: OpenPrompt) -> None:
+        """Send it at once."""
+        self._send_to_all(messages.prompt_opened(prompt, self.place(prompt)))
+
+    def prompt_closed(self, prompt: OpenPrompt, closed: PromptClosed) -> None:
+        """Send it at once."""
+        self._send_to_all(messages.prompt_closed(closed))
 
     def alerted(self, alert: Alert) -> None:
-        """The executive warns of something that is in no run's records."""
-        self._tell_all(words.fault(f"{alert.run}: {alert.text}" if alert.run else alert.text))
-
-    def failed(self, run: RunId, text: str) -> None:
-        """Something went wrong in a run."""
-        self._tell_all(words.fault(f"{run}: {text}"))
+        """Send it at once."""
+        text = f"{alert.run}: {alert.text}" if alert.run else alert.text
+        self._send_to_all(messages.fault(text))
 
     def announce(self, text: str) -> None:
-        """Tell every page of something that all operators have to know."""
-        self._tell_all(words.fault(text))
+        """Send a text that all operators have to know."""
+        self._send_to_all(messages.fault(text))
 
     def _lost(self, resource: ResourceId) -> None:
-        self._tell_all(words.fault(f"{resource} is no longer heard"))
+        self._send_to_all(messages.fault(f"{resource}: its link is lost"))
 
-    def _tell_all(self, message: dict[str, Any]) -> None:
+    def _send_to_all(self, message: dict[str, Any]) -> None:
         for viewer in self.viewers:
-            viewer.tell(message)
+            viewer.send_soon(message)
 
     def place(self, prompt: OpenPrompt) -> Place | None:
-        """Where a prompt was asked, if that is known yet."""
-        picture = self.feed.pictures.get(prompt.run)
-        return picture.asked.get(prompt.prompt) if picture is not None else None
+        """Return the process and element of an open prompt, if its record is known yet."""
+        view = self.follower.views.get(prompt.run)
+        record = view.prompts.get(prompt.prompt) if view is not None else None
+        return (record.process, record.element) if record is not None else None
 
     # --- at a pace ------------------------------------------------------------------------------
 
@@ -114,29 +157,40 @@ class Hub:
             await asyncio.sleep(at - loop.time())
             if self.viewers:
                 await self._tick(loop.time())
+            else:
+                self._end_changes({})
 
     async def _tick(self, now: float) -> None:
-        self._tell_of_runs()
-        await self._look_at_holders(now)
-        watched = {id(v.picture): v.picture for v in self.viewers if v.picture is not None}
-        for picture in watched.values():
-            await self._look_at_time(picture)
-        self._hand_out()
+        self._send_statuses()
+        await self._update_holders(now)
+        watched = self._watched()
+        self._end_changes(watched)
+        for live in watched.values():
+            await self._update_time(live.view)
+        self._distribute_changes()
         for viewer in self.viewers:
             if viewer.due(now):
                 viewer.frame_due = True
                 viewer.wake.set()
 
-    def _tell_of_runs(self) -> None:
-        for picture in self.feed.pictures.values():
-            if picture.dirty_summary:
-                picture.dirty_summary = False
-                self._tell_all(words.run(picture.counted()))
+    def _watched(self) -> dict[RunId, LiveRun]:
+        return {each.live.view.run: each.live for each in self.viewers if each.live is not None}
 
-    async def _look_at_holders(self, now: float) -> None:
-        if now - self._looked_at < HOLDERS_EVERY_S:
+    def _end_changes(self, watched: Mapping[RunId, LiveRun]) -> None:
+        for run, live in self.runs.items():
+            if run not in watched:
+                live.end_changes()
+
+    def _send_statuses(self) -> None:
+        for run in self._changed_status:
+            if run in self.runs:
+                self._send_to_all(messages.run(self.runs[run].view.counted()))
+        self._changed_status.clear()
+
+    async def _update_holders(self, now: float) -> None:
+        if now - self._holders_at < HOLDERS_EVERY_S:
             return
-        self._looked_at = now
+        self._holders_at = now
         try:
             holders = {str(each): who for each, who in (await self._control.holders()).items()}
         except M2pemError:
@@ -145,111 +199,129 @@ class Hub:
         self._holders = holders
         if changed:
             for viewer in self.viewers:
-                viewer.changes.holders |= changed
+                viewer.unsent.holders |= changed
 
-    async def _look_at_time(self, picture: Picture) -> None:
-        run = picture.summary.run
-        t_s = picture.t_s
-        if picture.summary.status in (RunStatus.RUNNING, RunStatus.PAUSED):
+    async def _update_time(self, view: RunView) -> None:
+        t_s = view.t_s
+        if view.status in (RunStatus.RUNNING, RunStatus.PAUSED):
             with suppress(M2pemError):
-                t_s = await self._control.mission_time_s(run)
-        self._times[run] = t_s
+                t_s = await self._control.mission_time_s(view.run)
+        self._times[view.run] = t_s
 
-    def _hand_out(self) -> None:
-        """Give the names of what is new to all who want to know it."""
+    def _distribute_changes(self) -> None:
+        """Add the names of what changed to the viewers that watch it."""
         for viewer in self.viewers:
-            if (picture := viewer.picture) is not None:
-                viewer.changes.elements |= picture.dirty
-                viewer.changes.commands |= picture.dirty_commands
-            viewer.changes.vehicles |= self.fleet.vehicles.dirty
-            viewer.changes.payloads |= self.fleet.payloads.dirty
-            viewer.changes.teams |= self.fleet.teams.dirty
-        for picture in {id(v.picture): v.picture for v in self.viewers if v.picture}.values():
-            for behavior in picture.dirty_commands - picture.commands.keys():
-                self.fleet.teams.forget(behavior)
-            picture.dirty.clear()
-            picture.dirty_commands.clear()
-        for heard in (self.fleet.vehicles, self.fleet.payloads, self.fleet.teams):
-            heard.dirty.clear()
+            if viewer.live is not None and (changes := viewer.live.view.changes) is not None:
+                viewer.unsent.elements |= changes.elements
+                viewer.unsent.commands |= changes.behaviors
+            viewer.unsent.vehicles |= self.fleet.vehicles.dirty
+            viewer.unsent.payloads |= self.fleet.payloads.dirty
+            viewer.unsent.teams |= self.fleet.teams.dirty
+        for live in self._watched().values():
+            if (changes := live.view.changes) is not None:
+                for behavior in changes.behaviors - live.view.behaviors.keys():
+                    self.fleet.teams.forget(behavior)
+                live.clear_changes()
+        for states in (self.fleet.vehicles, self.fleet.payloads, self.fleet.teams):
+            states.dirty.clear()
 
-    # --- what is told ---------------------------------------------------------------------------
+    # --- messages ---------------------------------------------------------------------------
 
     def next_messages(self, viewer: Viewer, now: float) -> list[dict[str, Any]]:
-        """What to send to a viewer now, in order; it counts as sent."""
-        messages = [viewer.numbered(each) for each in viewer.urgent]
+        """Return what to send to a viewer now, in order; it counts as sent."""
+        due = [viewer.numbered(each) for each in viewer.urgent]
         viewer.urgent.clear()
         if viewer.may_send and (viewer.wants_snapshot or viewer.frame_due):
-            # Records may have come since the names were handed out: all that is counted is shown.
-            self._hand_out()
-            told = self._snapshot(viewer) if viewer.wants_snapshot else self._frame(viewer)
+            # Records may have come since the names were added: all that is counted is shown.
+            self._distribute_changes()
+            state = self._snapshot(viewer) if viewer.wants_snapshot else self._frame(viewer)
             viewer.wants_snapshot = viewer.frame_due = False
-            viewer.changes = Changes()
-            viewer.told_seq = viewer.picture.seq if viewer.picture else 0
-            messages.append(viewer.numbered(told))
+            viewer.unsent = Unsent()
+            viewer.sent_seq = viewer.live.view.seq if viewer.live is not None else 0
+            due.append(viewer.numbered(state))
             viewer.sent_paced(now)
-            if viewer.picture is not None and viewer.log_due(now):
-                messages.append(viewer.numbered(self._log(viewer, viewer.picture)))
-        return messages
+            if viewer.live is not None and viewer.log_due(now):
+                due.append(viewer.numbered(self._log(viewer, viewer.live)))
+        return due
 
-    def _log(self, viewer: Viewer, picture: Picture) -> dict[str, Any]:
-        records = [each for each in picture.newest if each.seq > viewer.logged_seq]
-        viewer.logged_seq = picture.seq
-        return words.log(records)
+    def _log(self, viewer: Viewer, live: LiveRun) -> dict[str, Any]:
+        records = [each for each in live.view.newest if each.seq > viewer.logged_seq]
+        viewer.logged_seq = live.view.seq
+        return messages.log(records, live.view)
 
-    def _head(self, kind: str, picture: Picture | None) -> dict[str, Any]:
-        if picture is None:
+    def _head(self, kind: str, live: LiveRun | None) -> dict[str, Any]:
+        if live is None:
             return {"type": kind, "run": None, "now": now_s(), "t": 0.0, "events": 0}
-        run = picture.summary.run
-        t_s = max(self._times.get(run, 0.0), picture.t_s)
-        return {"type": kind, "run": run, "now": now_s(), "t": t_s, "events": picture.seq}
+        view = live.view
+        t_s = max(self._times.get(view.run, 0.0), view.t_s)
+        return {"type": kind, "run": view.run, "now": now_s(), "t": t_s, "events": view.seq}
 
     def _snapshot(self, viewer: Viewer) -> dict[str, Any]:
-        picture = viewer.picture
-        elements = picture.elements if picture is not None else {}
-        feed = self.feed
+        live = viewer.live
+        prompts = self.follower.prompts.values()
         return {
-            **self._head("snapshot", picture),
-            "status": picture.summary.status if picture is not None else None,
+            **self._head("snapshot", live),
+            "status": live.view.status if live is not None else None,
             "speed": self._control.speed(),
-            "elements": words.nested(
-                (place, picture.encoded(place)) for place in elements if picture is not None
-            ),
-            "prompts": [words.prompt_of(each, self.place(each)) for each in feed.prompts.values()],
-            "runs": [asdict(each.counted()) for each in feed.pictures.values()],
+            "elements": messages.nested(
+                (place, live.encoded(place)) for place in live.view.elements
+            )
+            if live is not None
+            else {},
+            "prompts": [messages.prompt_of(each, self.place(each)) for each in prompts],
+            "runs": [asdict(each.view.counted()) for each in self.runs.values()],
             "vehicles": _encoded(self.fleet.vehicles, self.fleet.vehicles.states),
             "payloads": _encoded(self.fleet.payloads, self.fleet.payloads.states),
             "teams": _encoded(self.fleet.teams, self.fleet.teams.states),
             "holders": self._holders,
-            "commands": picture.commands if picture is not None else {},
+            "commands": {key: command(each) for key, each in live.view.behaviors.items()}
+            if live is not None
+            else {},
         }
 
-    def _elements(self, picture: Picture, places: set[Place]) -> msgspec.Raw:
-        """Their states as JSON; browsers that keep up are told the same of a run."""
-        asked = (picture.summary.run, picture.seq, places)
-        if asked != self._asked:
-            states = words.nested((place, picture.encoded(place)) for place in places)
-            self._asked, self._told = asked, msgspec.Raw(_encode(states))
-        return self._told
+    def _elements(self, live: LiveRun, places: set[Place]) -> msgspec.Raw:
+        """Return states of elements as JSON, encoded once for browsers that keep up."""
+        wanted = (live.view.run, live.view.seq, places)
+        if wanted != self._encoded_for:
+            states = messages.nested((place, live.encoded(place)) for place in places)
+            self._encoded_for, self._encoded_elements = wanted, msgspec.Raw(_encode(states))
+        return self._encoded_elements
 
     def _frame(self, viewer: Viewer) -> dict[str, Any]:
-        picture, changes = viewer.picture, viewer.changes
-        frame = self._head("frame", picture)
-        if picture is not None and changes.elements:
-            frame["elements"] = self._elements(picture, changes.elements)
-        if picture is not None and changes.commands:
-            frame["commands"] = {key: picture.commands.get(key) for key in changes.commands}
-        for name, heard, changed in (
+        live, changes = viewer.live, viewer.unsent
+        frame = self._head("frame", live)
+        if live is not None and changes.elements:
+            frame["elements"] = self._elements(live, changes.elements)
+        if live is not None and changes.commands:
+            behaviors = live.view.behaviors
+            frame["commands"] = {
+                key: command(behaviors[key]) if key in behaviors else None
+                for key in changes.commands
+            }
+        for name, latest, changed in (
             ("vehicles", self.fleet.vehicles, changes.vehicles),
             ("payloads", self.fleet.payloads, changes.payloads),
             ("teams", self.fleet.teams, changes.teams),
         ):
             if changed:
-                frame[name] = _encoded(heard, changed)
+                frame[name] = _encoded(latest, changed)
         if changes.holders:
             frame["holders"] = {key: self._holders.get(key, "") for key in changes.holders}
         return frame
 
 
-def _encoded(heard: Heard, names: Any) -> Mapping[str, msgspec.Raw]:
-    found = ((name, heard.encoded(name)) for name in names)
+def _encoded(latest: LatestStates, names: Any) -> Mapping[str, msgspec.Raw]:
+    found = ((name, latest.encoded(name)) for name in names)
     return {name: state for name, state in found if state is not None}
+
+
+def _is_fault(record: r.Record) -> bool:
+    """Whether it is something that the mission does not handle."""
+    match record:
+        case r.BehaviorEnded(state=BehaviorState.LOST):
+            return True
+        case r.ErrorThrown(caught_by=""):
+            return True
+        case r.RunEnded(outcome=r.RunOutcome.FAILED):
+            return True
+    return False

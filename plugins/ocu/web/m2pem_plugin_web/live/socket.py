@@ -12,7 +12,7 @@ from starlette.websockets import WebSocketDisconnect, WebSocketDisconnected
 from m2pem.errors import M2pemError
 from m2pem_plugin_web.access.entry import SUBPROTOCOL, Entry, key_of
 from m2pem_plugin_web.access.people import person_of
-from m2pem_plugin_web.live import words
+from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.hub import MOST_VIEWERS, Hub
 from m2pem_plugin_web.live.viewer import HEARTBEAT_S, Viewer
 
@@ -141,7 +141,7 @@ async def _listen(socket: WebSocket, hub: Hub, viewer: Viewer) -> None:
                 try:
                     await _watch(hub, viewer, run)
                 except M2pemError as error:
-                    viewer.refuse(words.fault(str(error)))
+                    viewer.refuse(messages.fault(str(error)))
 
 
 async def _watch(hub: Hub, viewer: Viewer, run: str | None) -> None:
@@ -149,7 +149,7 @@ async def _watch(hub: Hub, viewer: Viewer, run: str | None) -> None:
     watching = asyncio.ensure_future(hub.watch(viewer, run))
     try:
         while not (await asyncio.wait({watching}, timeout=HEARTBEAT_S))[0]:
-            viewer.refuse(words.alive())
+            viewer.refuse(messages.alive())
         await watching
     finally:
         watching.cancel()
@@ -159,7 +159,7 @@ async def _look_after(viewer: Viewer, may_stay: Callable[[], bool]) -> None:
     loop = asyncio.get_running_loop()
     while True:
         await asyncio.sleep(LOOK_EVERY_S)
-        if viewer.silent_since(loop.time()):
+        if viewer.is_silent(loop.time()):
             raise _Leave(SILENT, "it takes nothing in any more")
         if not may_stay():
             raise _Leave(SIGNED_OUT, "signed out")

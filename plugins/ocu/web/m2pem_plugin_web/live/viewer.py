@@ -1,4 +1,4 @@
-"""One browser: what it has not been told yet, and how much it has not taken in yet.
+"""One browser: what it has not been sent yet, and how much it has not acknowledged yet.
 
 It holds names of what changed, never a queue of changes: however slow a browser is, what waits
 for it is bounded by the size of the mission and the fleet.
@@ -8,7 +8,8 @@ import asyncio
 from collections import deque
 from typing import Any
 
-from m2pem_plugin_web.live.picture import NEWEST, Picture, Place
+from m2pem.api.run_view import NEWEST, Place
+from m2pem_plugin_web.live.live_run import LiveRun
 
 WINDOW = 2
 """Paced messages that a browser may have on its way or before it."""
@@ -25,8 +26,8 @@ HEARTBEAT_S = 1.0
 LOG_EVERY_S = 0.25
 
 
-class Changes:
-    """Names of what has changed since it was told."""
+class Unsent:
+    """Names of what has changed since the browser was sent it."""
 
     def __init__(self) -> None:
         self.elements: set[Place] = set()
@@ -51,10 +52,10 @@ class Viewer:
     """Times are of the event loop's clock, in seconds."""
 
     def __init__(self) -> None:
-        self.picture: Picture | None = None
+        self.live: LiveRun | None = None
         self.watches = False
         """Whether it has asked for anything yet."""
-        self.changes = Changes()
+        self.unsent = Unsent()
         self.wants_snapshot = False
         self.frame_due = False
         self.urgent: deque[dict[str, Any]] = deque()
@@ -64,21 +65,21 @@ class Viewer:
         self._unacked: deque[tuple[int, float]] = deque()
         self._framed_at = 0.0
         self._logged_at = 0.0
-        self.told_seq = 0
+        self.sent_seq = 0
         """Of the watched run: the last record that was counted in a frame."""
         self.logged_seq = 0
 
-    def watch(self, picture: Picture | None) -> None:
-        """It wants to see a run (None: only the fleet and the list of runs), from a snapshot on."""
-        self.picture = picture
+    def watch(self, live: LiveRun | None) -> None:
+        """Watch a run (None: only the fleet and the list of runs), from a snapshot on."""
+        self.live = live
         self.watches = True
         self.wants_snapshot = True
-        self.told_seq = 0
-        self.logged_seq = max(0, picture.seq - NEWEST) if picture is not None else 0
+        self.sent_seq = 0
+        self.logged_seq = max(0, live.view.seq - NEWEST) if live is not None else 0
         self.wake.set()
 
-    def tell(self, message: dict[str, Any]) -> None:
-        """Say something before all that is paced."""
+    def send_soon(self, message: dict[str, Any]) -> None:
+        """Queue a message before all that is paced."""
         if not self.watches:
             return
         if len(self.urgent) >= URGENT:
@@ -88,7 +89,7 @@ class Viewer:
         self.wake.set()
 
     def refuse(self, message: dict[str, Any]) -> None:
-        """Say why what it asked for cannot be, whether or not it watches anything."""
+        """Queue the refusal of a request, whether or not the browser watches anything."""
         self.urgent.append(message)
         self.wake.set()
 
@@ -114,20 +115,20 @@ class Viewer:
         """Whether it can take another paced message."""
         return len(self._unacked) < WINDOW
 
-    def silent_since(self, now: float) -> bool:
-        """Whether it has left a message untouched for too long."""
+    def is_silent(self, now: float) -> bool:
+        """Whether it has not acknowledged a message for too long."""
         return bool(self._unacked) and now - self._unacked[0][1] > SILENT_S
 
     def due(self, now: float) -> bool:
-        """Whether there is something to tell it in a frame now."""
+        """Whether a frame is due now."""
         if not self.watches or self.wants_snapshot:
             return False
-        counted = self.picture is not None and self.picture.seq != self.told_seq
-        return bool(self.changes) or counted or now - self._framed_at >= HEARTBEAT_S
+        counted = self.live is not None and self.live.view.seq != self.sent_seq
+        return bool(self.unsent) or counted or now - self._framed_at >= HEARTBEAT_S
 
     def log_due(self, now: float) -> bool:
-        """Whether records are to be shown to it now."""
-        if self.picture is None or self.picture.seq <= self.logged_seq:
+        """Whether records are due now."""
+        if self.live is None or self.live.view.seq <= self.logged_seq:
             return False
         if now - self._logged_at < LOG_EVERY_S:
             return False

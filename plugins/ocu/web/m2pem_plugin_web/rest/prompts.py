@@ -5,7 +5,7 @@ from fastapi import APIRouter
 from m2pem.api import MissionControl
 from m2pem_plugin_web.access.people import Operator, Viewer
 from m2pem_plugin_web.live.hub import Hub
-from m2pem_plugin_web.live.words import prompt_of
+from m2pem_plugin_web.live.messages import prompt_of
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.lookup import find_run
 from m2pem_plugin_web.rest.models import Body, Name, PromptModel

@@ -1,6 +1,7 @@
 """/api/rehearsals: missions on a virtual clock, to be looked at like runs."""
 
-from collections.abc import Sequence
+import asyncio
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
@@ -8,15 +9,15 @@ import msgspec
 from fastapi import APIRouter, Query, Response
 from pydantic import AwareDatetime, BaseModel, Field
 
-from m2pem.api import MissionControl, SimulationResult
+from m2pem.api import MissionControl, MissionFile, SimulationResult
 from m2pem_plugin_web.access.people import Operator, Viewer
 from m2pem_plugin_web.jobs import Job, Jobs, JobState
-from m2pem_plugin_web.live.words import record_of
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of
 from m2pem_plugin_web.rest.findings import FindingModel, finding_models
 from m2pem_plugin_web.rest.models import RecordPage, RunModel, run_model
+from m2pem_plugin_web.rest.record_pages import new_view, page_of
 from m2pem_plugin_web.rest.runs import LARGEST, MOST_RECORDS, RunMissionModel, file_models
 from m2pem_plugin_web.rest.verifications import JobModel
 
@@ -107,10 +108,14 @@ def router(
         limit: Annotated[int, Query(ge=1, le=MOST_RECORDS)] = 1000,
     ) -> Response:
         """Its records after one of them: 0, or the `next` of the page before."""
-        page = _result(jobs.get(identifier)).records[after : after + limit]
-        after_next = page[-1].seq if len(page) >= limit else None
-        content = {"records": [msgspec.Raw(record_of(each)) for each in page], "next": after_next}
-        return Response(_encode(content), media_type="application/json")
+        result = _result(jobs.get(identifier))
+        view = new_view(
+            result.summary, names=await asyncio.to_thread(_names, control, result.files)
+        )
+        for stamped in result.records[:after]:
+            view.apply(stamped)
+        content = page_of(result.records[after : after + limit], view, limit)
+        return Response(content, media_type="application/json")
 
     @routes.get("/{identifier}/mission")
     async def mission(_: Viewer, identifier: str) -> RunMissionModel:
@@ -137,6 +142,19 @@ def router(
 def _microseconds(moment: datetime) -> int:
     since = moment.astimezone(UTC) - datetime(1970, 1, 1, tzinfo=UTC)
     return (since.days * 86_400 + since.seconds) * 1_000_000 + since.microseconds
+
+
+def _names(control: MissionControl, files: Iterable[MissionFile]) -> dict[str, str]:
+    """Return the names of what the files define, by the ids that records have."""
+    names = {}
+    for file in files:
+        outline = control.outline(file.source)
+        prefix = f"{file.qualifier}:" if file.qualifier else ""
+        defined = [(each.id, each.name) for each in outline.processes]
+        defined += [(each.id, each.name) for each in outline.elements]
+        defined += [(each.id, each.name) for each in (*outline.signals, *outline.messages)]
+        names.update({f"{prefix}{id_}": name for id_, name in defined})
+    return names
 
 
 def _result(job: Job[SimulationResult]) -> SimulationResult:

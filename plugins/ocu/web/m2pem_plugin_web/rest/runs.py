@@ -4,26 +4,23 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Annotated
 
-import msgspec
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel
 
 from m2pem.api import Draft, MissionControl, MissionFile, RunStatus, RunSummary
 from m2pem.errors import M2pemError
 from m2pem_plugin_web.access.people import Commander, Viewer
-from m2pem_plugin_web.live.words import record_of
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import WrittenName, of_folder
 from m2pem_plugin_web.rest.lookup import find_run
 from m2pem_plugin_web.rest.models import Body, Data, Name, RecordPage, RunModel, run_model
+from m2pem_plugin_web.rest.record_pages import RecordPages
 from m2pem_plugin_web.rest.shown import shown
 
 MOST_RUNS = 1000
 MOST_RECORDS = 5000
 LARGEST = 2**53 - 1
-
-_encode = msgspec.json.Encoder().encode
 
 
 class StartModel(Body):
@@ -67,6 +64,7 @@ class RunMissionModel(BaseModel):
 def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
     """The routes of runs. `folder`: what missions are started from."""
     routes = APIRouter(prefix="/api/runs", tags=["runs"], responses=RESPONSES)
+    pages = RecordPages(control)
 
     @routes.post("", status_code=201)
     async def start(person: Commander, wanted: StartModel) -> StartedModel:
@@ -112,12 +110,7 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
 
         A page ends with all records of an input, so that it may have more than `limit`.
         """
-        await find_run(control, run)
-        page = await control.records(run, after, limit)
-        after_next = page[-1].seq if len(page) >= limit else None
-        content = _encode(
-            {"records": [msgspec.Raw(record_of(each)) for each in page], "next": after_next}
-        )
+        content = await pages.read(await find_run(control, run), after, limit)
         return Response(content, media_type="application/json")
 
     @routes.get("/{run}/mission")

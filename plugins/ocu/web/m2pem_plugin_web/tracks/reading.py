@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from m2pem.api import RunId
-from m2pem_plugin_web.tracks.places import Place
+from m2pem_plugin_web.tracks.stores import Place
 from m2pem_plugin_web.tracks.thinning import Sample
 from m2pem_plugin_web.tracks.track import head_of, samples_of
 

@@ -11,11 +11,10 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from m2pem.api import MissionControl, PayloadState, RunId, RunStatus, VehicleState
+from m2pem.api import MissionControl, PayloadState, RunId, RunStatus, RunView, VehicleState
 from m2pem.errors import M2pemError
-from m2pem_plugin_web.live.fleet import FleetPicture
-from m2pem_plugin_web.live.picture import Picture
-from m2pem_plugin_web.tracks.places import HeldError, Place
+from m2pem_plugin_web.live.latest_states import FleetStates
+from m2pem_plugin_web.tracks.stores import HeldError, Place
 from m2pem_plugin_web.tracks.thinning import SPACING_S, Sample, State
 from m2pem_plugin_web.tracks.track import Head, Track, head_of
 
@@ -50,20 +49,20 @@ class _Writing:
 
 
 class Recorder:
-    """`pictures` and `fleet`: what is told of runs and resources."""
+    """`views` and `fleet`: runs, and the latest states of vehicles and payloads."""
 
     def __init__(
         self,
         control: MissionControl,
-        pictures: Mapping[RunId, Picture],
-        fleet: FleetPicture,
+        views: Mapping[RunId, RunView],
+        fleet: FleetStates,
         place: Place,
     ) -> None:
         self.place = place
         self.problems: dict[RunId, str] = {}
         """Why tracks of runs have gaps, for people."""
         self._control = control
-        self._pictures = pictures
+        self._views = views
         self._fleet = fleet
         self._before: list[State] = []
         """As it was at the last look."""
@@ -109,23 +108,23 @@ class Recorder:
         loop = asyncio.get_running_loop()
         every_s = max(QUICKEST_S, LOOK_S / self._control.speed())
         while True:
-            for run, picture in list(self._pictures.items()):
-                if picture.summary.status in GOES_ON and picture.summary.started_us:
+            for run, view in list(self._views.items()):
+                if view.status in GOES_ON and view.summary.started_us:
                     if loop.time() >= self._not_before.get(run, 0.0):
-                        await self._look_at(run, picture)
+                        await self._look_at(run, view)
                 elif run in self._writing:
                     await self._close(run)
-            for run in self._writing.keys() - self._pictures.keys():
+            for run in self._writing.keys() - self._views.keys():
                 await self._close(run)
             self._before = self._states()
             await asyncio.sleep(every_s)
 
-    async def _look_at(self, run: RunId, picture: Picture) -> None:
+    async def _look_at(self, run: RunId, view: RunView) -> None:
         try:
             t_s = await self._control.mission_time_s(run)
             writing = self._writing.get(run)
             if writing is None:
-                writing = await self._open(run, picture.summary.started_us, t_s)
+                writing = await self._open(run, view.summary.started_us, t_s)
                 t_s = await self._control.mission_time_s(run)
                 if writing is not None and writing.track.is_new and t_s <= self._soon_s:
                     self._take(writing, 0.0, self._before)

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api import PayloadState, RunId, VehicleState
-from m2pem_plugin_web.tracks.places import Kept, Place
+from m2pem_plugin_web.tracks.stores import Kept, Place
 from m2pem_plugin_web.tracks.thinning import SPACING_S, Sample, Thinner, thinned
 
 _encode = msgspec.json.Encoder().encode

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { emptyPicture, fold } from "./picture";
 import { Reel } from "./reel";
+import { apply, emptyView } from "./runView";
 import { loop, RECORDS } from "./testing";
 
 describe("reel", () => {
@@ -8,9 +8,9 @@ describe("reel", () => {
     const records = loop(9001);
     const reel = new Reel(records);
     for (const count of [9001, 10, 4500, 4499, 4000, 4001, 0, 6000, 2000, 1999, 9000]) {
-      const picture = emptyPicture();
-      for (const record of records.slice(0, count)) fold(picture, record);
-      expect(reel.after(count), `after ${count}`).toEqual(picture);
+      const view = emptyView();
+      for (const record of records.slice(0, count)) apply(view, record);
+      expect(reel.after(count), `after ${count}`).toEqual(view);
     }
   });
 
@@ -25,7 +25,7 @@ describe("reel", () => {
 
   it("is empty without records", () => {
     const reel = new Reel([]);
-    expect(reel.after(5)).toEqual(emptyPicture());
+    expect(reel.after(5)).toEqual(emptyView());
     expect(reel.end).toBe(0);
   });
 });

@@ -1,13 +1,13 @@
-// All records of a run that is over, and the picture after any number of them. Going back is cheap:
-// a picture is kept every few thousand records.
+// All records of a run that is over, and the view after any number of them. Going back is cheap:
+// a view is kept every few thousand records.
 import type { RunRecord } from "../shared/types";
-import { copy, emptyPicture, fold, type Picture } from "./picture";
+import { apply, copy, emptyView, type RunView } from "./runView";
 
 const KEPT_EVERY = 2000;
 
 export class Reel {
-  private readonly kept: Picture[] = [emptyPicture()];
-  private current = emptyPicture();
+  private readonly kept: RunView[] = [emptyView()];
+  private current = emptyView();
   private at = 0;
 
   constructor(readonly records: readonly RunRecord[]) {}
@@ -34,7 +34,7 @@ export class Reel {
   }
 
   /** After the first `count` records. Valid until it is asked for again. */
-  after(count: number): Picture {
+  after(count: number): RunView {
     const wanted = Math.max(0, Math.min(count, this.records.length));
     if (wanted < this.at || Math.floor(wanted / KEPT_EVERY) > Math.floor(this.at / KEPT_EVERY)) {
       this.jump(wanted);
@@ -51,7 +51,7 @@ export class Reel {
   }
 
   private advance(): void {
-    fold(this.current, this.records[this.at]!);
+    apply(this.current, this.records[this.at]!);
     this.at += 1;
     if (this.at === this.kept.length * KEPT_EVERY) this.kept.push(copy(this.current));
   }

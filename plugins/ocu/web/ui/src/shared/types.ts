@@ -149,12 +149,31 @@ export interface RunLine extends RunSummary {
   took_s: number | null;
 }
 
-/** A record, with its own fields beside these (docs/records.md). */
+export type LogKind = "run" | "tokens" | "behaviors" | "prompts" | "events" | "data" | "operators";
+
+/** What a record changes in the view of its run; null: it is there no more. */
+export interface RecordChanges {
+  elements?: Elements;
+  commands?: Record<string, Command | null>;
+  prompts?: Record<string, Prompt | null>;
+  holders?: Record<string, string | null>;
+  status?: RunStatus;
+  detail?: string;
+}
+
+/**
+ * A record, with its own fields beside these (docs/records.md). Pages of records have `changes`,
+ * records that are pushed have not.
+ */
 export interface RunRecord {
   run: string;
   seq: number;
   t: number;
   record: string;
+  sentence: string;
+  kind: LogKind;
+  urgent: boolean;
+  changes?: RecordChanges;
   token?: number;
   process?: string;
   element?: string;

@@ -1,7 +1,7 @@
 // What happened, newest last. Only the lines that are seen are made.
 import { useSignal } from "@preact/signals";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { LOG_KINDS, type LogKind, type LogLine } from "../../records/story";
+import { LOG_KINDS, type LogKind, type LogLine } from "../../records/logLine";
 import { clockTenths } from "../../shared/format";
 import { remember, remembered } from "../../shared/memory";
 import { fill, strings } from "../../strings";
@@ -18,7 +18,7 @@ const MARGIN_LINES = 10;
 const PAGE = 2000;
 
 export function LogPane() {
-  const { scene, mission } = useOperating();
+  const { scene } = useOperating();
   const page = usePaced(scene.log, 250);
   const words = useSignal("");
   const hidden = useSignal<ReadonlySet<LogKind>>(
@@ -27,10 +27,7 @@ export function LogPane() {
   const urgentOnly = useSignal(false);
   const most = useSignal(PAGE);
   const loading = useSignal(false);
-  const lines = useMemo(
-    () => new Lines({ element: mission.label, definition: mission.definition }),
-    [mission],
-  );
+  const lines = useMemo(() => new Lines(), []);
   const wanted: Wanted = {
     words: words.value,
     hidden: hidden.value,

@@ -1,9 +1,9 @@
 import { describe, expect, it } from "vitest";
-import type { LogKind } from "../../records/story";
+import type { LogKind } from "../../records/logLine";
 import { RECORDS } from "../../records/testing";
 import { Lines } from "./filter";
 
-const lines = new Lines({ element: (_, element) => element, definition: (id) => id });
+const lines = new Lines();
 const all = { words: "", hidden: new Set<LogKind>(), urgentOnly: false };
 const names = (wanted: object, most = 1000) =>
   lines.wanted(RECORDS, { ...all, ...wanted }, most).map(({ record }) => record);

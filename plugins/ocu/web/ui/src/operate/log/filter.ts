@@ -1,5 +1,5 @@
 // Which records the event log shows.
-import { lineOf, type LogKind, type LogLine, type Names } from "../../records/story";
+import { lineOf, type LogKind, type LogLine } from "../../records/logLine";
 import type { RunRecord } from "../../shared/types";
 
 export interface Wanted {
@@ -12,11 +12,9 @@ export interface Wanted {
 export class Lines {
   private readonly made = new WeakMap<RunRecord, LogLine>();
 
-  constructor(private readonly names: Names) {}
-
   of(record: RunRecord): LogLine {
     let line = this.made.get(record);
-    if (!line) this.made.set(record, (line = lineOf(record, this.names)));
+    if (!line) this.made.set(record, (line = lineOf(record)));
     return line;
   }
 

@@ -1,6 +1,6 @@
 // How a run ended, and why: said once, at its end.
 import type { RunRecord } from "../../shared/types";
-import { lineOf } from "../../records/story";
+import { lineOf } from "../../records/logLine";
 import { clock } from "../../shared/format";
 import { Dialog } from "../../shared/Dialog";
 import { strings } from "../../strings";
@@ -13,16 +13,15 @@ const MOST = 6;
 type Ended = keyof typeof text;
 
 export function RunEnd({ onClose }: { onClose: () => void }) {
-  const { scene, mission, replay } = useOperating();
+  const { scene, replay } = useOperating();
   const summary = scene.summary.value;
   if (!summary) return null;
   const { records } = scene.log.value;
-  const names = { element: mission.label, definition: mission.definition };
   const lines = (wanted: (record: RunRecord) => boolean) =>
     records
       .filter(wanted)
       .slice(-MOST)
-      .map((record) => lineOf(record, names));
+      .map(lineOf);
   const decisions = lines(({ record }) => record === "PromptAnswered");
   const faults = lines((record) => isFault(record));
   return (

@@ -150,12 +150,12 @@ export class ReplayScene implements Scene {
       }
       if (count === this.count && this.status.value !== null) return;
       this.count = count;
-      const picture = this.reel.after(count);
-      this.elements.replace(picture.elements);
-      this.commands.value = Object.fromEntries(picture.commands);
-      this.prompts.value = [...picture.prompts.values()];
-      this.holders.value = Object.fromEntries(picture.holders);
-      this.status.value = picture.status;
+      const view = this.reel.after(count);
+      this.elements.replace(view.elements);
+      this.commands.value = Object.fromEntries(view.commands);
+      this.prompts.value = [...view.prompts.values()];
+      this.holders.value = Object.fromEntries(view.holders);
+      this.status.value = view.status;
       this.events.value = count;
     });
   }

@@ -1,4 +1,4 @@
-"""What vehicles, payloads and teams said last, and which of it is new."""
+"""The latest states of vehicles, payloads and teams, and which of them are new."""
 
 from collections.abc import Callable
 
@@ -20,7 +20,7 @@ BACKLOG = 1000
 _encode = msgspec.json.Encoder().encode
 
 
-class Heard:
+class LatestStates:
     """The latest state by name, each encoded once for however many browsers."""
 
     def __init__(self) -> None:
@@ -29,31 +29,31 @@ class Heard:
         self._encoded: dict[str, msgspec.Raw] = {}
 
     def put(self, name: str, state: Telemetry) -> None:
-        """It is the latest."""
+        """Keep a state as the latest."""
         self.states[name] = state
         self._encoded.pop(name, None)
         self.dirty.add(name)
 
     def forget(self, name: str) -> None:
-        """It says nothing any more."""
+        """Drop a state."""
         self.states.pop(name, None)
         self._encoded.pop(name, None)
         self.dirty.discard(name)
 
     def encoded(self, name: str) -> msgspec.Raw | None:
-        """The latest state as JSON; None: there is none."""
+        """Return the latest state as JSON; None if there is none."""
         if name not in self._encoded and name in self.states:
             self._encoded[name] = msgspec.Raw(_encode(self.states[name]))
         return self._encoded.get(name)
 
 
-class FleetPicture:
-    """`lost` is told of each vehicle or payload that is no longer heard."""
+class FleetStates:
+    """`lost` is called with each vehicle or payload of which the link is lost."""
 
     def __init__(self, control: MissionControl, lost: Callable[[ResourceId], None]) -> None:
-        self.vehicles = Heard()
-        self.payloads = Heard()
-        self.teams = Heard()
+        self.vehicles = LatestStates()
+        self.payloads = LatestStates()
+        self.teams = LatestStates()
         """By the behavior that they do."""
         self._lost = lost
         self._telemetry = control.telemetry(size=BACKLOG)
@@ -69,9 +69,9 @@ class FleetPicture:
                 case TeamState():
                     self.teams.put(state.behavior, state)
 
-    def _take(self, heard: Heard, state: VehicleState | PayloadState) -> None:
-        before = heard.states.get(state.resource)
+    def _take(self, states: LatestStates, state: VehicleState | PayloadState) -> None:
+        before = states.states.get(state.resource)
         was = before.link if isinstance(before, VehicleState | PayloadState) else None
-        heard.put(state.resource, state)
+        states.put(state.resource, state)
         if state.link is LinkState.LOST and was is not LinkState.LOST:
             self._lost(state.resource)

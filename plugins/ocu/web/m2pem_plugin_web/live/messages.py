@@ -1,0 +1,101 @@
+"""Messages over the WebSocket: one function for each, without its number."""
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import Any, TypeVar
+
+import msgspec
+
+from m2pem.api import OpenPrompt, PromptClosed, RunId, RunSummary, RunView, StampedRecord, describe
+from m2pem.api.records import PromptOpened
+from m2pem.api.run_view import ElementState, Place
+
+_encode = msgspec.json.Encoder().encode
+
+State = TypeVar("State", msgspec.Raw, ElementState)
+
+
+def record_of(stamped: StampedRecord, view: RunView, **more: Any) -> bytes:
+    """Return a record as JSON, in the form of docs/records.md, with what the page shows of it.
+
+    `sentence`, `kind` and `urgent`: see `m2pem.api.describe`. `more`: further fields.
+    """
+    description = describe(stamped, view)
+    head = _encode(
+        {
+            "run": stamped.run,
+            "seq": stamped.seq,
+            "t": stamped.t_s,
+            "sentence": description.text,
+            "kind": description.kind,
+            "urgent": description.importance.is_urgent,
+            **more,
+        }
+    )
+    return head[:-1] + b"," + _encode(stamped.record)[1:]
+
+
+def prompt_of(prompt: OpenPrompt, place: Place | None) -> dict[str, Any]:
+    """A prompt as JSON. `place`: where it was asked, if that is known."""
+    return {
+        "run": prompt.run,
+        "prompt": prompt.prompt,
+        "process": place[0] if place else "",
+        "element": prompt.element,
+        "text": prompt.text,
+        "decisions": [
+            {"value": each.value, "label": each.label or each.value} for each in prompt.decisions
+        ],
+        "role": prompt.role,
+    }
+
+
+def prompt_record_of(run: RunId, record: PromptOpened) -> dict[str, Any]:
+    """A prompt as JSON, from its record."""
+    return {
+        "run": run,
+        "prompt": record.prompt,
+        "process": record.process,
+        "element": record.element,
+        "text": record.text,
+        "decisions": record.decisions,
+        "role": record.role,
+    }
+
+
+def prompt_opened(prompt: OpenPrompt, place: Place | None) -> dict[str, Any]:
+    """A prompt opened."""
+    return {"type": "prompt", "prompt": prompt_of(prompt, place)}
+
+
+def prompt_closed(closed: PromptClosed) -> dict[str, Any]:
+    """A prompt was answered or withdrawn."""
+    return {"type": "prompt_closed", **asdict(closed)}
+
+
+def run(summary: RunSummary) -> dict[str, Any]:
+    """The status of a run changed."""
+    return {"type": "run", "run": asdict(summary)}
+
+
+def fault(text: str) -> dict[str, Any]:
+    """Something went wrong."""
+    return {"type": "fault", "text": text}
+
+
+def alive() -> dict[str, Any]:
+    """The server goes on; what was asked for takes longer."""
+    return {"type": "alive"}
+
+
+def log(records: Iterable[StampedRecord], view: RunView) -> dict[str, Any]:
+    """The newest records of the watched run."""
+    return {"type": "log", "records": [msgspec.Raw(record_of(each, view)) for each in records]}
+
+
+def nested(states: Iterable[tuple[Place, State]]) -> dict[str, dict[str, State]]:
+    """States of elements by process and element."""
+    found: dict[str, dict[str, State]] = {}
+    for (process, element), state in states:
+        found.setdefault(process, {})[element] = state
+    return found

@@ -1,0 +1,75 @@
+// A run after a number of its records. The server applies the records; here only the changes that
+// come with each record are merged, so that a replay shows the same as a live run.
+import type {
+  Command,
+  Elements,
+  ElementState,
+  Prompt,
+  RunRecord,
+  RunStatus,
+} from "../shared/types";
+
+/** `apply` changes it in place, `copy` keeps a moment of it. */
+export interface RunView {
+  seq: number;
+  t: number;
+  status: RunStatus;
+  detail: string;
+  elements: Elements;
+  prompts: Map<string, Prompt>;
+  commands: Map<string, Command>;
+  holders: Map<string, string>;
+}
+
+export function emptyView(): RunView {
+  return {
+    seq: 0,
+    t: 0,
+    status: "running",
+    detail: "",
+    elements: {},
+    prompts: new Map(),
+    commands: new Map(),
+    holders: new Map(),
+  };
+}
+
+export function copy(view: RunView): RunView {
+  const elements: Elements = {};
+  for (const [process, states] of Object.entries(view.elements)) {
+    const copied: Record<string, ElementState> = {};
+    for (const [element, state] of Object.entries(states)) copied[element] = { ...state };
+    elements[process] = copied;
+  }
+  return {
+    ...view,
+    elements,
+    prompts: new Map(view.prompts),
+    commands: new Map(view.commands),
+    holders: new Map(view.holders),
+  };
+}
+
+/** Merge what the next record changes. One that was applied already changes nothing. */
+export function apply(view: RunView, record: RunRecord): void {
+  if (record.seq <= view.seq) return;
+  view.seq = record.seq;
+  view.t = record.t;
+  const { changes } = record;
+  if (!changes) return;
+  for (const [process, states] of Object.entries(changes.elements ?? {})) {
+    Object.assign((view.elements[process] ??= {}), states);
+  }
+  merge(view.commands, changes.commands);
+  merge(view.prompts, changes.prompts);
+  merge(view.holders, changes.holders);
+  view.status = changes.status ?? view.status;
+  view.detail = changes.detail ?? view.detail;
+}
+
+function merge<T>(into: Map<string, T>, changes: Record<string, T | null> = {}): void {
+  for (const [key, value] of Object.entries(changes)) {
+    if (value === null) into.delete(key);
+    else into.set(key, value);
+  }
+}
