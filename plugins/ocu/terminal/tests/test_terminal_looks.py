@@ -31,6 +31,8 @@ def drawn(terminal: Terminal) -> str:
 async def compare(terminal: Terminal, name: str) -> None:
     picture = PICTURES / f"terminal_{name}.svg"
     if os.environ.get("M2PEM_DRAW"):
+        for _ in range(50):  # until the log has scrolled to its end
+            await terminal.pilot.pause(0.01)
         picture.write_text(drawn(terminal), encoding="utf-8")
     expected = picture.read_text(encoding="utf-8")
     with suppress(TimeoutError):

@@ -268,11 +268,11 @@ async def test_a_browser_that_acknowledges_nothing_gets_no_more_than_the_window(
 
 async def test_what_is_urgent_goes_before_what_is_paced() -> None:
     viewer = Viewer()
-    viewer.tell({"type": "prompt"})
+    viewer.send_soon({"type": "prompt"})
     assert not viewer.urgent, "it has asked for nothing yet, and will get a snapshot"
     viewer.watch(None)
     for number in range(URGENT + 1):
-        viewer.tell({"type": "prompt", "number": number})
+        viewer.send_soon({"type": "prompt", "number": number})
     assert len(viewer.urgent) == URGENT
     assert viewer.overrun
 

@@ -1,5 +1,6 @@
 """What browsers ask of runs over HTTP, and how refusals are told."""
 
+import msgspec
 from m2pem_plugin_web.access.roles import Role
 from web_world import VEHICLE, MakeWorld
 
@@ -39,10 +40,32 @@ async def test_records_come_by_pages_in_the_form_of_the_command_line(world: Make
         kept = await here.control.records(prompt.run)
         assert [each["seq"] for each in told] == [each.seq for each in kept]
         whole = await browser.http.get(f"/api/runs/{prompt.run}/records")
-        lines = b",".join(
-            record_line(each.run, each.seq, round(each.t_s * US), each.record) for each in kept
-        )
-        assert whole.content == b'{"records":[' + lines + b'],"next":null}'
+        records = msgspec.json.decode(whole.content, type=dict[str, list[msgspec.Raw] | None])
+        for record, each in zip(records["records"] or (), kept, strict=True):
+            line = record_line(each.run, each.seq, round(each.t_s * US), each.record)
+            assert bytes(record).startswith(line[:-1] + b',"sentence":')
+
+
+async def test_records_say_what_they_change_in_the_view(world: MakeWorld) -> None:
+    async with world() as here:
+        prompt = await here.asked()
+        path = f"/api/runs/{prompt.run}/records"
+        browser = await here.browser()
+        records = (await browser.http.get(path)).json()["records"]
+        (opened,) = [each for each in records if each["record"] == "PromptOpened"]
+        assert (opened["kind"], opened["urgent"]) == ("prompts", True)
+        assert opened["sentence"].endswith(f"asks: {prompt.text}")
+        assert opened["changes"]["prompts"][prompt.prompt]["text"] == prompt.text
+        assert opened["changes"]["elements"][opened["process"]][opened["element"]]["asking"]
+        last = records[-1]["seq"]
+        await here.control.answer(prompt.run, prompt.prompt, "abort", by="test")
+        await here.control.wait(prompt.run)
+        # A page that begins anywhere has the same changes.
+        page = (await browser.http.get(path, params={"after": last})).json()["records"]
+        (answered,) = [each for each in page if each["record"] == "PromptAnswered"]
+        assert answered["changes"]["prompts"] == {prompt.prompt: None}
+        (end,) = [each for each in page if each["record"] == "RunEnded"]
+        assert end["changes"]["status"] == end["outcome"]
 
 
 async def test_runs_are_listed_the_newest_last(world: MakeWorld) -> None:

@@ -21,18 +21,14 @@ def record_of(stamped: StampedRecord, view: RunView, **more: Any) -> bytes:
     `sentence`, `kind` and `urgent`: see `m2pem.api.describe`. `more`: further fields.
     """
     description = describe(stamped, view)
-    head = _encode(
-        {
-            "run": stamped.run,
-            "seq": stamped.seq,
-            "t": stamped.t_s,
-            "sentence": description.text,
-            "kind": description.kind,
-            "urgent": description.importance.is_urgent,
-            **more,
-        }
-    )
-    return head[:-1] + b"," + _encode(stamped.record)[1:]
+    head = _encode({"run": stamped.run, "seq": stamped.seq, "t": stamped.t_s})
+    shown = {
+        "sentence": description.text,
+        "kind": description.kind,
+        "urgent": description.importance.is_urgent,
+        **more,
+    }
+    return b",".join((head[:-1], _encode(stamped.record)[1:-1], _encode(shown)[1:]))
 
 
 def prompt_of(prompt: OpenPrompt, place: Place | None) -> dict[str, Any]:
